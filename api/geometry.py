@@ -91,7 +91,7 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
     target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
     ranges = limits(found.joints)
     reply = look_reply(target, oculomotor, kinematics, ranges)
-    angles = reached_joints(oculomotor.reach(target), kinematics, ranges)
+    angles = reached_joints(oculomotor.reachable_gaze(target), kinematics, ranges)
     assert reply.done_m is not None
     return JointSolution(
         dict(zip(kinematics.names, angles, strict=True)),

@@ -14,7 +14,7 @@ from gazerig.config.load import (
     shipped_names,
     shipped_path,
 )
-from gazerig.gaze.gesture.gesture import Gesture, faults_of, loop_fault
+from gazerig.gaze.gesture.gesture import Gesture, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 _HEAD_KEYS = {
@@ -101,7 +101,7 @@ def gesture_name(file: str) -> str:
 
 def _frame_times(gesture: Gesture) -> Iterable[tuple[str, str]]:
     for key in ("frames", "frames_without_neck"):
-        for i, rule in faults_of(getattr(gesture, key)):
+        for i, rule in frame_faults(getattr(gesture, key)):
             yield f"{key}.{i}.time_s", rule
     if rule := loop_fault(gesture):
         yield "loop_s", rule

@@ -35,7 +35,7 @@ from gazerig.robot.control.loop import Tick, run  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,
     gaze_angles,
-    gaze_off_rad,
+    gaze_error_rad,
     true_part,
 )
 
@@ -239,7 +239,7 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
         face, pose = person.p_world_face_m, tick.pose
         part = true_part(person, tick.target.part)
         yaws = angles_of_place(face, pose)[0], gaze_angles(pose)[0], kinematics.facing(face)[0]
-        rows.append((tick.t_s, *yaws, pose.head_rad[0], gaze_off_rad(part, pose)))
+        rows.append((tick.t_s, *yaws, pose.head_rad[0], gaze_error_rad(part, pose)))
 
     made.robot.start(made.clock)
     run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)

@@ -74,7 +74,7 @@ def unit(a: Vec3) -> Vec3:
     return (x / length, y / length, z / length)
 
 
-def no_nearer(point: Vec3, eye: Vec3, least_m: float) -> Vec3:
+def keep_min_distance(point: Vec3, eye: Vec3, least_m: float) -> Vec3:
     """Return a point, moved straight away from the eye if it is nearer than a distance."""
     x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     if sqrt(x * x + y * y + z * z) >= least_m:
@@ -111,10 +111,10 @@ def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
     if angle < 1e-9:
         return end if fraction >= 0.5 else start
     axis = unit(cross(start, end)) if angle < pi - 1e-6 else (0.0, 0.0, 1.0)
-    return turned(start, axis, angle * fraction)
+    return rotate_about_axis(start, axis, angle * fraction)
 
 
-def beside(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3:
+def offset_direction(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3:
     """Return a direction moved on along its great circle, and across it.
 
     way: unit vector that is moved; start: unit vector at the start of the great circle
@@ -124,11 +124,11 @@ def beside(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3
     if norm(pole) < 1e-12:
         return way
     axis = unit(pole)
-    moved = turned(way, axis, further_rad)
-    return turned(moved, cross(moved, axis), -aside_rad)
+    moved = rotate_about_axis(way, axis, further_rad)
+    return rotate_about_axis(moved, cross(moved, axis), -aside_rad)
 
 
-def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
+def rotate_about_axis(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
     """Return a vector rotated about a unit axis (Rodrigues' formula)."""
     c, s = cos(angle_rad), sin(angle_rad)
     k = dot(axis, v) * (1.0 - c)
@@ -140,7 +140,7 @@ def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
     )
 
 
-def shortened(v: Vec3, offset_rad: float, start: Vec3 = (1.0, 0.0, 0.0)) -> Vec3:
+def shorten_arc(v: Vec3, offset_rad: float, start: Vec3 = (1.0, 0.0, 0.0)) -> Vec3:
     """Return a direction moved back towards another by an angle along the great circle.
 
     A direction closer than the offset becomes that other one.

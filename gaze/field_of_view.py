@@ -51,7 +51,7 @@ class FieldOfView:
         self._occlusion = params.occlusion
         self._own = frozenset(params.own_kinds)
 
-    def visible(self, bodies: Bodies, rows: BodyRows, state: GazeState) -> list[bool]:
+    def are_visible(self, bodies: Bodies, rows: BodyRows, state: GazeState) -> list[bool]:
         """Return whether each body's centre is in the field of at least one eye.
 
         Own bodies are never visible; with occlusion neither are bodies behind another one, own
@@ -66,18 +66,18 @@ class FieldOfView:
         seen = []
         for p, kind in zip(rows.p_world_m, rows.kinds, strict=True):
             inside = kind not in self._own
-            if inside and not self._inside(p, state.p_world_eye_left_m, left, left=True):
+            if inside and not self._is_inside(p, state.p_world_eye_left_m, left, left=True):
                 right = right or eye_axes(state, left=False)
-                inside = self._inside(p, state.p_world_eye_right_m, right, left=False)
+                inside = self._is_inside(p, state.p_world_eye_right_m, right, left=False)
             seen.append(inside)
         if self._occlusion:
             rel = bodies.p_world_m - np.asarray(state.p_world_head_m)
             found = np.flatnonzero(seen)
-            for row in found[occluded(rel, bodies.radius_m, found)].tolist():
+            for row in found[are_occluded(rel, bodies.radius_m, found)].tolist():
                 seen[row] = False
         return seen
 
-    def _inside(self, p: list[float], p_eye: Vec3, axes: Mat3, left: bool) -> bool:
+    def _is_inside(self, p: list[float], p_eye: Vec3, axes: Mat3, left: bool) -> bool:
         """Return whether a point is in the field of one eye."""
         x, y, z = p[0] - p_eye[0], p[1] - p_eye[1], p[2] - p_eye[2]
         (a, b, c), (d, e, f), (g, h, i) = axes
@@ -92,7 +92,7 @@ class FieldOfView:
         return eccentricity * eccentricity * (side * side + up * up) <= off_axis2
 
 
-def occluded(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+def are_occluded(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return for each of ``rows`` whether any body's sphere is wholly in front of its centre.
 
     rel_m:    (n, 3) centres seen from the eye

@@ -48,7 +48,7 @@ class Quintic:
             (12.0 * d - 6.0 * v * T - a * T * T) / (2.0 * T**5),
         )
 
-    def at(self, t_s: float) -> tuple[float, float, float]:
+    def state_at(self, t_s: float) -> tuple[float, float, float]:
         """Return position, speed and acceleration at a time since the start."""
         if t_s >= self._T:
             return (self._goal, 0.0, 0.0)
@@ -113,7 +113,7 @@ class MinimumJerkBlend:
         return self._values
 
     @property
-    def rests(self) -> bool:
+    def is_at_rest(self) -> bool:
         """Return whether ``step`` returns the same tuple from now on, until there is a new goal."""
         return not self._moves and self._goal == self._planned
 
@@ -130,12 +130,14 @@ class MinimumJerkBlend:
             return self._base
         for move in ended:
             self._moves.remove(move)
-            self._base = _added(self._base, move.delta, 1.0)
+            self._base = _add_scaled(self._base, move.delta, 1.0)
         values = self._base
         for move in self._moves:
-            values = _added(values, move.delta, min_jerk((t_s - move.start_s) / move.duration_s))
+            values = _add_scaled(
+                values, move.delta, min_jerk((t_s - move.start_s) / move.duration_s)
+            )
         return values
 
 
-def _added(values: Values, delta: Values, factor: float) -> Values:
+def _add_scaled(values: Values, delta: Values, factor: float) -> Values:
     return tuple([v + factor * d for v, d in zip(values, delta, strict=True)])

@@ -237,7 +237,7 @@ class GazeState(NamedTuple):
     base_rate_rad_s: Angles2 = (0.0, 0.0)
 
 
-class Limited(NamedTuple):
+class LimitedAngle(NamedTuple):
     """An angle clipped by a range, in radians: requested, and executed.
 
     axis: "left eye yaw", "right eye pitch", "head yaw", "head pitch"
@@ -274,7 +274,7 @@ class GazeCommand(NamedTuple):
     blinks: int
     lower_left: float = 1.0
     lower_right: float = 1.0
-    limited: tuple[Limited, ...] = ()
+    limited: tuple[LimitedAngle, ...] = ()
 
 
 class HeadGeometry(Protocol):

@@ -22,7 +22,7 @@ class DeviceFaults(Protocol):
 
     wire: ActiveFaults
 
-    def on(self, kind: str) -> bool:
+    def is_on(self, kind: str) -> bool:
         """Return whether echo, babble, unplug, deny or block is active."""
         ...
 
@@ -50,7 +50,7 @@ class Device(Protocol):
         """Return the faults of the device and its line."""
         ...
 
-    def at_baud(self, client_baud: int) -> bool:
+    def understands_baud(self, client_baud: int) -> bool:
         """Return whether the device understands a client at this baud rate."""
         ...
 
@@ -58,7 +58,7 @@ class Device(Protocol):
         """Process received bytes and return the answer to each instruction in them."""
         ...
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         """Choose the device's behaviour where documents and devices differ.
 
         Raises:

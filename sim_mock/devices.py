@@ -16,7 +16,7 @@ from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 BAUDS: dict[BusKind, tuple[int, ...]] = {
@@ -121,7 +121,7 @@ _KINDS: dict[str, type[ShippedLine]] = {
 class ShaftMakers(NamedTuple):
     """Factories of the shafts of smart servos and hobby servos."""
 
-    make_shaft: ShaftMaker = own_shaft
+    make_shaft: ShaftMaker = create_shaft
     make_servo: HobbyMaker = HobbyServo
 
 
@@ -193,12 +193,12 @@ def plugin_line(kind: BusKind, params: object, servos: tuple[EmulatedJoint, ...]
     return PluginLine(kind, base64.b85encode(pickle.dumps(params)).decode(), servos)
 
 
-def packed(what: Emulated) -> dict[str, object]:
+def device_data(what: Emulated) -> dict[str, object]:
     """Return a device as JSON data."""
     return {"kind": what.kind, **asdict(what)}
 
 
-def unpacked(data: Mapping[str, Any]) -> Emulated:
+def device_of_data(data: Mapping[str, Any]) -> Emulated:
     """Return a device from the data of ``packed``; servos may be as short as [1, "xl330-m077"].
 
     Raises:
@@ -212,11 +212,11 @@ def unpacked(data: Mapping[str, Any]) -> Emulated:
         return PluginLine(str(kind), servos=servos, **settings)
     if kind not in _KINDS:
         raise ValueError(f"unknown device kind {kind!r}: expected {', '.join(_KINDS)}")
-    read = HobbySpec._make if kind in HOBBY_KINDS else _servo
+    read = HobbySpec._make if kind in HOBBY_KINDS else _servo_of_data
     settings["servos"] = tuple(read(spec) for spec in settings.get("servos", ()))
     return _KINDS[kind](**settings)
 
 
-def _servo(data: Any) -> ServoSpec:
+def _servo_of_data(data: Any) -> ServoSpec:
     spec = ServoSpec(*data)
     return spec._replace(physics=Physics(*spec.physics), quirks=Quirks(*spec.quirks))

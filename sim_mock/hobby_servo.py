@@ -49,25 +49,25 @@ class HobbyServo:
 
     def __init__(self, spec: HobbySpec | Sequence[float]) -> None:
         self.spec = check_spec(HobbySpec(*spec))
-        self.place_steps = self._within(self.spec.start_steps)
+        self.place_steps = self._clip_to_stops(self.spec.start_steps)
         self.stuck = False
         self.width_steps = 0
         self._share = 1.0 - exp(-STEP_S / self.spec.lag_s) if self.spec.lag_s > 0.0 else 1.0
 
     @property
-    def unpowered(self) -> bool:
+    def is_unpowered(self) -> bool:
         """Return whether it gets no pulses, so that a hand can turn it."""
         return self.width_steps == 0
 
     @property
-    def resting(self) -> bool:
+    def is_resting(self) -> bool:
         """Return whether the next step would not move it."""
         return self.place_steps == self._next_steps()
 
     @property
-    def straining(self) -> bool:
+    def is_straining(self) -> bool:
         """Return whether it pushes against an obstacle."""
-        return not self._content() and self.resting
+        return not self._is_in_dead_band() and self.is_resting
 
     def step(self) -> None:
         """Advance by 10 ms."""
@@ -81,19 +81,19 @@ class HobbyServo:
         """
         if self.stuck:
             raise ValueError(f"channel {self.spec.channel} is stuck; free it first")
-        self.place_steps = self._within(self.place_steps + steps)
+        self.place_steps = self._clip_to_stops(self.place_steps + steps)
 
-    def _content(self) -> bool:
-        return self.unpowered or abs(self.width_steps - self.place_steps) <= self.spec.dead_steps
+    def _is_in_dead_band(self) -> bool:
+        return self.is_unpowered or abs(self.width_steps - self.place_steps) <= self.spec.dead_steps
 
     def _next_steps(self) -> float:
-        if self.stuck or self._content():
+        if self.stuck or self._is_in_dead_band():
             return self.place_steps
         most = self.spec.speed_steps_s * STEP_S
         move = (self.width_steps - self.place_steps) * self._share
-        return self._within(self.place_steps + min(max(move, -most), most))
+        return self._clip_to_stops(self.place_steps + min(max(move, -most), most))
 
-    def _within(self, steps: float) -> float:
+    def _clip_to_stops(self, steps: float) -> float:
         return min(max(steps, self.spec.stop_low_steps), self.spec.stop_high_steps)
 
 

@@ -64,10 +64,10 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             BusLost: unplugged, or the adapter accepts no bytes.
         """
-        self._see()
+        self._fetch_arrived()
         if self._tap is not None:
             self._tap(data)
-        if self.faults.wire.any and self.faults.on("block"):
+        if self.faults.wire.has_any and self.faults.is_on("block"):
             self._wait(self.now_s() + WRITE_S)
             raise BusLost(f"{self.port_name} accepts no bytes: replug the adapter")
         self._waiting += self.line.send(data, self.baudrate)
@@ -78,7 +78,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             BusLost: unplugged.
         """
-        self._see()
+        self._fetch_arrived()
         while len(self._waiting) < length and self._sleep_until is not None:
             due_s = self.line.next_due_s()
             if due_s is None or due_s > deadline_s:
@@ -104,27 +104,27 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def drain(self) -> int:
         """Discard received bytes; return their number."""
-        self._see()
+        self._fetch_arrived()
         dropped = len(self._waiting)
         self._waiting = b""
         return dropped
 
-    def _see(self) -> None:
+    def _fetch_arrived(self) -> None:
         """Fetch the bytes that have arrived by now."""
-        if self.faults.wire.any and self.faults.on("unplug"):
+        if self.faults.wire.has_any and self.faults.is_on("unplug"):
             self._lost = True
         if self._lost:
             self._waiting = b""
             self.line.forget()
             raise BusLost(f"{self.port_name} is gone: plug the adapter in")
-        if self.line.busy:
-            self._waiting += self.line.arrived()
+        if self.line.is_busy:
+            self._waiting += self.line.take_arrived()
 
     def _wait(self, until_s: float) -> None:
         """Advance the device's clock to a time, if it can be advanced."""
         if self._sleep_until is not None and until_s > self.now_s():
             self._sleep_until(until_s)
-        self._see()
+        self._fetch_arrived()
 
     # --- what the SDK uses
 
@@ -140,7 +140,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             PortError: unplugged, or opening is forbidden.
         """
         for fault, code in (("unplug", errno.ENOENT), ("deny", errno.EACCES)):
-            if self.faults.on(fault):
+            if self.faults.is_on(fault):
                 raise PortError(f"cannot open {self.port_name}: {os.strerror(code)}")
         self.is_open = True
         self.is_using = False
@@ -161,7 +161,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def getBytesAvailable(self) -> int:
         """Return the number of received bytes."""
-        self._see()
+        self._fetch_arrived()
         return len(self._waiting)
 
     def readPort(self, length: int) -> bytes:
@@ -192,7 +192,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         A simulated clock is advanced to the next bytes or to the end of the time-out.
         """
         if self._sleep_until is None or self._waiting:
-            return not self.line.busy
+            return not self.line.is_busy
         due_s = self.line.next_due_s()
         if due_s is None or due_s > self._give_up_s:
             self._wait(self._give_up_s)

@@ -25,7 +25,7 @@ def angles_of_place(p_world_m: Vec3, pose: GazeState) -> Angles2:
     return yaw_pitch(sub(p_world_m, _middle(pose)))
 
 
-def gaze_off_rad(p_world_m: Vec3, pose: GazeState) -> float:
+def gaze_error_rad(p_world_m: Vec3, pose: GazeState) -> float:
     """Return the angle between the measured gaze and a point, from the midpoint of the eyes."""
     return angle_between(_cyclopean(pose), sub(p_world_m, _middle(pose)))
 

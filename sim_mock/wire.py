@@ -43,10 +43,10 @@ class ServoLine:
         self._said = b""
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """Return whether bytes are in transit, or may arrive without a request."""
         faults = self.device.faults
-        return bool(self._late) or (faults.wire.any and faults.on("babble"))
+        return bool(self._late) or (faults.wire.has_any and faults.is_on("babble"))
 
     def next_due_s(self) -> float | None:
         """Return the arrival time of the next bytes, None if none are in transit."""
@@ -57,10 +57,12 @@ class ServoLine:
         self._late.clear()
         self._host_free_s = self._line_free_s = 0.0
 
-    def arrived(self) -> bytes:
+    def take_arrived(self) -> bytes:
         """Return the bytes that have arrived since the last call."""
         now_s = self.device.now_s()
-        out = [self.device.faults.wire.babble(now_s)] if self.device.faults.wire.any else []
+        out = (
+            [self.device.faults.wire.babble_bytes(now_s)] if self.device.faults.wire.has_any else []
+        )
         while self._late and self._late[0][0] <= now_s:
             out.append(self._late.popleft()[1])
         return b"".join(out)
@@ -68,7 +70,7 @@ class ServoLine:
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
         """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
         wire = self.device.faults.wire
-        faulty = wire.any
+        faulty = wire.has_any
         if faulty:
             data = wire.add_noise(data, self.device.now_s())
         replies = self.device.exchange(data, baud)
@@ -82,15 +84,15 @@ class ServoLine:
                 )
                 for r in replies
             ]
-            if said and before and wire.take("repeat", None, noise_s) is not None:
+            if said and before and wire.use_fault("repeat", None, noise_s) is not None:
                 first = replies[0]
                 replies[0] = DeviceReply(first.end, [Piece(NO_DEVICE, before), *first.pieces])
         if self.wire_time:
             self._on_the_wire(data, replies, baud, self.device.now_s() if now_s is None else now_s)
-            return self.arrived()
+            return self.take_arrived()
         if not replies:
             return b""
-        if not self._late and not wire.any and not self._any_late(replies):
+        if not self._late and not wire.has_any and not self._any_late(replies):
             return b"".join([piece[1] for reply in replies for piece in reply[1]])
         # The only delays are those of faults.
         sent_s = self.device.now_s()
@@ -99,7 +101,7 @@ class ServoLine:
             for piece in reply.pieces:
                 due_s += piece.late_s
                 self._late.append((due_s, piece.data))
-        return self.arrived()
+        return self.take_arrived()
 
     def _any_late(self, replies: list[DeviceReply]) -> bool:
         for _, pieces in replies:

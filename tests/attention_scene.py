@@ -77,7 +77,7 @@ def salience(
 
 
 def visible(view: FieldOfView, seen: Bodies, state: GazeState) -> list[bool]:
-    return view.visible(seen, seen.rows(), state)
+    return view.are_visible(seen, seen.rows(), state)
 
 
 def attention(**params: Any) -> Attention:

@@ -81,7 +81,7 @@ class Noisy:
         self.now = 10.0
         self.device: Device = build(self._emulated(kind), lambda: self.now, seed)
         if kind == "maestro crc":
-            self.device.choose("crc", "on")
+            self.device.choose_behaviour("crc", "on")
         self._seen: list[tuple[float, ...]] = []
         self._writes, self._strike = 0, None  # type: tuple[int, tuple[int, str] | None]
         self.port = InProcessPort(self.device, self._tap, "noisy line", self._sleep_until)

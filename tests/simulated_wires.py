@@ -17,7 +17,7 @@ from gazerig.drivers.serial import port as ports
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build, unpacked
+from gazerig.sim_mock.devices import build, device_of_data
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import _ServerProcess
 
@@ -64,9 +64,9 @@ class _Wires:
             # The doctor looks whether a path is a serial port; nothing goes through this one.
             ends = os.openpty()
             path = os.ttyname(ends[1])
-            device = build(unpacked(bus["device"]), self._clock.now_s, bus.get("seed", 0))  # type: ignore[arg-type]
+            device = build(device_of_data(bus["device"]), self._clock.now_s, bus.get("seed", 0))  # type: ignore[arg-type]
             for case, value in bus.get("choices", {}).items():  # type: ignore[attr-defined]
-                device.choose(case, value)
+                device.choose_behaviour(case, value)
             paths[str(bus.get("name", ""))] = path
             self._devices[path], self._terminals[path] = device, ends
         self._of[server] = paths

@@ -43,7 +43,7 @@ class SteppedShaft:
         """Move on by so many milliseconds, one after the other."""
         for _ in range(ms):
             before = self.profile.r
-            (r,) = self.profile.ahead(1)
+            (r,) = self.profile.advance(1)
             self._step(r, r - before)
 
     def _step(self, r: float, moved: float) -> None:
@@ -52,7 +52,7 @@ class SteppedShaft:
         self.rv += (moved - self.rv) * SMOOTHING
         if abs(self.rv) < SLOWEST:
             self.rv = 0.0
-        kr = 0.0 if self.profile.jumps else loop.d
+        kr = 0.0 if self.profile.is_jump else loop.d
         asked = loop.p * (r - self.x) + kr * self.rv
         free = 1.0 + accel * (self.induced + self.viscous)
         load = accel * self.physics.load_nm / self.model.stall_torque_nm

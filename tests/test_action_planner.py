@@ -10,7 +10,7 @@ from attention_scene import attention, body, looking, percept
 from gazerig.config.schema import load_rules
 from gazerig.gaze.attention.action_planner import ActionPlanner, ActionPlannerParams, Plan
 from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.opponent import SeenHand, approaches, places
+from gazerig.gaze.attention.opponent import SeenHand, approaches, hit_places
 from gazerig.gaze.attention.top_down import PLANNED, TopDown, TopDownParams
 from gazerig.gaze.types import Face, Percept, Target, Vec3
 
@@ -26,9 +26,9 @@ DT_S = 1.0 / 30.0
 
 def face(nose: Vec3 = NOSE) -> Face:
     x, y, z = nose
-    places = {"DN": (0.0, -0.1), "FL": (0.06, 0.0), "LE": (0.03, 0.03), "M": (0.0, -0.06),
+    hit_places = {"DN": (0.0, -0.1), "FL": (0.06, 0.0), "LE": (0.03, 0.03), "M": (0.0, -0.06),
               "N": (0.0, 0.0), "FR": (-0.06, 0.0), "RE": (-0.03, 0.03), "UP": (0.0, 0.1)}  # fmt: skip
-    parts = tuple((x, y + off_y, z + off_z) for off_y, off_z in places.values())
+    parts = tuple((x, y + off_y, z + off_z) for off_y, off_z in hit_places.values())
     return Face(1, nose, (0.0, 0.0, 0.0), TOWARDS, parts, 0.98)
 
 
@@ -193,7 +193,7 @@ def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
 
 def test_after_a_punch_less_room_will_do_for_a_moment() -> None:
     narrow = seen(0.0, fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09)))
-    room = places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m
+    room = hit_places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m
     assert PARAMS.counter_ratio * PARAMS.open_m < room < PARAMS.open_m
     still = [replace(narrow, captured_s=k * DT_S) for k in range(30)]
     assert {plan.action for plan in stepped(ActionPlanner(PARAMS), still)} == {"wait"}
@@ -311,7 +311,7 @@ def test_the_planner_switched_off_leaves_the_behaviour_of_the_start() -> None:
 
 def test_the_line_to_the_chest_passes_below_fists_before_the_chin() -> None:
     hands = [SeenHand(2, (-0.12, 0.12, -0.13), 0.0), SeenHand(3, (-0.12, -0.12, -0.13), 0.0)]
-    clear = {place.name: place.clear_m for place in places(face(), hands, EYE)}
+    clear = {place.name: place.clear_m for place in hit_places(face(), hands, EYE)}
     # At 0.88 m the line to a chest 1 m away and 0.3 m below is 0.264 m below the eyes.
     off = 0.13 - 0.264
     assert clear["chest"] == pytest.approx(hypot(0.12, off / hypot(1.0, 0.3)), abs=0.01)

@@ -20,7 +20,7 @@ from attention_scene import (
 
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, occluded
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, are_occluded
 from gazerig.gaze.types import Bodies, Percept
 
 
@@ -78,8 +78,8 @@ def test_the_person_looked_at_last_counts_as_nearer() -> None:
 
 def test_what_is_behind_the_eye_hides_nothing_before_it() -> None:
     places, rows = np.array([[2.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 0]]), np.array([0])
-    assert not occluded(places[:2], np.array([0.1, 0.3]), rows).any()
-    assert occluded(places[[0, 2]], np.array([0.1, 0.3]), rows).all()
+    assert not are_occluded(places[:2], np.array([0.1, 0.3]), rows).any()
+    assert are_occluded(places[[0, 2]], np.array([0.1, 0.3]), rows).all()
 
 
 def test_pulls_rise_with_the_time_constant() -> None:

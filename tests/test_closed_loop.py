@@ -19,7 +19,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.frames import NewestPose, PoseHistory
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
-from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
+from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
 RIG = apply_changes(
     load_rig("desk"),
@@ -71,7 +71,7 @@ def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen
         rows.append(
             (
                 t_s,
-                degrees(gaze_off_rad(part, pose)),
+                degrees(gaze_error_rad(part, pose)),
                 degrees(gaze_angles(pose)[0]),
                 degrees(angles_of_place(part, pose)[0]),
                 degrees(pose.head_rad[0]),

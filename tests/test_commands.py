@@ -217,8 +217,8 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
     expected = {}
     for name in ("rest", "conversation"):
         lids = Lids(LidParams(), np.random.default_rng(1))
-        lids.mode("rest" if name == "conversation" else "conversation")
-        lids.mode(name)
+        lids.set_mode("rest" if name == "conversation" else "conversation")
+        lids.set_mode(name)
         expected[name] = blinks_in_two_minutes(lids)
     assert expected["conversation"] > expected["rest"] + 5
     lids = Lids(LidParams(), np.random.default_rng(1))

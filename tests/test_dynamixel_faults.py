@@ -39,7 +39,7 @@ def data_of(raw, servo_id, fast):
 
 @pytest.mark.parametrize("victim", IDS)
 def test_a_damaged_answer_costs_only_its_servo_and_only_once(rig, victim):
-    fast = rig.bus._plan.packets is not None
+    fast = rig.bus._plan.create_group_read is not None
     rig.port.spoil = once(lambda raw: flipped(raw, data_of(raw, victim, fast)))
     expected = [None if i == victim else 2000 + i for i in IDS]
     assert rig.places() == expected
@@ -49,7 +49,7 @@ def test_a_damaged_answer_costs_only_its_servo_and_only_once(rig, victim):
 
 
 def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
-    fast = rig.bus._plan.packets is not None
+    fast = rig.bus._plan.create_group_read is not None
 
     def garble(code, raw):
         asked = rig.sent[-1][12:-2]
@@ -74,8 +74,8 @@ def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
 
 @pytest.mark.parametrize("kept", range(3))
 def test_a_truncated_answer_gives_what_arrived(rig, kept):
-    fast = rig.bus._plan.packets is not None
-    block = (14 if fast else 21) + (0 if rig.bus._plan.block is None else 3)
+    fast = rig.bus._plan.create_group_read is not None
+    block = (14 if fast else 21) + (0 if rig.bus._plan.indirect_block is None else 3)
     size = (8 if fast else 0) + block * kept + 3
     rig.port.spoil = once(lambda raw: raw[:size])
     # Those behind the one that fell silent are asked again without it, in the same cycle.
@@ -85,7 +85,7 @@ def test_a_truncated_answer_gives_what_arrived(rig, kept):
 
 def test_a_repeated_answer_is_not_taken_for_the_next_one(rig):
     rig.bus.enable_torque()
-    size = 50 if rig.bus._plan.packets is not None else 21
+    size = 50 if rig.bus._plan.create_group_read is not None else 21
     rig.port.spoil = lambda code, raw: raw + raw[-size:]
     for k in range(20):
         rig.now_s += 0.005

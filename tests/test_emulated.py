@@ -14,8 +14,8 @@ from gazerig.sim_mock.devices import (
     FeetechLine,
     MaestroLine,
     build,
-    packed,
-    unpacked,
+    device_data,
+    device_of_data,
 )
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -33,26 +33,26 @@ KINDS = pytest.mark.parametrize("line", LINES, ids=[line.kind for line in LINES]
 
 @KINDS
 def test_a_device_travels_as_json(line):
-    assert unpacked(json.loads(json.dumps(packed(line)))) == line
+    assert device_of_data(json.loads(json.dumps(device_data(line)))) == line
 
 
 def test_an_endless_stop_travels_too():
-    line = unpacked(json.loads(json.dumps(packed(LINES[1]))))
+    line = device_of_data(json.loads(json.dumps(device_data(LINES[1]))))
     assert cast(ServoSpec, line.servos[0]).physics.stop_high_steps == inf  # type: ignore[union-attr]
 
 
 def test_short_words_are_enough():
-    line = unpacked({"kind": "dynamixel", "servos": [[1, "xl330-m077"]]})
+    line = device_of_data({"kind": "dynamixel", "servos": [[1, "xl330-m077"]]})
     assert line == DynamixelLine((ServoSpec(1, "xl330-m077"),))
 
 
 def test_what_cannot_be_is_refused():
     with pytest.raises(ValueError, match="unknown device kind 'canopen': expected dynamixel, feet"):
-        unpacked({"kind": "canopen"})
+        device_of_data({"kind": "canopen"})
     with pytest.raises(ValueError, match="unknown device kind None"):
-        unpacked({"servos": [[1, "xl330-m077"]]})
+        device_of_data({"servos": [[1, "xl330-m077"]]})
     with pytest.raises(TypeError, match="volts"):
-        unpacked({"kind": "maestro", "volts": 6})
+        device_of_data({"kind": "maestro", "volts": 6})
     with pytest.raises(ValueError, match="baud 12"):
         build(FeetechLine((ServoSpec(1, "sts3215"),), 12), lambda: 0.0)
 
@@ -61,7 +61,7 @@ def test_what_cannot_be_is_refused():
 def test_what_is_built_heeds_its_rate_and_knows_its_cases(line):
     device = build(line, lambda: 0.0)
     assert device.check_baud is (line.baud is not None)
-    assert device.at_baud(line.baud or 115_200)
+    assert device.understands_baud(line.baud or 115_200)
     assert len(device.positions_steps()) == len(line.servos) or line.kind == "maestro"
     for case in CASES[line.kind]:
         assert case in device.faults.command("help")
@@ -74,7 +74,7 @@ def test_every_rate_of_a_kind_can_be_built_and_opened(line):
         device = build(type(line)(servos=servos, baud=baud), lambda: 0.0)
         port = InProcessPort(device)
         assert port.setBaudRate(baud)
-        assert device.at_baud(port.baudrate)
+        assert device.understands_baud(port.baudrate)
     assert not InProcessPort(device).setBaudRate(12)
 
 

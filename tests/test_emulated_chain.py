@@ -54,7 +54,7 @@ def test_a_torn_instruction_is_forgotten_after_the_gap(make):
     bench.now_s = 0.002
     assert bench.chain.receive(ping[5:]) == b""
     assert pings(bench, 1)
-    bench.chain.choose("packet-gap-ms", "50")
+    bench.chain.choose_behaviour("packet-gap-ms", "50")
     bench.chain.receive(ping[:5])
     bench.now_s = 0.04
     assert len(bench.chain.receive(ping[5:])) == make.pong
@@ -94,8 +94,8 @@ def test_a_group_answers_in_the_order_asked(make):
 )
 def test_what_comes_behind_a_missing_one(make, policy, ids, waits):
     bench = bench_of(make, (1, 2, 3))
-    bench.chain.choose("after-missing", policy)
-    bench.chain.choose("slot-timeout-ms", "4")
+    bench.chain.choose_behaviour("after-missing", policy)
+    bench.chain.choose_behaviour("slot-timeout-ms", "4")
     pieces = answered(bench, 1, 8, 9, 2, 3)
     assert [piece.servo_id for piece in pieces] == ids
     assert [piece.late_s for piece in pieces] == waits
@@ -135,9 +135,9 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
     own = bench.chain[1].baud
     assert bench.chain.receive(make.instruction(1, PING), 115_200) == b""
     assert pings(bench, 1, own)
-    bench.chain.choose("wrong-baud", "garbage")
+    bench.chain.choose_behaviour("wrong-baud", "garbage")
     assert 0 < len(bench.chain.receive(make.instruction(1, PING), 115_200)) < make.pong
-    bench.chain.choose("baud", "any")
+    bench.chain.choose_behaviour("baud", "any")
     assert pings(bench, 1, 115_200)
 
 
@@ -233,9 +233,9 @@ def test_echo_and_babble(make):
 def test_faults_of_the_adapter_are_told_to_the_port(make, fault):
     bench = bench_of(make)
     bench.chain.faults.command(f"{fault} for 0.5")
-    assert bench.chain.faults.on(fault)
+    assert bench.chain.faults.is_on(fault)
     bench.now_s = 0.6
-    assert not bench.chain.faults.on(fault)
+    assert not bench.chain.faults.is_on(fault)
 
 
 # --- as text

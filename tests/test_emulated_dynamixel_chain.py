@@ -414,7 +414,7 @@ def test_a_wrong_crc_may_be_answered():
     bench = DynamixelBench((1, "xm430-w210"))
     bad = PING[:-1] + bytes([PING[-1] ^ 1])
     assert bench.chain.receive(bad) == b""
-    bench.chain.choose("bad-crc", "reply")
+    bench.chain.choose_behaviour("bad-crc", "reply")
     assert bench.chain.receive(bad) == status(1, 3, b"")
     assert len(bench.chain.receive(PING)) == 14
 
@@ -424,7 +424,7 @@ def test_a_packet_that_should_have_been_stuffed_may_be_dropped():
     stuffed = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
     bench = DynamixelBench((1, "xm430-w210"))
     assert bench.chain.receive(raw)[8] == 0
-    bench.chain.choose("stuffing", "strict")
+    bench.chain.choose_behaviour("stuffing", "strict")
     assert bench.chain.receive(raw) == b""
     assert bench.chain.receive(stuffed)[8] == 0
 

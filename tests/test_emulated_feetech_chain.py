@@ -61,7 +61,7 @@ def test_what_is_no_register_reads_0(bench, length, address):
 
 def test_registers_lie_where_the_drivers_table_has_them():
     theirs = {(r.address, r.size, r.sign) for r in feetech_table.REGISTERS.values()}
-    own = (*STS.kept, *STS.ram, *STS.fixed)
+    own = (*STS.permanent, *STS.ram, *STS.fixed)
     ours = {(r.address, r.size, r.sign) for r in own}
     live = {at for at, _, _ in theirs} & set(range(56, 71))
     assert {row for row in theirs if row[0] not in live} <= ours
@@ -181,13 +181,13 @@ def test_a_calibration_of_all_is_obeyed_in_silence():
 @pytest.mark.parametrize(("policy", "ids"), [("answer", [1, 2, 3]), ("silence", [])])
 def test_broadcast_ping(policy, ids):
     bench = three()
-    bench.chain.choose("broadcast-ping", policy)
+    bench.chain.choose_behaviour("broadcast-ping", policy)
     assert [i for i, _, _ in bench.ask(ALL, PING)] == ids
 
 
 def test_a_broadcast_ping_that_mixes_is_no_packet():
     bench = three()
-    bench.chain.choose("broadcast-ping", "mix")
+    bench.chain.choose_behaviour("broadcast-ping", "mix")
     said = bench.chain.receive(FeetechBench.instruction(ALL, PING))
     assert said == bytes((255, 255, 1 & 2 & 3, 2, 0, 0xFC & 0xFB & 0xFA))
 

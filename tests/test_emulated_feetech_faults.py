@@ -124,7 +124,7 @@ def test_a_torque_limit_below_it_never_overloads(limit):
 )
 def test_what_ends_an_overload(policy, by_goal, by_torque):
     bench = FeetechBench()
-    bench.chain.choose("overload-ends", policy)
+    bench.chain.choose_behaviour("overload-ends", policy)
     bench.enable_torque()
     bench.chain.faults.command("overload 1")
     assert bench.error() == OVERLOAD
@@ -142,7 +142,7 @@ def test_what_ends_an_overload(policy, by_goal, by_torque):
 
 def test_an_overload_may_end_only_by_a_goal_that_leads_away():
     bench = jammed(goal=3000)
-    bench.chain.choose("overload-ends", "goal-away")
+    bench.chain.choose_behaviour("overload-ends", "goal-away")
     bench.wait(2.1)
     for goal, error in ((3100, OVERLOAD), (2100, OVERLOAD), (2000, 0)):
         bench.write(1, 42, goal, 2)

@@ -24,7 +24,7 @@ def command(bench, goal, speed=0, acceleration=0, time_ms=0):
 
 def led_to(bench):
     """Return where the servo's profile is now."""
-    profile, drive = bench.chain.here(1).shaft.profile, bench.chain[1].drive
+    profile, drive = bench.chain.find_servo(1).shaft.profile, bench.chain[1].drive
     return profile.r + drive.position_steps - drive.shaft.x
 
 
@@ -57,7 +57,7 @@ def test_acceleration_makes_ramps_at_both_ends(bench, seconds, at):
 def test_goal_time_decides_how_long_it_takes_or_nothing():
     for policy, at in (("obey", 2248.0), ("ignore", 3000.0)):
         bench = one()
-        bench.chain.choose("goal-time", policy)
+        bench.chain.choose_behaviour("goal-time", policy)
         bench.enable_torque()
         command(bench, 3048, speed=2000, time_ms=2400)
         bench.wait(0.48)
@@ -141,7 +141,7 @@ def test_the_same_goals_give_the_same_bytes():
 
 
 def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on(bench):
-    bench.chain.choose("torque-on", "present")
+    bench.chain.choose_behaviour("torque-on", "present")
     bench.write(1, 42, 3000, 2)
     bench.write(1, 40, 1)
     bench.wait(1.0)
@@ -149,7 +149,7 @@ def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on(bench):
 
 
 def test_a_goal_may_switch_the_torque_on(bench):
-    bench.chain.choose("goal", "torque-on")
+    bench.chain.choose_behaviour("goal", "torque-on")
     bench.write(1, 46, 1000, 2)
     assert bench.read(1, 40) == 0
     bench.write(1, 42, 2500, 2)

@@ -18,7 +18,7 @@ def path(made: PositionProfile, most: int = 200_000, stride: int = 1) -> list[fl
     """Return all positions until the profile is done, or up to a stride more."""
     out = [made.r]
     while made.running:
-        out += made.ahead(stride)
+        out += made.advance(stride)
         assert len(out) < most
     return out
 
@@ -70,7 +70,7 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
 ):
     made = PositionProfile(0.0)
     made.plan_by_velocity(first, cruise, ramp)
-    positions = [0.0, *made.ahead(after + 1)]
+    positions = [0.0, *made.advance(after + 1)]
     made.plan_by_velocity(second, cruise, ramp)
     positions += path(made, stride=100)[1:]
     assert positions[-1] == second
@@ -87,20 +87,20 @@ def test_in_one_go_or_in_steps_is_the_same(pieces, goal, later):
     once, often = PositionProfile(5.0), PositionProfile(5.0)
     for made in (once, often):
         made.plan_by_velocity(goal, 2.0, 0.01)
-    whole = once.ahead(sum(pieces))
-    assert whole == [r for piece in pieces for r in often.ahead(piece)]
+    whole = once.advance(sum(pieces))
+    assert whole == [r for piece in pieces for r in often.advance(piece)]
     assert (once.r, once.v, once.running) == (often.r, often.v, often.running)
     for made in (once, often):
         made.plan_by_time(later, 100, 20)
-    assert once.ahead(50) == often.ahead(50)
+    assert once.advance(50) == often.advance(50)
 
 
 def test_a_speed_profile_ramps_and_ends():
     made = SpeedProfile(0.0, 0.0)
     made.set_goal(2.0, 0.01)
-    positions = made.ahead(300)
+    positions = made.advance(300)
     assert made.v == 2.0 and made.running
     assert speeds(positions)[:3] == pytest.approx([0.02, 0.03, 0.04])
     made.set_goal(0.0, 0.0)
-    assert made.ahead(2) == [positions[-1]] * 2
+    assert made.advance(2) == [positions[-1]] * 2
     assert not made.running

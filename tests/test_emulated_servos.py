@@ -30,7 +30,7 @@ def make(request):
 def three(make, **options):
     bench = make(*[(i, make.model, 1000.0 * i) for i in (1, 2, 3)], **options)
     if make is FeetechBench:
-        bench.chain.choose("reboot", "answer")
+        bench.chain.choose_behaviour("reboot", "answer")
     return bench
 
 
@@ -50,7 +50,7 @@ def kept_goal(bench, servo_id, goal):
 def test_it_is_a_device(make):
     device: Device = make().chain
     assert device.positions_steps() == (2048.0,)
-    assert device.at_baud(57_600)
+    assert device.understands_baud(57_600)
 
 
 def test_a_servo_that_is_not_there_says_nothing(make):
@@ -73,7 +73,7 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
     assert ids(bench.ask(1, WRITE, bench.head_of("baud_rate"), slower, baud=BAUD)) == [1]
     assert [len(bench.ask(1, PING, baud=baud)) for baud in (BAUD, 115_200, 9600)] == [0, 1, 0]
     assert [len(bench.ask(ALL, PING, baud=baud)) for baud in (115_200, BAUD)] == [1, 0]
-    assert bench.chain.at_baud(115_200) and not bench.chain.at_baud(BAUD)
+    assert bench.chain.understands_baud(115_200) and not bench.chain.understands_baud(BAUD)
 
 
 def test_what_cannot_be_built(make):

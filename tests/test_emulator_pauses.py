@@ -89,7 +89,7 @@ def test_a_pause_ends_where_a_life_through_it_does(begin):
         bench = FeetechBench(ServoSpec(1, "sts3215", 2048.0))
         begin(bench)
         bench.wait(40.0, looks)
-        servo = bench.chain.here(1)
+        servo = bench.chain.find_servo(1)
         ends.append((bench.position(), servo.torque, servo.protection.temperature_c))
     (at, torque, warm), (truly, torque_truly, warm_truly) = ends
     apart = abs(at - truly)
@@ -163,7 +163,7 @@ def test_a_maestro_whose_script_runs_all_night_answers(timeout_s, monkeypatch):
     world.do(f"set timeout-ms {1000 * timeout_s}")
     passed = []
     body = type(world.board.body)
-    through = body._pass
+    through = body._run_period
     monkeypatch.setattr(body, "_pass", lambda self: (passed.append(1), through(self)))  # type: ignore[func-returns-value]
     world.after(HOUR_S)
     here = world.positions()

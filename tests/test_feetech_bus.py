@@ -115,7 +115,7 @@ def test_open_names_every_problem_at_once_and_those_that_nobody_expects(twin):
 
 def test_a_servo_of_another_model_is_named():
     rig = Rig()
-    rig.chain[2].memory.keep("model_number", 1540)
+    rig.chain[2].memory.set_permanently("model_number", 1540)
     rig.chain[2].memory.power_up()
     with pytest.raises(ServoMissing, match=r"jaw \(servo 2\) is model number 1540, not sts3215"):
         rig.bus.open()
@@ -183,8 +183,8 @@ def test_strength_and_gains_reach_the_servo_and_outlive_a_restart():
 def test_what_the_eeprom_must_be_is_kept_and_the_lock_closed():
     rig = Rig()
     for servo in rig.chain.servos:
-        servo.memory.keep("phase", 12 | 0x10)
-        servo.memory.keep("operating_mode", 1)
+        servo.memory.set_permanently("phase", 12 | 0x10)
+        servo.memory.set_permanently("operating_mode", 1)
         servo.memory.power_up()
     rig.bus.open()
     for servo in rig.chain.servos:

@@ -153,7 +153,7 @@ def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(rig):
     rig.command("unplug for 0.1")
     rig.run(0.3, [2000] * 4)
     for servo_id in IDS:
-        rig.chain.here(servo_id).write(40, b"\x00")
+        rig.chain.find_servo(servo_id).write(40, b"\x00")
     rig.run(2.0, [2100] * 4)
     assert [servo.torque for servo in rig.chain.servos] == [True, False, True, True]
     assert rig.bus.faults() == ("jaw (servo 2): overheating",)

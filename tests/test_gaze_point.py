@@ -28,7 +28,7 @@ def path(first: Vec3, then: Vec3, jump_s: float, h_s: float) -> tuple[np.ndarray
     before = SaccadeTrajectory(MODEL, at(0.0), first, EYE, 0.0)
     after = RedirectedTrajectory(before, MODEL, then, EYE, jump_s)
     times = np.arange(0.0, after.ends_s + 0.02, h_s)
-    return times, np.array([(before if t < jump_s else after).at(EYE, t) for t in times])
+    return times, np.array([(before if t < jump_s else after).point_at(EYE, t) for t in times])
 
 
 @pytest.mark.parametrize(
@@ -139,8 +139,8 @@ def test_refixations_stay_near_the_middle_and_come_one_to_two_a_second() -> None
 def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_followed() -> None:
     points = Refixations(OculomotorParams(), np.random.default_rng(0))
     times = np.arange(0.0, 20.0, 0.005)
-    assert not any(points.due(t, still=False) for t in times)
-    assert any(points.due(20.0 + t) for t in times)
+    assert not any(points.is_due(t, still=False) for t in times)
+    assert any(points.is_due(20.0 + t) for t in times)
     assert 0.0 < degrees(hypot(*points.offset_rad)) <= 1.13
     points.reset()
     assert points.offset_rad == (0.0, 0.0)
@@ -152,4 +152,4 @@ def test_without_sizes_or_a_generator_nothing_is_fixated_again() -> None:
         (OculomotorParams(), None),
     ):
         points = Refixations(params, rng)
-        assert not any(points.due(t) for t in np.arange(0.0, 10.0, 0.005))
+        assert not any(points.is_due(t) for t in np.arange(0.0, 10.0, 0.005))

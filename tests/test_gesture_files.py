@@ -93,8 +93,8 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     found, values = fit_keys(even, smooth, TOLERANCE_DEG)
     assert 4 <= len(found) <= 30
     curve = MinimumJerkCurve(float(smooth[0]), found.tolist(), values.tolist())
-    assert np.abs(curve.sampled(even)[0] - smooth).max() <= TOLERANCE_DEG
-    assert np.abs(curve.sampled(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
+    assert np.abs(curve.sample_at(even)[0] - smooth).max() <= TOLERANCE_DEG
+    assert np.abs(curve.sample_at(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
     still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
     assert len(still[0]) == 0
 

@@ -45,7 +45,7 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     eyes = [kinematics.eyes_on(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets]
     left, right = np.array(eyes)[:, 0, :2].T, np.array(eyes)[:, 1, :2].T
     yaw, pitch = np.array([one.eyes_rad for one in offsets]).T
-    lids = [LidOpenings(0.9, 0.9, False, 0.9, 0.9).scaled(one.lids) for one in offsets]
+    lids = [LidOpenings(0.9, 0.9, False, 0.9, 0.9).scale(one.lids) for one in offsets]
     openings = np.array([(one.left, one.right, one.lower_left, one.lower_right) for one in lids]).T
     head, joints = (
         np.array([one.head_rad for one in offsets]).T,

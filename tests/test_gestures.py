@@ -12,7 +12,7 @@ from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.gaze.gesture import minimum_jerk_curve
-from gazerig.gaze.gesture.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
+from gazerig.gaze.gesture.gesture import POSE_TRACKS, Gesture, KeyFrame, track_keys
 from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
@@ -73,14 +73,14 @@ def test_a_curve_that_does_not_turn_is_the_spline_of_least_jerk_unless_that_swin
     curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
     at = np.linspace(0.0, times[-1], 500)
     least, rate = spline_of_least_jerk(times, values, at)
-    value, speed, acceleration = curve.sampled(at)
+    value, speed, acceleration = curve.sample_at(at)
     assert speed.min() > -1e-4 * speed.max()  # never back
     if rate.min() > 0.0:
         assert np.abs(value - least).max() < 1e-6 * np.abs(least).max()
     before = np.maximum(0.0, times - 1e-9)
-    for one, other in zip(curve.sampled(before)[1:], curve.sampled(times)[1:], strict=True):
+    for one, other in zip(curve.sample_at(before)[1:], curve.sample_at(times)[1:], strict=True):
         assert np.abs(one - other).max() < 1e-5 * max(1.0, np.abs(acceleration).max())
-    assert [curve.at(t) for t in at[::50]] == pytest.approx(value[::50], abs=1e-9)
+    assert [curve.value_at(t) for t in at[::50]] == pytest.approx(value[::50], abs=1e-9)
 
 
 def test_most_even_curves_are_those_of_least_jerk() -> None:
@@ -89,7 +89,7 @@ def test_most_even_curves_are_those_of_least_jerk() -> None:
         at = np.linspace(0.0, times[-1], 100)
         curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
         least, rate = spline_of_least_jerk(times, values, at)
-        assert np.abs(curve.sampled(at)[0] - least).max() < 1e-9
+        assert np.abs(curve.sample_at(at)[0] - least).max() < 1e-9
 
 
 def test_many_keys_give_the_curve_of_few_and_take_time_in_proportion(
@@ -100,7 +100,7 @@ def test_many_keys_give_the_curve_of_few_and_take_time_in_proportion(
     at = np.linspace(0.0, times[-1], 5000)
     least, rate = spline_of_least_jerk(times, values, at)
     assert rate.min() > -1e-6 * rate.max()  # it does not swing back
-    value = MinimumJerkCurve(0.0, times.tolist(), values.tolist()).sampled(at)[0]
+    value = MinimumJerkCurve(0.0, times.tolist(), values.tolist()).sample_at(at)[0]
     assert np.abs(value - least).max() < 1e-6 * np.abs(least).max()
     solved: list[int] = []
     coefficients = minimum_jerk_curve._coefficients
@@ -127,9 +127,9 @@ def test_a_gesture_of_too_many_frames_is_refused() -> None:
 
 def test_a_curve_rests_where_it_turns_and_never_swings_past() -> None:
     curve = MinimumJerkCurve(0.0, [0.3, 0.6, 0.9, 1.4], [10.0, -4.0, -4.0, 0.0])
-    value, speed, acceleration = curve.sampled(np.linspace(0.0, 1.5, 3001))
+    value, speed, acceleration = curve.sample_at(np.linspace(0.0, 1.5, 3001))
     assert value.max() <= 10.0 + 1e-9 and value.min() >= -4.0 - 1e-9
-    at = curve.sampled(np.array([0.3, 0.6, 0.9, 1.4]))
+    at = curve.sample_at(np.array([0.3, 0.6, 0.9, 1.4]))
     assert np.abs(at[1]).max() < 1e-9 and np.abs(at[2]).max() < 1e-6
     assert np.abs(np.gradient(value, 5e-4) - speed).max() < 0.2
     assert np.abs(np.gradient(speed, 5e-4) - acceleration)[5:-5].max() < 20.0
@@ -150,7 +150,7 @@ def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
     # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
     assert slow.slowed_by == pytest.approx((23094.0 / 1600.0) ** 0.5, rel=0.01)
     assert slow.slow_joint == "neck_pitch"
-    most = np.abs(slow.played.motion.samples.scaled(np.array(slow.played.sizes), slow.played.speed).acceleration)  # fmt: skip
+    most = np.abs(slow.played.motion.samples.scale(np.array(slow.played.sizes), slow.played.speed).acceleration)  # fmt: skip
     assert degrees(most.max()) == pytest.approx(1600.0, rel=0.01)
 
 
@@ -177,12 +177,12 @@ def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_nam
 
 def test_a_loop_repeats_and_all_ends_at_rest() -> None:
     laugh = shipped_gestures()["laugh"]
-    once, often = (keys_of(laugh, laugh.frames, count) for count in (1, 5))
+    once, often = (track_keys(laugh, laugh.frames, count) for count in (1, 5))
     pitch = once["head_pitch"], often["head_pitch"]
     assert len(pitch[1].times_s) == len(pitch[0].times_s) + 4 * 2
     assert pitch[1].times_s[-1] == pytest.approx(pitch[0].times_s[-1] + 4 * 0.3)
     aside = Gesture("aside", (KeyFrame(0.3, eyes_yaw_deg=5.0),), return_s=0.7)
-    assert keys_of(aside, aside.frames, 1)["eyes_yaw"].times_s == (0.3, 1.0)
+    assert track_keys(aside, aside.frames, 1)["eyes_yaw"].times_s == (0.3, 1.0)
 
 
 def test_in_joint_space_the_eyes_go_along_with_the_head() -> None:

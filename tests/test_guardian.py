@@ -193,7 +193,7 @@ def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
     sts.bus.write([2900] * 4)
     assert len(sts.sent) == count, "hands off while the guardian speaks"
     for i in (1, 2, 3):  # the guardian's work
-        sts.chain.here(i).write(40, b"\0")
+        sts.chain.find_servo(i).write(40, b"\0")
     other.set_state(0, RELEASED)
     readings = sts.tick(None)
     assert other.state(0) == IDLE

@@ -123,7 +123,7 @@ def test_the_place_left_is_avoided_by_a_gaussian_that_decays(
     a = radians(aside_deg)
     seen = bodies("hand", (2 * np.cos(a), 2 * np.sin(a), 0))
     interest(model, seen, -1, 10.0)
-    model.leave((1.0, 0.0, 0.0), 10.0)
+    model.record_left((1.0, 0.0, 0.0), 10.0)
     expected = 1.0 - 0.8 * np.exp(-0.5 * (aside_deg / 4.0) ** 2 - age_s / 1.5)
     assert interest(model, seen, -1, 10.0 + age_s) == pytest.approx([expected])
     assert interest(model, seen, -1, 17.0) == [1.0]
@@ -135,7 +135,7 @@ def test_what_is_attended_is_not_avoided_and_strength_0_avoids_nothing() -> None
         model = Habituation(
             HabituationParams(decay_rate_1_s=0.0, inhibition_of_return_strength=strength)
         )
-        model.leave((1.0, 0.0, 0.0), 0.0)
+        model.record_left((1.0, 0.0, 0.0), 0.0)
         assert interest(model, seen, attended, 0.1) == [1.0]
 
 

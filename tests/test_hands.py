@@ -162,7 +162,7 @@ def test_e91_a_waving_hand_is_found_from_pixels_and_whose_it_is() -> None:
         persons.update(frame.percept, HEAD_M)
         hands = frame.seen(HAND)
         if frame.t_s > 22.2:
-            named.append(persons.named("waving"))
+            named.append(persons.ids_with_trait("waving"))
             off.append(min([off_deg(p, frame.hands[0]) for _, p in hands], default=90.0))
             faces = dict(frame.seen("face"))
     assert np.median(off) < 5.0 and np.percentile(off, 90) < 9.0

@@ -71,16 +71,16 @@ def test_from_rest_the_plan_is_eq_8() -> None:
     plan = Quintic((0.1, 0.0, 0.0), 0.7, 0.8)
     for s in np.linspace(0.0, 1.0, 11):
         expected = 0.1 + 0.6 * (6 * s**5 - 15 * s**4 + 10 * s**3)
-        assert plan.at(0.8 * s)[0] == pytest.approx(expected, abs=1e-12)
+        assert plan.state_at(0.8 * s)[0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_new_goal_in_flight_makes_no_step() -> None:
     first = Quintic((0.0, 0.0, 0.0), 1.0, 0.8)
-    now = first.at(0.3)
+    now = first.state_at(0.3)
     second = Quintic(now, -0.5, 0.6)
-    assert second.at(0.0) == pytest.approx(now)
-    assert second.at(0.6) == pytest.approx((-0.5, 0.0, 0.0))
-    assert second.at(9.0) == (-0.5, 0.0, 0.0)
+    assert second.state_at(0.0) == pytest.approx(now)
+    assert second.state_at(0.6) == pytest.approx((-0.5, 0.0, 0.0))
+    assert second.state_at(9.0) == (-0.5, 0.0, 0.0)
 
 
 def test_attention_bounds_must_be_in_order() -> None:

@@ -109,11 +109,11 @@ def test_equal_shifts_scatter_within_bounds() -> None:
 
 def test_the_head_is_first_in_half_of_its_own_looks_and_never_in_a_reaction() -> None:
     head = model(5)
-    own = [head.leads_s(target(0.0, -2 - n, "glance"), 0.7) for n in range(600)]
+    own = [head.draw_lead_s(target(0.0, -2 - n, "glance"), 0.7) for n in range(600)]
     assert 0.5 < np.mean(np.array(own) > 0.0) < 0.75
     assert 0.35 < np.mean(np.array(own) > 0.008) < 0.6 and max(own) <= 0.071
-    assert max(head.leads_s(target(0.0, n), 0.7) for n in range(200)) == 0.0
-    assert max(head.leads_s(target(0.0, -2, "glance"), 0.1) for n in range(50)) == 0.0
+    assert max(head.draw_lead_s(target(0.0, n), 0.7) for n in range(200)) == 0.0
+    assert max(head.draw_lead_s(target(0.0, -2, "glance"), 0.1) for n in range(50)) == 0.0
 
 
 def test_a_search_is_completed_by_the_head() -> None:
@@ -126,4 +126,4 @@ def test_without_spreads_a_generator_changes_no_shift() -> None:
     exact = {"slope_spread": 0.0, "duration_spread": 0.0, "lead_spread_ms": 0.0}
     place = np.full(200, 50.0)
     assert (follow(model(1, **exact), place) == follow(model(None, **exact), place)).all()
-    assert model(1, **exact).leads_s(target(0.0), 1.0) == 0.0
+    assert model(1, **exact).draw_lead_s(target(0.0), 1.0) == 0.0

@@ -83,7 +83,7 @@ def test_e75_stahls_law_holds_outward_and_homeward(
 ) -> None:
     params = HeadParams(eye_only_range_deg=range_deg, head_slope=slope, recentre_after_ms=NO_RELIEF)
     arc = radians(70.0) * (place[0] + 75.0) / 150.0
-    went = arc - HeadShare(params, radians(170.0)).short_rad(salience, arc)
+    went = arc - HeadShare(params, radians(170.0)).undershoot_rad(salience, arc)
     law = slope * max(0.0, degrees(arc) - range_deg / 2.0)
     assert degrees(went) == pytest.approx(law, abs=1e-9)
 

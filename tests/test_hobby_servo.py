@@ -23,7 +23,7 @@ def test_it_goes_at_its_top_speed_and_settles_within_its_dead_band():
     assert places[:5] == [4200, 4400, 4600, 4800, 5000]
     assert all(b - a <= 200 for a, b in zip(places, places[1:], strict=False))
     assert 0 < 8000 - places[-1] <= 20
-    assert servo.resting and not servo.straining
+    assert servo.is_resting and not servo.is_straining
 
 
 def test_without_lag_and_dead_band_it_is_a_straight_line():
@@ -41,7 +41,7 @@ def test_a_change_within_the_dead_band_does_not_move_it():
 def test_without_pulses_it_is_limp_and_a_hand_turns_it():
     servo = HobbyServo(HobbySpec(0, 6000))
     servo.turn(-500)
-    assert servo.unpowered
+    assert servo.is_unpowered
     assert run(servo, 0, 50)[-1] == 5500
     servo.turn(1e5)
     assert servo.place_steps == 10_000
@@ -51,7 +51,7 @@ def test_with_pulses_it_goes_back_from_where_a_hand_turned_it():
     servo = HobbyServo(HobbySpec(0, 6000))
     run(servo, 6000, 5)
     servo.turn(300)
-    assert not servo.resting
+    assert not servo.is_resting
     assert run(servo, 6000, 100)[-1] == pytest.approx(6000, abs=20)
 
 
@@ -59,22 +59,22 @@ def test_a_stuck_one_strains_and_goes_on_when_freed():
     servo = HobbyServo(HobbySpec(0, 6000))
     servo.stuck = True
     assert run(servo, 7000, 50)[-1] == 6000
-    assert servo.straining and servo.resting
+    assert servo.is_straining and servo.is_resting
     with pytest.raises(ValueError, match="channel 0 is stuck"):
         servo.turn(10)
     servo.stuck = False
     assert run(servo, 7000, 100)[-1] == pytest.approx(7000, abs=20)
-    assert not servo.straining
+    assert not servo.is_straining
 
 
 def test_it_strains_at_a_hard_stop():
     servo = HobbyServo(HobbySpec(0, 6000, stop_high_steps=6500))
     assert run(servo, 8000, 1)[-1] == 6220
-    assert not servo.straining
+    assert not servo.is_straining
     assert run(servo, 8000, 100)[-1] == 6500
-    assert servo.straining
+    assert servo.is_straining
     run(servo, 0, 1)
-    assert not servo.straining
+    assert not servo.is_straining
 
 
 @pytest.mark.parametrize(

@@ -161,9 +161,9 @@ def test_e76_glances_go_to_what_is_in_view_and_to_what_was_there_lately() -> Non
     for k in range(30_000):
         t = k * DT
         if k < 20_000:
-            model.see(list(THINGS), list(THINGS.values()), t)
+            model.record_seen(list(THINGS), list(THINGS.values()), t)
         elif k == 20_000:
-            model.see((), (), t)
+            model.record_seen((), (), t)
         now = model.step(t)
         for name, place in THINGS.items():
             on[name] += norm(sub(now.p_world_m, place)) < 1e-6 and k < 20_000
@@ -172,7 +172,7 @@ def test_e76_glances_go_to_what_is_in_view_and_to_what_was_there_lately() -> Non
     shares = np.array(list(on.values())) / 20_000
     assert 0.2 <= shares.sum() <= 0.7 and shares.min() >= 0.05
     never = idle(3, thing_share=0.0)
-    never.see(list(THINGS), list(THINGS.values()), 0.0)
+    never.record_seen(list(THINGS), list(THINGS.values()), 0.0)
     assert {t.why for t in run(never, 0.0, 30.0)} == {
         "no one in sight", "glancing around, no one in sight"
     }  # fmt: skip
@@ -181,14 +181,14 @@ def test_e76_glances_go_to_what_is_in_view_and_to_what_was_there_lately() -> Non
 def test_a_thing_that_no_longer_moves_is_not_searched_for() -> None:
     model = idle(2)
     model.remember(seen()._replace(kind="thing"))
-    model.see((3,), ((1.0, 0.2, 0.2),), 0.5)
+    model.record_seen((3,), ((1.0, 0.2, 0.2),), 0.5)
     assert {t.kind for t in run(model, 0.5, 6.0)} == {"rest", "glance"}
 
 
 def test_more_things_than_can_be_remembered_push_out_the_oldest() -> None:
     model = idle(2)
     for name in range(100):
-        model.see((name,), ((1.0, 0.001 * name, 0.2),), 0.0)
+        model.record_seen((name,), ((1.0, 0.001 * name, 0.2),), 0.0)
     assert len(model._seen) == 16 and 99 in model._seen and 0 not in model._seen
 
 

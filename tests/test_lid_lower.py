@@ -54,9 +54,9 @@ def test_upper_lids_move_as_if_there_were_no_lower_ones() -> None:
             if k == 1000:
                 model.wink("left", k * DT)
             if k == 2000:
-                model.sleepy(0.6)
+                model.set_sleepiness(0.6)
             if k == 3000:
-                model.mode("conversation")
+                model.set_mode("conversation")
             shift = radians(25.0) if k % 700 == 0 else None
             rows.append(model.step(k * DT, radians(20.0) * sin(0.7 * k * DT), shift)[:3])
         return rows
@@ -157,7 +157,7 @@ def test_a_wink_shuts_both_lids_of_one_eye(side: Side) -> None:
 def test_sleepiness_raises_a_lower_lid_by_little_and_slowly() -> None:
     model = lids()
     model.step(1.0, 0.0, None)
-    model.sleepy(1.0)
+    model.set_sleepiness(1.0)
     assert largest_step(model, 1.0, 1.5) <= 1.875 * 0.1 * AWAKE * DT + 1e-9
     drowsy = model.step(2.5, 0.0, None)
     assert drowsy.lower_left == pytest.approx(0.9 * AWAKE)

@@ -64,9 +64,9 @@ def happen(model: Lids, event: Event, other: LidParams, t_s: float) -> None:
     if event.what in ("left", "right"):
         model.wink(event.what, t_s + event.level - 0.5)  # type: ignore[arg-type]
     elif event.what in ("rest", "conversation"):
-        model.mode(event.what)  # type: ignore[arg-type]
+        model.set_mode(event.what)  # type: ignore[arg-type]
     elif event.what == "sleepy":
-        model.sleepy(event.level)
+        model.set_sleepiness(event.level)
     elif event.what == "retune":
         model.retune(other)
 
@@ -114,7 +114,7 @@ def test_both_lids_follow_the_eye_the_same_way_with_any_parameters(
     params: LidParams, one_deg: float, other_deg: float, level: float
 ) -> None:
     model = Lids(params, np.random.default_rng(0))
-    model.sleepy(level)
+    model.set_sleepiness(level)
     down, up = (model.step(0.0, radians(a), None) for a in sorted((one_deg, other_deg)))
     assert up.left >= down.left and up.right >= down.right
     assert up.lower_left <= down.lower_left and up.lower_right <= down.lower_right
@@ -131,7 +131,7 @@ def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
     never = {"blinks_per_min": 0.0, "gaze_evoked_blink_literal_deg": 0.0, "sleepy_level": 0.0}
     chosen = LidParams(**{**vars(params), **whole, **never, "sleepy_slowness": 0.0})
     model = Lids(chosen, np.random.default_rng(0))
-    model.sleepy(level)
+    model.set_sleepiness(level)
     model.step(0.0, radians(pitch_deg), radians(90.0))
     shut = model.step(chosen.close_ms / 1e3, radians(pitch_deg), None)
     assert shut.blink and (shut.left, shut.right, shut.lower_left, shut.lower_right) == (0.0,) * 4
@@ -144,7 +144,7 @@ def test_rounding_errors_lead_no_lid_beyond_shut_or_open() -> None:
     still = LidParams(sleepy_droop=1.0, lower_sleepy_rise=1.0, blinks_per_min=0.0, close_ms=500.0)
     winking, drowsy = (Lids(still, np.random.default_rng(0)) for _ in range(2))
     winking.wink("left", 0.0)
-    drowsy.sleepy(1.0)
+    drowsy.set_sleepiness(1.0)
     winks = [winking.step(0.5 * float(t_s), 0.0, None) for t_s in near]
     assert min(o.left for o in winks) == min(o.lower_left for o in winks) == 0.0
     sinks = [drowsy.step(float(t_s), 0.0, None) for t_s in near]

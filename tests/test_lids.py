@@ -48,7 +48,7 @@ ROUGHLY_S = 0.02
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_e50_blink_rate(mode: LidMode, rate: float, band: float, seed: int) -> None:
     model = lids(seed)
-    model.mode(mode)
+    model.set_mode(mode)
     times = np.array(onsets(model, 1200.0, dt_s=ROUGHLY_S))
     gaps = np.diff(times)
     assert len(times) / 20.0 == pytest.approx(rate, abs=band)
@@ -227,7 +227,7 @@ def test_e74_blinks_with_large_shifts_are_among_the_published_rate(
     counts, gaps = [], []
     for replaces in (True, False):
         model = lids(3, gaze_evoked_blink_replaces=replaces)
-        model.mode(mode)
+        model.set_mode(mode)
         rng, last_s, onset_s = np.random.default_rng(9), 0.0, list[float]()
         at_s = float(rng.exponential(every_s))
         for k in range(round(1800.0 / ROUGHLY_S)):
@@ -257,9 +257,9 @@ def test_laws_of_the_intervals_keep_the_mean(law: str, low: float, high: float) 
 def test_one_mode_may_be_without_blinks_and_a_change_counts_at_once() -> None:
     model = lids(blinks_per_min=0.0)
     assert onsets(model, 60.0) == []
-    model.mode("conversation")
+    model.set_mode("conversation")
     assert 8 <= len(onsets(model, 30.0, 60.0)) <= 20
-    model.mode("rest")
+    model.set_mode("rest")
     assert onsets(model, 60.0, 90.0) == []
 
 
@@ -267,7 +267,7 @@ def test_the_same_mode_again_changes_nothing() -> None:
     plain, reported = lids(4), lids(4)
     times = []
     for k in range(12_000):
-        reported.mode("rest")
+        reported.set_mode("rest")
         count = reported.blinks
         reported.step(k * DT, 0.0, None)
         if reported.blinks > count:
@@ -337,7 +337,7 @@ def test_no_blink_spoils_a_wink() -> None:
 def test_sleepy_lids_sink_slowly_and_blink_long() -> None:
     model = lids(blinks_per_min=0.0)
     model.step(1.0, 0.0, None)
-    model.sleepy(1.0)
+    model.set_sleepiness(1.0)
     trace = [model.step(1.0 + k * DT, 0.0, None)[0] for k in range(300)]
     assert trace[0] == AWAKE and trace[-1] == pytest.approx(AWAKE * 0.35)
     assert all(b <= a for a, b in pairwise(trace))
@@ -345,7 +345,7 @@ def test_sleepy_lids_sink_slowly_and_blink_long() -> None:
     model.step(3.0, 0.0, radians(90.0))
     blinking = [model.step(3.0 + k * DT, 0.0, None)[2] for k in range(1, 300)]
     assert sum(blinking) * DT == pytest.approx(3 * 0.285, abs=0.02)
-    model.sleepy(0.0)
+    model.set_sleepiness(0.0)
     model.step(9.0, 0.0, None)
     assert model.step(11.0, 0.0, None)[0] == AWAKE
     assert lids(sleepy_level=1.0, blinks_per_min=0.0).step(0.0, 0.0, None)[0] < 0.3
@@ -354,12 +354,12 @@ def test_sleepy_lids_sink_slowly_and_blink_long() -> None:
 def test_commands_that_make_no_sense_are_refused() -> None:
     model = lids()
     with pytest.raises(ValueError, match="modes: rest, conversation"):
-        model.mode("talk")  # type: ignore[arg-type]
+        model.set_mode("talk")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="sides: left, right"):
         model.wink("both", 0.0)  # type: ignore[arg-type]
     for level in (-0.1, 1.1, float("nan")):
         with pytest.raises(ValueError, match="0..1"):
-            model.sleepy(level)
+            model.set_sleepiness(level)
 
 
 def test_lids_follow_the_eyes_and_stay_between_shut_and_open() -> None:

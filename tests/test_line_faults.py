@@ -366,7 +366,7 @@ def test_faults_last_for_a_count_a_time_or_until_cleared(world):
     assert world.one(3) == b""
     world.faults.command("clear 3")
     assert world.one(3) == good(3)
-    assert not world.faults.wire.any
+    assert not world.faults.wire.has_any
 
 
 def test_status_tells_servos_and_faults(world):
@@ -401,7 +401,7 @@ def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
     with pytest.raises(ValueError) as error:
         world.faults.command(text)
     assert says in str(error.value)
-    assert not world.faults.wire.any
+    assert not world.faults.wire.has_any
 
 
 def test_help_explains_every_command(world):

@@ -43,7 +43,7 @@ class Wire:
         out = []
         while (due_s := self.line.next_due_s()) is not None:
             self.now_s = due_s
-            out.append((due_s, self.line.arrived()))
+            out.append((due_s, self.line.take_arrived()))
         return out
 
 
@@ -92,7 +92,7 @@ def test_bytes_of_the_host_queue_too():
     times = []
     while (due_s := wire.line.next_due_s()) is not None:
         wire.now_s = due_s
-        wire.line.arrived()
+        wire.line.take_arrived()
         times.append(round(due_s * 1e6))
     assert times == [240, 380]
 
@@ -140,7 +140,7 @@ def test_nothing_overtakes_and_nothing_is_lost(sendings, delay):
     while (due_s := wire.line.next_due_s()) is not None:
         assert due_s >= last_s
         last_s = wire.now_s = max(due_s, wire.now_s)
-        got += wire.line.arrived()
+        got += wire.line.take_arrived()
     assert got == expected
 
 

@@ -311,7 +311,7 @@ def test_a_channel_keeps_its_limits_and_always_arrives(orders):
     for _ in range(800):
         channel.step()
     assert channel.position == channel.target
-    assert not channel.moving
+    assert not channel.is_moving
 
 
 # --- servos, time

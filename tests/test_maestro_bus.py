@@ -40,7 +40,7 @@ class Bench:
         self.sent: list[Any] = []
         self.board = build_board(channels, lambda: self.now_s, crc=params.get("crc", False))
         for case, value in chosen:
-            self.board.choose(case, value)
+            self.board.choose_behaviour(case, value)
         self.port = InProcessPort(self.board, self.sent.append, "emulated board", self._sleep_until)
         self.bus = MaestroBus(self.port, setups, MaestroParams(**{"channels": channels, **params}))
 
@@ -271,14 +271,14 @@ def test_a_joint_outside_its_limits_comes_inside_slowly(bench):
 
 
 def test_a_board_with_a_narrower_range_is_refused(bench):
-    bench.board.choose("max-us", "1800")
+    bench.board.choose_behaviour("max-us", "1800")
     with pytest.raises(ServoMissing, match="brow.*sent to 1900 us and gets 1800 us.*widen"):
         bench.bus.enable_torque()
     assert bench.pulses() == [0, 0, 0]
 
 
 def test_no_answer_at_engage(bench):
-    bench.board.choose("mode", "mute")
+    bench.board.choose_behaviour("mode", "mute")
     with pytest.raises(ServoMissing, match="no answer about eyes"):
         bench.bus.enable_torque()
 
@@ -399,7 +399,7 @@ def test_release_is_confirmed_and_reported_where_it_is_not(held):
     assert not any(reading.torque for reading in held.run(0.05)[-1])
     held.bus.enable_torque()
     held.bus.events()
-    held.board.choose("mode", "mute")
+    held.board.choose_behaviour("mode", "mute")
     held.bus.disable_torque()
     assert sum("not confirmed" in line for line in held.bus.events()) == 3
 
@@ -450,7 +450,7 @@ def test_an_error_that_sends_all_home_is_named_and_healed(held):
 
 
 def test_an_error_that_moves_nothing_is_only_named(held):
-    held.board.choose("on-error", "ignore")
+    held.board.choose_behaviour("on-error", "ignore")
     held.raw("55")
     seen = held.run(0.3, [5500, 5600, 6600])
     assert not any(r is None or r.rearmed for readings in seen for r in readings)
@@ -458,7 +458,7 @@ def test_an_error_that_moves_nothing_is_only_named(held):
 
 
 def test_where_home_is_a_place_they_come_back_before_they_are_there(held):
-    held.board.choose("on-error", "home")
+    held.board.choose_behaviour("on-error", "home")
     held.run(1.0, [5000, 5000, 5000])
     held.raw("55")
     seen = held.run(0.3)
@@ -468,7 +468,7 @@ def test_where_home_is_a_place_they_come_back_before_they_are_there(held):
 
 def test_where_home_is_reached_at_once_they_are_held_there():
     bench = Bench(tuple(setup._replace(max_speed_steps_s=2e6) for setup in SETUPS))
-    bench.board.choose("on-error", "home")
+    bench.board.choose_behaviour("on-error", "home")
     bench.bus.open()
     bench.bus.enable_torque()
     bench.run(1.0, [5000, 5000, 5000])
@@ -518,7 +518,7 @@ def test_goals_never_switch_a_channel_on_that_is_not_held_yet(held):
 
 
 def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
-    held.board.choose("max-us", "1850")
+    held.board.choose_behaviour("max-us", "1850")
     for _ in range(3):
         seen = held.run(1.0, [7600, 6000, 7000])
         held.run(1.0, [6000, 6000, 7000])
@@ -557,7 +557,7 @@ def test_a_late_answer_is_never_taken_for_another(held):
 
 def test_a_silent_board_costs_little_time_and_is_given_up_in_the_end(held):
     held.bus._board.timing = held.bus._board.timing._replace(give_up_s=2.0)
-    held.board.choose("mode", "mute")
+    held.board.choose_behaviour("mode", "mute")
     began_s, ticks = held.now_s, 0
     with pytest.raises(BusLost, match="has not answered for 2"):
         while True:
@@ -571,7 +571,7 @@ def test_a_silent_board_costs_little_time_and_is_given_up_in_the_end(held):
 
 
 def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):
-    held.board.choose("mode", "mute")
+    held.board.choose_behaviour("mode", "mute")
     held.run(TICK_S)
     held.packets()
     held.bus.write([7000] * 3)
@@ -579,9 +579,9 @@ def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):
 
 
 def test_a_board_that_comes_back_after_silence_is_looked_at(held):
-    held.board.choose("mode", "mute")
+    held.board.choose_behaviour("mode", "mute")
     held.run(2.0, [5000, 6000, 7000])
-    held.board.choose("mode", "usb-dual-port")
+    held.board.choose_behaviour("mode", "usb-dual-port")
     seen = held.run(1.0, [5000, 6000, 7000])
     assert places(seen[-1]) == [5000, 6000, 7000]
     assert any("answers again after" in line for line in held.bus.events())

@@ -25,7 +25,7 @@ def world():
 def test_a_mute_port_says_nothing(world):
     world.do("set mode mute")
     assert world.ask("AA A1") == b""
-    assert not world.board.at_baud(9600)
+    assert not world.board.understands_baud(9600)
     world.do("set mode usb-chained")
     assert world.ask("A1") == bytes(2)
 
@@ -46,7 +46,7 @@ def test_serial_pins_that_detect_the_rate_wait_for_its_sign():
 
 def test_serial_pins_with_a_rate_of_their_own():
     world = World(baud=57_600)
-    assert world.board.at_baud(57_600) and not world.board.at_baud(9600)
+    assert world.board.understands_baud(57_600) and not world.board.understands_baud(9600)
     world.ask(target(0, 6000), 57_600)
     assert world.ask("90 00", 57_600) == b"\x70\x17"
     assert world.ask("A1", 9600) == b""
@@ -136,7 +136,7 @@ def test_commands_and_bytes_are_lost_on_their_way(world):
     world.do("lose-bytes 1")
     world.ask(target(0, 6000))
     assert world.errors() == PROTOCOL
-    assert not world.board.faults.wire.any
+    assert not world.board.faults.wire.has_any
 
 
 def test_answers_are_lost_spoilt_and_late_as_on_any_line(world):

@@ -13,7 +13,7 @@ from gazerig.sim_mock.maestro.board import build_board
 def make(channels=12, device=12, crc=False, chosen=()):
     board = build_board(channels, lambda: 0.0, device=device, crc=crc)
     for case, value in chosen:
-        board.choose(case, value)
+        board.choose_behaviour(case, value)
     return board, InProcessPort(board)
 
 
@@ -22,7 +22,7 @@ def send(board, text):
 
 
 def errors(board):
-    return board.faults.board()["errors"]
+    return board.faults.board_status()["errors"]
 
 
 def test_a_board_as_from_the_shop():
@@ -71,7 +71,7 @@ def test_a_running_script_is_seen_and_goes_on():
     board.faults.command("script on")
     found = probe(port, MaestroParams())
     assert found is not None and found.is_script_running is True
-    assert board.faults.board()["script"]
+    assert board.faults.board_status()["script"]
 
 
 @pytest.mark.parametrize("wanted", [False, True])

@@ -46,8 +46,8 @@ def test_frames_of_4_to_3_show_more_of_the_sensor_above_and_below():
 
 def test_e98_straightened_frames_have_no_distortion_others_that_of_the_lens():
     straight, bent = found(), found(OakParams(undistort=False))
-    assert not straight.lens.distorts and bent.lens.distorts
-    assert straight.own_distortion == bent.lens.distortion
+    assert not straight.lens.has_distortion and bent.lens.has_distortion
+    assert straight.raw_distortion == bent.lens.distortion
     # The five numbers put points where the fourteen of the factory do.
     rng = np.random.default_rng(0)
     points = np.column_stack(
@@ -58,7 +58,7 @@ def test_e98_straightened_frames_have_no_distortion_others_that_of_the_lens():
     assert np.hypot(*(project(points, bent.lens) - true).T).max() < 0.4
     plain = Intrinsics(K[0, 0], K[1, 1], K[0, 2], K[1, 2])
     assert np.hypot(*(project(points, plain) - true).T).max() > 2.0
-    assert bent.fit_px < 0.1
+    assert bent.fit_error_px < 0.1
 
 
 def test_fisheye_is_refused_where_frames_are_not_straightened():

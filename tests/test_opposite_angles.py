@@ -17,7 +17,7 @@ LIMIT_RAD = radians(20.0)
 
 
 class Saccades:
-    waits = corrects = False
+    is_saccade_due = is_correction_due = False
 
 
 def in_range(eyes: Eyes) -> Eyes:

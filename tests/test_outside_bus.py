@@ -22,7 +22,7 @@ from gazerig.robot.cli.main import app
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.sim_mock.devices import build, packed, unpacked
+from gazerig.sim_mock.devices import build, device_data, device_of_data
 from gazerig.sim_mock.in_process_port import InProcessPort
 
 
@@ -88,7 +88,7 @@ def test_its_section_is_checked(example, tmp_path):
 def test_the_guardian_switches_its_torque_off(example):
     rig, clock = load_rig(str(HEAD)), SimulatedClock(1.0)
     assert not has_watchdog(rig, "")
-    device: Any = build(unpacked(packed(emulated_lines(rig)[""])), clock.now_s)
+    device: Any = build(device_of_data(device_data(emulated_lines(rig)[""])), clock.now_s)
     port = InProcessPort(device, sleep_until=clock.sleep_until)
     for servo in device.servos.values():
         servo.torque = True

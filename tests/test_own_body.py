@@ -92,4 +92,4 @@ def test_the_own_body_waves_to_nobody() -> None:
             places = np.array([(1.0, 0.0, 0.2), (0.9, 0.3, 0.2)])
             seen = Bodies((1, 2), ("face", kind), places, v, np.zeros((2, 3)), np.full(2, 0.1))
             persons.update(Percept(k / 30, seen), (0.0, 0.0, 0.1))
-        assert persons.named("waving") == named
+        assert persons.ids_with_trait("waving") == named

@@ -76,7 +76,7 @@ def test_a_pulse_is_what_the_counts_and_the_oscillator_make_of_it(bench):
     bench.wake()
     bench.set(LED0, *MIDDLE)
     assert bench.pulse_us() == pytest.approx(307 * 122 / 25, abs=0.2)
-    bench.bridge.choose("oscillator-mhz", "26.5")
+    bench.bridge.choose_behaviour("oscillator-mhz", "26.5")
     assert bench.pulse_us() == pytest.approx(307 * 122 / 26.5, abs=0.2)
 
 
@@ -207,7 +207,7 @@ def test_a_servo_follows_its_pulses_and_is_limp_without(bench):
     assert place == pytest.approx(0x19A * 122 / 25 * 4, abs=21)
     bench.bridge.faults.command("brown-out")
     bench.wait(0.5)
-    assert bench.bridge.here(0).unpowered
+    assert bench.bridge.find_servo(0).is_unpowered
     assert bench.bridge.positions_steps()[0] == pytest.approx(place, abs=30)
 
 

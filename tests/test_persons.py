@@ -86,30 +86,30 @@ def test_the_nearest_is_the_nearest_until_another_is_clearly_so() -> None:
     persons = Persons()
     for away, nearest in [(1.2, 5), (1.0, 5), (0.95, 5), (0.8, 7), (0.95, 7), (1.2, 5)]:
         persons.update(percept(away, {5: (1.0, 0.0, 0.0), 7: (away, 0.01, 0.0)}), EYE)
-        assert persons.named("nearest") == {nearest}, away
+        assert persons.ids_with_trait("nearest") == {nearest}, away
     persons.update(percept(2.0, {}), EYE)
-    assert persons.named("nearest") == frozenset()
+    assert persons.ids_with_trait("nearest") == frozenset()
 
 
 def test_the_newest_came_last_and_who_came_together_is_named_together() -> None:
     persons = Persons()
-    assert persons.named("newest") == frozenset()
+    assert persons.ids_with_trait("newest") == frozenset()
     persons.update(percept(0.0, {5: LEFT}), EYE)
     persons.update(percept(0.3, {5: LEFT, 2: RIGHT}), EYE)
-    assert persons.named("newest") == {5, 2}
+    assert persons.ids_with_trait("newest") == {5, 2}
     for t_s in (4.0, 9.0):
         persons.update(percept(t_s, {5: LEFT, 1: FAR, 2: RIGHT}), EYE)
-        assert persons.named("newest") == {1}
+        assert persons.ids_with_trait("newest") == {1}
     # Out of view for a while, they did not come anew.
     persons.update(percept(12.0, {1: FAR}), EYE)
     persons.update(percept(15.0, {5: LEFT, 1: FAR, 2: RIGHT}), EYE)
-    assert persons.named("newest") == {1}
+    assert persons.ids_with_trait("newest") == {1}
 
 
 def test_who_looks_is_told_by_the_faces_of_the_frame() -> None:
     persons = Persons()
     persons.update(percept(0.0, {5: LEFT, 2: RIGHT}, looks=(2,)), EYE)
-    assert persons.named("looking") == {2}
+    assert persons.ids_with_trait("looking") == {2}
 
 
 @pytest.mark.parametrize(
@@ -127,12 +127,12 @@ def test_a_hand_that_swings_to_both_sides_waves_for_the_nearest_face(
         hand = (beside[0] - 0.1, beside[1] - 0.25 + swing_m * sin(phase), beside[2])
         v = 2 * pi * hz * swing_m * np.cos(phase)
         persons.update(percept(t_s, {5: LEFT, 2: RIGHT}, (), hand, v), EYE)
-        named.append(persons.named("waving"))
+        named.append(persons.ids_with_trait("waving"))
     assert (named[-1] == {2}) is waves and (named[-1] == frozenset()) is not waves
     assert named[5] == frozenset()
     for k in range(90, 150):
         persons.update(percept(k / 30, {5: LEFT, 2: RIGHT}), EYE)
-    assert persons.named("waving") == frozenset()
+    assert persons.ids_with_trait("waving") == frozenset()
 
 
 def test_a_hand_that_moves_to_one_side_does_not_wave() -> None:
@@ -140,7 +140,7 @@ def test_a_hand_that_moves_to_one_side_does_not_wave() -> None:
     for k in range(60):
         y = -0.8 + 0.5 * k / 30
         persons.update(percept(k / 30, {2: RIGHT}, (), (1.0, y, 0.0), 0.5), EYE)
-    assert persons.named("waving") == frozenset()
+    assert persons.ids_with_trait("waving") == frozenset()
 
 
 @pytest.mark.parametrize(

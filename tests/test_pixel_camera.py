@@ -101,10 +101,10 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     corner = middle - 0.5 * (right + down)
     canvas.draw_quad(TexturedQuad(tuple(corner), tuple(right), tuple(down), red))
     y, x = np.nonzero(canvas.image[:, :, 2] > 127)
-    expected = project(canvas.seen(middle), LENS)[0]
+    expected = project(canvas.to_camera(middle), LENS)[0]
     assert (x.mean(), y.mean()) == pytest.approx(tuple(expected), abs=0.6)
     seen_m = canvas.depth_m[round(expected[1]), round(expected[0])]
-    assert seen_m == pytest.approx(canvas.seen(middle)[0, 2], abs=0.01)
+    assert seen_m == pytest.approx(canvas.to_camera(middle)[0, 2], abs=0.01)
     assert np.isinf(canvas.depth_m[0, 0])
 
 
@@ -171,7 +171,7 @@ def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[ImageArray, Ca
     draw_head(canvas, place, R, PERSON_COLOURS[who])
     noise = np.random.default_rng(0).normal(0.0, 3.0, canvas.image.shape)
     picture = np.clip(canvas.image + noise, 0.0, 255.0).astype(np.uint8)
-    return picture, canvas, project(canvas.seen(LANDMARKS_FACE_M @ R.T + place), LENS)
+    return picture, canvas, project(canvas.to_camera(LANDMARKS_FACE_M @ R.T + place), LENS)
 
 
 @pytest.mark.parametrize("roll_deg", [-20.0, 0.0, 20.0])
@@ -188,7 +188,7 @@ def test_a_real_detector_finds_drawn_faces_where_they_are(
         errors.append(np.linalg.norm(found[0].landmarks_px - true, axis=1).mean() / eyes_px)
         pose = face_pose(found[0].landmarks_px, LENS)
         assert pose is not None
-        nose = canvas.seen((away_m, 0.05 * away_m, 0.03))[0]
+        nose = canvas.to_camera((away_m, 0.05 * away_m, 0.03))[0]
         directions.append(angle_between(pose.p_camera_m, tuple(nose)))
         assert np.linalg.norm(pose.p_camera_m) == pytest.approx(np.linalg.norm(nose), rel=0.12)
     assert np.mean(errors) < 0.07 and max(errors) < 0.12

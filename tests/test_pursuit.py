@@ -7,7 +7,7 @@ import pytest
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale
 from gazerig.gaze.oculomotor.params import PursuitParams
-from gazerig.gaze.oculomotor.pursuit import Pursuit, sight
+from gazerig.gaze.oculomotor.pursuit import Pursuit, line_of_sight_to
 from gazerig.gaze.types import Vec3
 
 DT = 0.005
@@ -122,7 +122,9 @@ def catch_up(speed_deg_s: float, behind_deg: float, outruns: bool) -> float:
     """Return the speed of a gaze that is behind a circling target; degrees."""
     pursuit, gaze = Pursuit(PursuitParams()), point(-behind_deg)
     now, v = circling(0.0, speed_deg_s)
-    moved = pursuit.follow(sight(gaze, EYE), sight(now, EYE), now, v, EYE, DT, True, outruns)
+    moved = pursuit.follow(
+        line_of_sight_to(gaze, EYE), line_of_sight_to(now, EYE), now, v, EYE, DT, True, outruns
+    )
     return (yaw(moved) - yaw(gaze)) / DT
 
 

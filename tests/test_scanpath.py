@@ -296,7 +296,7 @@ def test_a_known_walk_is_recovered(smoothing: str) -> None:
         n, sd = fitted.visits[i], WALK.dwell_sd_s[i]
         assert abs(fitted.dwell_mean_s[i].value - WALK.dwell_mean_s[i]) < 4.0 * sd / np.sqrt(n)
         assert fitted.dwell_sd_s[i].value == pytest.approx(sd, rel=0.15)
-    assert fitted.start == "FR" and fitted.outside == 0 and fitted.pooled == ()
+    assert fitted.start == "FR" and fitted.outside_fixations == 0 and fitted.pooled_parts == ()
     assert np.sum([[c.value for c in row] for row in fitted.matrix], axis=1) == pytest.approx(
         np.ones(8)
     )
@@ -335,11 +335,11 @@ def test_counts_are_of_neighbours_on_the_face_only() -> None:
     n, re, le = (PARTS.index(part) for part in ("N", "RE", "LE"))
     seen = {(i, j): c for i, row in enumerate(fitted.counts) for j, c in enumerate(row) if c}
     assert seen == {(n, re): 1, (le, le): 1}
-    assert fitted.outside == 1
+    assert fitted.outside_fixations == 1
     # Laplace: (1 + 1/2) / (1 + 8/2), and even odds from where nothing was seen.
     assert fitted.matrix[n][re].value == pytest.approx(0.3)
     assert fitted.matrix[0][3].value == pytest.approx(0.125)
-    assert "M" in fitted.pooled and "LE" not in fitted.pooled
+    assert "M" in fitted.pooled_parts and "LE" not in fitted.pooled_parts
     assert fitted.dwell_mean_s[PARTS.index("M")].value == pytest.approx(0.2)
 
 

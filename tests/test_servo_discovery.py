@@ -39,7 +39,7 @@ class Bench:
             chain = self.chain = build_dynamixel(specs, lambda: self.now_s)
             for servo in chain.servos:
                 servo.memory.set("baud_rate", BAUD_RATES.index(baud))
-            chain.choose("baud", "heed")
+            chain.choose_behaviour("baud", "heed")
             chain.refresh()
             self.port = InProcessPort(chain, sleep_until=self.sleep_until)
             self.names = [FoundServo(i, 1190, 53, baud, XL) for i in ids]
@@ -76,7 +76,7 @@ def mixed(bauds=None):
     for servo, baud in zip(chain.servos, bauds or (), strict=False):
         servo.memory.set("baud_rate", BAUD_RATES.index(baud))
     if bauds is not None:
-        chain.choose("baud", "heed")
+        chain.choose_behaviour("baud", "heed")
     chain.refresh()
     return InProcessPort(chain)
 
@@ -87,8 +87,8 @@ def mixed(bauds=None):
 def test_all_servos_are_found_at_their_own_rate_and_no_other(family):
     bench = Bench(family, 57_600, 1, 7, family.highest_id)
     rounds = list(scan(bench.port, family, thorough=True))
-    assert [one.baud for one in rounds] == list(family.usual_rates)
-    assert sorted(family.usual_rates) == sorted(family.baud_rates)
+    assert [one.baud for one in rounds] == list(family.scan_rates)
+    assert sorted(family.scan_rates) == sorted(family.baud_rates)
     assert {one.baud: one.found for one in rounds if one.found} == {57_600: tuple(bench.names)}
     assert all(one.is_supported and not one.shared_ids and not one.junk_bytes for one in rounds)
 

@@ -17,15 +17,15 @@ def settled(params: OculomotorParams | None = None, scatters: bool = False) -> S
     """Return a rule that has answered its first event and landed at 0."""
     rule = SaccadeTrigger(params or OculomotorParams(), scatters)
     rule.record_shift(1, 0.0, None, -1.0)
-    assert not rule.due(slip(0.0), 0.0)
-    assert not rule.waits
+    assert not rule.is_due(slip(0.0), 0.0)
+    assert not rule.is_saccade_due
     rule.record_landing(0.0)
     return rule
 
 
 def first_s(rule: SaccadeTrigger, seen: Slip, until_s: float = 1.0) -> float | None:
     times = (k / 1000 for k in range(1, round(until_s * 1000)))
-    return next((t for t in times if rule.due(seen, t)), None)
+    return next((t for t in times if rule.is_due(seen, t)), None)
 
 
 def test_error_beyond_two_degrees_jumps_after_the_refractory_time() -> None:
@@ -48,20 +48,20 @@ def test_a_target_that_slips_away_is_caught_up_with() -> None:
 def test_new_target_jumps_at_once_unless_it_is_nearly_there() -> None:
     rule = settled()
     rule.record_shift(2, 0.0, None, 0.15)
-    assert rule.due(slip(1.0), 0.15)
+    assert rule.is_due(slip(1.0), 0.15)
     rule.record_shift(3, 0.0, None, 0.16)
-    assert not rule.due(slip(0.2), 0.16)
-    assert not rule.waits
+    assert not rule.is_due(slip(0.2), 0.16)
+    assert not rule.is_saccade_due
 
 
 def test_latency_counts_from_the_first_unanswered_event() -> None:
     rule = settled(OculomotorParams(latency_ms=200.0))
     rule.record_shift(2, 0.0, None, 0.1)
     rule.record_shift(3, 0.0, None, 0.25)
-    assert rule.waits
+    assert rule.is_saccade_due
     assert rule.onset_s == pytest.approx(0.3)
-    assert not rule.due(slip(5.0), 0.299)
-    assert rule.due(slip(5.0), 0.300)
+    assert not rule.is_due(slip(5.0), 0.299)
+    assert rule.is_due(slip(5.0), 0.300)
     assert rule.onset_s == pytest.approx(0.3)
 
 
@@ -76,24 +76,24 @@ def test_an_event_early_in_flight_redirects_and_a_late_one_waits_after_the_landi
     early = settled()
     early.record_shift(2, 0.0, 0.29, 0.2)
     assert early.onset_s == pytest.approx(0.2)
-    assert early.redirects(0.2)
-    assert not early.redirects(0.205) and not early.waits
+    assert early.may_redirect(0.2)
+    assert not early.may_redirect(0.205) and not early.is_saccade_due
     late = settled()
     late.record_shift(2, 0.0, 0.26, 0.2)
     assert late.onset_s == pytest.approx(0.36)
-    assert not any(late.redirects(t) for t in (0.2, 0.23, 0.255))
+    assert not any(late.may_redirect(t) for t in (0.2, 0.23, 0.255))
     late.record_landing(0.26)
-    assert not late.due(slip(5.0), 0.355)
-    assert late.due(slip(5.0), 0.36)
+    assert not late.is_due(slip(5.0), 0.355)
+    assert late.is_due(slip(5.0), 0.36)
 
 
 def test_landings_that_err_are_corrected_and_exact_ones_are_not() -> None:
     scattered = settled(scatters=True)
     scattered.record_landing(0.0, 0.17)
-    assert not scattered.due(slip(1.5), 0.01)
-    assert scattered.corrects
+    assert not scattered.is_due(slip(1.5), 0.01)
+    assert scattered.is_correction_due
     assert first_s(scattered, slip(1.5)) == pytest.approx(0.17, abs=0.001)
     assert first_s(settled(), slip(1.5)) is None
     small = settled(scatters=True)
-    assert not small.due(slip(1.1), 0.01)
-    assert not small.corrects
+    assert not small.is_due(slip(1.1), 0.01)
+    assert not small.is_correction_due

@@ -37,7 +37,7 @@ def shown(path: Path, seconds: float, model: str = "periodic", noise_m: float = 
     for k in range(round(seconds / FRAME_S) + 1):
         seen = target(path, k * FRAME_S)
         x, y, z = seen.p_world_m
-        prediction.see(
+        prediction.record_target(
             seen._replace(p_world_m=(x, y + noise_m * float(rng.normal()), z)), EYE, fastest
         )
     return prediction
@@ -57,7 +57,7 @@ def test_a_swing_is_recognised_after_one_to_two_cycles_and_predicted(hz: float) 
     off = []
     for k in range(round(5.0 / hz / FRAME_S)):
         t = k * FRAME_S
-        prediction.see(target(path, t), EYE, FAST)
+        prediction.record_target(target(path, t), EYE, FAST)
         if known_s is None and prediction.sine is not None:
             known_s = t
         if t > 2.0 / hz + 0.2:
@@ -100,7 +100,7 @@ def test_a_step_aside_and_one_back_are_no_swing(lasts_s: float) -> None:
 
     prediction = TargetPrediction("periodic", 0.12, 0.3)
     for k in range(round(7.0 / FRAME_S)):
-        prediction.see(target(path, k * FRAME_S), EYE, FAST)
+        prediction.record_target(target(path, k * FRAME_S), EYE, FAST)
         assert prediction.sine is None
 
 
@@ -115,7 +115,7 @@ def test_a_swing_that_stops_is_given_up_within_a_quarter_of_its_period() -> None
     assert prediction.sine is not None
     end_s, there = prediction._at_s, path(prediction._at_s)
     for k in range(1, 7):
-        prediction.see(at(there, 0.0, end_s + k * FRAME_S), EYE, FAST)
+        prediction.record_target(at(there, 0.0, end_s + k * FRAME_S), EYE, FAST)
         if prediction.sine is None:
             break
     assert prediction.sine is None
@@ -127,10 +127,10 @@ def test_a_glance_elsewhere_does_not_forget_a_swing() -> None:
     prediction = shown(path, 3.0)
     end_s = prediction._at_s
     for k in range(1, 16):
-        prediction.see(at(0.0, 0.0, end_s + k * FRAME_S, name=2), EYE, FAST)
+        prediction.record_target(at(0.0, 0.0, end_s + k * FRAME_S, name=2), EYE, FAST)
     assert prediction.sine is None
     t = end_s + 16 * FRAME_S
-    prediction.see(target(path, t), EYE, FAST)
+    prediction.record_target(target(path, t), EYE, FAST)
     assert prediction.sine is not None
     assert path(t) + y_of(prediction.displacement(t + AGE_S)) == pytest.approx(
         path(t + AGE_S), abs=0.01
@@ -143,11 +143,11 @@ def test_a_glance_elsewhere_does_not_forget_a_swing() -> None:
 def test_a_swing_that_stopped_while_something_else_was_looked_at_is_not_expected() -> None:
     prediction = shown(swing(1.5), 3.0)
     end_s = prediction._at_s
-    prediction.see(at(0.0, 0.0, end_s + 0.3, name=2), EYE, FAST)
+    prediction.record_target(at(0.0, 0.0, end_s + 0.3, name=2), EYE, FAST)
     resting = at(0.3 + 0.1, 0.0, 0.0)
     kept = 0
     for k in range(12):
-        prediction.see(resting._replace(at_s=end_s + 0.6 + k * FRAME_S), EYE, FAST)
+        prediction.record_target(resting._replace(at_s=end_s + 0.6 + k * FRAME_S), EYE, FAST)
         kept += prediction.sine is not None
     assert prediction.sine is None
     assert kept <= 5
@@ -194,7 +194,7 @@ def test_whatever_is_seen_predictions_are_finite_and_bounded(
 ) -> None:
     prediction = TargetPrediction("periodic", 0.12, 0.3)
     for k, (y, v) in enumerate(seen):
-        prediction.see(at(y, v, k * gap_s), EYE, 1.2)
+        prediction.record_target(at(y, v, k * gap_s), EYE, 1.2)
         for age_s in (0.0, 0.05, 0.3, 5.0):
             moved = prediction.displacement(k * gap_s + age_s)
             assert np.isfinite([*moved, *prediction.motion(k * gap_s + age_s)[1]]).all()
@@ -211,7 +211,9 @@ def test_cos_and_sin_of_an_ellipse_are_both_predicted() -> None:
     for k in range(90):
         t = k * FRAME_S
         v = (0.0, -0.1 * w * sin(w * t), 0.06 * w * cos(w * t))
-        prediction.see(at(0.0, 0.0, t)._replace(p_world_m=place(t), v_world_m_s=v), EYE, FAST)
+        prediction.record_target(
+            at(0.0, 0.0, t)._replace(p_world_m=place(t), v_world_m_s=v), EYE, FAST
+        )
     moved = prediction.displacement(t + AGE_S)
     assert norm(sub(moved, sub(place(t + AGE_S), place(t)))) < 0.003
 
@@ -227,6 +229,6 @@ def test_motion_at_one_speed_is_no_sine_and_never_outrun(hz: float) -> None:
     speed = 4.0 * hz * 0.1
     for k in range(round(6.0 / FRAME_S)):
         t = k * FRAME_S
-        prediction.see(target(path, t), EYE, FAST)
+        prediction.record_target(target(path, t), EYE, FAST)
         assert prediction.sine is None
         assert norm(prediction.motion(t + AGE_S)[1]) <= 1.001 * speed

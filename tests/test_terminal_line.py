@@ -39,7 +39,7 @@ class Bench:
         self.serve()
 
     def serve(self):
-        ready, _, _ = select.select(self.line.watched(), (), (), 0.0)
+        ready, _, _ = select.select(self.line.watched_files(), (), (), 0.0)
         self.line.serve(ready, self.now_s)
 
     def heard(self):

@@ -43,7 +43,7 @@ class FaultSuite:
         return machine
 
     def test_whatever_befalls_a_bus_ends_well(self, machine, case):
-        outcome = machine.strike(*pair_of(machine.rig, machine.rig.bus.kind), case, STRUCK_S)
+        outcome = machine.apply_fault(*pair_of(machine.rig, machine.rig.bus.kind), case, STRUCK_S)
         assert outcome.survived, outcome
         assert (outcome.end == "left, named") == (case.name in self.left), outcome
         # A write to an adapter that accepts no bytes times out after 0.25 s.
@@ -64,5 +64,5 @@ class FaultSuite:
                 tuple(text for case in three for text in case.ends),
                 own_speed=True,
             )
-            outcome = machine.strike(*pair_of(machine.rig, machine.rig.bus.kind), both)
+            outcome = machine.apply_fault(*pair_of(machine.rig, machine.rig.bus.kind), both)
             assert outcome.survived, (both.name, outcome)

@@ -287,7 +287,7 @@ class ManualControl:
 
         def on_the_way(_: JointState, t_s: float, __: float) -> JointAngles:
             share = min(1.0, (t_s - start_s) / takes_s)
-            return tuple(way.at(share)[0] for way in ways)
+            return tuple(way.state_at(share)[0] for way in ways)
 
         def there(step: Step) -> str | None:
             if step.t_s - start_s < takes_s:

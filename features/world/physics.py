@@ -17,7 +17,7 @@ from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.integration import whole_ms
-from gazerig.sim_mock.smart_servo.motor import Shaft, own_shaft
+from gazerig.sim_mock.smart_servo.motor import Shaft, create_shaft
 from gazerig.sim_mock.smart_servo.physics import MS_S, Motor, Physics
 
 DEVICE_MS = 5
@@ -116,7 +116,7 @@ class World:
         def shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
             at = axis(servo_id)
             if at is None:
-                return own_shaft(servo_id, model, physics, position_steps)
+                return create_shaft(servo_id, model, physics, position_steps)
             made = WorldShaft(model, physics, at)
             self._shafts.append(made)
             return made

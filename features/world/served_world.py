@@ -17,9 +17,9 @@ from gazerig.sim_mock.faults.grammar import (
     Argument,
     CommandTable,
     Verb,
-    anything,
-    number,
-    one_of,
+    any_word,
+    number_parser,
+    word_choice,
 )
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.smart_servo.integration import whole_ms
@@ -57,10 +57,10 @@ COMMANDS = CommandTable(
         "push": Verb(
             _push,
             (
-                Argument("BODY", anything),
-                Argument("N", number(0.0, MOST_N, "newtons")),
-                Argument("|".join(DIRECTIONS), one_of(*DIRECTIONS)),
-                Argument("SECONDS", number(0.001, 60.0, "seconds"), optional=True),
+                Argument("BODY", any_word),
+                Argument("N", number_parser(0.0, MOST_N, "newtons")),
+                Argument("|".join(DIRECTIONS), word_choice(*DIRECTIONS)),
+                Argument("SECONDS", number_parser(0.001, 60.0, "seconds"), optional=True),
             ),
             "push a part of the head, such as head, at its origin; the servos give way",
         ),

@@ -228,13 +228,13 @@ class WorldShaft(Shaft):
         profile, rv = self.profile, self._rv
         before = r = profile.r
         if profile.running:
-            r = profile.ahead(1)[0]
+            r = profile.advance(1)[0]
         if rv or r != before:
             rv += (r - before - rv) * SMOOTHING
             if -SLOWEST < rv < SLOWEST:
                 rv = 0.0
         c = kp * self._error(r) + self._integral + bias
-        if rv and not profile.jumps:
+        if rv and not profile.is_jump:
             c += (kd + f1) * rv
         if f2:
             c += f2 * (rv - self._rv)

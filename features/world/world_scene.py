@@ -77,13 +77,13 @@ class WorldScene:
         """Return a place, at the height of what is looked at there."""
         return place_m(self.figures.script, name)
 
-    def out_back_s(self, one: TimedAct) -> tuple[float, float]:
+    def reach_times_s(self, one: TimedAct) -> tuple[float, float]:
         """Return how long a hand takes to its target, and back."""
         lasts_s = one.end_s - one.start_s
         out, back = OUT_S[one.act.do]
         return out * lasts_s, back * lasts_s
 
-    def before_head(self, p_m: Vec3) -> bool:
+    def is_before_head(self, p_m: Vec3) -> bool:
         """Return whether a point is in the field of view of a camera that points ahead."""
         x, y, z = np.subtract(p_m, HEAD_M).tolist()
         return bool(x > 0.0 and abs(atan2(y, x)) < HALF_FIELD_RAD and z > -0.35 * x)

@@ -22,8 +22,8 @@ from gazerig.gaze.attention.opponent import (
     HitTarget,
     OpponentHands,
     approaches,
+    hit_places,
     nearest_face,
-    places,
 )
 from gazerig.gaze.types import Face, Percept, Vec3, body_name
 from gazerig.params import Bounds
@@ -127,9 +127,11 @@ class ActionPlanner:
         if face is not None:
             memory_s = par.hand_memory_ms / 1e3
             hands = self._hands.step(percept.bodies, face.p_world_m, memory_s, t_s)
-            found = places(face, hands, p_eye) if len(hands) >= HANDS or asked is not None else []
+            found = (
+                hit_places(face, hands, p_eye) if len(hands) >= HANDS or asked is not None else []
+            )
         if asked is not None:
-            self.plan = self._as_asked(asked, percept, face, found, p_eye)
+            self.plan = self._user_plan(asked, percept, face, found, p_eye)
             self._since_s = t_s
         elif threat is not None:
             self.plan = self._guard(threat, t_s)
@@ -141,7 +143,7 @@ class ActionPlanner:
             self.plan = self._attack(face, found, t_s)
         return self.plan
 
-    def _as_asked(
+    def _user_plan(
         self,
         asked: Action,
         percept: Percept,

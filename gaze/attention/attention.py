@@ -101,24 +101,24 @@ class Attention:
         fresh = percept is not None and t_s - percept.captured_s <= stale_s
         new = percept is not None and percept.captured_s != self._seen_s
         target = self._target
-        if fresh and not new and target is not None and not self._reaction.waits:
+        if fresh and not new and target is not None and not self._reaction.is_waiting:
             return target  # as decided for the frame
         if percept is not None and fresh and new:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
         if fresh:
-            self._target = self._reaction.take(t_s) or self._target
+            self._target = self._reaction.take_due(t_s) or self._target
         else:
             self._target = None
             self._reaction.drop()
         if self._target is None:
-            return self._settle(self._idle.step(t_s, not fresh), t_s)
+            return self._count_shift(self._idle.step(t_s, not fresh), t_s)
         if self._target.id >= 0:
             self._idle.remember(self._target)
-        self._target = self._settle(self._target, t_s)
+        self._target = self._count_shift(self._target, t_s)
         return self._target
 
-    def _settle(self, target: Target, t_s: float) -> Target:
+    def _count_shift(self, target: Target, t_s: float) -> Target:
         """Count a gaze shift whenever the object changes."""
         place, self._place = self._place, target.p_world_m
         identity = (target.kind, target.id)
@@ -126,7 +126,7 @@ class Attention:
             return target
         if identity != self._identity:
             if self._identity is not None:
-                self._habituation.leave(place, t_s)
+                self._habituation.record_left(place, t_s)
                 self._reaction.record_left(*self._identity, t_s)
             self._identity = identity
             self._shift += 1
@@ -154,43 +154,45 @@ class Attention:
         if self.top_down.plans:
             self.top_down.plan(percept, state.p_world_head_m, t_s)
         trait = self.top_down.rule.person
-        self.top_down.named_ids = self._persons.named(trait) if trait is not None else _NO_ONE
+        self.top_down.named_ids = (
+            self._persons.ids_with_trait(trait) if trait is not None else _NO_ONE
+        )
         ratio = self._params.looks_elsewhere_ratio
         elsewhere = [
             face.id for face in percept.faces if face.looks_at_head is False and not face.speaks
         ]
         worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
         made = self._compare(bodies, worth, state, t_s)
-        self._note_gestures(made)
+        self._record_gestures(made)
         if self._shows_nothing_salient(made):
             self._reaction.drop()
             seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
             places = [vec(made.bodies.p_world_m[row]) for row in seen]
-            self._idle.see([made.bodies.ids[row] for row in seen], places, t_s)
+            self._idle.record_seen([made.bodies.ids[row] for row in seen], places, t_s)
             return None
         changed = self._behaviour != self.top_down.behaviour
         if changed:
             self._behaviour, self._changed_s = self.top_down.behaviour, t_s
-        present = self._present_row(made)
+        present = self._target_row(made)
         row = made.best
         if present is not None:
             favoured = made.total[present] * self._params.hysteresis_ratio
             row = present if made.total[row] < favoured else row
         named = made.rule_target is not None and row in made.rule_target.rows
         if named:
-            self._stay_with(made.bodies.ids[row])
+            self._draw_stay(made.bodies.ids[row])
         winner = made.target(row, percept.captured_s)
         # A change of mind waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
             self._reaction.drop()
             return winner
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
-        self._reaction.wait(winner, dwelt_s)
+        self._reaction.start_waiting(winner, dwelt_s)
         if present is not None:
             return made.target(present, percept.captured_s)
         return self._target and self._target._replace(plan=made.plan)
 
-    def _stay_with(self, id: int) -> None:
+    def _draw_stay(self, id: int) -> None:
         """Draw the additional time of a look at another one of several people."""
         if id == self._stay.id:
             return
@@ -216,7 +218,7 @@ class Attention:
         worth: additional factor 0..1 of each body's salience
         """
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
-        seen = self._field_of_view.visible(bodies, rows, state)
+        seen = self._field_of_view.are_visible(bodies, rows, state)
         v_eye = self._eye_velocity(eye, t_s)
         motion = self._bottom_up.step(
             rows, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
@@ -234,7 +236,7 @@ class Attention:
                 rule[row] = rule_target.salience
                 amount[row] = max(amount[row], rule_target.salience)
             if not point:
-                shares = self._shares(rule_target, bodies.ids, worth, attended, t_s)
+                shares = self._rule_shares(rule_target, bodies.ids, worth, attended, t_s)
                 for row, one in zip(wanted, shares, strict=True):
                     habituation[row] = one
         total = [
@@ -254,7 +256,8 @@ class Attention:
         persons, ratio = self._persons, self._params.habituation.rhythm_ratio
         sunk = self._params.sinking_ratio
         return [
-            (sunk if id in persons.sinking else 1.0) * ratio ** persons.repeats(id) for id in ids
+            (sunk if id in persons.sinking else 1.0) * ratio ** persons.repetitions(id)
+            for id in ids
         ]
 
     def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
@@ -267,7 +270,7 @@ class Attention:
             worth.append(ratio if id in parts else 1.0)
         return most, worth
 
-    def _note_gestures(self, made: TargetComparison) -> None:
+    def _record_gestures(self, made: TargetComparison) -> None:
         """Record the motion of each person's own body, which counts in the next decision."""
         ratio, self._gestures = self._params.own_motion_ratio, {}
         if ratio == 0.0 or ratio == 1.0:
@@ -279,7 +282,7 @@ class Attention:
                 moved = (motion.total - motion.onset) * (1.0 / ratio - 1.0)
                 self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
 
-    def _shares(
+    def _rule_shares(
         self,
         rule_target: RuleTarget,
         ids: tuple[int, ...],
@@ -326,7 +329,7 @@ class Attention:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
-    def _present_row(self, made: TargetComparison) -> int | None:
+    def _target_row(self, made: TargetComparison) -> int | None:
         """Return the row of the present target, None if it is gone."""
         if self._identity is not None and self._identity[1] == NO_BODY:
             there = made.total[-1] > -inf and made.point_kind == self._identity[0]

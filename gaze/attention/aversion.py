@@ -207,7 +207,7 @@ class Aversion:
             self._return()
             self._until_s = t_s + self._mutual_s()
             return
-        self._away = self._place(_centre(target), p_world_head_m)
+        self._away = self._draw_place(_centre_of_target(target), p_world_head_m)
         self._shifts += 1
         self._away_shift = target.shift + self._shifts
         _, _, mean_s, sd_s = self._times[self._mode]
@@ -229,17 +229,17 @@ class Aversion:
             part=None,
             shift=self._away_shift,
             why=f"looking away from face {target.id} ({_MODE_TEXT.get(self._mode, self._mode)})",
-            centre_world_m=_centre(target),
+            centre_world_m=_centre_of_target(target),
         )
 
-    def _place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
+    def _draw_place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
         """Draw a point next to the face, at the distance of the face."""
         rel = sub(face, p_world_head_m)
         ahead = unit(rel)
         right = unit(cross(ahead, (0.0, 0.0, 1.0)))
         up = cross(right, ahead)
-        way = radians(self._way_deg())
-        angle = radians(self._angle_deg(_edge_deg(way, norm(rel))))
+        way = radians(self._draw_direction_deg())
+        angle = radians(self._angle_deg(_face_extent_deg(way, norm(rel))))
         aside = add(scale(right, cos(way)), scale(up, sin(way)))
         looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
         return add(p_world_head_m, scale(looking, norm(rel)))
@@ -255,15 +255,15 @@ class Aversion:
         p = (1.0 - float(self._rng.random())) * p_most
         return min(most, -_SCALE_DEG * log(p / _P_TOP))
 
-    def _way_deg(self) -> float:
+    def _draw_direction_deg(self) -> float:
         """Draw the direction, 0 right and 90 up: a sector of the table, uniform within it."""
         if self._mode == "think" and self._rng.random() < self._params.think_up_share:
             sector = _UP
         else:
-            sector = self._sector()
+            sector = self._draw_sector()
         return 45.0 * sector + float(self._rng.uniform(-22.5, 22.5))
 
-    def _sector(self) -> int:
+    def _draw_sector(self) -> int:
         draw = float(self._rng.random()) * sum(DIRECTIONS_PERCENT)
         for sector, share in enumerate(DIRECTIONS_PERCENT):
             draw -= share
@@ -285,11 +285,11 @@ class Aversion:
         return max(drawn, self._params.min_dwell_s)
 
 
-def _edge_deg(way_rad: float, distance_m: float) -> float:
+def _face_extent_deg(way_rad: float, distance_m: float) -> float:
     """Return the extent of a face from its centre, degrees, in a direction (0 right, pi/2 up)."""
     across, up = cos(way_rad) / _HALF_WIDE_M, sin(way_rad) / _HALF_HIGH_M
     return degrees(atan2(1.0 / hypot(across, up), distance_m))
 
 
-def _centre(target: Target) -> Vec3:
+def _centre_of_target(target: Target) -> Vec3:
     return target.p_world_m if target.centre_world_m is None else target.centre_world_m

@@ -196,7 +196,7 @@ class BottomUp:
         par, states = self._params, self._states
         if par.form == "none":
             return [_UNSEEN] * len(rows.ids)
-        self._pause(t_s)
+        self._shift_times(t_s)
         fresh = self._onset_share(t_s)
         tau = par.smoothing_s
         gain = 1.0 - (exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0)
@@ -257,7 +257,7 @@ class BottomUp:
         recovery_s = self._params.onset_recovery_s
         return -expm1((self._onset_s - t_s) / recovery_s) if recovery_s > 0.0 else 1.0
 
-    def _pause(self, t_s: float) -> None:
+    def _shift_times(self, t_s: float) -> None:
         """Shift all times after a long pause without steps, so that no body counts as gone."""
         paused_s = t_s - self._at_s
         if self._started_s < inf and paused_s <= _BLINK_S:

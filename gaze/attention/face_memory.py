@@ -18,7 +18,7 @@ _FOUND_WITHIN_S = 0.7
 
 
 @dataclass(slots=True)
-class _Remembered:
+class _RememberedFace:
     """A face: last position and time, and start of the look for it."""
 
     p_world_m: Vec3
@@ -35,7 +35,7 @@ class FaceMemory:
 
     def reset(self) -> None:
         """Forget all faces."""
-        self._faces: dict[int, _Remembered] = {}
+        self._faces: dict[int, _RememberedFace] = {}
         self._captured_s = -inf
 
     def step(self, bodies: Bodies, attended_id: int, captured_s: float, lasts_s: float) -> Bodies:
@@ -73,7 +73,7 @@ class FaceMemory:
             if kind == "face":
                 x, y, z = bodies.p_world_m[row].tolist()
                 radius_m = float(bodies.radius_m[row])
-                self._faces[bodies.ids[row]] = _Remembered((x, y, z), radius_m, captured_s)
+                self._faces[bodies.ids[row]] = _RememberedFace((x, y, z), radius_m, captured_s)
 
     def _join(self, bodies: Bodies, seen: frozenset[int]) -> Bodies:
         """Return the bodies and the remembered faces that are not visible."""

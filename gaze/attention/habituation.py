@@ -20,7 +20,7 @@ from gazerig.gaze.attention.shared_attention import SharedAttention
 from gazerig.gaze.types import BodyRows, Vec3
 
 
-class _Left(NamedTuple):
+class _LeftPoint(NamedTuple):
     """A point that the gaze has left, and when."""
 
     p_world_m: Vec3
@@ -56,14 +56,14 @@ class Habituation:
         # Only factors below 1 are kept: of those attended in the last 1/recovery_rate_1_s
         # seconds, a handful however many bodies there are.
         self._habituation: dict[int, float] = {}
-        self._left: list[_Left] = []
+        self._left: list[_LeftPoint] = []
         self._shared.reset(t_s)
         self._at_s = t_s
 
-    def leave(self, p_world_m: Vec3, t_s: float) -> None:
+    def record_left(self, p_world_m: Vec3, t_s: float) -> None:
         """Record a point that the gaze has left."""
         if self._params.inhibition_of_return_strength > 0.0:
-            self._left.append(_Left(p_world_m, t_s))
+            self._left.append(_LeftPoint(p_world_m, t_s))
 
     def step(
         self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float

@@ -90,10 +90,10 @@ class Idle:
 
     def __init__(self, params: IdleParams, rng: np.random.Generator | None = None) -> None:
         self._rng = rng
-        self._take(params)
+        self._set_params(params)
         self.reset(0.0)
 
-    def _take(self, params: IdleParams) -> None:
+    def _set_params(self, params: IdleParams) -> None:
         self._params = params
         self._eye: Vec3 = (0.0, 0.0, params.rest_height_m)
         self._rest: Vec3 = (params.rest_distance_m, 0.0, params.rest_height_m)
@@ -103,7 +103,7 @@ class Idle:
         self._t_s = t_s
         self._last: Target | None = None
         self._lost = False
-        self._now = self._resting(t_s)
+        self._now = self._rest_target(t_s)
         self._until_s = self._search_until_s = t_s
         self._count = 0
         self._gone: Target | None = None
@@ -113,10 +113,10 @@ class Idle:
     def retune(self, params: IdleParams) -> None:
         """Change durations and ranges; the present phase continues, its duration scaled."""
         before = self._params
-        self._take(params)
+        self._set_params(params)
         since_s, left_s = self._now.at_s, self._until_s - self._now.at_s
         if self._now.kind == "rest":
-            self._now = self._resting(since_s)
+            self._now = self._rest_target(since_s)
             left_s *= params.rest_ms / before.rest_ms
         elif self._now.kind == "glance":
             left_s *= params.glance_ms / before.glance_ms
@@ -125,7 +125,7 @@ class Idle:
             left_s += (params.hold_ms - before.hold_ms) / 1e3
             self._search_until_s = since_s + left_s + params.search_ms / 1e3
         if params.explores != before.explores and self._now.kind in ("rest", "glance"):
-            self._rest_now(self._t_s)
+            self._start_rest(self._t_s)
             left_s = self._until_s - since_s
         if self._lost:  # else the phase before this target has expired
             self._until_s = max(since_s + left_s, self._t_s)
@@ -134,19 +134,19 @@ class Idle:
         """Record a target that is in sight."""
         self._last, self._lost = target, False
         if target.id >= 0:
-            self._keep(target.id, target.p_world_m, target.at_s)
+            self._remember_place(target.id, target.p_world_m, target.at_s)
 
-    def see(self, ids: Sequence[int], p_world_m: Sequence[Vec3], t_s: float) -> None:
+    def record_seen(self, ids: Sequence[int], p_world_m: Sequence[Vec3], t_s: float) -> None:
         """Record the bodies in view, salient or not."""
         self._in_view = frozenset(ids)
         for id, place in zip(ids, p_world_m, strict=True):
-            self._keep(id, place, t_s)
+            self._remember_place(id, place, t_s)
 
     def forget_places(self) -> None:
         """Forget the bodies in view, as the scene has changed."""
         self._seen, self._in_view = {}, frozenset()
 
-    def _keep(self, id: int, place: Vec3, t_s: float) -> None:
+    def _remember_place(self, id: int, place: Vec3, t_s: float) -> None:
         self._seen.pop(id, None)
         self._seen[id] = place, t_s
         if len(self._seen) > _PLACES:
@@ -160,19 +160,19 @@ class Idle:
         """
         self._t_s = t_s
         if not self._lost:
-            self._lose(t_s, blind)
+            self._start_waiting(t_s, blind)
         while t_s >= self._until_s:
-            self._next(self._until_s)
+            self._start_next_phase(self._until_s)
         return self._now
 
-    def _lose(self, t_s: float, blind: bool) -> None:
+    def _start_waiting(self, t_s: float, blind: bool) -> None:
         """Start to wait for a lost target, at its last or extrapolated position."""
         self._lost = True
         gone, par = self._last, self._params
         self._gone, self._last = gone, None
         self._until_s = self._search_until_s = t_s
         if gone is None or gone.id in self._in_view:  # a still thing in view is not lost
-            self._rest_now(t_s)
+            self._start_rest(t_s)
             return
         coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3) if blind else 0.0
         there = self._reachable(add(gone.p_world_m, scale(gone.v_world_m_s, coast_s)))
@@ -187,10 +187,10 @@ class Idle:
         self._until_s = t_s + par.hold_ms / 1e3
         self._search_until_s = self._until_s + par.search_ms / 1e3
 
-    def _next(self, t_s: float) -> None:
+    def _start_next_phase(self, t_s: float) -> None:
         """Start the next phase at ``t_s``, when the duration of the last one is over."""
         if self._rng is None:
-            self._now, self._until_s = self._resting(t_s), float("inf")
+            self._now, self._until_s = self._rest_target(t_s), float("inf")
         elif self._gone is not None and t_s < self._search_until_s:
             self._search(self._gone, t_s, self._rng)
         elif self._is_far_aside():
@@ -200,12 +200,12 @@ class Idle:
         ):
             self._glance(t_s, self._rng)
         else:
-            self._rest_now(t_s)
+            self._start_rest(t_s)
 
-    def _rest_now(self, t_s: float) -> None:
+    def _start_rest(self, t_s: float) -> None:
         """Start a rest: look straight ahead."""
         self._gone = None
-        self._now = self._resting(t_s)
+        self._now = self._rest_target(t_s)
         self._until_s = float("inf")
         if self._rng is not None and self._params.explores:
             self._until_s = t_s + self._time_s(self._params.rest_ms, self._rng)
@@ -214,7 +214,7 @@ class Idle:
         """Start a search fixation: first a step in the direction of the loss, then around."""
         par, first = self._params, self._now.kind != "search"
         rel = sub(gone.p_world_m, self._eye)
-        out = self._heading(rel, gone.v_world_m_s)
+        out = self._heading_yaw_pitch(rel, gone.v_world_m_s)
         share = 1.0 if first else float(rng.uniform(-0.2, 1.2))
         # Heads keep about one height: the search for people goes sideways.
         spread = 0.0 if first and out != (0.0, 0.0) else radians(par.search_spread_deg)
@@ -259,7 +259,7 @@ class Idle:
         self._look("search", place, par.rest_distance_m, t_s, "looking back from the side")
         self._until_s = t_s + self._time_s(par.search_fixation_ms, rng)
 
-    def _heading(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
+    def _heading_yaw_pitch(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
         """Return the yaw and pitch from the loss towards its heading; 0 for a target at rest."""
         soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
         now = yaw_pitch(rel)
@@ -277,16 +277,16 @@ class Idle:
         par = self._params
         self._until_s = t_s + self._time_s(par.glance_ms, rng)
         here = yaw_pitch(sub(self._now.p_world_m, self._eye))
-        things = self._elsewhere(here, t_s) if rng.random() < par.thing_share else []
+        things = self._other_places(here, t_s) if rng.random() < par.thing_share else []
         if things:
             rel = sub(things[int(rng.integers(len(things)))], self._eye)
             self._look("glance", yaw_pitch(rel), norm(rel), t_s, "looking at things in view")
             self._until_s = t_s + _THING_HOLDS * (self._until_s - t_s)
             return
-        place = self._plausible(here, rng)
+        place = self._draw_glance_point(here, rng)
         self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")
 
-    def _elsewhere(self, here: Angles2, t_s: float) -> list[Vec3]:
+    def _other_places(self, here: Angles2, t_s: float) -> list[Vec3]:
         """Return the places of things within reach, except the present target."""
         par, way = self._params, direction(here)
         self._seen = {
@@ -302,12 +302,12 @@ class Idle:
             and angle_between(sub(place, self._eye), way) > least
         ]
 
-    def _plausible(self, here: Angles2, rng: np.random.Generator) -> Angles2:
+    def _draw_glance_point(self, here: Angles2, rng: np.random.Generator) -> Angles2:
         """Draw the next point, by the size of shifts and the preference for the middle."""
         par = self._params
         wide, high = max(par.glance_yaw_deg, 1e-3), max(par.glance_pitch_deg, 1e-3)
         yaw, pitch = degrees(here[0]), degrees(here[1])
-        far = _off_middle(yaw / wide, pitch / high)
+        far = _eccentricity_cost(yaw / wide, pitch / high)
         for _ in range(_TRIES):
             more = max(0.0, par.glance_step_deg - par.glance_least_deg)
             size = par.glance_least_deg + more * float(rng.standard_exponential())
@@ -316,7 +316,7 @@ class Idle:
             to_pitch = pitch + _UPRIGHT * size * sin(turn)
             if abs(to_yaw) > wide or abs(to_pitch) > high:
                 continue
-            odds = exp(min(0.0, far - _off_middle(to_yaw / wide, to_pitch / high)))
+            odds = exp(min(0.0, far - _eccentricity_cost(to_yaw / wide, to_pitch / high)))
             if rng.random() < odds and hypot(to_yaw - yaw, to_pitch - pitch) >= min(
                 par.glance_least_deg, wide
             ):
@@ -330,7 +330,7 @@ class Idle:
         salience, name = self._params.rest_salience, -1 - self._count
         self._now = Target(point, _STILL, t_s, kind, name, salience, True, None, 0, why)
 
-    def _resting(self, t_s: float) -> Target:
+    def _rest_target(self, t_s: float) -> Target:
         salience = self._params.rest_salience
         return Target(
             self._rest, _STILL, t_s, "rest", -1, salience, True, None, 0, "no one in sight"
@@ -343,6 +343,6 @@ class Idle:
         return max(drawn, _SHORTEST_S)
 
 
-def _off_middle(yaw_share: float, pitch_share: float) -> float:
+def _eccentricity_cost(yaw_share: float, pitch_share: float) -> float:
     """Return the negative logarithm of a point's share of looks, 0 in the middle."""
     return 2.0 * (yaw_share * yaw_share + pitch_share * pitch_share)

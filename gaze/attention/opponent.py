@@ -145,7 +145,7 @@ class OpponentHands:
         return self._known
 
 
-def places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTarget]:
+def hit_places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTarget]:
     """Return the places to hit, those with the most room around the line first."""
     known = dict(zip(PARTS, face.parts_world_m, strict=False))
     spots = {
@@ -154,14 +154,14 @@ def places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTarget
         "right side of the face": known.get("FR", face.p_world_m),
     }
     found = [
-        HitTarget(name, p, min((_off_line(add(face.p_world_m, hand.off_m), p_eye, p) for hand in hands),
+        HitTarget(name, p, min((_distance_from_line(add(face.p_world_m, hand.off_m), p_eye, p) for hand in hands),
                            default=inf))
         for name, p in spots.items()
     ]  # fmt: skip
     return sorted(found, key=lambda place: -place.clear_m)
 
 
-def _off_line(p: Vec3, start: Vec3, end: Vec3) -> float:
+def _distance_from_line(p: Vec3, start: Vec3, end: Vec3) -> float:
     """Return the distance of a point from the line between two others."""
     along, rel = sub(end, start), sub(p, start)
     share = min(1.0, max(0.0, dot(rel, along) / max(dot(along, along), 1e-9)))

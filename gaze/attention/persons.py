@@ -118,14 +118,14 @@ class Persons:
                     moving.add(low_of)
                     if -vz > max(_GESTURES_M_S, hypot(vx, vy)):
                         self._sank_s[id] = self._at_s
-        self.sinking = set(self._within(self._sank_s, _SANK_S))
+        self.sinking = set(self._ids_within(self._sank_s, _SANK_S))
         share = min(1.0, (self._at_s - before_s) / _GESTURES_S)
         for id in faces:
             now = self._gestures.get(id, 0.0)
             self._gestures[id] = now + share * ((id in moving) - now)
         self._drop_old()
 
-    def named(self, trait: str) -> frozenset[int]:
+    def ids_with_trait(self, trait: str) -> frozenset[int]:
         """Return the ids of the people with a trait.
 
         Args:
@@ -134,7 +134,7 @@ class Persons:
         if trait == LOOKING:
             return self._looking
         if trait == WAVING:
-            return self._within(self._waved_s, _WAVED_S)
+            return self._ids_within(self._waved_s, _WAVED_S)
         if trait == NEAREST:
             return frozenset((self._nearest,)) if self._nearest >= 0 else frozenset()
         latest_s = max(self._came_s.values(), default=-inf)
@@ -162,7 +162,7 @@ class Persons:
         # Sideways as seen from the eye: level, and across the direction to the hand.
         ahead, aside = place[0] - p_eye[0], place[1] - p_eye[1]
         away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
-        if self._turns(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
+        if self._has_turned(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
             owner = min(faces, key=lambda face: dist(faces[face], place))
             if _is_raised(place, faces[owner]) and dist(faces[owner], place) < _ARM_M:
                 self._waved_s[owner] = self._at_s
@@ -184,7 +184,9 @@ class Persons:
         if beside[owner] >= _ARM_M:
             return -1
         high = _is_raised(place, faces[owner])
-        gestures = self._gestures.get(owner, 0.0) > _GESTURES and owner not in self.named(WAVING)
+        gestures = self._gestures.get(owner, 0.0) > _GESTURES and owner not in self.ids_with_trait(
+            WAVING
+        )
         if high and not gestures:
             self.raised.add(id)
         elif away > _HELD_OUT * dist(faces[owner], p_eye):
@@ -192,7 +194,7 @@ class Persons:
             return -1 if high else owner
         return -1
 
-    def _turns(self, id: int, across_m_s: float) -> bool:
+    def _has_turned(self, id: int, across_m_s: float) -> bool:
         """Return whether a hand has just changed sides in a wave."""
         hand = self._hands.setdefault(id, _Hand())
         hand.seen_s = self._at_s
@@ -207,7 +209,7 @@ class Persons:
             hand.repeats += 1.0
         return len(hand.turned_s) >= _TURNS
 
-    def repeats(self, id: int) -> float:
+    def repetitions(self, id: int) -> float:
         """Return how often a hand has repeated its motion recently, 0 for a new motion.
 
         The first change of side soon after another is still new.
@@ -220,7 +222,7 @@ class Persons:
         for hand in self._hands.values():
             hand.repeats *= exp(-dt_s / recovery_s)
 
-    def _within(self, at_s: Mapping[int, float], lasts_s: float) -> frozenset[int]:
+    def _ids_within(self, at_s: Mapping[int, float], lasts_s: float) -> frozenset[int]:
         return frozenset(id for id, one_s in at_s.items() if self._at_s - one_s <= lasts_s)
 
     def _drop_old(self) -> None:

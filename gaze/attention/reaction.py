@@ -49,7 +49,7 @@ class Reaction:
             self._left_s = {k: at_s for k, at_s in self._left_s.items() if t_s - at_s < lasts_s}
             self._left_s[id] = t_s
 
-    def wait(self, target: Target, free_s: float) -> None:
+    def start_waiting(self, target: Target, free_s: float) -> None:
         """Start the reaction time of a winning target, which takes over that of a waiting one.
 
         free_s: earliest time of the change
@@ -64,11 +64,11 @@ class Reaction:
         self._next = None
 
     @property
-    def waits(self) -> bool:
+    def is_waiting(self) -> bool:
         """Return whether a target waits for its reaction time."""
         return self._next is not None
 
-    def take(self, t_s: float) -> Target | None:
+    def take_due(self, t_s: float) -> Target | None:
         """Return the target whose reaction time is over, once; None without one."""
         target = self._next
         if target is None or t_s < max(self._free_s, self._due_s(target)) - 1e-9:

@@ -61,6 +61,6 @@ class Animation:
         """Return the offset of the pose in this tick."""
         expressions, levels, gestures = self.expressions, self.levels, self.gestures
         if expressions.moves or levels.moves or gestures.moves:
-            face = expressions.step(t_s).plus(levels.step(t_s))
-            self._sum = face.plus(gestures.step(t_s))
+            face = expressions.step(t_s).combine(levels.step(t_s))
+            self._sum = face.combine(gestures.step(t_s))
         return self._sum

@@ -32,10 +32,10 @@ class Breathing:
     """Sway of the neck as a closed form of the time."""
 
     def __init__(self, params: BreathingParams) -> None:
-        self._take(params)
+        self._set_params(params)
         self.reset(0.0)
 
-    def _take(self, params: BreathingParams) -> None:
+    def _set_params(self, params: BreathingParams) -> None:
         self._pitch_rad = radians(params.pitch_deg)
         self._roll_rad = radians(params.roll_deg)
         self._rate_hz = params.rate_hz
@@ -48,7 +48,7 @@ class Breathing:
     def retune(self, params: BreathingParams) -> None:
         """Change amplitude and rate; the phase of the breath is continuous."""
         breaths = (self._t_s - self._start_s) * self._rate_hz
-        self._take(params)
+        self._set_params(params)
         self._start_s = self._t_s - breaths / self._rate_hz
         pitch, roll = self._sway(self._t_s)[1:]
         self._left = (0.0, self._shown[1] - pitch, self._shown[2] - roll)

@@ -24,7 +24,7 @@ class Expressions:
     def __init__(self, offsets: Mapping[str, PoseOffset], blend_s: float, joints: int) -> None:
         self._rest = NO_OFFSET._replace(joints_rad=(0.0,) * joints)
         self._offsets = self._with_neutral(offsets)
-        self._blend = MinimumJerkBlend(self._rest.flat(), blend_s)
+        self._blend = MinimumJerkBlend(self._rest.to_flat(), blend_s)
         self.reset()
 
     @property
@@ -72,12 +72,12 @@ class Expressions:
         flat = self._blend.step(t_s)
         if flat is not self._flat:
             self._flat, self._offset = flat, PoseOffset.from_flat(flat)
-        self.moves = not self._blend.rests
+        self.moves = not self._blend.is_at_rest
         return self._offset
 
     def _with_neutral(self, offsets: Mapping[str, PoseOffset]) -> dict[str, PoseOffset]:
         return {NEUTRAL: self._rest, **offsets}
 
     def _goal(self) -> tuple[float, ...]:
-        rest, full = self._rest.flat(), self._offsets[self.name].flat()
+        rest, full = self._rest.to_flat(), self._offsets[self.name].to_flat()
         return tuple([r + self.strength * (f - r) for r, f in zip(rest, full, strict=True)])

@@ -134,12 +134,12 @@ class TrackKeys(NamedTuple):
     values: tuple[float, ...]
 
 
-def rest_of(track: str) -> float:
+def rest_value(track: str) -> float:
     """Return the neutral value of a track."""
     return 1.0 if track in LID_TRACKS else 0.0
 
 
-def faults_of(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
+def frame_faults(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
     """Return the faults between frames: index of the frame, and the rule."""
     return [
         (i + 1, f"must be later than the frame before, which is at {one.time_s:g} s")
@@ -164,7 +164,7 @@ def loop_fault(gesture: Gesture) -> str:
     return ""
 
 
-def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[str, TrackKeys]:
+def track_keys(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[str, TrackKeys]:
     """Return the keys of every track with its loop repeated, ending at rest.
 
     Args:
@@ -173,13 +173,13 @@ def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[
         count: number of repetitions.
     """
     tracks: dict[str, list[tuple[float, float]]] = {}
-    for time_s, values in _repeat(frames, gesture.loop_s, count):
+    for time_s, values in _repeat_loop(frames, gesture.loop_s, count):
         for name, value in values.items():
             tracks.setdefault(name, []).append((time_s, value))
-    return {name: _end(name, keys, gesture.return_s) for name, keys in tracks.items()}
+    return {name: _end_at_rest(name, keys, gesture.return_s) for name, keys in tracks.items()}
 
 
-def _repeat(
+def _repeat_loop(
     frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
 ) -> list[tuple[float, dict[str, float]]]:
     """Return the times and the values of all frames, with those of the loop repeated."""
@@ -193,8 +193,8 @@ def _repeat(
     return [*before, *rounds, *((later_s + t_s, values) for t_s, values in keys if t_s > end_s)]
 
 
-def _end(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:
-    rest = rest_of(name)
+def _end_at_rest(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:
+    rest = rest_value(name)
     if keys[-1][1] != rest:
         keys = [*keys, (keys[-1][0] + return_s, rest)]
     times, values = zip(*keys, strict=True)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture.gesture import EYE_TRACKS, POSE_TRACKS, TrackKeys, rest_of
+from gazerig.gaze.gesture.gesture import EYE_TRACKS, POSE_TRACKS, TrackKeys, rest_value
 from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 
@@ -25,7 +25,7 @@ class MotionSamples(NamedTuple):
     speed: Floats
     acceleration: Floats
 
-    def scaled(self, size: Floats, rate: float) -> "MotionSamples":
+    def scale(self, size: Floats, rate: float) -> "MotionSamples":
         """Return the samples of the same motion, scaled in size and speed.
 
         Args:
@@ -56,28 +56,28 @@ class GestureMotion:
         self, tracks: Mapping[str, TrackKeys], joints: tuple[str, ...], eyes_follow_head: bool
     ) -> None:
         channels = (*POSE_TRACKS, *joints)
-        self._rests = [rest_of(name) for name in channels]
+        self._rests = [rest_value(name) for name in channels]
         self.rest = np.array(self._rests)
         self._follow = eyes_follow_head
         self._curves = [
-            (channels.index(name), MinimumJerkCurve(rest_of(name), keys.times_s, keys.values))
+            (channels.index(name), MinimumJerkCurve(rest_value(name), keys.times_s, keys.values))
             for name, keys in tracks.items()
         ]
         self._keys_s = [np.array(keys.times_s) for keys in tracks.values()]
         self.duration_s = max(curve.duration_s for _, curve in self._curves)
-        self.samples = self._sample()
+        self.samples = self._sample_evenly()
 
-    def _sample(self) -> MotionSamples:
+    def _sample_evenly(self) -> MotionSamples:
         count = min(_MOST_SAMPLES, int(self.duration_s / _SAMPLE_S) + 2)
         even = np.linspace(0.0, self.duration_s, count)
         # The extremes are keys, which evenly spaced samples may miss.
-        return self.sampled(np.unique(np.concatenate((even, *self._keys_s))))
+        return self.sample_at(np.unique(np.concatenate((even, *self._keys_s))))
 
-    def sampled(self, times_s: Floats) -> MotionSamples:
+    def sample_at(self, times_s: Floats) -> MotionSamples:
         """Return the motion at (n,) times since its start."""
         columns = [np.zeros((len(times_s), len(self.rest))) for _ in range(3)]
         for i, curve in self._curves:
-            for column, found in zip(columns, curve.sampled(times_s), strict=True):
+            for column, found in zip(columns, curve.sample_at(times_s), strict=True):
                 column[:, i] = found
         for i, _ in self._curves:
             columns[0][:, i] -= self.rest[i]
@@ -109,7 +109,7 @@ class GestureMotion:
         """
         first, rest = _FIRST_EYE, self._rests
         for i, curve in self._curves:
-            moved = sizes[i] * (curve.at(t_s) - rest[i])
+            moved = sizes[i] * (curve.value_at(t_s) - rest[i])
             flat[i] += moved
             if self._follow and i < 2:
                 flat[first + i] += moved

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture.gesture import POSE_TRACKS, rest_of
+from gazerig.gaze.gesture.gesture import POSE_TRACKS, rest_value
 from gazerig.gaze.gesture.gesture_motion import GestureMotion
 from gazerig.gaze.gesture.pose_offset import PoseOffset
 from gazerig.gaze.minimum_jerk import Quintic
@@ -51,7 +51,7 @@ class GesturePlayer:
     """
 
     def __init__(self, joints: int) -> None:
-        self._rest_flat = (*map(rest_of, POSE_TRACKS), *(0.0,) * joints)
+        self._rest_flat = (*map(rest_value, POSE_TRACKS), *(0.0,) * joints)
         self._rest = PoseOffset.from_flat(self._rest_flat)
         self.reset()
 
@@ -91,7 +91,7 @@ class GesturePlayer:
         """Return the offset at a time, with its speed and acceleration."""
         total = [np.zeros(len(self._rest_flat)) for _ in range(3)]
         for i, fade in self._fades:
-            for column, number in zip(total, fade.at(t_s - self._fades_from_s), strict=True):
+            for column, number in zip(total, fade.state_at(t_s - self._fades_from_s), strict=True):
                 column[i] += number
         if self._played is not None:
             _, motion, speed, sizes = self._played

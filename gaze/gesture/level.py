@@ -32,9 +32,9 @@ class LevelRange(NamedTuple):
     high: PoseOffset
     smoothing_s: float
 
-    def at(self, value: float) -> tuple[float, ...]:
+    def offset_at(self, value: float) -> tuple[float, ...]:
         """Return the offset of a value, flat."""
-        low, high = self.low.flat(), self.high.flat()
+        low, high = self.low.to_flat(), self.high.to_flat()
         return tuple([a + value * (b - a) for a, b in zip(low, high, strict=True)])
 
 
@@ -50,11 +50,11 @@ class _Level:
 
     def set(self, value: float, until_s: float) -> None:
         self.value, self.until_s = value, until_s
-        self.blend.move_to(self.span.at(value))
+        self.blend.move_to(self.span.offset_at(value))
 
     def retune(self, span: LevelRange) -> None:
         self.span, self.blend.duration_s = span, span.smoothing_s
-        self.blend.move_to(span.at(self.value))
+        self.blend.move_to(span.offset_at(self.value))
 
 
 class Levels:
@@ -80,7 +80,9 @@ class Levels:
 
     def reset(self) -> None:
         """Set all levels to 0 immediately."""
-        self._levels = {name: _Level(span, span.at(0.0)) for name, span in self._ranges.items()}
+        self._levels = {
+            name: _Level(span, span.offset_at(0.0)) for name, span in self._ranges.items()
+        }
         self._gone: list[_Level] = []
         self._flats: tuple[tuple[float, ...], ...] = ()
         self._offset = self._rest
@@ -96,7 +98,7 @@ class Levels:
             self._gone.append(level)
         for name, span in ranges.items():
             if name not in self._levels:
-                self._levels[name] = _Level(span, self._rest.flat())
+                self._levels[name] = _Level(span, self._rest.to_flat())
             elif span != self._levels[name].span:
                 self._levels[name].retune(span)
         self._ranges = dict(ranges)
@@ -119,7 +121,7 @@ class Levels:
             there = ", ".join(self._levels) or "none: add a table levels to the rig"
             raise ValueError(f"no level {name!r}; there is {there}")
 
-    def lapsed(self, t_s: float) -> tuple[str, ...]:
+    def drop_lapsed(self, t_s: float) -> tuple[str, ...]:
         """Drop levels to 0 that were not set for ``HOLD_S``; return those that were above."""
         fallen = []
         for name, level in self._levels.items():
@@ -136,13 +138,13 @@ class Levels:
         if not self.moves:
             return self._offset
         if self._gone:
-            self._gone = [one for one in self._gone if one.blend.step(t_s) != self._rest.flat()]
+            self._gone = [one for one in self._gone if one.blend.step(t_s) != self._rest.to_flat()]
         levels = (*self._levels.values(), *self._gone)
         flats = tuple([level.blend.step(t_s) for level in levels])
         if flats != self._flats:
             offset = self._rest
             for flat in flats:
-                offset = offset.plus(PoseOffset.from_flat(flat))
+                offset = offset.combine(PoseOffset.from_flat(flat))
             self._flats, self._offset = flats, offset
-        self.moves = not all([level.blend.rests for level in levels])
+        self.moves = not all([level.blend.is_at_rest for level in levels])
         return self._offset

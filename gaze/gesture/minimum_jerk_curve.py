@@ -36,13 +36,13 @@ class MinimumJerkCurve:
             raise ValueError("the times of the keys must increase from 0, one for each value")
         position = np.array([start, *values])
         speed, acceleration = _states(position, span)
-        self._table = _coefficients(span, *_ends(position, speed, acceleration))
+        self._table = _coefficients(span, *_segment_ends(position, speed, acceleration))
         self._rows = [tuple(row) for row in self._table.tolist()]
         self._knots = knots
         self._starts: list[float] = knots[:-1].tolist()
         self.duration_s, self._last = float(knots[-1]), float(position[-1])
 
-    def at(self, t_s: float) -> float:
+    def value_at(self, t_s: float) -> float:
         """Return the value at a time since the start."""
         if t_s >= self.duration_s:
             return self._last
@@ -64,7 +64,7 @@ class MinimumJerkCurve:
             2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
         )
 
-    def sampled(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
+    def sample_at(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (n,) values, speeds and accelerations at (n,) times."""
         times = np.clip(times_s, 0.0, None)
         i = np.minimum(
@@ -105,7 +105,7 @@ def _states_between(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     speeds before and after each key, which prevents it.
     """
     speed, acceleration = _least_jerk(position, span)
-    table = _coefficients(span, *_ends(position, speed, acceleration))
+    table = _coefficients(span, *_segment_ends(position, speed, acceleration))
     s = np.linspace(0.0, 1.0, 33)[:, None] * span
     c1, c2, c3, c4, c5 = table.T[1:]
     rates = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
@@ -126,7 +126,7 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     def gaps(unknown: Floats) -> Floats:
         """Return the jumps of jerk and snap at the inner keys; linear in the unknowns."""
         speed[inner], acceleration[inner] = unknown[:count], unknown[count:]
-        _, _, _, c3, c4, c5 = _coefficients(span, *_ends(position, speed, acceleration)).T
+        _, _, _, c3, c4, c5 = _coefficients(span, *_segment_ends(position, speed, acceleration)).T
         jerk = 6.0 * c3 + span * (24.0 * c4 + span * 60.0 * c5)
         snap = 24.0 * c4 + span * 120.0 * c5
         return np.concatenate((jerk[:-1] - 6.0 * c3[1:], snap[:-1] - 24.0 * c4[1:]))
@@ -185,7 +185,7 @@ def _solve(before: Floats, own: Floats, behind: Floats, right: Floats) -> Floats
     return solution
 
 
-def _ends(position: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, ...]:
+def _segment_ends(position: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, ...]:
     """Return the states before and after every segment, as ``_coefficients`` takes them."""
     before = position[:-1], speed[:-1], acceleration[:-1]
     return *before, position[1:], speed[1:], acceleration[1:]

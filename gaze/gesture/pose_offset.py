@@ -19,18 +19,18 @@ class PoseOffset(NamedTuple):
     lids: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     joints_rad: tuple[float, ...] = ()
 
-    def plus(self, other: "PoseOffset") -> "PoseOffset":
+    def combine(self, other: "PoseOffset") -> "PoseOffset":
         """Return both combined: angles are added, factors of the lids multiplied."""
         if not any(self.joints_rad) and self[:3] == NO_OFFSET[:3]:
             return other
         if not any(other.joints_rad) and other[:3] == NO_OFFSET[:3]:
             return self
-        a, b = self.flat(), other.flat()
+        a, b = self.to_flat(), other.to_flat()
         lids = [x * y for x, y in zip(a[5:9], b[5:9], strict=True)]
         angles = [x + y for x, y in zip(a, b, strict=True)]
         return PoseOffset.from_flat((*angles[:5], *lids, *angles[9:]))
 
-    def flat(self) -> tuple[float, ...]:
+    def to_flat(self) -> tuple[float, ...]:
         """Return all values as one sequence: head, eyes, lids, joints."""
         return (*self.head_rad, *self.eyes_rad, *self.lids, *self.joints_rad)
 

@@ -59,10 +59,10 @@ class Sway:
     def __init__(self, params: SwayParams, rng: np.random.Generator | None = None) -> None:
         self._rng = rng
         self._t_s = 0.0
-        self._take(params)
+        self._set_params(params)
         self.reset(0.0)
 
-    def _take(self, params: SwayParams) -> None:
+    def _set_params(self, params: SwayParams) -> None:
         octaves = 1 + ceil(log2(params.slowest_s / params.fastest_s) - 1e-9)
         self._periods_s = [params.fastest_s * 2.0**k for k in range(octaves)]
         unit = 1.0 / sqrt(_VARIANCE * octaves)
@@ -80,7 +80,7 @@ class Sway:
     def retune(self, params: SwayParams) -> None:
         """Change size and periods; the size glides, and changed periods start in the middle."""
         periods, self._before = self._periods_s, [*self._sizes_at(self._t_s)]
-        self._take(params)
+        self._set_params(params)
         self._retuned_s = self._t_s
         if self._periods_s != periods:
             self.reset(self._t_s)
@@ -102,7 +102,7 @@ class Sway:
 
     def _wander(self, sizes: Angles3, rng: np.random.Generator) -> Angles3:
         yaw, pitch, roll = (
-            size * sum([octave.at(self._t_s, rng) for octave in octaves])
+            size * sum([octave.value_at(self._t_s, rng) for octave in octaves])
             for size, octaves in zip(sizes, self._axes, strict=True)
         )
         return (yaw, pitch, roll)
@@ -116,7 +116,7 @@ class _Octave:
         self._from = self._to = 0.0
         self._begin_s = self._end_s = t_s
 
-    def at(self, t_s: float, rng: np.random.Generator) -> float:
+    def value_at(self, t_s: float, rng: np.random.Generator) -> float:
         """Return the value at a time; times must not decrease."""
         while t_s >= self._end_s:
             self._from, self._to = self._to, float(rng.uniform(-1.0, 1.0))

@@ -34,7 +34,7 @@ class LidClosure(NamedTuple):
     onset_s: its start; close_s, hold_s, open_s: its durations at no sleepiness
     lower_share: relative stroke of the lower lid
     depth: relative stroke of both lids, 1 is shut
-    slow: factor of these durations
+    slowness: factor of these durations
     """
 
     onset_s: float
@@ -43,25 +43,25 @@ class LidClosure(NamedTuple):
     open_s: float
     lower_share: float
     depth: float = 1.0
-    slow: float = 1.0
+    slowness: float = 1.0
 
     @property
     def length_s(self) -> float:
         """Return the total duration."""
-        return self.slow * (self.close_s + self.hold_s + self.open_s)
+        return self.slowness * (self.close_s + self.hold_s + self.open_s)
 
-    def under_way(self, t_s: float) -> bool:
+    def is_in_progress(self, t_s: float) -> bool:
         """Return whether it is in progress."""
         return self.onset_s <= t_s < self.onset_s + self.length_s
 
-    def at(self, t_s: float) -> float:
+    def closure_at(self, t_s: float) -> float:
         """Return the closure of the upper lid, 0..1; the lower lid's is lower_share of it."""
-        since_s = (t_s - self.onset_s) / self.slow
+        since_s = (t_s - self.onset_s) / self.slowness
         return self.depth * closure(since_s, self.close_s, self.hold_s, self.open_s)
 
     def eye_turn(self, t_s: float) -> float:
         """Return the turn of the eyes with it, 0..1: it ends before that of the lids."""
-        since_s = (t_s - self.onset_s) / self.slow
+        since_s = (t_s - self.onset_s) / self.slowness
         out_s = _EYES_OUT * self.close_s
         back_s = self.close_s - out_s + self.hold_s + _EYES_BACK * self.open_s
         if not 0.0 < since_s < out_s + back_s:
@@ -70,7 +70,7 @@ class LidClosure(NamedTuple):
             return self.depth * min_jerk(since_s / out_s)
         return self.depth * (1.0 - min_jerk((since_s - out_s) / back_s))
 
-    def vary(self, params: LidParams, rng: np.random.Generator) -> "LidClosure":
+    def vary_durations(self, params: LidParams, rng: np.random.Generator) -> "LidClosure":
         """Return it with durations drawn about its own."""
         if params.duration_spread == 0.0:
             return self
@@ -79,7 +79,9 @@ class LidClosure(NamedTuple):
             close_s=close * self.close_s, hold_s=hold * self.hold_s, open_s=open * self.open_s
         )
 
-    def both(self, params: LidParams, rng: np.random.Generator) -> "tuple[LidClosure, LidClosure]":
+    def left_and_right(
+        self, params: LidParams, rng: np.random.Generator
+    ) -> "tuple[LidClosure, LidClosure]":
         """Return it for the left and the right lids, which differ a little."""
         if params.asymmetry == 0.0:
             return self, self

@@ -56,13 +56,13 @@ class LidsAtRest:
         """Change the parameters without a jump of the openings."""
         before, self._params = self._params, params
         if params.sleepy_level != before.sleepy_level:
-            self.sleepy(params.sleepy_level, t_s)
+            self.set_sleepiness(params.sleepy_level, t_s)
         if self._shown is not None:
             upper, lower = openings(params, self._pitch_deg, self.sleepiness(t_s))
             self._left = self._shown[0] - upper, self._shown[1] - lower
         self._retuned_s = t_s
 
-    def sleepy(self, level: float, t_s: float) -> None:
+    def set_sleepiness(self, level: float, t_s: float) -> None:
         """Change the sleepiness within a second: 0 awake .. 1 hardly awake.
 
         Raises:

@@ -46,22 +46,22 @@ class LidOpenings(NamedTuple):
     lower_left: float
     lower_right: float
 
-    def scaled(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
+    def scale(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
         """Return the openings times factors, slowing down towards fully open.
 
         factors: of the left and right upper, then of the left and right lower lid
         """
         left, right, lower_left, lower_right = factors
         return LidOpenings(
-            _times(self.left, left),
-            _times(self.right, right),
+            _scale_opening(self.left, left),
+            _scale_opening(self.right, right),
             self.blink,
-            _times(self.lower_left, lower_left),
-            _times(self.lower_right, lower_right),
+            _scale_opening(self.lower_left, lower_left),
+            _scale_opening(self.lower_right, lower_right),
         )
 
 
-def _times(opening: float, factor: float) -> float:
+def _scale_opening(opening: float, factor: float) -> float:
     """Return an opening times a factor, with a smooth limit at fully open.
 
     Beyond factor 1 it approaches 1 as tanh does, with the same slope and no bend at 1.
@@ -111,7 +111,7 @@ class Lids:
                 self._redraw = True
         self._rest.retune(params, self._t_s)
 
-    def mode(self, name: LidMode) -> None:
+    def set_mode(self, name: LidMode) -> None:
         """Set the blink rate to that at "rest" or in "conversation", from the next step on.
 
         Raises:
@@ -134,20 +134,20 @@ class Lids:
         if side not in self._winks:
             raise ValueError(f"no lid {side!r}; sides: left, right")
         wink = self._winks[side]
-        if wink is None or not wink.under_way(self._t_s):
-            wink = self._closing(max(t_s, self._t_s), self._params.wink_hold_ms)
+        if wink is None or not wink.is_in_progress(self._t_s):
+            wink = self._full_closure(max(t_s, self._t_s), self._params.wink_hold_ms)
             self._winks[side] = wink
-            self._expect(wink)
+            self._record_motion_end(wink)
 
-    def sleepy(self, level: float) -> None:
+    def set_sleepiness(self, level: float) -> None:
         """Set the sleepiness, which lowers the lids and slows blinks: 0 awake .. 1 hardly awake.
 
         Raises:
             ValueError: level is not within 0..1.
         """
-        self._rest.sleepy(level, self._t_s)
+        self._rest.set_sleepiness(level, self._t_s)
 
-    def announce(self, shift_rad: float, onset_s: float, t_s: float) -> float:
+    def draw_blink_of_shift(self, shift_rad: float, onset_s: float, t_s: float) -> float:
         """Draw the blink of a gaze shift that is about to begin; return the wait of the shift.
 
         A blink that precedes its shift begins now at the earliest, and the shift after it.
@@ -180,11 +180,11 @@ class Lids:
         upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
         if shift_rad is None and self._shut_until_s < t_s < self._next_s and t_s < self._evoked_s:
             return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
-        if self._due(t_s, shift_rad):
+        if self._is_blink_due(t_s, shift_rad):
             self._begin_blink(t_s)
         blinks = [_closures(side, t_s) for side in self._sides or (None, None)]
         (left, lower_left), (right, lower_right) = (
-            _more(blink, _closures(wink, t_s))
+            _larger_closure(blink, _closures(wink, t_s))
             for blink, wink in zip(blinks, self._winks.values(), strict=True)
         )
         # Closings come out at 1 and a rounding error just before they are done.
@@ -207,10 +207,10 @@ class Lids:
 
     def closure(self, since_onset_s: float) -> float:
         """Return the closure of the upper lid by a full blink, 0..1, at a time after its onset."""
-        _, close_s, hold_s, open_s, *_ = self._closing(0.0, self._params.hold_ms)
+        _, close_s, hold_s, open_s, *_ = self._full_closure(0.0, self._params.hold_ms)
         return closure(since_onset_s, close_s, hold_s, open_s)
 
-    def _due(self, t_s: float, shift_rad: float | None) -> bool:
+    def _is_blink_due(self, t_s: float, shift_rad: float | None) -> bool:
         """Return whether a blink begins now; each gaze shift has one draw."""
         par, blink = self._params, self._blink
         if shift_rad is not None:
@@ -218,7 +218,7 @@ class Lids:
             if not announced and evokes_blink(par, degrees(abs(shift_rad)), self._rng):
                 after_s = abs(evoked_offset_s(par, self._rng))
                 self._evoked_s = min(self._evoked_s, t_s + after_s)
-        if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
+        if any(wink is not None and wink.is_in_progress(t_s) for wink in self._winks.values()):
             # Both eyes would shut, and hide the wink.
             self._evoked_s = inf
             self._next_s = max(self._next_s, t_s + par.min_interval_ms / 1e3)
@@ -229,20 +229,20 @@ class Lids:
                 return True
             self._evoked_s = inf
         # A raised rate may require the next blink before this one is over.
-        return t_s >= self._next_s and (blink is None or not blink.under_way(t_s))
+        return t_s >= self._next_s and (blink is None or not blink.is_in_progress(t_s))
 
     def _begin_blink(self, t_s: float) -> None:
         """Start a blink; draw its depth and the time of the next one."""
         par = self._params
         self.blinks += 1
         slow = 1.0 + par.sleepy_slowness * self._rest.sleepiness(t_s)
-        blink = self._closing(t_s, par.hold_ms)._replace(
-            depth=blink_depth(par, self._rng), slow=slow
+        blink = self._full_closure(t_s, par.hold_ms)._replace(
+            depth=blink_depth(par, self._rng), slowness=slow
         )
-        self._blink = blink = blink.vary(par, self._rng)
-        self._sides = blink.both(par, self._rng)
+        self._blink = blink = blink.vary_durations(par, self._rng)
+        self._sides = blink.left_and_right(par, self._rng)
         for side in self._sides:
-            self._expect(side)
+            self._record_motion_end(side)
         double = is_double_blink(par, self._rng)
         pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
         after_s, ends_s = blink.length_s + pause_s, t_s + blink.length_s
@@ -255,12 +255,12 @@ class Lids:
             self._next_s = t_s + after_s
         self._evoked_s = inf
 
-    def _expect(self, closing: LidClosure) -> None:
+    def _record_motion_end(self, closing: LidClosure) -> None:
         """Record the end of the lids' motion, for a blink or wink that begins."""
         ends_s = closing.onset_s + closing.length_s + _ROUNDING_S
         self._shut_until_s = max(self._shut_until_s, ends_s)
 
-    def _closing(self, onset_s: float, hold_ms: float) -> LidClosure:
+    def _full_closure(self, onset_s: float, hold_ms: float) -> LidClosure:
         """Return a complete closure at no sleepiness."""
         par = self._params
         return LidClosure(
@@ -275,7 +275,7 @@ class Lids:
         """Return the length of the last blink, of an awake one before the first."""
         if self._blink is not None:
             return self._blink.length_s
-        return self._closing(0.0, self._params.hold_ms).length_s
+        return self._full_closure(0.0, self._params.hold_ms).length_s
 
     def _per_min(self) -> float:
         par = self._params
@@ -292,13 +292,13 @@ class Lids:
 
 def _closures(closing: LidClosure | None, t_s: float) -> LidPair:
     """Return the closure of the upper and the lower lid by a blink or wink, 0..1."""
-    shut = 0.0 if closing is None else closing.at(t_s)
+    shut = 0.0 if closing is None else closing.closure_at(t_s)
     if closing is None or shut == 0.0:
         return _NOT_SHUT
     return shut, closing.lower_share * shut
 
 
-def _more(one: LidPair, other: LidPair) -> LidPair:
+def _larger_closure(one: LidPair, other: LidPair) -> LidPair:
     if other is _NOT_SHUT:
         return one
     return max(one[0], other[0]), max(one[1], other[1])

@@ -26,7 +26,7 @@ from typing import NamedTuple, Protocol
 from gazerig.gaze.angles import (
     add,
     direction,
-    no_nearer,
+    keep_min_distance,
     norm,
     rotate,
     rotate_back,
@@ -48,7 +48,7 @@ _LOST_S = 0.04
 """A moving target without a frame for this time is out of sight until the next one."""
 
 
-class Version(NamedTuple):
+class MeanGaze(NamedTuple):
     """Both eyes as one direction in the head and the angle between them.
 
     ahead: unit vector in the head; vergence_rad: right yaw minus left yaw, positive if they meet
@@ -74,7 +74,7 @@ class EyeGeometry(NamedTuple):
 
     def eyes_to(self, point: Vec3) -> Eyes:
         """Return the eye angles that fixate a point."""
-        point = no_nearer(point, self.p_head, self.nearest_m)
+        point = keep_min_distance(point, self.p_head, self.nearest_m)
         return self.eyes_on(point, self.R_world_head, self.p_head)
 
 
@@ -82,21 +82,21 @@ class SaccadeState(Protocol):
     """Pending saccades (gazerig.gaze.oculomotor.saccade_trigger)."""
 
     @property
-    def waits(self) -> bool:
+    def is_saccade_due(self) -> bool:
         """Return whether the saccade to a new target has not started yet."""
         ...
 
     @property
-    def corrects(self) -> bool:
+    def is_correction_due(self) -> bool:
         """Return whether an error waits for a corrective saccade."""
         ...
 
 
-def version_of(eyes: Eyes) -> Version:
+def mean_gaze_of(eyes: Eyes) -> MeanGaze:
     """Return the mean direction and the vergence of two eyes."""
     (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
     mean = 0.5 * (left_yaw + right_yaw), 0.5 * (left_pitch + right_pitch)
-    return Version(direction(mean), right_yaw - left_yaw)
+    return MeanGaze(direction(mean), right_yaw - left_yaw)
 
 
 class DelayedSight:
@@ -110,7 +110,7 @@ class DelayedSight:
         self._frames: deque[tuple[float, Vec3, Vec3]] = deque()
         self._shift = -1
 
-    def place(self, target: Target, t_s: float) -> Vec3 | None:
+    def position_at(self, target: Target, t_s: float) -> Vec3 | None:
         """Return the target's position at a past time; None: out of sight by then.
 
         A new target is known immediately, as it must have been seen to be chosen.
@@ -155,7 +155,7 @@ class BinocularController:
 
     def reset(self) -> None:
         """Forget target and head; the eyes begin at the angles of ``hold``, or straight ahead."""
-        self.version = Version(_STRAIGHT, 0.0)
+        self.version = MeanGaze(_STRAIGHT, 0.0)
         self.started = False
         self.sight.reset()
         self._seen: Vec3 | None = None
@@ -180,30 +180,30 @@ class BinocularController:
         gaze: the point fixated so far, or that a saccade prescribes
         prescribed: eye angles of a saccade; None: no saccade is in flight
         """
-        place = self.sight.place(target, t_s - self.delay_s)
+        place = self.sight.position_at(target, t_s - self.delay_s)
         seen = None if place is None else view.eyes_to(place)
         if prescribed is not None or dt_s <= 0.0 or not self.started:
             eyes = view.eyes_to(gaze) if prescribed is None else prescribed
-            self.hold(eyes, seen, view.R_world_head, t_s)
+            self.adopt(eyes, seen, view.R_world_head, t_s)
             return eyes, gaze
-        if saccades.waits:
+        if saccades.is_saccade_due:
             seen = None
-        eyes = self.step(seen, view.R_world_head, t_s, dt_s, not saccades.corrects)
+        eyes = self.step(seen, view.R_world_head, t_s, dt_s, not saccades.is_correction_due)
         p_head, ahead = view.p_head, rotate(view.R_world_head, self.version.ahead)
         one_m = view.eyes_to(add(p_head, ahead))
         distance = self.distance_m(one_m, norm(sub(target.p_world_m, p_head)))
         return eyes, add(p_head, scale(ahead, max(distance, view.nearest_m)))
 
-    def hold(self, eyes: Eyes, target: Eyes | None, R_world_head: Mat3, t_s: float) -> None:
+    def adopt(self, eyes: Eyes, target: Eyes | None, R_world_head: Mat3, t_s: float) -> None:
         """Adopt the angles that a saccade prescribes; the target's velocity is kept.
 
         target: eye angles that fixate the target as seen, from the present pose of the head
         """
-        self.version, self.started = version_of(eyes), True
+        self.version, self.started = mean_gaze_of(eyes), True
         self._rotations(R_world_head, t_s)
         if target is not None:
-            self._shift(rotate(R_world_head, version_of(target).ahead))
-            self._demand(version_of(target).vergence_rad, t_s)
+            self._adopt_jump(rotate(R_world_head, mean_gaze_of(target).ahead))
+            self._delayed_vergence_rad(mean_gaze_of(target).vergence_rad, t_s)
 
     def step(
         self, target: Eyes | None, R_world_head: Mat3, t_s: float, dt_s: float, closing: bool = True
@@ -225,20 +225,20 @@ class BinocularController:
             self._velocity = scale(self._velocity, exp(-dt_s / self._fade_s))
             rate = scale(_clip(self._velocity, self._max_rad_s), par.velocity_gain)
         else:
-            seen, demand_rad = version_of(target)
+            seen, demand_rad = mean_gaze_of(target)
             self._follow(rotate(R_world_head, seen), dt_s)
             rate = scale(_clip(self._velocity, self._max_rad_s), par.velocity_gain)
             if closing:
                 error = _clip(sub(self._smoothed, gaze), self._max_error_rad)
                 rate = add(rate, scale(error, par.gain_1_s))
-            past_rad = self._demand(demand_rad, t_s)
+            past_rad = self._delayed_vergence_rad(demand_rad, t_s)
             if past_rad is not None:
                 off = past_rad - vergence
                 gain = par.vergence_gain_1_s if off >= 0.0 else par.divergence_gain_1_s
                 vergence += gain * off * dt_s
         vergence = min(max(vergence, 0.0), self._widest_rad)
         ahead = rotate_back(R_world_head, unit(add(gaze, scale(rate, dt_s))))
-        self.version = Version(ahead, vergence)
+        self.version = MeanGaze(ahead, vergence)
         yaw, pitch = yaw_pitch(ahead)
         return (yaw - 0.5 * vergence, pitch), (yaw + 0.5 * vergence, pitch)
 
@@ -248,7 +248,7 @@ class BinocularController:
         one_m: eye angles that fixate a point in the same direction 1 m away
         otherwise_m: for eyes that cannot converge
         """
-        half_m = tan(0.5 * version_of(one_m).vergence_rad)
+        half_m = tan(0.5 * mean_gaze_of(one_m).vergence_rad)
         if half_m <= 0.0:
             return otherwise_m
         vergence = self.version.vergence_rad
@@ -264,10 +264,10 @@ class BinocularController:
         while len(heads) > 1 and heads[1][0] <= t_s - self._reflex_delay_s + 1e-9:
             heads.popleft()
         then = heads[0][1]
-        self._opposed = _middle(then, heads[1][1]) if len(heads) > 1 else then
+        self._opposed = _mean_rotation(then, heads[1][1]) if len(heads) > 1 else then
         return None if before is None else (before, self._opposed)
 
-    def _demand(self, vergence_rad: float, t_s: float) -> float | None:
+    def _delayed_vergence_rad(self, vergence_rad: float, t_s: float) -> float | None:
         """Return the vergence that the target required a delay ago, None before the first."""
         demands = self._demands
         demands.append((t_s, vergence_rad))
@@ -276,7 +276,7 @@ class BinocularController:
             demands.popleft()
         return demands[0][1] if demands[0][0] <= due_s else None
 
-    def _shift(self, seen: Vec3) -> None:
+    def _adopt_jump(self, seen: Vec3) -> None:
         """Adopt a jump of the target, which does not count as velocity."""
         moved = _NONE if self._seen is None else sub(seen, self._seen)
         self._smoothed = seen if self._seen is None else add(self._smoothed, moved)
@@ -287,7 +287,7 @@ class BinocularController:
         before = self._seen
         most = self._reject_rad_s * dt_s
         if before is None or not self._known or norm(sub(seen, before)) > most:
-            self._shift(seen)
+            self._adopt_jump(seen)
         self._seen = seen
         kept = exp(-dt_s / self._smooth_s)
         smoothed = add(scale(self._smoothed, kept), scale(seen, 1.0 - kept))
@@ -301,7 +301,7 @@ def _clip(v: Vec3, most: float) -> Vec3:
     return v if size <= most else scale(v, most / size)
 
 
-def _middle(a: Mat3, b: Mat3) -> Mat3:
+def _mean_rotation(a: Mat3, b: Mat3) -> Mat3:
     """Return the mean of two rotations that differ by little: those of two ticks."""
     x, y, z = (scale(add(p, q), 0.5) for p, q in zip(a, b, strict=True))
     return x, y, z
@@ -349,13 +349,13 @@ class OppositeAngles:
             return wanted, gaze
         left, right = self._eyes or ((0.0, 0.0), (0.0, 0.0))
         if self._eyes is not None:
-            left, right = oppose(left, before, head), oppose(right, before, head)
+            left, right = opposite_angles(left, before, head), opposite_angles(right, before, head)
         self._eyes = left, right
-        ahead = rotate(R, version_of(self._eyes).ahead)
+        ahead = rotate(R, mean_gaze_of(self._eyes).ahead)
         return self._eyes, add(view.p_head, scale(ahead, norm(sub(target.p_world_m, view.p_head))))
 
 
-def oppose(eye_rad: Angles2, head_before_rad: Angles2, head_rad: Angles2) -> Angles2:
+def opposite_angles(eye_rad: Angles2, head_before_rad: Angles2, head_rad: Angles2) -> Angles2:
     """Return the eye angles of the rule (-x, -y), literally."""
     return (
         eye_rad[0] - (head_rad[0] - head_before_rad[0]),

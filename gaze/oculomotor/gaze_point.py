@@ -16,17 +16,17 @@ import numpy as np
 from gazerig.gaze.angles import (
     add,
     angle_between,
-    beside,
     direction,
-    no_nearer,
+    keep_min_distance,
     norm,
+    offset_direction,
     scale,
     sub,
     unit,
     yaw_pitch,
 )
 from gazerig.gaze.oculomotor.params import OculomotorParams
-from gazerig.gaze.oculomotor.pursuit import Pursuit, sight
+from gazerig.gaze.oculomotor.pursuit import Pursuit, line_of_sight_to
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.oculomotor.saccade_trajectory import (
     RedirectedTrajectory,
@@ -81,12 +81,12 @@ class GazePoint:
         Raises:
             ValueError: endpoints scatter and rng is None.
         """
-        if params.scatters and self._rng is None:
+        if params.has_scatter and self._rng is None:
             raise ValueError(
                 "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
             )
         self._params = params
-        self._trigger.retune(params, params.errs)
+        self._trigger.retune(params, params.has_errors)
         self._refixations.retune(params)
 
     def reset(self, t_s: float, point_m: Vec3) -> None:
@@ -98,24 +98,24 @@ class GazePoint:
         self.saccades = self.fixations = 0
 
     @property
-    def jumps(self) -> bool:
+    def is_in_saccade(self) -> bool:
         """Return whether a saccade is in flight."""
         return self._trajectory is not None
 
     @property
-    def settled(self) -> bool:
+    def has_arrived(self) -> bool:
         """Return whether the gaze has arrived: no saccade to a new target is due or in flight."""
-        return self._trajectory is None and not self._trigger.waits
+        return self._trajectory is None and not self._trigger.is_saccade_due
 
     @property
-    def waits(self) -> bool:
+    def is_saccade_due(self) -> bool:
         """Return whether the saccade to a new target has not started yet."""
-        return self._trigger.waits
+        return self._trigger.is_saccade_due
 
     @property
-    def corrects(self) -> bool:
+    def is_correction_due(self) -> bool:
         """Return whether the error of the last saccade waits for a correction."""
-        return self._trigger.corrects
+        return self._trigger.is_correction_due
 
     @property
     def nearest_m(self) -> float:
@@ -170,43 +170,45 @@ class GazePoint:
         if self._refixations.offset_rad != _MIDDLE:
             point = _offset_point(point, p_head, self._refixations.offset_rad)
         if trajectory is None:
-            gaze, there = sight(self.point_m, p_head), sight(point, p_head)
+            gaze, there = line_of_sight_to(self.point_m, p_head), line_of_sight_to(point, p_head)
             x, y, z = there[0] - gaze[0], there[1] - gaze[1], there[2] - gaze[2]
-            if not trigger.rests(sqrt(x * x + y * y + z * z)):
+            if not trigger.is_error_small(sqrt(x * x + y * y + z * z)):
                 self._refixations.interrupt()
                 slip = self._pursuit.slip(self.point_m, point, velocity, p_head)
-                if trigger.due(slip, t_s):
-                    shift_rad = self._jump(point, velocity, p_head, t_s)
-            elif not self._exact and self._refixations.due(t_s, norm(velocity) <= MOVING_M_S):
+                if trigger.is_due(slip, t_s):
+                    shift_rad = self._start_saccade(point, velocity, p_head, t_s)
+            elif not self._exact and self._refixations.is_due(t_s, norm(velocity) <= MOVING_M_S):
                 trigger.refixate(t_s)
             if shift_rad is None:
                 if dt_s > 0.0 and self._pursuit.controller is None:
-                    closing = not (trigger.corrects or trigger.waits)
+                    closing = not (trigger.is_correction_due or trigger.is_saccade_due)
                     known = self._prediction.sine is not None
                     self.point_m = self._pursuit.follow(
                         gaze, there, point, velocity, p_head, dt_s, closing, known
                     )
                 return None
-        elif trigger.redirects(t_s):
-            end = self.clear(add(point, scale(velocity, trajectory.ends_s - t_s)), p_head)
+        elif trigger.may_redirect(t_s):
+            end = self.keep_min_distance(
+                add(point, scale(velocity, trajectory.ends_s - t_s)), p_head
+            )
             self._trajectory = RedirectedTrajectory(trajectory, self._saccade, end, p_head, t_s)
         trajectory = self._trajectory
         assert trajectory is not None
-        self.point_m = trajectory.at(p_head, t_s)
-        if trajectory.landed(t_s):
+        self.point_m = trajectory.point_at(p_head, t_s)
+        if trajectory.has_landed(t_s):
             self._trajectory = None
             trigger.record_landing(t_s, self._correction_delay_s())
             self.fixations += 1
         return shift_rad
 
-    def _jump(self, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float) -> float:
+    def _start_saccade(self, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float) -> float:
         """Start a saccade; return its amplitude in radians."""
         error = angle_between(sub(self.point_m, p_head), sub(point, p_head))
         after_s = t_s + self._saccade.duration_s(error)
         moved, until = self._prediction.displacement(t_s), self._prediction.displacement(after_s)
         end = add(point, sub(until, moved))
-        end = self.clear(end, p_head)
-        if self._params.errs and not self._exact:
+        end = self.keep_min_distance(end, p_head)
+        if self._params.has_errors and not self._exact:
             end = endpoint(end, self.point_m, p_head, self._params, self._rng)
         self._trajectory = SaccadeTrajectory(self._saccade, self.point_m, end, p_head, t_s)
         self.saccades += 1
@@ -215,13 +217,13 @@ class GazePoint:
     def _correction_delay_s(self) -> float:
         """Draw the delay of a correction of this landing's error."""
         par, spread = self._params, 0.0
-        if self._rng is not None and par.scatters and par.correct_spread_ms > 0.0:
+        if self._rng is not None and par.has_scatter and par.correct_spread_ms > 0.0:
             spread = par.correct_spread_ms * float(self._rng.uniform(-1.0, 1.0))
         return (par.correct_after_ms + spread) / 1e3
 
-    def clear(self, point: Vec3, p_head: Vec3) -> Vec3:
+    def keep_min_distance(self, point: Vec3, p_head: Vec3) -> Vec3:
         """Return a point, moved away to ``nearest_m`` if it is nearer."""
-        return no_nearer(point, p_head, self._params.nearest_m)
+        return keep_min_distance(point, p_head, self._params.nearest_m)
 
 
 def _offset_point(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
@@ -243,11 +245,11 @@ def endpoint(
     amplitude = angle_between(a, b)
     far = (degrees(amplitude) - _NONE_DEG) / (_FULL_DEG - _NONE_DEG)
     along, across = -params.undershoot * min(1.0, max(0.0, far)), 0.0
-    if rng is not None and params.scatters:
+    if rng is not None and params.has_scatter:
         further, aside = (float(n) for n in rng.standard_normal(2))
         along += params.endpoint_scatter_along * further
         across = params.endpoint_scatter_across * aside
-    way = beside(unit(b), unit(a), along * amplitude, across * amplitude)
+    way = offset_direction(unit(b), unit(a), along * amplitude, across * amplitude)
     return add(eye, scale(way, norm(b)))
 
 
@@ -281,7 +283,7 @@ class Refixations:
         """Restart the rest, as the gaze has moved."""
         self._due_s = inf
 
-    def due(self, t_s: float, still: bool = True) -> bool:
+    def is_due(self, t_s: float, still: bool = True) -> bool:
         """Return whether another point is chosen now; called in every tick of a rest.
 
         still: whether the target is at rest; a moving one is only followed

@@ -27,7 +27,7 @@ from gazerig.gaze.angles import (
     direction,
     norm,
     scale,
-    shortened,
+    shorten_arc,
     sub,
     yaw_pitch,
 )
@@ -77,7 +77,7 @@ class HeadShare:
         full = radians(par.max_offset_deg) * (1.0 - interest(par, salience))
         return full if par.literal_reach else min(full, self.reach_rad)
 
-    def short_rad(self, salience: float, arc_rad: float, steeper: float = 0.0) -> float:
+    def undershoot_rad(self, salience: float, arc_rad: float, steeper: float = 0.0) -> float:
         """Return the angle by which the head stops short of a target.
 
         Args:
@@ -128,7 +128,7 @@ _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""
 
 
-def _bounded(rng: np.random.Generator, most: float) -> float:
+def _draw_bounded(rng: np.random.Generator, most: float) -> float:
     """Draw a standard normal deviate within bounds."""
     return min(most, max(-most, float(rng.standard_normal())))
 
@@ -187,7 +187,7 @@ class HeadModel:
         self._aside_since_s = self._stepped_s = t_s
         self._lead_s = 0.0
         self._drift, self._pursues = _NO_DRIFT, False
-        self._draw()
+        self._draw_variation()
         self._level = head_rad[2] == 0.0
         self._start = self._goal_direction
         self._target: tuple[str, int] | None = None
@@ -200,10 +200,10 @@ class HeadModel:
             offset_rad: angle by which the head stops short of it.
             start: direction at the head's start; it is the goal if it is nearer to the target.
         """
-        yaw, pitch = yaw_pitch(shortened(direction(facing_rad), offset_rad, start))
-        return self.in_range((yaw, pitch, 0.0))[:2]
+        yaw, pitch = yaw_pitch(shorten_arc(direction(facing_rad), offset_rad, start))
+        return self.clip_to_range((yaw, pitch, 0.0))[:2]
 
-    def in_range(self, head_rad: Angles3) -> Angles3:
+    def clip_to_range(self, head_rad: Angles3) -> Angles3:
         """Return head angles with yaw and pitch clipped to the neck's range."""
         (yaw_low, yaw_high), (pitch_low, pitch_high) = self._neck
         yaw, pitch, roll = head_rad
@@ -223,12 +223,12 @@ class HeadModel:
         """
         start = self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
-        short_rad = self.share.short_rad(target.salience, arc_rad)
+        short_rad = self.share.undershoot_rad(target.salience, arc_rad)
         if min(short_rad, arc_rad) > self._comfort_rad:
             short_rad = self._relief_rad
-        return self._reaching(target, facing_rad, facing_rad, short_rad, start)
+        return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start)
 
-    def leads_s(self, target: Target, eccentricity_rad: float) -> float:
+    def draw_lead_s(self, target: Target, eccentricity_rad: float) -> float:
         """Return the time for which the eyes wait because the head goes first.
 
         Called once for each new target: the onset of the head is drawn here.
@@ -236,7 +236,7 @@ class HeadModel:
         par = self._params
         self._lead_s = par.lead_ms / 1e3 if target.top_down else -par.start_delay_ms / 1e3
         if self._rng is not None and par.lead_spread_ms > 0.0:
-            self._lead_s += par.lead_spread_ms / 1e3 * _bounded(self._rng, _MOST_SD)
+            self._lead_s += par.lead_spread_ms / 1e3 * _draw_bounded(self._rng, _MOST_SD)
             if target.kind in OWN_LOOKS:
                 self._lead_s += _FIRST_S
             else:  # a reaction to something seen, whose time is drawn with it
@@ -265,14 +265,14 @@ class HeadModel:
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         soon_rad = facing_rad if soon_rad is None else soon_rad
-        if self._moves_on(facing_rad, soon_rad, since_eye_onset_s, t_s):
+        if self._is_in_sustained_motion(facing_rad, soon_rad, since_eye_onset_s, t_s):
             self._pursue(target, facing_rad, soon_rad, t_s)
         since_s = t_s - self._planned_s
         if since_s >= self._lasts_s:
-            return self.in_range(self._goal)
+            return self.clip_to_range(self._goal)
         yaw, pitch, roll = self._plans
         # A new plan in full flight may swing past its goal, but not past the neck's range.
-        return self.in_range(
+        return self.clip_to_range(
             (yaw.position(since_s), pitch.position(since_s), roll.position(since_s))
         )
 
@@ -293,8 +293,8 @@ class HeadModel:
                 self._drift, self._pursues = _NO_DRIFT, False
             self._target = target.kind, target.id
             self._aside_since_s = t_s
-            self._draw()
-            self._start = self._facing(t_s) if moving else self._goal_direction
+            self._draw_variation()
+            self._start = self._extrapolated_direction(t_s) if moving else self._goal_direction
             # A reason that moved the eyes back from the target before it ends.
             self._follows, self._relieves = moving, False
         elif (
@@ -318,7 +318,7 @@ class HeadModel:
         elif self._follows:
             arc_rad = angle_between(self._start, direction(facing))
             steeper = self._steeper * par.slope_spread
-            short_rad = share.short_rad(target.salience, arc_rad, steeper)
+            short_rad = share.undershoot_rad(target.salience, arc_rad, steeper)
             if target.kind == SEARCH:
                 short_rad = min(short_rad, self._search_rad)
             self._follow(target, facing, gaze, short_rad, t_s)
@@ -329,7 +329,7 @@ class HeadModel:
             return min(self._search_rad, self.share.trigger_rad)
         return self.share.trigger_rad
 
-    def _draw(self) -> None:
+    def _draw_variation(self) -> None:
         """Draw how this shift differs from equal ones, and when and how far an eye is brought back.
 
         Deviates in standard deviations; the spreads are the present parameters'.
@@ -337,13 +337,18 @@ class HeadModel:
         self._steeper = self._longer = self._later = 0.0
         self._relief = 0.5
         if (rng := self._rng) is not None:
-            self._steeper, self._longer = _bounded(rng, _MOST_SD), _bounded(rng, _MOST_DURATION_SD)
+            self._steeper, self._longer = (
+                _draw_bounded(rng, _MOST_SD),
+                _draw_bounded(rng, _MOST_DURATION_SD),
+            )
             self._later, self._relief = (
                 float(rng.standard_exponential()),
                 float(rng.uniform(*_RELIEF)),
             )
 
-    def _moves_on(self, facing: Angles2, soon: Angles2, since_onset: float, t_s: float) -> bool:
+    def _is_in_sustained_motion(
+        self, facing: Angles2, soon: Angles2, since_onset: float, t_s: float
+    ) -> bool:
         """Return whether the target is in sustained motion, which the head pursues."""
         dt_s, self._stepped_s = t_s - self._stepped_s, t_s
         least = self._pursue_rad_s
@@ -364,8 +369,8 @@ class HeadModel:
         """Plan a movement to where the target will be soon, from the present one."""
         low, high = self._roll
         roll = min(max(self.share.roll_rad(target.salience, facing[0]), low), high)
-        yaw, pitch, _ = self.in_range((*soon, 0.0))
-        starts = [plan.at(t_s - self._planned_s) for plan in self._plans]
+        yaw, pitch, _ = self.clip_to_range((*soon, 0.0))
+        starts = [plan.state_at(t_s - self._planned_s) for plan in self._plans]
         goal = yaw, pitch, roll
         self._plans = tuple(
             Quintic(start, end, _PURSUES_S) for start, end in zip(starts, goal, strict=True)
@@ -394,11 +399,11 @@ class HeadModel:
             return
         if moving:
             # From the point where it can stop, unless that is past the target.
-            stop = self._facing(t_s, _BRAKES_S)
+            stop = self._extrapolated_direction(t_s, _BRAKES_S)
             start = stop if angle_between(start, stop) <= arc_rad else to_centre
-        self._aim(self._reaching(target, facing, gaze, short_rad, start), t_s)
+        self._plan_to(self._reachable_goal(target, facing, gaze, short_rad, start), t_s)
 
-    def _reaching(
+    def _reachable_goal(
         self, target: Target, facing: Angles2, gaze: Angles2, offset_rad: float, start: Vec3
     ) -> Angles3:
         """Return the goal for the centre; for the point itself if the eyes could not reach it."""
@@ -411,18 +416,18 @@ class HeadModel:
         roll = self.share.roll_rad(target.salience, facing[0])
         return (*goal, min(max(roll, low), high))
 
-    def _facing(self, t_s: float, ahead_s: float = 0.0) -> Vec3:
+    def _extrapolated_direction(self, t_s: float, ahead_s: float = 0.0) -> Vec3:
         """Return the direction of the head, extrapolated at its present speed by a time."""
         since_s = t_s - self._planned_s
-        (yaw, yaw_rate, _), (pitch, pitch_rate, _) = (p.at(since_s) for p in self._plans[:2])
+        (yaw, yaw_rate, _), (pitch, pitch_rate, _) = (p.state_at(since_s) for p in self._plans[:2])
         return direction((yaw + ahead_s * yaw_rate, pitch + ahead_s * pitch_rate))
 
-    def _aim(self, goal: Angles3, t_s: float) -> None:
+    def _plan_to(self, goal: Angles3, t_s: float) -> None:
         """Plan a new trajectory when the goal has moved by more than ``replan_deg``."""
         change = hypot(goal[0] - self._goal[0], goal[1] - self._goal[1])
         if change < radians(self._params.replan_deg) and self._level:
             return
-        starts = [plan.at(t_s - self._planned_s) for plan in self._plans]
+        starts = [plan.state_at(t_s - self._planned_s) for plan in self._plans]
         (yaw, yaw_rate, _), (pitch, pitch_rate, _), _ = starts
         duration = self._duration_s(goal[0] - yaw, goal[1] - pitch, yaw_rate, pitch_rate)
         # A roll in motion would swing far in a long turn.

@@ -37,7 +37,7 @@ from gazerig.gaze.types import (
     GazeCommand,
     GazeState,
     HeadGeometry,
-    Limited,
+    LimitedAngle,
     Mat3,
     Phase,
     Target,
@@ -58,14 +58,14 @@ class ReachableGaze(NamedTuple):
     """Final position of head and eyes for a point, and the required eye angles.
 
     facing_rad, head_rad: (yaw, pitch, roll) that face it, and those of the head at rest
-    asked_eyes_rad, eyes_rad: required left and right (yaw, pitch) there, and the clipped ones
+    required_eyes_rad, eyes_rad: required left and right (yaw, pitch) there, and the clipped ones
     too_near: the point is nearer than the eyes can converge
     base_rad: (yaw, pitch) of a lower neck meanwhile
     """
 
     facing_rad: Angles3
     head_rad: Angles3
-    asked_eyes_rad: tuple[Angles2, Angles2]
+    required_eyes_rad: tuple[Angles2, Angles2]
     eyes_rad: tuple[Angles2, Angles2]
     too_near: bool
     base_rad: Angles2 = (0.0, 0.0)
@@ -163,7 +163,7 @@ class Oculomotor:
         if not self._started:
             self.reset(t_s, state)
         R_world_head, p_head = self._predict_head(state)
-        point, velocity, centre_point, toward, moves = self._now(target, p_head, t_s)
+        point, velocity, centre_point, toward, moves = self._predict_target(target, p_head, t_s)
         self._base_rad = base = state.base_rad
         facing = centre = self._geometry.facing(point, base)
         if centre_point is not point:
@@ -174,7 +174,7 @@ class Oculomotor:
         if target.shift != place.shift:
             off_rad = angle_between(sub(place.point_m, p_head), toward)
             self._record_shift(target, aside_rad, off_rad, t_s)
-        jumps = place.jumps
+        jumps = place.is_in_saccade
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         soon = None
         if moves and (ahead_s := self._head.foresees_s) > 0.0:
@@ -184,7 +184,7 @@ class Oculomotor:
         wanted = eyes_on(place.point_m, R_world_head, p_head)
         if (controller := self._pursuit.controller) is not None:
             jumps = jumps or shift_rad is not None
-            view = EyeGeometry(R_world_head, p_head, eyes_on, place.nearest_m, self._in_range)
+            view = EyeGeometry(R_world_head, p_head, eyes_on, place.nearest_m, self._clip_eyes)
             wanted, place.point_m = controller.fixate(
                 target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )
@@ -193,18 +193,18 @@ class Oculomotor:
                 _add_offset(wanted[0], offset.eyes_rad),
                 _add_offset(wanted[1], offset.eyes_rad),
             )
-        left, right = eyes = self._in_range(wanted)
-        limited = () if eyes == wanted else self._limited(wanted, head, facing)
+        left, right = eyes = self._clip_eyes(wanted)
+        limited = () if eyes == wanted else self._limited_angles(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
         if lids.blink and (turns := self._lids.eye_turn_rad(t_s)) is not None:
-            left, right = self._in_range(
+            left, right = self._clip_eyes(
                 (_add_offset(left, turns[0]), _add_offset(right, turns[1]))
             )
         if offset.lids != NO_OFFSET.lids:
-            lids = lids.scaled(offset.lids)
+            lids = lids.scale(offset.lids)
         head = self._add_sway(head, offset.head_rad, t_s)
         phase: Phase = (
-            "saccade" if place.jumps
+            "saccade" if place.is_in_saccade
             else "pursue" if norm(velocity) > MOVING_M_S
             else "fixate"
         )  # fmt: skip
@@ -218,22 +218,22 @@ class Oculomotor:
             ),
         )  # fmt: skip
 
-    def reach(self, target: Target) -> ReachableGaze:
+    def reachable_gaze(self, target: Target) -> ReachableGaze:
         """Return the final position of head and eyes for a fixed point."""
         facing = self._geometry.facing(target.p_world_m, self._base_rad)
         head = self._head.destination_rad(target, facing)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
         exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
-        point = self._gaze.clear(target.p_world_m, p_head)
-        left, right = self._in_range(self._geometry.eyes_on(point, R_world_head, p_head))
+        point = self._gaze.keep_min_distance(target.p_world_m, p_head)
+        left, right = self._clip_eyes(self._geometry.eyes_on(point, R_world_head, p_head))
         return ReachableGaze(
             (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
         )
 
     @property
-    def settled(self) -> bool:
+    def has_arrived(self) -> bool:
         """Return whether the gaze has arrived: no saccade to a new target is due or in flight."""
-        return self._gaze.settled
+        return self._gaze.has_arrived
 
     @property
     def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
@@ -246,19 +246,19 @@ class Oculomotor:
         aside_rad, off_rad: angles of the target off the head's facing direction, and off the gaze
         """
         gaze = self._gaze
-        waits = gaze.waits
-        wait_s = self._head.leads_s(target, aside_rad)
+        waits = gaze.is_saccade_due
+        wait_s = self._head.draw_lead_s(target, aside_rad)
         gaze.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
         if waits:
             return
-        if not gaze.jumps:
-            wait_s = self._lids.announce(off_rad, gaze.onset_s, t_s)
+        if not gaze.is_in_saccade:
+            wait_s = self._lids.draw_blink_of_shift(off_rad, gaze.onset_s, t_s)
             if wait_s > 0.0:
                 gaze.postpone(wait_s)
         elif gaze.onset_s <= t_s:
-            self._lids.announce(off_rad, t_s, t_s)
+            self._lids.draw_blink_of_shift(off_rad, t_s, t_s)
 
-    def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
+    def _clip_eyes(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
         """Return the angles of both eyes clipped to their ranges; the same object if unclipped."""
         (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
         left, right = self._eye_limits
@@ -269,14 +269,14 @@ class Oculomotor:
                 return eyes
         return _clip(eyes[0], left), _clip(eyes[1], right)
 
-    def _limited(
+    def _limited_angles(
         self, wanted: tuple[Angles2, Angles2], head: Angles3, facing: Angles2
-    ) -> tuple[Limited, ...]:
+    ) -> tuple[LimitedAngle, ...]:
         """Return the angles that the ranges of eyes and neck cut off."""
-        eyes = self._in_range(wanted)
+        eyes = self._clip_eyes(wanted)
         rows = (("left eye", wanted[0], eyes[0]), ("right eye", wanted[1], eyes[1]))
         found = [
-            Limited(f"{name} {axis}", asked[i], done[i], _AT_END)
+            LimitedAngle(f"{name} {axis}", asked[i], done[i], _AT_END)
             for name, asked, done in rows
             for i, axis in enumerate(("yaw", "pitch"))
             if asked[i] != done[i]
@@ -284,7 +284,7 @@ class Oculomotor:
         for i, axis in enumerate(("yaw", "pitch")):
             low, high = self._head.range_rad[i]
             if not low < head[i] < high and not low <= facing[i] <= high:
-                found.append(Limited(f"head {axis}", facing[i], head[i], _AT_END))
+                found.append(LimitedAngle(f"head {axis}", facing[i], head[i], _AT_END))
         return tuple(found)
 
     def _add_sway(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
@@ -297,7 +297,9 @@ class Oculomotor:
             head = head[0] + yaw, head[1] + pitch, head[2] + roll
         if self._breathing is None and self._sway is None and offset == NO_OFFSET.head_rad:
             return head
-        return self._head.in_range((head[0] + offset[0], head[1] + offset[1], head[2] + offset[2]))
+        return self._head.clip_to_range(
+            (head[0] + offset[0], head[1] + offset[1], head[2] + offset[2])
+        )
 
     def _predict_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when a present eye command takes effect."""
@@ -310,13 +312,13 @@ class Oculomotor:
             (yaw + yaw_rate * lag, pitch + pitch_rate * lag, roll + roll_rate * lag), base
         )
 
-    def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
+    def _predict_target(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
         """Return the target at its predicted present position."""
         prediction = self._prediction
-        prediction.see(target, p_head, self._pursuit.fastest_swing_rad_s)
+        prediction.record_target(target, p_head, self._pursuit.fastest_swing_rad_s)
         moved, velocity = prediction.motion(t_s)
         p, centre = target.p_world_m, target.centre_world_m
-        point = self._gaze.clear(add(p, moved), p_head)
+        point = self._gaze.keep_min_distance(add(p, moved), p_head)
         middle, toward, moves = (
             prediction.to_middle,
             sub(point, p_head),
@@ -324,11 +326,13 @@ class Oculomotor:
         )
         if middle is not None and prediction.size_m <= _SWING_RAD * norm(toward):
             moves = False
-            head_point = self._gaze.clear(add(p if centre is None else centre, middle), p_head)
+            head_point = self._gaze.keep_min_distance(
+                add(p if centre is None else centre, middle), p_head
+            )
         elif centre is None:
             head_point = point
         else:
-            head_point = self._gaze.clear(add(centre, moved), p_head)
+            head_point = self._gaze.keep_min_distance(add(centre, moved), p_head)
         return point, velocity, head_point, toward, moves
 
 

@@ -55,12 +55,12 @@ class OculomotorParams:
     # fmt: on
 
     @property
-    def errs(self) -> bool:
+    def has_errors(self) -> bool:
         """Return whether saccades miss their targets."""
-        return self.undershoot > 0.0 or self.scatters
+        return self.undershoot > 0.0 or self.has_scatter
 
     @property
-    def scatters(self) -> bool:
+    def has_scatter(self) -> bool:
         """Return whether endpoints are random."""
         return self.endpoint_scatter_along > 0.0 or self.endpoint_scatter_across > 0.0
 

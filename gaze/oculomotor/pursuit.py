@@ -105,7 +105,10 @@ class Pursuit:
 
     def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
         """Return error and retinal slip; all points in the world, metres."""
-        (x, y, z, _), (to_x, to_y, to_z, near) = sight(gaze, eye), sight(target, eye)
+        (x, y, z, _), (to_x, to_y, to_z, near) = (
+            line_of_sight_to(gaze, eye),
+            line_of_sight_to(target, eye),
+        )
         across = perpendicular(scale(v_target, near), (to_x, to_y, to_z))
         return Slip((to_x - x, to_y - y, to_z - z), sub(across, self._adopted_speed(across)))
 
@@ -121,7 +124,13 @@ class Pursuit:
         if dt_s <= 0.0:
             return gaze
         return self.follow(
-            sight(gaze, eye), sight(target, eye), target, v_target, eye, dt_s, closing
+            line_of_sight_to(gaze, eye),
+            line_of_sight_to(target, eye),
+            target,
+            v_target,
+            eye,
+            dt_s,
+            closing,
         )
 
     def follow(
@@ -146,7 +155,7 @@ class Pursuit:
         (x, y, z, near), (to_x, to_y, to_z, near_now) = gaze, now
         vx, vy, vz = v_target
         # The target one step ago, and by how much its direction has changed since.
-        was_x, was_y, was_z, near_before = sight(
+        was_x, was_y, was_z, near_before = line_of_sight_to(
             (target[0] - vx * dt_s, target[1] - vy * dt_s, target[2] - vz * dt_s), eye
         )
         rate = 1.0 / dt_s
@@ -163,7 +172,7 @@ class Pursuit:
             close = off_x * share, off_y * share, off_z * share
             if not outruns:
                 way = to_x - was_x, to_y - was_y, to_z - was_z
-                close = _no_faster(close, way, 1.0 - par.velocity_gain, dt_s)
+                close = _limit_speed(close, way, 1.0 - par.velocity_gain, dt_s)
             move_x, move_y, move_z = move_x + close[0], move_y + close[1], move_z + close[2]
             size = sqrt(move_x * move_x + move_y * move_y + move_z * move_z)
             most = self._max_rad_s * dt_s
@@ -195,7 +204,7 @@ class Pursuit:
         return (x * gain, y * gain, z * gain)
 
 
-def _no_faster(close: Vec3, way: Vec3, least: float, dt_s: float) -> Vec3:
+def _limit_speed(close: Vec3, way: Vec3, least: float, dt_s: float) -> Vec3:
     """Return the closing of an error, not faster along a target's motion than what it lacks.
 
     close: of this step; way: the target's motion in it; least: share of that motion which pursuit
@@ -208,7 +217,7 @@ def _no_faster(close: Vec3, way: Vec3, least: float, dt_s: float) -> Vec3:
     return close if along <= most else sub(close, scale(way, (along - most) / size))
 
 
-def sight(point: Vec3, eye: Vec3) -> Sight:
+def line_of_sight_to(point: Vec3, eye: Vec3) -> Sight:
     """Return the direction of a point and its nearness; straight ahead for the eye itself."""
     x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     length = sqrt(x * x + y * y + z * z)

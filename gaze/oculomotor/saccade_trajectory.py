@@ -17,9 +17,9 @@ from gazerig.gaze.angles import (
     angle_between,
     cross,
     norm,
+    rotate_about_axis,
     scale,
     sub,
-    turned,
     unit,
 )
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
@@ -46,7 +46,7 @@ class SaccadeTrajectory:
         self.amplitude_rad = angle_between(self._start_way, self._end_way)
         self.ends_s = onset_s + self._profile.duration_s(self.amplitude_rad)
 
-    def at(self, eye: Vec3, t_s: float) -> Vec3:
+    def point_at(self, eye: Vec3, t_s: float) -> Vec3:
         """Return the gaze point, seen from where the eyes are now."""
         done = self._profile.displacement_rad(self.amplitude_rad, t_s - self.onset_s)
         share = done / self.amplitude_rad if self.amplitude_rad > 0.0 else 1.0
@@ -59,7 +59,7 @@ class SaccadeTrajectory:
         way = add(way, scale(sub(scale(b, near_b), self._end_way), share))
         return add(eye, scale(unit(way), 1.0 / ((1.0 - share) * near_a + share * near_b)))
 
-    def landed(self, t_s: float) -> bool:
+    def has_landed(self, t_s: float) -> bool:
         """Return whether it is over."""
         return t_s >= self.ends_s - 1e-9
 
@@ -106,7 +106,7 @@ class RedirectedTrajectory:
         times = np.arange(t_s, before.ends_s + lasts_s, _SAMPLE_S)
         if norm(pole) < 1e-9 or len(times) < 3:
             return before.ends_s
-        ways = np.array([unit(sub(before.at(eye, float(t)), eye)) for t in times])
+        ways = np.array([unit(sub(before.point_at(eye, float(t)), eye)) for t in times])
         velocity = np.diff(ways, axis=0) / _SAMPLE_S
         toward = np.array(cross(unit(pole), first))
         top, most = saccade.max_speed_rad_s * _MARGIN, saccade.max_acceleration_rad_s2 * _MARGIN
@@ -119,19 +119,19 @@ class RedirectedTrajectory:
                 return begin_s
         return before.ends_s
 
-    def at(self, eye: Vec3, t_s: float) -> Vec3:
+    def point_at(self, eye: Vec3, t_s: float) -> Vec3:
         """Return the gaze point, seen from where the eyes are now."""
-        way = sub(self._before.at(eye, t_s), eye)
+        way = sub(self._before.point_at(eye, t_s), eye)
         added = self._profile.displacement_rad(self._angle_rad, t_s - self._begin_s)
         share = added / self._angle_rad if self._angle_rad > 0.0 else 1.0
         first, then = sub(self._before.end, eye), sub(self.end, eye)
         near = 1.0 / norm(way) + share * (1.0 / norm(then) - 1.0 / norm(first))
         pole = cross(unit(first), unit(then))
         if norm(pole) > 1e-9:
-            way = turned(way, unit(pole), share * angle_between(first, then))
+            way = rotate_about_axis(way, unit(pole), share * angle_between(first, then))
         return add(eye, scale(unit(way), 1.0 / max(near, _FARTHEST_1_M)))
 
-    def landed(self, t_s: float) -> bool:
+    def has_landed(self, t_s: float) -> bool:
         """Return whether it is over."""
         return t_s >= self.ends_s - 1e-9
 

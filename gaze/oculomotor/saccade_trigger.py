@@ -77,7 +77,7 @@ class SaccadeTrigger:
         if self._due_s is not None:
             self._due_s = self.onset_s = self._due_s + wait_s
 
-    def redirects(self, t_s: float) -> bool:
+    def may_redirect(self, t_s: float) -> bool:
         """Return whether a new target bends the saccade in flight now, at most once for each."""
         if self._due_s is None or t_s < self._due_s - 1e-9:
             return False
@@ -94,11 +94,11 @@ class SaccadeTrigger:
         self._landed_s, self._correct_s = t_s, max(correct_after_s, self._interval_s)
         self._erred = None if self._errs else False
 
-    def rests(self, error_rad: float) -> bool:
+    def is_error_small(self, error_rad: float) -> bool:
         """Return whether no event is pending and an error requires none: ``due`` would be False."""
         return self._due_s is None and self._erred is False and error_rad <= self._saccade_rad
 
-    def due(self, slip: Slip, t_s: float) -> bool:
+    def is_due(self, slip: Slip, t_s: float) -> bool:
         """Return whether a saccade starts now; called only between saccades."""
         error = norm(slip.error_rad)
         if self._erred is None:
@@ -120,12 +120,12 @@ class SaccadeTrigger:
         return self._go(t_s) if not self._crosses(slip, error) else False
 
     @property
-    def waits(self) -> bool:
+    def is_saccade_due(self) -> bool:
         """Return whether the saccade to a new target has not started yet."""
         return self._due_s is not None
 
     @property
-    def corrects(self) -> bool:
+    def is_correction_due(self) -> bool:
         """Return whether the error of the last saccade waits for a correction."""
         return bool(self._erred)
 

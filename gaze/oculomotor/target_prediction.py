@@ -124,7 +124,7 @@ class TargetPrediction:
         self._past.clear()
         self._bend = _STILL
 
-    def see(self, target: Target, eye: Vec3, fastest_rad_s: float) -> None:
+    def record_target(self, target: Target, eye: Vec3, fastest_rad_s: float) -> None:
         """Record the target; a known frame changes nothing.
 
         eye: position of the eye
@@ -149,7 +149,7 @@ class TargetPrediction:
         past.append((at_s, *p, *v))
         while past[0][0] < at_s - _WINDOWS_S[-1]:
             past.popleft()
-        self._bend = self._slope()
+        self._bend = self._past_slope()
         recent = (seen[4:] for seen in reversed(past) if seen[0] > at_s - _FASTEST_IN_S)
         self._most_m_s = max(map(norm, recent))
         self.sine = sine = self._recognise(p, at_s)
@@ -193,7 +193,7 @@ class TargetPrediction:
         more = bent * (age_s - 0.5 * bent)
         (x, y, z), (a, b, c) = self._v, self._bend
         moved = x * age_s + a * more, y * age_s + b * more, z * age_s + c * more
-        return _shorten(moved, self._fastest_m_s * age_s)
+        return _limit_length(moved, self._fastest_m_s * age_s)
 
     def _speed(self, age_s: float) -> Vec3:
         """Return the velocity an age after the frame."""
@@ -204,9 +204,9 @@ class TargetPrediction:
         (x, y, z), (a, b, c) = self._v, self._bend
         speed = x + a * bent, y + b * bent, z + c * bent
         # No extrapolated change makes the target faster than it has been.
-        return _shorten(speed, self._most_m_s)
+        return _limit_length(speed, self._most_m_s)
 
-    def _slope(self) -> Vec3:
+    def _past_slope(self) -> Vec3:
         """Return the rate at which the velocity has changed over the last frames."""
         past = self._past
         if len(past) < _SLOPE_FRAMES:
@@ -252,7 +252,7 @@ class TargetPrediction:
         return False
 
 
-def _shorten(v: Vec3, most: float) -> Vec3:
+def _limit_length(v: Vec3, most: float) -> Vec3:
     """Return a vector, shortened if it is longer than a limit."""
     x, y, z = v
     squares = x * x + y * y + z * z

@@ -74,27 +74,29 @@ def _uniform(mean_s: float, sd_s: float) -> Draw:
 
 
 def _truncated_normal(mean_s: float, sd_s: float) -> Draw:
-    cut = _cut(sd_s / mean_s)
+    cut = _cut_distribution(sd_s / mean_s)
     if cut is None:
         return lambda rng: mean_s * (rng.standard_exponential() or 1e-9)
     tail, excess, _ = _tail(cut)
     sigma = mean_s / excess
 
     def draw(rng: np.random.Generator) -> float:
-        beyond = -_NORMAL.inv_cdf((1.0 - rng.random()) * tail) if tail < 0.5 else _above(rng, tail)
+        beyond = (
+            -_NORMAL.inv_cdf((1.0 - rng.random()) * tail) if tail < 0.5 else _draw_above(rng, tail)
+        )
         return max(sigma * (beyond - cut), 1e-9)
 
     return draw
 
 
-def _above(rng: np.random.Generator, tail: float) -> float:
+def _draw_above(rng: np.random.Generator, tail: float) -> float:
     """Draw a standard normal number from its upper ``tail`` of more than a half."""
     # From the other end, so that the probability keeps its digits if the tail is nearly 1.
     p = (1.0 - tail) + tail * rng.random()
     return _NORMAL.inv_cdf(min(max(p, 1e-300), 1.0 - 1e-16))
 
 
-def _cut(variation: float) -> float | None:
+def _cut_distribution(variation: float) -> float | None:
     """Return the cut of a standard normal law for this SD over mean; None: no cut."""
     low, high = _LEAST_CUT, _MOST_CUT
     if variation >= _tail(high)[2]:

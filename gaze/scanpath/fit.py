@@ -58,19 +58,19 @@ class WalkFit:
     """A fitted walk; rows and columns in the order of PARTS, rows from, columns to.
 
     counts:  transitions seen; matrix: their probabilities with intervals
-    visits:  fixations per part; outside: fixations on no part
+    visits:  fixations per part; outside_fixations: fixations on no part
     dwell_mean_s, dwell_sd_s: per part, with intervals
-    pooled:  parts with too few looks, whose dwell is that of all parts together
+    pooled_parts:  parts with too few looks, whose dwell is that of all parts together
     start:   part of the first fixation on the face
     """
 
     counts: tuple[tuple[int, ...], ...]
     matrix: tuple[tuple[Interval, ...], ...]
     visits: tuple[int, ...]
-    outside: int
+    outside_fixations: int
     dwell_mean_s: tuple[Interval, ...]
     dwell_sd_s: tuple[Interval, ...]
-    pooled: tuple[str, ...]
+    pooled_parts: tuple[str, ...]
     start: str
 
 

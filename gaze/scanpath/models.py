@@ -36,7 +36,7 @@ class ScanpathStep(NamedTuple):
 
     p_world_m: Vec3
     part: str | None
-    moved: bool
+    has_moved: bool
 
 
 class ScanpathModel(Protocol):
@@ -51,7 +51,7 @@ class ScanpathModel(Protocol):
         """Return the present part, None without one, and the end of that look, if known."""
         ...
 
-    def go_on(self, before: "ScanpathModel") -> bool:
+    def continue_walk(self, before: "ScanpathModel") -> bool:
         """Continue the fixation of another model; return whether this model can."""
         ...
 
@@ -124,7 +124,7 @@ class MarkovWalk:
         """Return the present part and the end of its dwell, None before the gaze is there."""
         return self._parts[self._part], self._until_s
 
-    def go_on(self, before: ScanpathModel) -> bool:
+    def continue_walk(self, before: ScanpathModel) -> bool:
         """Continue the part fixated and its dwell; return whether it is one of this model's."""
         part, until_s = before.dwell
         if part not in self._parts:
@@ -218,7 +218,7 @@ class SimpleCycle:
         """Return the present part and the end of its time, None before the gaze is there."""
         return self._parts[self._at], self._until_s
 
-    def go_on(self, before: ScanpathModel) -> bool:
+    def continue_walk(self, before: ScanpathModel) -> bool:
         """Continue the part fixated and its dwell; return whether it is one of this model's."""
         part, until_s = before.dwell
         if part not in self._parts:
@@ -252,7 +252,7 @@ class FaceTracking:
         """Return the nose, for ever."""
         return "N", None
 
-    def go_on(self, before: ScanpathModel) -> bool:
+    def continue_walk(self, before: ScanpathModel) -> bool:
         """Return whether the nose was the last part."""
         return before.dwell[0] == "N"
 
@@ -285,7 +285,7 @@ class RandomAngles:
         """Return no part, and the end of the interval."""
         return None, self._until_s
 
-    def go_on(self, before: ScanpathModel) -> bool:
+    def continue_walk(self, before: ScanpathModel) -> bool:
         """Continue angles and interval of another such model, clipped to this one's limits."""
         if not isinstance(before, RandomAngles):
             return False

@@ -166,7 +166,9 @@ class _Replacement(NamedTuple):
         )
 
 
-def _replaced(target: Target, face: Face | None, look: ScanpathStep | None, shift: int) -> Target:
+def _replace_target(
+    target: Target, face: Face | None, look: ScanpathStep | None, shift: int
+) -> Target:
     """Return a target with the point of its face, and counting the shifts on the face."""
     if face is None or look is None:
         return target._replace(shift=target.shift + shift) if shift else target
@@ -198,7 +200,7 @@ class Scanpath:
         """
         before, self.looks = self.looks, _model(params, walk, self._rng)
         self._last = None
-        if not self.looks.go_on(before):
+        if not self.looks.continue_walk(before):
             self._shift += 1
 
     def reset(self, t_s: float) -> None:
@@ -234,13 +236,13 @@ class Scanpath:
         look = None
         if face is not None:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
-            self._shift += look.moved
+            self._shift += look.has_moved
         self._rests_until_s = self._until_s(look, settled)
         point = look.p_world_m if look is not None else None
         last = self._last
         if last is not None and last.of(target, face, point, self._shift):
             return last.result
-        result = _replaced(target, face, look, self._shift)
+        result = _replace_target(target, face, look, self._shift)
         self._last = _Replacement(target, face, point, self._shift, result)
         return result
 
@@ -258,7 +260,7 @@ class Scanpath:
         _, until_s = self.looks.dwell
         if until_s is not None:
             return until_s
-        return -inf if settled and not look.moved else inf
+        return -inf if settled and not look.has_moved else inf
 
     def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
         """Return the face, the last known while it is out of sight, and whether it is new.
@@ -292,7 +294,7 @@ def _model(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> Scan
     match params.model:
         case "simple":
             dwells_s = [ms / 1e3 / params.rate_scale for ms in params.simple_dwell_ms]
-            return SimpleCycle(_owners(params, params.simple_order), dwells_s)
+            return SimpleCycle(_part_owners(params, params.simple_order), dwells_s)
         case "face_tracking":
             return FaceTracking()
         case "random":
@@ -306,7 +308,7 @@ def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) ->
     matrix, dwells = steps_and_dwells(params, walk)
     start = walk.start if params.start in ("nearest", "as_walk") else params.start
     return MarkovWalk(
-        _owners(params, walk.order), matrix, dwells, walk.order.index(start), rng,
+        _part_owners(params, walk.order), matrix, dwells, walk.order.index(start), rng,
         params.start == "nearest", observer_of(params),
     )  # fmt: skip
 
@@ -340,7 +342,7 @@ def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[D
     return steps, [shift_dwell(law, mean, sd, floor_s) for mean, sd in pairs]
 
 
-def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
+def _part_owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
     """Name the parts by the owner's left and right."""
     if not params.viewers_left:
         return parts

@@ -16,8 +16,8 @@ _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""
 
 LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
-    "awake": lambda lids, t_s: lids.sleepy(0.0),
-    "sleepy": lambda lids, t_s: lids.sleepy(0.7),
+    "awake": lambda lids, t_s: lids.set_sleepiness(0.0),
+    "sleepy": lambda lids, t_s: lids.set_sleepiness(0.7),
     "wink left": lambda lids, t_s: lids.wink("left", t_s),
     "wink right": lambda lids, t_s: lids.wink("right", t_s),
 }
@@ -56,7 +56,7 @@ class Menus:
         elif command.menu == "conversation":
             mode = next(mode for mode in MODES if mode == command.choice)
             self._aversion.converse(mode, t_s)
-            self._lids.mode("rest" if mode == "none" else "conversation")
+            self._lids.set_mode("rest" if mode == "none" else "conversation")
         elif command.menu == "expression":
             self._expressions.express(command.choice)
         else:

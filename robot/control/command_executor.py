@@ -97,7 +97,7 @@ class CommandExecutor:
             self._messages.append(f"{lead.words}: {why}, so the gaze leads again")
             self._change_control(lambda: lead.end(why))
         if t_s >= levels.lapses_s:
-            for name in levels.lapsed(t_s):
+            for name in levels.drop_lapsed(t_s):
                 self._messages.append(f"level {name}: not set any more, so it falls to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:

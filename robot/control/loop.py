@@ -236,7 +236,7 @@ class Robot:
         rests_s = self._scanpath.rests_until_s
         target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active, rests_s)
         target = self._scanpath.wander(
-            target, percept, t_s, self._oculomotor.settled, pose.p_world_head_m, self._gaze_m
+            target, percept, t_s, self._oculomotor.has_arrived, pose.p_world_head_m, self._gaze_m
         )
         offset = self._animation.step(t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)

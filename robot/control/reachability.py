@@ -42,7 +42,7 @@ def look_reply(
         kinematics: Kinematics of the rig.
         limits: Limits of the joints, in the order of ``kinematics.names``.
     """
-    reach = oculomotor.reach(target)
+    reach = oculomotor.reachable_gaze(target)
     done = reached_joints(reach, kinematics, limits)
     at_rest = (0.0,) * len(done)
     pose = kinematics.forward(JointState(done, at_rest, at_rest, ()))
@@ -50,7 +50,7 @@ def look_reply(
     # A head that stops short because the eyes do the rest is not limited.
     head = reach.facing_rad if error.whole > _OFF_POINT_RAD else reach.head_rad
     further_rad = kinematics.further_rad(reach.base_rad)
-    asked = kinematics.inverse(_command(head, *reach.asked_eyes_rad), further_rad)
+    asked = kinematics.inverse(_command(head, *reach.required_eyes_rad), further_rad)
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     far_m = norm(sub(target.p_world_m, pose.p_world_head_m))
     met = add(pose.p_world_head_m, scale(unit(add(left, right)), far_m))

@@ -18,7 +18,7 @@ from gazerig.gaze.gesture.gesture import (
     POSE_TRACKS,
     Gesture,
     KeyFrame,
-    keys_of,
+    track_keys,
 )
 from gazerig.gaze.gesture.gesture_motion import GestureMotion, MotionSamples
 from gazerig.gaze.gesture.gesture_player import OffsetState, PlayedGesture
@@ -74,7 +74,7 @@ def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureM
         GestureRefused: It needs a joint that the rig lacks.
     """
     frames, left_out = _frames_for(gesture, joints)
-    tracks = keys_of(gesture, frames, count or gesture.count)
+    tracks = track_keys(gesture, frames, count or gesture.count)
     there = {*joints, *EYE_TRACKS} - {*HEAD_TRACKS}
     there |= {track for track in HEAD_TRACKS if _neck(track) in joints}
     kept = {name: keys for name, keys in tracks.items() if name in there}
@@ -180,7 +180,7 @@ class GestureFit:
         if smaller and min(left for _, left in smaller) < _SMALLEST:
             joint = min(smaller, key=lambda one: one[1])[0]
             raise GestureRefused(f"{joint} is at the end of its range")
-        samples = motion.samples.scaled(sizes, speed)
+        samples = motion.samples.scale(sizes, speed)
         factor, joint, text = self._too_fast(samples, limits, share)
         if factor > 1.0 + _ROUNDING and not slow:
             raise GestureRefused(text)
@@ -271,7 +271,7 @@ class GestureFit:
         ]
         for wait in _WAITS:
             since = np.maximum(0.0, fade.times_s - wait * fade_s) * played.speed
-            also = played.motion.sampled(since).scaled(np.array(played.sizes), played.speed)
+            also = played.motion.sample_at(since).scale(np.array(played.sizes), played.speed)
             both = MotionSamples(
                 fade.times_s, *(a + b for a, b in zip(fade[1:], also[1:], strict=True))
             )
@@ -347,7 +347,7 @@ def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats,
         curve = MinimumJerkCurve(
             float(values[0]), times_s[chosen].tolist(), values[chosen].tolist()
         )
-        error = np.abs(curve.sampled(times_s)[0] - values)
+        error = np.abs(curve.sample_at(times_s)[0] - values)
         if error.max() <= tolerance:
             break
         error[[0, *chosen]] = 0.0

@@ -16,7 +16,7 @@ from gazerig.gaze.types import (
     Face,
     GazeCommand,
     GazeState,
-    Limited,
+    LimitedAngle,
     Percept,
     Salience,
     Target,
@@ -106,7 +106,7 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
         data[name] = _name_fields(kind, data[name])
     target, gaze = data["target"], data["gaze"]
     target["saliences"] = [_name_fields(Salience, one) for one in target["saliences"]]
-    gaze["limited"] = [_name_fields(Limited, one) for one in gaze["limited"]]
+    gaze["limited"] = [_name_fields(LimitedAngle, one) for one in gaze["limited"]]
     if data.pop("as_desired"):  # nearly always: written once
         data["guard_result"]["desired_rad"] = None
     if not target["plan"]:
@@ -145,7 +145,10 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
     target = {
         **data["target"], "saliences": tuple([Salience(**s) for s in data["target"]["saliences"]])
     }  # fmt: skip
-    gaze = {**data["gaze"], "limited": tuple([Limited(**one) for one in data["gaze"]["limited"]])}
+    gaze = {
+        **data["gaze"],
+        "limited": tuple([LimitedAngle(**one) for one in data["gaze"]["limited"]]),
+    }
     tick = Tick(
         data["t_s"],
         _build(JointState, data["joints"]),

@@ -53,7 +53,7 @@ class Canvas:
         self.R_world_camera = np.array(R)
         self.p_m = np.array(p_m)
 
-    def seen(self, points_world_m: ArrayLike) -> Floats:
+    def to_camera(self, points_world_m: ArrayLike) -> Floats:
         """Transform points (n, 3) into the camera frame."""
         points = np.asarray(points_world_m, dtype=np.float64).reshape(-1, 3)
         seen: Floats = (points - self.p_m) @ self.R_world_camera
@@ -61,7 +61,7 @@ class Canvas:
 
     def polygon(self, points_world_m: ArrayLike, colour: Colour) -> None:
         """Fill a polygon (n, 3) with a colour; the distances do not change."""
-        points = self.seen(points_world_m)
+        points = self.to_camera(points_world_m)
         if points[:, 2].min() > _NEAREST_M:
             fixed = np.rint((self._pixels(points)) * (1 << _SHIFT)).astype(np.int32)
             cv2.fillPoly(self.image, [fixed], colour, cv2.LINE_AA, _SHIFT)
@@ -87,7 +87,7 @@ class Canvas:
         if len(outline) < 3:
             return
         pixels = self._pixels(outline)
-        window = self._window(pixels)
+        window = self._bounding_window(pixels)
         if window is None:
             return
         left, top, width, height = window
@@ -119,12 +119,12 @@ class Canvas:
         if not self._depth:
             return
         A = self.R_world_camera.T @ R_world_body / np.array(half_m)
-        centre = self.seen(centre_m)[0]
+        centre = self.to_camera(centre_m)[0]
         reach = float(max(half_m))
         if centre[2] - reach < _NEAREST_M:
             return
         box = centre + reach * np.array([(-1, -1, -1), (1, 1, -1), (-1, 1, -1), (1, -1, -1)])
-        window = self._window(self._pixels(box))
+        window = self._bounding_window(self._pixels(box))
         if window is None:
             return
         left, top, width, height = window
@@ -143,7 +143,7 @@ class Canvas:
         pixels: Floats = points[:, :2] / points[:, 2:] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
         return pixels
 
-    def _window(self, pixels: Floats) -> tuple[int, int, int, int] | None:
+    def _bounding_window(self, pixels: Floats) -> tuple[int, int, int, int] | None:
         """Return x, y, width, height of the part of the image that the points span."""
         height, width = self.depth_m.shape
         low = np.floor(np.clip(pixels.min(axis=0), -2.0, 1e6)).astype(int)

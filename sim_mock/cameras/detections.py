@@ -160,7 +160,7 @@ class SceneCamera:
         turned_away = dot(unit(to_camera), outwards) < _COS_TURNED_AWAY
         if missed or turned_away or norm(to_camera) > _FARTHEST_FACE_M:
             return None
-        points = _landmarks_before(R, p, R_world_face, place)
+        points = _landmarks_in_camera(R, p, R_world_face, place)
         if min([z for _, _, z in points]) < 0.1:
             return None
         lens = self._lens
@@ -169,7 +169,7 @@ class SceneCamera:
         size = fx * _FACE_BOX_M / points[2][2]
         x, y = pixels[2]
         box = (x - size / 2, y - size / 2, size, size)
-        if not self._inside(x, y, size / 2):
+        if not self._is_inside(x, y, size / 2):
             return None
         lips_m = _LIPS_M * (1.0 - cos(2.0 * pi * _LIPS_HZ * scene_s)) if person.speaks else 0.0
         signs = FaceSigns(None, lips_m)
@@ -184,17 +184,17 @@ class SceneCamera:
         x, y, z = point
         lens = self._lens
         x, y = (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
-        if not self._inside(x, y, 0.0):
+        if not self._is_inside(x, y, 0.0):
             return ()
         place = scale(point, 1.0 + noise / norm(point))
         return (MovingBlob(thing.id, thing.kind, place, thing.radius_m, thing.spin_rad_s),)
 
-    def _inside(self, x: float, y: float, margin: float) -> bool:
+    def _is_inside(self, x: float, y: float, margin: float) -> bool:
         par = self._params
         return margin <= x <= par.width_px - margin and margin <= y <= par.height_px - margin
 
 
-def _landmarks_before(R: Mat3, p: Vec3, R_world_face: Mat3, p_world_face_m: Vec3) -> list[Vec3]:
+def _landmarks_in_camera(R: Mat3, p: Vec3, R_world_face: Mat3, p_world_face_m: Vec3) -> list[Vec3]:
     """Return the landmarks of a face in the axes of a camera.
 
     R, p: rotation and position of the camera in the world

@@ -26,8 +26,8 @@ def draw_arm(
     camera = float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2])
     shoulder = shoulder_m(p_world_face_m, p_world_hand_m, camera)
     elbow = elbow_m(shoulder, p_world_hand_m)
-    _limb(canvas, shoulder, elbow, _UPPER_WIDTH_M, sleeve)
-    _limb(canvas, elbow, p_world_hand_m, _FOREARM_WIDTH_M, skin)
+    _draw_limb(canvas, shoulder, elbow, _UPPER_WIDTH_M, sleeve)
+    _draw_limb(canvas, elbow, p_world_hand_m, _FOREARM_WIDTH_M, skin)
 
 
 def shoulder_m(face: Vec3, hand: Vec3, camera: Vec3) -> Vec3:
@@ -55,7 +55,7 @@ def elbow_m(shoulder: Vec3, hand: Vec3) -> Vec3:
     return add(shoulder, add(scale(ahead, along), scale(unit(down), off)))
 
 
-def _limb(canvas: Canvas, start: Vec3, end: Vec3, width_m: float, colour: Colour) -> None:
+def _draw_limb(canvas: Canvas, start: Vec3, end: Vec3, width_m: float, colour: Colour) -> None:
     """Draw one link as a patterned strip that faces the camera."""
     way = np.subtract(end, start)
     across = np.cross(way, np.add(start, end) * 0.5 - canvas.p_m)
@@ -64,11 +64,13 @@ def _limb(canvas: Canvas, start: Vec3, end: Vec3, width_m: float, colour: Colour
         return
     across *= width_m / length
     corner = np.array(start) - 0.5 * across
-    canvas.draw_quad(TexturedQuad(_vec(corner), _vec(across), _vec(way), _cloth(colour)))
+    canvas.draw_quad(
+        TexturedQuad(_to_vec3(corner), _to_vec3(across), _to_vec3(way), _cloth_texture(colour))
+    )
 
 
 @lru_cache(maxsize=16)
-def _cloth(colour: Colour) -> Bytes:
+def _cloth_texture(colour: Colour) -> Bytes:
     """Return an opaque patterned strip with round ends: (96, 32, 4)."""
     rng = np.random.default_rng(3000 + sum(colour))
     cells = rng.uniform(-22.0, 22.0, (12, 4))
@@ -83,5 +85,5 @@ def _cloth(colour: Colour) -> Bytes:
     return strip
 
 
-def _vec(row: np.ndarray) -> Vec3:
+def _to_vec3(row: np.ndarray) -> Vec3:
     return float(row[0]), float(row[1]), float(row[2])

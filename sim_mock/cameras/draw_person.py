@@ -105,7 +105,7 @@ def draw_person(canvas: Canvas, person: ScenePerson, number: int) -> None:
     draw_head(canvas, person.p_world_face_m, R, looks)
 
 
-def draw_arm_of(canvas: Canvas, person: ScenePerson, number: int, p_world_hand_m: Vec3) -> None:
+def draw_person_arm(canvas: Canvas, person: ScenePerson, number: int, p_world_hand_m: Vec3) -> None:
     """Draw a person's arm to a hand."""
     looks = PERSON_COLOURS[number % len(PERSON_COLOURS)]
     draw_arm(canvas, person.p_world_face_m, p_world_hand_m, looks.shirt, looks.skin)
@@ -121,15 +121,15 @@ def draw_head(
         return out
 
     back = world(_ellipsoid(_HAIR_MIDDLE_M, _HAIR_HALF_M))
-    if canvas.seen(back)[:, 2].min() < 0.05:
+    if canvas.to_camera(back)[:, 2].min() < 0.05:
         return
-    seen = canvas.seen(back)
+    seen = canvas.to_camera(back)
     flat = (seen[:, :2] / seen[:, 2:]).astype(np.float32)
     order = cv2.convexHull(flat, returnPoints=False)[:, 0]
     canvas.polygon(back[order], looks.hair)
     to_camera = (canvas.p_m - np.array(p_world_face_m)) @ R_world_face
     if to_camera[0] > 0.0:
-        for outline, colour in _features(looks):
+        for outline, colour in _feature_outlines(looks):
             canvas.polygon(world(outline), colour)
     middle = world(np.array([HEAD_MIDDLE_M]))[0]
     canvas.ellipsoid_depth((middle[0], middle[1], middle[2]), R_world_face, HEAD_HALF_M)
@@ -144,7 +144,9 @@ def draw_body(canvas: Canvas, p_world_face_m: Vec3, looks: PersonColours, number
     middle = np.array((x, y, z + _TORSO_TOP_M)) + (*(away * _TORSO_BEHIND_M), 0.0)
     corner = middle - 0.5 * aside
     canvas.draw_quad(
-        TexturedQuad(_vec(corner), _vec(aside), (0.0, 0.0, -_TORSO_HEIGHT_M), _trunk(looks, number))
+        TexturedQuad(
+            _to_vec3(corner), _to_vec3(aside), (0.0, 0.0, -_TORSO_HEIGHT_M), _trunk(looks, number)
+        )
     )
 
 
@@ -157,8 +159,10 @@ def draw_thing(canvas: Canvas, thing: Thing) -> None:
     turned, r = thing.turned_rad, thing.radius_m
     aside, up = cos(turned) * aside - sin(turned) * up, cos(turned) * up + sin(turned) * aside
     corner = np.array(thing.p_world_m) - r * aside + r * up
-    texture = _ball(thing.kind == "hand", thing.id)
-    canvas.draw_quad(TexturedQuad(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))
+    texture = _round_patch(thing.kind == "hand", thing.id)
+    canvas.draw_quad(
+        TexturedQuad(_to_vec3(corner), _to_vec3(2 * r * aside), _to_vec3(-2 * r * up), texture)
+    )
 
 
 def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
@@ -171,12 +175,12 @@ def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
 
 
 @lru_cache(maxsize=8)
-def _features(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
+def _feature_outlines(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
     """Return the outlines of a face's features in drawing order."""
     skin = looks.skin
-    shade, deep = _darker(skin, 0.86), _darker(skin, 0.68)
+    shade, deep = _darken(skin, 0.86), _darken(skin, 0.68)
     drawn: list[tuple[Floats, Colour]] = [
-        (_on_head(0.066 * np.cos(_AROUND), -0.008 + 0.098 * np.sin(_AROUND)), skin),
+        (_points_on_head(0.066 * np.cos(_AROUND), -0.008 + 0.098 * np.sin(_AROUND)), skin),
     ]
     for eye, side in ((_RIGHT_EYE, -1.0), (_LEFT_EYE, 1.0)):
         x, y, z = eye.tolist()
@@ -184,8 +188,11 @@ def _features(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
             (_ellipse((x, y, z + 0.002), 0.019, 0.012), shade),
             (_ellipse((x, y, z), 0.0145, 0.0068), (238, 240, 242)),
             (_ellipse((x, y, z), 0.0062, 0.0062), (40, 50, 60)),
-            (_arc((x, y, z + 0.0062), 0.016, 0.003, 0.0030), (30, 35, 45)),
-            (_arc((x + 0.006, y + 0.002 * side, z + 0.018), 0.019, 0.005, 0.0055), looks.hair),
+            (_curved_band((x, y, z + 0.0062), 0.016, 0.003, 0.0030), (30, 35, 45)),
+            (
+                _curved_band((x + 0.006, y + 0.002 * side, z + 0.018), 0.019, 0.005, 0.0055),
+                looks.hair,
+            ),
         ]
     drawn += [
         (
@@ -205,7 +212,7 @@ def _features(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
         (_ellipse((-0.006, 0.0065, -0.011), 0.0035, 0.0025), (45, 50, 70)),
         (_mouth(0.0075, 0.0085), (95, 95, 175)),
         (_mouth(0.0012, 0.0012), (55, 50, 95)),
-        (_arc((-0.020, 0.0, -0.056), 0.012, -0.002, 0.0025), shade),
+        (_curved_band((-0.020, 0.0, -0.056), 0.012, -0.002, 0.0025), shade),
     ]
     return tuple(drawn)
 
@@ -236,7 +243,7 @@ def _ellipse(middle: tuple[float, float, float], half_y: float, half_z: float) -
     return np.stack((np.full(len(t), x), y + half_y * np.cos(t), z + half_z * np.sin(t)), axis=1)
 
 
-def _arc(
+def _curved_band(
     middle: tuple[float, float, float], half_y: float, rise_m: float, thick_m: float
 ) -> Floats:
     """Return a band that bends down by ``rise_m`` towards its ends and is thinner there."""
@@ -250,7 +257,7 @@ def _arc(
     return np.concatenate((top, bottom[::-1]))
 
 
-def _on_head(y: Floats, z: Floats) -> Floats:
+def _points_on_head(y: Floats, z: Floats) -> Floats:
     """Return points on the front of the head at given positions in the face's plane."""
     cx, cy, cz = HEAD_MIDDLE_M
     a, b, c = HEAD_HALF_M
@@ -276,13 +283,13 @@ def _trunk(looks: PersonColours, number: int) -> Bytes:
     )
     body = np.zeros((height, width), np.uint8)
     cv2.fillPoly(body, [outline], 255, cv2.LINE_AA)
-    shirt[neck > 0, :3] = _darker(looks.skin, 0.85)
+    shirt[neck > 0, :3] = _darken(looks.skin, 0.85)
     shirt[:, :, 3] = np.maximum(body, neck)
     return shirt
 
 
 @lru_cache(maxsize=32)
-def _ball(hand: bool, number: int) -> Bytes:
+def _round_patch(hand: bool, number: int) -> Bytes:
     """Return a round patterned patch: (64, 64, 4)."""
     rng = np.random.default_rng(2000 + number)
     spread = 25.0 if hand else 90.0
@@ -297,10 +304,10 @@ def _ball(hand: bool, number: int) -> Bytes:
     return ball
 
 
-def _darker(colour: Colour, share: float) -> Colour:
+def _darken(colour: Colour, share: float) -> Colour:
     b, g, r = colour
     return round(b * share), round(g * share), round(r * share)
 
 
-def _vec(row: Floats) -> Vec3:
+def _to_vec3(row: Floats) -> Vec3:
     return float(row[0]), float(row[1]), float(row[2])

@@ -63,7 +63,7 @@ class Sensor:
         image = self._tone[light] if self._has_tone else light
         if params.noise_grey <= 0.0 and params.shot_noise_grey <= 0.0:
             return image
-        noise = self._piece(image.size).reshape(image.shape)
+        noise = self._noise_piece(image.size).reshape(image.shape)
         if params.shot_noise_grey > 0.0:
             noise = noise * self._deviation[image]
         out: ImageArray = cv2.add(image, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
@@ -71,7 +71,7 @@ class Sensor:
 
     def stereo(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return distances as stereo measures them: quadratic error, blind next to edges."""
-        noise = self._piece(depth_m.size).reshape(depth_m.shape)
+        noise = self._noise_piece(depth_m.size).reshape(depth_m.shape)
         noise = noise * (self._params.depth_noise_1_m / self._unit)
         seen = depth_m * (1.0 + depth_m * noise)
         kernel = np.ones((_BLIND_PX, _BLIND_PX), np.uint8)
@@ -80,7 +80,7 @@ class Sensor:
         out: NDArray[np.float32] = np.where(blind, np.float32(np.nan), seen).astype(np.float32)
         return out
 
-    def _piece(self, size: int) -> NDArray[np.float32]:
+    def _noise_piece(self, size: int) -> NDArray[np.float32]:
         """Return a slice of the prepared noise, different in each call."""
         start = int(self._rng.integers(0, _NOISE_STOCK))
         piece = self._stock[start : start + size]
@@ -169,7 +169,7 @@ def expose(
     """
     bands = [
         _average_exposure(view, params, t_s, lens, size_px, motion, late_s, rows, depth)
-        for late_s, rows in _bands(params, size_px[1])
+        for late_s, rows in _row_bands(params, size_px[1])
     ]
     image = np.concatenate([band.image for band in bands]) if len(bands) > 1 else bands[0].image
     seen = [band.depth_m for band in bands if band.depth_m is not None]
@@ -182,7 +182,7 @@ def expose(
     return Rendered(image, np.concatenate(seen) if seen else None)
 
 
-def _bands(params: OpticsParams, height: int) -> Iterator[tuple[float, tuple[int, int] | None]]:
+def _row_bands(params: OpticsParams, height: int) -> Iterator[tuple[float, tuple[int, int] | None]]:
     """Yield the delay of each band of rows, and its rows; None: all."""
     if params.read_out_ms <= 0.0:
         yield 0.0, None
@@ -235,7 +235,7 @@ def through_lens(
     lens, size_px = seen_by.lens, seen_by.size_px
     if not lens.has_distortion:
         return view.draw(seen_by, depth=depth, rows=rows)
-    ideal, ideal_px, columns, lines = _undistorting(lens, size_px)
+    ideal, ideal_px, columns, lines = _ideal_lens_and_map(lens, size_px)
     top, bottom = rows or (0, size_px[1])
     columns, lines = columns[top:bottom], lines[top:bottom]
     first = max(0, int(lines.min()) - 1) if rows else 0
@@ -255,11 +255,11 @@ def through_lens(
 
 def ideal_size_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
     """Return width and height of the ideal picture that a picture through a lens needs."""
-    return _undistorting(lens, size_px)[1] if lens.has_distortion else size_px
+    return _ideal_lens_and_map(lens, size_px)[1] if lens.has_distortion else size_px
 
 
 @lru_cache(maxsize=8)
-def _undistorting(
+def _ideal_lens_and_map(
     lens: Intrinsics, size_px: tuple[int, int]
 ) -> tuple[Intrinsics, tuple[int, int], NDArray[np.float32], NDArray[np.float32]]:
     """Return an ideal lens and picture size that cover a lens's field, and the pixel map.

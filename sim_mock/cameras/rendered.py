@@ -25,7 +25,7 @@ from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene_view import PinholeView, Rendered, SceneView
 from gazerig.sim_mock.cameras.canvas import Canvas
-from gazerig.sim_mock.cameras.draw_person import draw_arm_of, draw_person, draw_room, draw_thing
+from gazerig.sim_mock.cameras.draw_person import draw_person, draw_person_arm, draw_room, draw_thing
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
@@ -232,7 +232,9 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
     for thing in things:
         away = norm(sub(thing.p_world_m, eye))
         if thing.person is not None:
-            draw = _defer(draw_arm_of, canvas, people[thing.person], thing.person, thing.p_world_m)
+            draw = _defer(
+                draw_person_arm, canvas, people[thing.person], thing.person, thing.p_world_m
+            )
             drawn.append((away + _BEHIND_HAND_M, draw))
         drawn.append((away, _defer(draw_thing, canvas, thing)))
     for _, draw in sorted(drawn, key=lambda item: -item[0]):

@@ -99,8 +99,8 @@ def _arm(person: ScenePerson, number: int, p_hand_m: Vec3, eye_m: Vec3) -> list[
     sleeve, bare = _limb(number, True), _limb(number, False)
     wrist = np.array(p_hand_m) - (0.0, 0.0, 0.8 * _HAND_M)
     return [
-        _between(sleeve, shoulder, elbow, eye_m),
-        _between(bare, elbow, (float(wrist[0]), float(wrist[1]), float(wrist[2])), eye_m),
+        _place_link(sleeve, shoulder, elbow, eye_m),
+        _place_link(bare, elbow, (float(wrist[0]), float(wrist[1]), float(wrist[2])), eye_m),
         _hand(p_hand_m, number, _HAND_M, eye_m),
     ]
 
@@ -123,7 +123,7 @@ def _limb(number: int, sleeve: bool) -> Painted:
     return painted(mesh, look.shirt if sleeve else look.skin)
 
 
-def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _PlacedShape:
+def _place_link(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _PlacedShape:
     """Place a link from one point to another."""
     way = np.subtract(end, start)
     length = max(float(np.linalg.norm(way)), 1e-6)
@@ -139,7 +139,7 @@ def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _PlacedShape
 def _draw_solid(canvas: Canvas, solid: _PlacedShape) -> None:
     """Draw a shape face by face, the farthest first, with diffuse shading."""
     mesh = solid.shape.mesh
-    seen = canvas.seen(solid.scale * mesh.vertices @ solid.R.T + solid.p_m)
+    seen = canvas.to_camera(solid.scale * mesh.vertices @ solid.R.T + solid.p_m)
     if seen[:, 2].min() < _NEAREST_M:
         return
     lens = canvas.lens
@@ -167,7 +167,7 @@ def _draw_solid(canvas: Canvas, solid: _PlacedShape) -> None:
 
 
 def _draw_ball(canvas: Canvas, p_m: Vec3, radius_m: float) -> None:
-    seen = canvas.seen(p_m)[0]
+    seen = canvas.to_camera(p_m)[0]
     if seen[2] < max(_NEAREST_M, radius_m):
         return
     lens = canvas.lens
@@ -194,8 +194,8 @@ def _draw_room(canvas: Canvas) -> None:
     rise = up[0] * columns[None, ::8] + up[1] * rows[:, None] + up[2]
     edge = _TABLE_M / 3.0
     share = np.clip(0.5 + (rise - edge) * 90.0, 0.0, 1.0)[..., None]
-    wall = _fade(rise, edge, 0.75, _WALL_LOW, _WALL_TOP)
-    floor = _fade(edge - rise, 0.0, 0.6, _TABLE_FAR, _TABLE_NEAR)
+    wall = _fade_colours(rise, edge, 0.75, _WALL_LOW, _WALL_TOP)
+    floor = _fade_colours(edge - rise, 0.0, 0.6, _TABLE_FAR, _TABLE_NEAR)
     small = (wall * share + floor * (1.0 - share)).astype(np.float32)
     wide = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
     canvas.image[:] = np.clip(wide, 0.0, 255.0)
@@ -215,7 +215,7 @@ def _draw_room(canvas: Canvas) -> None:
         canvas.polygon(inner, colour)
 
 
-def _fade(
+def _fade_colours(
     value: Floats,
     start: float,
     reach: float,

@@ -130,29 +130,31 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         if self.quirks.bad_crc == "silent" or servo.status_level < 2:
             return []
         error = CRC_ERROR | servo.error_flag
-        return self._out([Answer(servo_id, error, b"", self._delay_s[servo_id])])
+        return self._apply_line_faults([Answer(servo_id, error, b"", self._delay_s[servo_id])])
 
     # --- groups
 
     def _group_instructions(self) -> dict[int, GroupAction]:
         rows = self.instructions.sync_rows
         return super()._group_instructions() | {
-            FAST_SYNC_READ: lambda params: self._fast(rows(params)),
+            FAST_SYNC_READ: lambda params: self._answer_fast_sync_read(rows(params)),
             BULK_READ: lambda params: self._answer_plain(bulk_rows(params)),
-            FAST_BULK_READ: lambda params: self._fast(bulk_rows(params)),
+            FAST_BULK_READ: lambda params: self._answer_fast_sync_read(bulk_rows(params)),
             BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
         }
 
-    def _fast(self, rows: Sequence[GroupRead]) -> list[Piece]:
+    def _answer_fast_sync_read(self, rows: Sequence[GroupRead]) -> list[Piece]:
         """Return one packet of all answers; a servo that refuses fills its block with zeros."""
         length = 1 + sum([4 + row[2] for row in rows])
-        if not self._wire.any and not self._twins:
+        if not self._wire.has_any and not self._twins:
             packet = fast_reply(self._by_id, rows, length, self._now_ms, self._fed_ms)
             return [Piece(rows[0][0], packet, self._delay_s[rows[0][0]])] if packet else []
         answers: list[Answer] = []
         for servo_id, address, size in rows:
             servo = self._by_id.get(servo_id)
-            answer = self._part(servo_id, address, size) if servo and servo.fast_reads else None
+            answer = (
+                self._group_part(servo_id, address, size) if servo and servo.fast_reads else None
+            )
             if answer is None:
                 break
             answers.append(answer if answer[2] else answer._replace(params=bytes(size)))

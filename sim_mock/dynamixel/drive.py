@@ -19,7 +19,7 @@ from gazerig.drivers.dynamixel.control_table import (
 )
 from gazerig.sim_mock.dynamixel.memory import DynamixelMemory
 from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 from gazerig.sim_mock.smart_servo.quirks import LENGTH
@@ -47,12 +47,12 @@ FAR_BEYOND = 2.0
 Get = Callable[[str], int]
 
 
-def modes_of(model: DynamixelModel) -> tuple[int, ...]:
+def supported_modes(model: DynamixelModel) -> tuple[int, ...]:
     """Return a model's operating modes."""
     return MODES_WITHOUT_CURRENT if model.current_limit is None else MODES
 
 
-def loop_of(get: Get, model: DynamixelModel, side: int) -> Loop:
+def control_loop(get: Get, model: DynamixelModel, side: int) -> Loop:
     """Return the controller that the registers describe; ``side`` is -1 in reverse mode."""
     mode = get("operating_mode")
     slew = inf
@@ -122,7 +122,7 @@ class DynamixelDrive(Drive):
         memory: DynamixelMemory,
         model: DynamixelModel,
         spec: ServoSpec,
-        make_shaft: ShaftMaker = own_shaft,
+        make_shaft: ShaftMaker = create_shaft,
     ) -> None:
         self._model = model
         self._quirks = Quirks(*spec.quirks)
@@ -209,7 +209,7 @@ class DynamixelDrive(Drive):
             profile.set_goal(self._side * speed * _SPEED_UNIT, ramp)
             self.shaft.resume()
 
-    def halt(self) -> None:
+    def hold_position(self) -> None:
         """Stop at the present position under torque until a new goal arrives."""
         shaft = self.shaft
         if isinstance(shaft.profile, SpeedProfile):
@@ -312,5 +312,5 @@ class DynamixelDrive(Drive):
         timed = get("firmware_version") >= BY_TIME_SINCE
         self._by_time = timed and bool(get("drive_mode") & BY_TIME)
         halted = self.memory.bytes[_WATCHDOG_AT] == TRIPPED
-        loop = loop_of(get, self._model, self._side) if self.torque else DISABLED
+        loop = control_loop(get, self._model, self._side) if self.torque else DISABLED
         self.shaft.drive(loop._replace(bias=0.0) if halted else loop)

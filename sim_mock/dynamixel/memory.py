@@ -291,5 +291,5 @@ class Backup:
     def recall(self, memory: DynamixelMemory, eeprom: bool) -> None:
         """Restore one area, the EEPROM's or the RAM's."""
         for name, value in self._stored.items():
-            if in_eeprom(memory.named(name)) == eeprom:
+            if in_eeprom(memory.register_named(name)) == eeprom:
                 memory.set(name, value)

@@ -26,7 +26,7 @@ from gazerig.sim_mock.dynamixel.drive import (
     TORQUE_ON_BY_GOAL,
     TRIPPED,
     DynamixelDrive,
-    modes_of,
+    supported_modes,
 )
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
@@ -50,7 +50,7 @@ from gazerig.sim_mock.dynamixel.memory import (
     SensedWindow,
     in_eeprom,
 )
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
@@ -70,7 +70,7 @@ class WriteRules:
         self, memory: DynamixelMemory, model: DynamixelModel, drive: DynamixelDrive
     ) -> None:
         self._memory = memory
-        self._modes = modes_of(model)
+        self._modes = supported_modes(model)
         self._drive = drive
         self.goal_range = (0, 0)
 
@@ -81,7 +81,7 @@ class WriteRules:
         if self._drive.mode == POSITION:
             self.goal_range = get("min_position_limit"), get("max_position_limit")
 
-    def permitted(self, address: int, data: bytes) -> Fields | int:
+    def is_permitted(self, address: int, data: bytes) -> Fields | int:
         """Return the registers of a write, or the error number."""
         fields = self._memory.fields(address, data)
         if isinstance(fields, int):
@@ -161,13 +161,13 @@ class DynamixelServo(EmulatedServo):
     memory: DynamixelMemory
     drive: DynamixelDrive
 
-    def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = own_shaft) -> None:
+    def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:
         self.model = MODELS[spec.model]
         self.mute_reboot = Quirks(*spec.quirks).mute_reboot
         self.memory = DynamixelMemory(self.model, spec.firmware)
         self.memory.set("firmware_version", spec.firmware)
         self.memory.set("id", spec.id)
-        self.baud_rates = BAUD_RATES[: (self.memory.named("baud_rate").high or 0) + 1]
+        self.baud_rates = BAUD_RATES[: (self.memory.register_named("baud_rate").high or 0) + 1]
         self.drive = DynamixelDrive(self.memory, self.model, spec, make_shaft)
         self._rules = WriteRules(self.memory, self.model, self.drive)
         self.fast_reads = spec.firmware >= FAST_READ_SINCE[self.model.family]
@@ -212,7 +212,7 @@ class DynamixelServo(EmulatedServo):
         """Stop as the bus watchdog does; goals are refused until 98 is cleared."""
         super()._trip(after_ms)
         self.memory.set("bus_watchdog", TRIPPED)
-        self.drive.halt()
+        self.drive.hold_position()
 
     # --- reading
 
@@ -269,7 +269,7 @@ class DynamixelServo(EmulatedServo):
         """Write bytes as an instruction does; return the error number, 0 on success."""
         if address == GOAL_AT and len(data) == GOAL_END - GOAL_AT and self.drive.follows:
             return self._take_goal(data)
-        fields = self._rules.permitted(address, data)
+        fields = self._rules.is_permitted(address, data)
         if isinstance(fields, int):
             return fields
         for register, value in fields:
@@ -322,10 +322,10 @@ class DynamixelServo(EmulatedServo):
 
     # --- instructions
 
-    def register(self, address: int, data: bytes) -> int:
+    def store_write(self, address: int, data: bytes) -> int:
         """Store a write for Action if it is permitted now; return the error number."""
-        fields = self._rules.permitted(address, data)
-        return fields if isinstance(fields, int) else super().register(address, data)
+        fields = self._rules.is_permitted(address, data)
+        return fields if isinstance(fields, int) else super().store_write(address, data)
 
     def factory_reset(self, option: int) -> int:
         """Restore the EEPROM (0xFF all, 1 all but id, 2 all but id and baud), then restart."""

@@ -15,18 +15,18 @@ TIME = ("for",)
 class Argument(NamedTuple):
     """One word of a command: its name in the help, and its parser."""
 
-    shown: str
+    label: str
     read: Callable[[str], Any]
     optional: bool = False
 
 
 class Verb(NamedTuple):
-    """One command. lasting: it may end with ``count N`` and ``for S``."""
+    """One command. duration_words: it may end with ``count N`` and ``for S``."""
 
-    do: Callable[..., str]
+    action: Callable[..., str]
     arguments: tuple[Argument, ...]
     description: str
-    lasting: tuple[str, ...] = ()
+    duration_words: tuple[str, ...] = ()
 
 
 class CommandTable(NamedTuple):
@@ -59,23 +59,23 @@ class CommandTable(NamedTuple):
             left, found = list(rest), dict[str, Any]()
             while len(left) >= 2 and left[-2] in BOTH:
                 value, word = left.pop(), left.pop()
-                if word not in verb.lasting:
+                if word not in verb.duration_words:
                     raise ValueError(f"{word!r} is not expected here")
                 if word == "count":
                     found["count"] = count(value)
                 else:
-                    found["seconds"] = number(0.0, 1e6, "seconds")(value)
+                    found["seconds"] = number_parser(0.0, 1e6, "seconds")(value)
             rest, lasting = left, found
-            return verb.do(faults, *_arguments(verb, rest), **lasting)
+            return verb.action(faults, *_arguments(verb, rest), **lasting)
         except (KeyError, ValueError) as error:
             raise ValueError(f"{name}: {error.args[0]}; usage: {self.usage(name)}") from None
 
     def usage(self, name: str) -> str:
         """Return the syntax of a command."""
         verb = self.verbs[name]
-        shown = [f"[{w.shown}]" if w.optional else w.shown for w in verb.arguments]
+        shown = [f"[{w.label}]" if w.optional else w.label for w in verb.arguments]
         ends = {"count": "[count N]", "for": "[for SECONDS]"}
-        return " ".join([name, *shown, *(ends[word] for word in verb.lasting)])
+        return " ".join([name, *shown, *(ends[word] for word in verb.duration_words)])
 
     def help(self, name: str | None = None) -> str:
         """Describe one command or all of them, one per line."""
@@ -92,7 +92,7 @@ class CommandTable(NamedTuple):
 def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
     needed = [word for word in verb.arguments if not word.optional]
     if len(arguments) < len(needed):
-        raise ValueError(f"{needed[len(arguments)].shown} is missing")
+        raise ValueError(f"{needed[len(arguments)].label} is missing")
     if len(arguments) > len(verb.arguments):
         raise ValueError(f"{arguments[len(verb.arguments)]!r} is one argument too many")
     return [word.read(text) for word, text in zip(verb.arguments, arguments, strict=False)]
@@ -101,7 +101,7 @@ def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
 # --- words
 
 
-def number(low: float, high: float, what: str) -> Callable[[str], float]:
+def number_parser(low: float, high: float, what: str) -> Callable[[str], float]:
     """Return a parser of numbers; ``what`` and the range are part of its error message."""
 
     def read(text: str) -> float:
@@ -116,7 +116,7 @@ def number(low: float, high: float, what: str) -> Callable[[str], float]:
     return read
 
 
-def whole(low: int, high: int, what: str) -> Callable[[str], int]:
+def integer_parser(low: int, high: int, what: str) -> Callable[[str], int]:
     """Return a parser of integers, also written as 0x1F."""
 
     def read(text: str) -> int:
@@ -131,12 +131,12 @@ def whole(low: int, high: int, what: str) -> Callable[[str], int]:
     return read
 
 
-def or_all(read: Callable[[str], int]) -> Callable[[str], int | None]:
+def id_or_all(read: Callable[[str], int]) -> Callable[[str], int | None]:
     """Return a parser of ids that also accepts ``all``, which is None."""
     return lambda text: None if text in ALL_DEVICES else read(text)
 
 
-def one_of(*values: str) -> Callable[[str], str]:
+def word_choice(*values: str) -> Callable[[str], str]:
     """Return a parser of words from a short list."""
 
     def read(text: str) -> str:
@@ -151,7 +151,7 @@ def one_of(*values: str) -> Callable[[str], str]:
 
 def on_off(text: str) -> bool:
     """Parse on or off."""
-    return one_of("on", "off")(text) == "on"
+    return word_choice("on", "off")(text) == "on"
 
 
 def hex_bytes(text: str) -> bytes | None:
@@ -164,12 +164,12 @@ def hex_bytes(text: str) -> bytes | None:
         raise ValueError(f"{text!r} is neither random nor bytes in hex such as FFFF00") from None
 
 
-def anything(text: str) -> str:
+def any_word(text: str) -> str:
     """Return a word unchanged."""
     return text
 
 
-count = whole(1, 1_000_000, "a number of answers")
+count = integer_parser(1, 1_000_000, "a number of answers")
 
-MS = Argument("MS", number(0.0, 60_000.0, "milliseconds"))
+MS = Argument("MS", number_parser(0.0, 60_000.0, "milliseconds"))
 SWITCH = Argument("on|off", on_off, True)

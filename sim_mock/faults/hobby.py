@@ -8,9 +8,9 @@ from gazerig.sim_mock.faults.grammar import (
     Argument,
     CommandTable,
     Verb,
-    number,
-    or_all,
-    whole,
+    id_or_all,
+    integer_parser,
+    number_parser,
 )
 from gazerig.sim_mock.faults.line import FaultTarget, LineFaults
 from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, loss_verb
@@ -43,7 +43,7 @@ class HobbyBoard(FaultTarget, Protocol):
         """Return the board without its line."""
         ...
 
-    def here(self, servo_id: int, /) -> HobbyServo:
+    def find_servo(self, servo_id: int, /) -> HobbyServo:
         """Return the servo of a channel, advanced to the present time."""
         ...
 
@@ -101,7 +101,7 @@ class HobbyFaults(LineFaults):
     def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
         """Return a servo, or all (None), advanced to the present time."""
         if channel is not None:
-            return [self._hobby.here(channel)]
+            return [self._hobby.find_servo(channel)]
         self._hobby.body.advance()
         return self._hobby.body.servos
 
@@ -113,7 +113,7 @@ class HobbyFaults(LineFaults):
                 "id": nth,
                 **self._hobby.channel_report(nth),
                 "place": round(servo.place_steps, 1),
-                "straining": servo.straining,
+                "straining": servo.is_straining,
             }
             for nth, servo in enumerate(self._hobby.body.servos)
         ]
@@ -121,13 +121,13 @@ class HobbyFaults(LineFaults):
 
 def channel_word(highest: int) -> Argument:
     """Return the argument that names a channel."""
-    return Argument("ID", whole(0, highest, "a channel"))
+    return Argument("ID", integer_parser(0, highest, "a channel"))
 
 
 # fmt: off
 def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str, Verb]:
     """Return the fault commands of a board of hobby servos."""
-    label = Argument(one.shown, or_all(one.read))
+    label = Argument(one.label, id_or_all(one.read))
     return {
         **line_verbs(one),
         "lose-writes": loss_verb("lose_writes", writes),
@@ -140,7 +140,7 @@ def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str
                       "supply of the servos; the board does not detect it"),
         "stick": Verb(HobbyFaults.stick, (label,), "jam the servo at its position"),
         "free": Verb(HobbyFaults.free, (label,), "free a jammed servo"),
-        "turn": Verb(HobbyFaults.turn, (label, Argument("STEPS", number(-1e5, 1e5, "quarter us"))),
+        "turn": Verb(HobbyFaults.turn, (label, Argument("STEPS", number_parser(-1e5, 1e5, "quarter us"))),
                      "turn the servo by hand; with pulses it returns"),
         **closing_verbs(one),
     }

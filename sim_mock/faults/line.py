@@ -21,7 +21,7 @@ class FaultTarget(Protocol):
 
     now_s: Callable[[], float]
 
-    def here(self, servo_id: int) -> object:
+    def find_servo(self, servo_id: int) -> object:
         """Return the servo or channel with this id, advanced to the present time.
 
         Raises:
@@ -29,7 +29,7 @@ class FaultTarget(Protocol):
         """
         ...
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         """Choose the device's behaviour where documents and devices differ."""
         ...
 
@@ -51,7 +51,7 @@ class LineFaults(ABC):
     def reports(self) -> list[dict[str, object]]:
         """Return the state of every servo, for ``status``."""
 
-    def board(self) -> dict[str, object]:
+    def board_status(self) -> dict[str, object]:
         """Return further entries of ``status``, for devices that are more than servos."""
         return {}
 
@@ -88,7 +88,7 @@ class LineFaults(ABC):
             KeyError: the servo does not exist.
         """
         if servo_id is not None:
-            self._chain.here(servo_id)
+            self._chain.find_servo(servo_id)
         until_s = None if seconds is None else self._chain.now_s() + seconds
         self.wire.add(LineFault(kind, servo_id, numbers, data, count, until_s))
         span = "" if count is None else f" {count} times"
@@ -104,13 +104,13 @@ class LineFaults(ABC):
 
     # --- all
 
-    def on(self, kind: str) -> bool:
+    def is_on(self, kind: str) -> bool:
         """Return whether echo, babble, unplug, deny or block is active."""
-        return self.wire.on(kind, self._chain.now_s())
+        return self.wire.is_on(kind, self._chain.now_s())
 
-    def choose(self, case: str, value: str) -> str:
+    def choose_behaviour(self, case: str, value: str) -> str:
         """Choose the servos' behaviour where documents and devices differ."""
-        self._chain.choose(case, value)
+        self._chain.choose_behaviour(case, value)
         return f"{case} is {value}"
 
     def clear(self, servo_id: int | None = None) -> str:
@@ -121,16 +121,16 @@ class LineFaults(ABC):
         """Return all servos and the active faults as one line of JSON."""
         faults = [
             f"{fault.kind} {'all' if fault.servo_id is None else fault.servo_id}"
-            for fault in self.wire.listed(self._chain.now_s())
+            for fault in self.wire.active_faults(self._chain.now_s())
         ]
-        return json.dumps({"servos": self.reports(), **self.board(), "faults": faults})
+        return json.dumps({"servos": self.reports(), **self.board_status(), "faults": faults})
 
-    def around(self, replies: list[DeviceReply], data: bytes) -> list[DeviceReply]:
+    def add_line_noise(self, replies: list[DeviceReply], data: bytes) -> list[DeviceReply]:
         """Add the host's echo and a babbling node to replies, if the line has such faults."""
         now_s = self._chain.now_s()
-        if self.wire.on("echo", now_s):
+        if self.wire.is_on("echo", now_s):
             replies.insert(0, DeviceReply(len(data), [Piece(NO_DEVICE, data)]))
-        babble = self.wire.babble(now_s)
+        babble = self.wire.babble_bytes(now_s)
         if babble:
             replies.insert(0, DeviceReply(0, [Piece(NO_DEVICE, babble)]))
         return replies

@@ -9,17 +9,17 @@ from gazerig.sim_mock.faults.grammar import (
     TIME,
     Argument,
     Verb,
-    anything,
+    any_word,
     count,
     hex_bytes,
-    number,
-    one_of,
-    or_all,
-    whole,
+    id_or_all,
+    integer_parser,
+    number_parser,
+    word_choice,
 )
 from gazerig.sim_mock.faults.line import LineFaults
 
-_BYTE_COUNT = whole(0, 1024, "a number of bytes")
+_BYTE_COUNT = integer_parser(0, 1024, "a number of bytes")
 _BYTES = Argument("BYTES", _BYTE_COUNT)
 _N = Argument("N", _BYTE_COUNT)
 _TIMES = Argument("N", count, True)
@@ -27,10 +27,10 @@ _TIMES = Argument("N", count, True)
 Do = Callable[..., str]
 
 
-def answers(kind: str, text: str) -> Do:
+def answer_command(kind: str, text: str) -> Do:
     """Return a command that disturbs the answers of one servo or all; ``text``: its reply."""
 
-    def do(
+    def run_command(
         faults: LineFaults,
         servo_id: int | None = None,
         *numbers: float,
@@ -40,13 +40,13 @@ def answers(kind: str, text: str) -> Do:
         done = text.format(*numbers, label=faults.label(servo_id))
         return faults.begin(kind, servo_id, done, count, seconds, numbers)
 
-    return do
+    return run_command
 
 
 def line_command(kind: str, text: str) -> Do:
     """Return a command that starts a fault of the whole line; ``text``: its reply."""
 
-    def do(
+    def run_command(
         faults: LineFaults,
         *numbers: float,
         count: int | None = None,
@@ -54,25 +54,27 @@ def line_command(kind: str, text: str) -> Do:
     ) -> str:
         return faults.begin(kind, None, text.format(*numbers), count, seconds, numbers)
 
-    return do
+    return run_command
 
 
 def counted_command(kind: str, text: str) -> Do:
     """Return a command that affects the next N, or all."""
 
-    def do(faults: LineFaults, count: int | None = None, seconds: float | None = None) -> str:
+    def run_command(
+        faults: LineFaults, count: int | None = None, seconds: float | None = None
+    ) -> str:
         return faults.begin(kind, None, text, count, seconds)
 
-    return do
+    return run_command
 
 
 def switch_command(kind: str, text: str) -> Do:
     """Return a command that switches a fault of the whole line on or off."""
 
-    def do(faults: LineFaults, on: bool = True, seconds: float | None = None) -> str:
+    def run_command(faults: LineFaults, on: bool = True, seconds: float | None = None) -> str:
         return faults.switch(kind, on, text, seconds)
 
-    return do
+    return run_command
 
 
 def _noise(
@@ -94,29 +96,29 @@ def _plug(faults: LineFaults) -> str:
 # fmt: off
 def line_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of any line; ``one`` parses an id."""
-    target = Argument(one.shown, or_all(one.read))
+    target = Argument(one.label, id_or_all(one.read))
     return {
-        "lose": Verb(answers("lose", "{label} does not answer"), (target,),
+        "lose": Verb(answer_command("lose", "{label} does not answer"), (target,),
                      "stay silent but obey", BOTH),
-        "delay": Verb(answers("delay", "{label} answers {:g} ms late"), (target, MS),
+        "delay": Verb(answer_command("delay", "{label} answers {:g} ms late"), (target, MS),
                       "answer late; in a group the following servos wait, too", BOTH),
-        "truncate": Verb(answers("truncate", "only {} bytes of answers of {label} arrive"),
+        "truncate": Verb(answer_command("truncate", "only {} bytes of answers of {label} arrive"),
                          (target, _BYTES), "only the first BYTES of an answer arrive", BOTH),
-        "duplicate": Verb(answers("duplicate", "answers of {label} arrive twice"), (target,),
+        "duplicate": Verb(answer_command("duplicate", "answers of {label} arrive twice"), (target,),
                           "answers arrive twice", BOTH),
-        "corrupt": Verb(answers("corrupt", "a bit flips in answers of {label}"),
-                        (target, Argument("BIT", whole(0, 8191, "a bit"), True)),
+        "corrupt": Verb(answer_command("corrupt", "a bit flips in answers of {label}"),
+                        (target, Argument("BIT", integer_parser(0, 8191, "a bit"), True)),
                         "a bit flips, a random one by default", BOTH),
-        "drop": Verb(answers("drop", "byte {} is lost in answers of {label}"),
-                     (target, Argument("BYTE", whole(-1024, 1023, "a byte"))),
+        "drop": Verb(answer_command("drop", "byte {} is lost in answers of {label}"),
+                     (target, Argument("BYTE", integer_parser(-1024, 1023, "a byte"))),
                      "byte BYTE of an answer is lost; -1 the last", BOTH),
-        "stall": Verb(answers("stall", "{label} stops for {:g} ms half-way through its answer"),
+        "stall": Verb(answer_command("stall", "{label} stops for {:g} ms half-way through its answer"),
                       (target, MS), "stop half-way through an answer", BOTH),
-        "noise": Verb(_noise, (Argument("before|after", one_of("before", "after")),
+        "noise": Verb(_noise, (Argument("before|after", word_choice("before", "after")),
                                Argument("HEX|random", hex_bytes, True)),
                       "bytes around every answer", BOTH),
         "static": Verb(line_command("static", "noise hits {:g} % of all bytes, both directions"),
-                       (Argument("PERCENT", number(0.0, 100.0, "a percentage")),),
+                       (Argument("PERCENT", number_parser(0.0, 100.0, "a percentage")),),
                        "noise hits this share of all bytes, both directions", TIME),
         "repeat": Verb(line_command("repeat", "the previous answers arrive again before the next"),
                        (), "the last answers arrive again first", BOTH),
@@ -125,21 +127,21 @@ def line_verbs(one: Argument) -> dict[str, Verb]:
 
 def packet_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of lines with many servos; ``one`` parses an id."""
-    target = Argument(one.shown, or_all(one.read))
+    target = Argument(one.label, id_or_all(one.read))
     return {
-        "fragment": Verb(answers("fragment", "a loose header before answers of {label}"),
+        "fragment": Verb(answer_command("fragment", "a loose header before answers of {label}"),
                          (target._replace(optional=True),),
                          "a loose header before the real one", BOTH),
         "reorder": Verb(line_command("reorder", "groups answer in reverse order"), (),
                         "groups answer in reverse order", BOTH),
-        "wrong-id": Verb(answers("wrong_id", "{label} answers as {}"),
-                         (target, Argument("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
-        "short": Verb(answers("short", "{label} answers {} bytes too few"), (target, _N),
+        "wrong-id": Verb(answer_command("wrong_id", "{label} answers as {}"),
+                         (target, Argument("AS", integer_parser(0, 255, "an id"))), "answer under another id", BOTH),
+        "short": Verb(answer_command("short", "{label} answers {} bytes too few"), (target, _N),
                       "N bytes of data too few, checksum right", BOTH),
-        "long": Verb(answers("long", "{label} answers {} bytes too many"), (target, _N),
+        "long": Verb(answer_command("long", "{label} answers {} bytes too many"), (target, _N),
                      "N bytes of data too many, checksum right", BOTH),
-        "refuse": Verb(answers("refuse", "{label} answers with error {} and no data"),
-                       (target, Argument("NUMBER", whole(0, 255, "an error number"))),
+        "refuse": Verb(answer_command("refuse", "{label} answers with error {} and no data"),
+                       (target, Argument("NUMBER", integer_parser(0, 255, "an error number"))),
                        "answer with an error number and no data", BOTH),
         "lose-writes": loss_verb("lose_writes", "group writes"),
     }
@@ -169,7 +171,7 @@ def adapter_verbs() -> dict[str, Verb]:
 def closing_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of every device, which are last in its help."""
     return {
-        "set": Verb(LineFaults.choose, (Argument("CASE", anything), Argument("VALUE", anything)),
+        "set": Verb(LineFaults.choose_behaviour, (Argument("CASE", any_word), Argument("VALUE", any_word)),
                     "choose where documents and devices differ: see below"),
         "status": Verb(LineFaults.status, (), "all servos and faults as JSON"),
         "clear": Verb(LineFaults.clear, (one._replace(optional=True),),

@@ -20,7 +20,7 @@ from gazerig.drivers.feetech.memory_table import TORQUE_FULL as FULL
 from gazerig.sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, FeetechMemory
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -62,7 +62,7 @@ class FeetechDrive(Drive):
         memory: FeetechMemory,
         model: FeetechModel,
         spec: ServoSpec,
-        make_shaft: ShaftMaker = own_shaft,
+        make_shaft: ShaftMaker = create_shaft,
     ) -> None:
         table = memory.table
         self._goals = GOALS[table.order]
@@ -70,7 +70,7 @@ class FeetechDrive(Drive):
         self._last = table.last_step
         self._top = model.no_load_rpm / 60.0 * TURN / 1000.0
         self._current_full = model.stall_current_a / CURRENT_UNIT_A
-        self._timed = True
+        self._uses_goal_time = True
         physics, scale = Physics(*spec.physics), self._scale
         steps = ("upright_steps", "stop_low_steps", "stop_high_steps")
         here = {name: getattr(physics, name) / scale for name in steps}
@@ -81,7 +81,7 @@ class FeetechDrive(Drive):
         """Reset to power-on: torque off, position within one turn."""
         self.torque = self.damped = False
         self.max_duty = 1.0
-        self.mode = self._wanted_mode()
+        self.mode = self._configured_mode()
         self._goals_followed: tuple[int, ...] = ()
         self._offset = self.memory.get("position_offset")
         self.shaft.disable()
@@ -144,14 +144,14 @@ class FeetechDrive(Drive):
             self._offset = offset
             if not self.counts_turns:
                 self._wrap_to_one_turn()
-        if self._wanted_mode() != self.mode:
-            self.mode = self._wanted_mode()
+        if self._configured_mode() != self.mode:
+            self.mode = self._configured_mode()
             self._set_goal_here()
             if self.torque:
                 self._begin()
         self.apply_gains()
 
-    def _wanted_mode(self) -> int:
+    def _configured_mode(self) -> int:
         """Return the mode from its register, or from the limits for a series without it."""
         get = self.memory.get
         if self._last is not None and get("min_position_limit") == get("max_position_limit") == 0:
@@ -210,7 +210,7 @@ class FeetechDrive(Drive):
 
     def obey_goal_time(self, obeyed: bool) -> None:
         """Choose whether Goal Time is used."""
-        self._timed = obeyed
+        self._uses_goal_time = obeyed
 
     def follow(self, new_goal: bool = False) -> None:
         """Follow the goal registers; ``new_goal``: the goal position has just been written."""
@@ -241,7 +241,7 @@ class FeetechDrive(Drive):
         cruise = abs(signed(speed, 15)) * self._speed_unit / self._scale / 1000.0
         if cruise == 0.0 and self._stops_at_zero:
             return
-        if time_ms and self._timed and self.mode == SERVO:
+        if time_ms and self._uses_goal_time and self.mode == SERVO:
             # No faster than possible: the next path begins at the speed of this one.
             profile.plan_by_time(to, max(time_ms, abs(to - profile.r) / self._top), 0.0)
         else:
@@ -260,7 +260,7 @@ class FeetechDrive(Drive):
         if self._last is not None:
             return
         offset = (round(self.shaft.x) - to + TURN // 2) % TURN - TURN // 2
-        self.memory.keep("position_offset", offset)
+        self.memory.set_permanently("position_offset", offset)
         self.apply_settings()
         self._set_goal_here()
 

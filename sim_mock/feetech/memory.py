@@ -41,7 +41,7 @@ class EmulatedFeetechRegister(NamedTuple):
     sign: int | None = None
 
 
-def _with(
+def _with_start_values(
     registers: tuple[EmulatedFeetechRegister, ...], **initial: int
 ) -> tuple[EmulatedFeetechRegister, ...]:
     """Return registers with other start values."""
@@ -96,7 +96,9 @@ _STS_KEPT = (
 )
 _SCS_KEPT = (
     # The values of STS servos are assumed for these, too [A].
-    *_with(_KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25),
+    *_with_start_values(
+        _KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25
+    ),
     EmulatedFeetechRegister("protective_torque", 37, initial=20),
     EmulatedFeetechRegister("protection_time", 38, initial=200),
     EmulatedFeetechRegister("overload_torque", 39, initial=80),
@@ -133,10 +135,10 @@ _ABSENT_FROM_SCS = (
 )
 
 
-class Table(NamedTuple):
+class FeetechTable(NamedTuple):
     """Registers of one series of servos.
 
-    kept: permanent registers; ram: registers with start values; fixed: read-only registers
+    permanent: permanent registers; ram: registers with start values; fixed: read-only registers
     absent: registers that a series lacks but its emulated motor uses; they cannot be read
     order: byte order of words
     lock_at: the register that makes writes temporary
@@ -147,7 +149,7 @@ class Table(NamedTuple):
     baud_rates: bit/s by the value of their register
     """
 
-    kept: tuple[EmulatedFeetechRegister, ...]
+    permanent: tuple[EmulatedFeetechRegister, ...]
     ram: tuple[EmulatedFeetechRegister, ...]
     lock_at: int
     highest: Mapping[int, int]
@@ -160,8 +162,8 @@ class Table(NamedTuple):
     baud_rates: tuple[int, ...] = BAUD_RATES
 
 
-STS = Table(
-    kept=_STS_KEPT,
+STS = FeetechTable(
+    permanent=_STS_KEPT,
     ram=(
         *_RAM,
         EmulatedFeetechRegister("torque_limit", 48, 2),
@@ -172,10 +174,10 @@ STS = Table(
 )
 
 
-def _scs(travel_deg: float) -> Table:
+def _scs(travel_deg: float) -> FeetechTable:
     """Return the registers of a model."""
-    return Table(
-        kept=_SCS_KEPT,
+    return FeetechTable(
+        permanent=_SCS_KEPT,
         ram=(*_RAM, EmulatedFeetechRegister("lock", 48, initial=1)),
         lock_at=48,
         highest={5: HIGHEST_ID, 6: len(SCS_BAUD_RATES) - 1},
@@ -191,7 +193,7 @@ def _scs(travel_deg: float) -> Table:
 SCS = {"scs0009": _scs(300.0), "scs15": _scs(200.0)}
 
 
-def model_and_table(model: str) -> tuple[FeetechModel, Table]:
+def model_and_table(model: str) -> tuple[FeetechModel, FeetechTable]:
     """Return a model and the registers of its series.
 
     Raises:
@@ -219,13 +221,13 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
     """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
 
     def __init__(
-        self, model: FeetechModel, servo_id: int, firmware: int, table: Table = STS
+        self, model: FeetechModel, servo_id: int, firmware: int, table: FeetechTable = STS
     ) -> None:
-        registers = (*table.kept, *table.ram, *table.fixed, *table.absent)
+        registers = (*table.permanent, *table.ram, *table.fixed, *table.absent)
         super().__init__(registers, SIZE + ABSENT_SIZE)
         self._model = model
         self.table = table
-        self._kept_at = _bytes_of(table.kept)
+        self._kept_at = _bytes_of(table.permanent)
         self._writable = self._kept_at | _bytes_of(table.ram)
         self._kept = bytearray(SIZE + ABSENT_SIZE)
         for register in registers:
@@ -233,7 +235,7 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
         self.set("firmware_minor", firmware)
         self.set("model_number", model.number)
         self.factory_settings()
-        self.keep("id", servo_id)
+        self.set_permanently("id", servo_id)
 
     def _decode(self, register: EmulatedFeetechRegister, data: bytes | bytearray) -> int:
         raw = int.from_bytes(data, self.table.order)
@@ -244,10 +246,10 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
         raw = value if register.sign is None else unsigned(value, register.sign)
         return raw.to_bytes(register.size, self.table.order)
 
-    def keep(self, name: str, value: int) -> None:
+    def set_permanently(self, name: str, value: int) -> None:
         """Set a register, in the EEPROM as well."""
         self.set(name, value)
-        _, address, size, _, _ = self.named(name)
+        _, address, size, _, _ = self.register_named(name)
         self._kept[address : address + size] = self.bytes[address : address + size]
 
     def factory_settings(self) -> None:
@@ -259,15 +261,15 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
             "min_voltage_limit": model.min_voltage,
             "max_velocity_limit": round(model.no_load_steps_s / SPEED_UNIT_STEPS_S),
         }
-        for register in self.table.kept:
+        for register in self.table.permanent:
             if register.name != "id":
-                self.keep(register.name, own.get(register.name, register.initial))
+                self.set_permanently(register.name, own.get(register.name, register.initial))
 
     def power_up(self) -> None:
         """Set the start values of the RAM, and the permanent values of the EEPROM."""
         for address in self._kept_at:
             self.bytes[address] = self._kept[address]
-        for register in (*self.table.ram, self.named("registered_instruction")):
+        for register in (*self.table.ram, self.register_named("registered_instruction")):
             self.put(register, register.initial)
         self.set("torque_limit", self.get("max_torque"))
 

@@ -16,7 +16,7 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.sim_mock.feetech.drive import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
 from gazerig.sim_mock.feetech.memory import SERVO, FeetechMemory, model_and_table
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
@@ -86,7 +86,7 @@ class FeetechServo(EmulatedServo):
     memory: FeetechMemory
     drive: FeetechDrive
 
-    def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = own_shaft) -> None:
+    def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = create_shaft) -> None:
         self.model, self.table = model_and_table(spec.model)
         self.baud_rates = self.table.baud_rates
         self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
@@ -147,12 +147,14 @@ class FeetechServo(EmulatedServo):
     def read(self, address: int, length: int) -> bytes:
         """Return bytes of the memory; addresses without a register are 0."""
         if address == SENSED_AT and length == SENSED_END - SENSED_AT:
-            return self._sensed.pack(*self._live_words())  # a control loop reads them every tick
+            return self._sensed.pack(
+                *self._read_live_words()
+            )  # a control loop reads them every tick
         if address < SENSED_END and address + length > SENSED_AT:
-            self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._live_words())
+            self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._read_live_words())
         return self.memory.read(address, length)
 
-    def _live_words(self) -> tuple[int, ...]:
+    def _read_live_words(self) -> tuple[int, ...]:
         """Return the registers with live values, 56 to 70."""
         if self.stale_surroundings:
             self.stale_surroundings = False
@@ -211,7 +213,7 @@ class FeetechServo(EmulatedServo):
             self.memory.set("torque_enable", int(drive.torque))
             drive.calibrate(MIDDLE)
             return
-        self._end(CURRENT)
+        self._clear_error(CURRENT)
         if value == 0 and self.quirks.overload_ends != "restart":
             self._end_overload()
         unload = self.memory.get("unloading_condition")
@@ -223,10 +225,10 @@ class FeetechServo(EmulatedServo):
 
     def _end_overload(self) -> None:
         if self.errors & OVERLOAD:
-            self._end(OVERLOAD)
+            self._clear_error(OVERLOAD)
             self._protect()
 
-    def _end(self, bit: int) -> None:
+    def _clear_error(self, bit: int) -> None:
         """Clear an error and reset the counts of its protection."""
         self.errors &= ~bit
         self.protection.restart()
@@ -237,7 +239,7 @@ class FeetechServo(EmulatedServo):
         """Restore the factory settings of the EEPROM, except the id, and restart."""
         self.memory.factory_settings()
         if new_id is not None:
-            self.memory.keep("id", new_id)
+            self.memory.set_permanently("id", new_id)
         self.restart()
 
     def fail(self, error: str) -> str:

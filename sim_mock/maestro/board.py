@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, one_of
+from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, word_choice
 from gazerig.sim_mock.faults.hobby import HobbyBoard, HobbyFaults, channel_word, hobby_verbs
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.maestro.body import EmulatedChannel, MaestroBody
@@ -33,7 +33,7 @@ from gazerig.sim_mock.maestro.commands import (
     STOP_SCRIPT,
     CommandParser,
     ParsedCommand,
-    word,
+    decode_word,
 )
 from gazerig.sim_mock.maestro.settings import LIMITS, Settings, cases, change_setting, width_steps
 from gazerig.sim_mock.replies import Piece
@@ -55,7 +55,7 @@ class MaestroFaults(HobbyFaults):
         self._body.fail(name)
         return f"the board has found an error: {name}"
 
-    def script(self, what: int | bool) -> str:
+    def set_script(self, what: int | bool) -> str:
         """Start a script that does nothing or swings a channel, or end it (False)."""
         if what is False:
             self._body.advance()
@@ -64,11 +64,11 @@ class MaestroFaults(HobbyFaults):
         if what is True:
             self._body.run_script()
             return "a script runs and does nothing"
-        self._hobby.here(what)
+        self._hobby.find_servo(what)
         self._body.run_script(what)
         return f"a script swings channel {what} from end to end"
 
-    def board(self) -> dict[str, object]:
+    def board_status(self) -> dict[str, object]:
         """Return the unread errors, and whether a script runs."""
         named = [name for bit, name in enumerate(ERRORS) if self._body.errors >> bit & 1]
         return {"errors": named, "script": self._body.script_running}
@@ -83,9 +83,9 @@ def _script(text: str) -> int | bool:
 
 # fmt: off
 OWN: dict[str, Verb] = {
-    "error": Verb(MaestroFaults.error, (Argument("NAME", one_of(*ERRORS)),),
+    "error": Verb(MaestroFaults.error, (Argument("NAME", word_choice(*ERRORS)),),
                   f"the board finds an error: {', '.join(ERRORS)}"),
-    "script": Verb(MaestroFaults.script, (Argument("on|off|ID", _script),),
+    "script": Verb(MaestroFaults.set_script, (Argument("on|off|ID", _script),),
                    "a script runs; with a channel it swings this from end to end"),
 }
 # fmt: on
@@ -116,17 +116,21 @@ class EmulatedMaestro:
         self._wire = self.faults.wire
         self._parser = CommandParser(device, len(servos) > SIZES[0])
         self._detected_baud: int | None = None
-        self._set_up(self.body.settings)
+        self._apply_settings(self.body.settings)
         self._do: dict[int, Callable[[bytes], bytes | None]] = {
-            SET_TARGET: lambda data: self._at(data, EmulatedChannel.aim),
+            SET_TARGET: lambda data: self._apply_to_channel(data, EmulatedChannel.set_target),
             SET_TARGETS: self._set_targets,
-            SET_SPEED: lambda data: self._at(data, EmulatedChannel.limit_speed),
-            SET_ACCELERATION: lambda data: self._at(data, EmulatedChannel.limit_acceleration),
+            SET_SPEED: lambda data: self._apply_to_channel(data, EmulatedChannel.limit_speed),
+            SET_ACCELERATION: lambda data: self._apply_to_channel(
+                data, EmulatedChannel.limit_acceleration
+            ),
             SET_PWM: lambda data: None,
             GET_POSITION: self._get_position,
-            GET_MOVING: lambda data: bytes((any(c.led for c in self.body.channels),)),
+            GET_MOVING: lambda data: bytes(
+                (any(c.is_moving_under_limit for c in self.body.channels),)
+            ),
             GET_ERRORS: lambda data: self.body.read_errors().to_bytes(2, "little"),
-            GO_HOME: lambda data: self.body.send_all(self.body.settings.on_error),
+            GO_HOME: lambda data: self.body.move_all_to(self.body.settings.on_error),
             STOP_SCRIPT: lambda data: self.body.stop_script(),
             RUN_SCRIPT: lambda data: self._run_script(),
             RUN_SCRIPT_WITH: lambda data: self._run_script(),
@@ -136,7 +140,7 @@ class EmulatedMaestro:
 
     # --- device interface
 
-    def at_baud(self, client_baud: int) -> bool:
+    def understands_baud(self, client_baud: int) -> bool:
         """Return whether a client at this baud rate is understood, once it has sent AA."""
         mode = self.body.settings.mode
         if mode == "uart-fixed":
@@ -145,7 +149,7 @@ class EmulatedMaestro:
             return self._detected_baud in (None, client_baud)
         return mode != "mute"
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         """Change a setting of the board; it does not restart."""
         self.body.advance()
         if case in LIMITS:
@@ -153,27 +157,27 @@ class EmulatedMaestro:
             self.body.limit(*((steps, None) if case == "min-us" else (None, steps)))
             return
         before = self.body.settings.mode
-        self._set_up(change_setting(self.body.settings, case, value))
+        self._apply_settings(change_setting(self.body.settings, case, value))
         if before != self.body.settings.mode:
-            self._forget()
-        self.body.feed()
+            self._forget_input()
+        self.body.reset_timeout()
 
-    def _set_up(self, settings: Settings) -> None:
+    def _apply_settings(self, settings: Settings) -> None:
         self.body.settings = settings
         self._parser.crc = settings.crc
         # The client's rate matters at the serial pins only.
         self.check_baud = settings.mode in ("uart-fixed", "uart-detect")
 
-    def _forget(self) -> None:
+    def _forget_input(self) -> None:
         self._parser.forget()
         self._detected_baud = None
 
     def restart(self) -> None:
         """Restart as after a dip of the supply."""
         self.body.restart()
-        self._forget()
+        self._forget_input()
 
-    def here(self, channel: int) -> HobbyServo:
+    def find_servo(self, channel: int) -> HobbyServo:
         """Return the servo of a channel, advanced to the present time."""
         self.body.advance()
         servos = self.body.servos
@@ -212,18 +216,18 @@ class EmulatedMaestro:
             pieces = self._execute(command)
             if pieces:
                 replies.append(DeviceReply(missing + command.end, pieces))
-        return self.faults.around(replies, data) if self._wire.any else replies
+        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
 
     def _filter_input(self, data: bytes, client_baud: int | None) -> bytes:
         """Return the bytes of a client that the board understands."""
-        if not self.body.awake or self.body.settings.mode == "mute":
+        if not self.body.is_awake or self.body.settings.mode == "mute":
             return b""
         if self.check_baud and client_baud is not None:
             data = self._filter_pins(data, client_baud)
         now_s = self.now_s()
-        if not self._wire.any or not self._wire.on("lose_bytes", now_s):
+        if not self._wire.has_any or not self._wire.is_on("lose_bytes", now_s):
             return data
-        return bytes(b for b in data if self._wire.take("lose_bytes", None, now_s) is None)
+        return bytes(b for b in data if self._wire.use_fault("lose_bytes", None, now_s) is None)
 
     def _filter_pins(self, data: bytes, client_baud: int) -> bytes:
         """Return the bytes understood at the serial pins: none before AA in uart-detect."""
@@ -233,7 +237,7 @@ class EmulatedMaestro:
                 return b""
             self._detected_baud = client_baud
             return data[sign:]
-        if self.at_baud(client_baud):
+        if self.understands_baud(client_baud):
             return data
         if data:
             self.body.fail("signal")
@@ -241,31 +245,31 @@ class EmulatedMaestro:
 
     def _execute(self, command: ParsedCommand) -> list[Piece]:
         """Execute one command; return the answer."""
-        if command.trouble:
-            self.body.fail(command.trouble)
+        if command.error:
+            self.body.fail(command.error)
             return []
-        silent = self._wire.any and command.code not in ASKING
-        if silent and self._wire.take("lose_writes", None, self.now_s()) is not None:
+        silent = self._wire.has_any and command.code not in ASKING
+        if silent and self._wire.use_fault("lose_writes", None, self.now_s()) is not None:
             return []
         answer = self._do[command.code](command.data)
-        self.body.feed()
+        self.body.reset_timeout()
         if answer is None:
             return []
         asked = command.data[0] if command.code == GET_POSITION else NO_DEVICE
         piece = Piece(asked, answer)
-        if not self._wire.any:
+        if not self._wire.has_any:
             return [piece]
         now_s = self.now_s()
-        if self._wire.take("lose", piece.servo_id, now_s):
+        if self._wire.use_fault("lose", piece.servo_id, now_s):
             return []
         return self._wire.spoil_pieces([piece], False, now_s)
 
     # --- commands
 
-    def _at(self, data: bytes, do: Callable[[EmulatedChannel, int], None]) -> None:
+    def _apply_to_channel(self, data: bytes, do: Callable[[EmulatedChannel, int], None]) -> None:
         """Apply a number to a channel; an unknown channel is a protocol error [A]."""
         if data[0] < len(self.body.channels):
-            do(self.body.channels[data[0]], word(data[1], data[2]))
+            do(self.body.channels[data[0]], decode_word(data[1], data[2]))
         else:
             self.body.fail("protocol")
 
@@ -275,7 +279,7 @@ class EmulatedMaestro:
             self.body.fail("protocol")
             return
         for nth, channel in enumerate(self.body.channels[first : first + number], 1):
-            channel.aim(word(data[2 * nth], data[2 * nth + 1]))
+            channel.set_target(decode_word(data[2 * nth], data[2 * nth + 1]))
 
     def _get_position(self, data: bytes) -> bytes | None:
         if data[0] < len(self.body.channels):
@@ -287,7 +291,7 @@ class EmulatedMaestro:
         """Set a target of 8 bits: 127 is 1500 us, 0 and 254 are 476.25 us to either side."""
         # Servo numbers beyond its own belong to other boards.
         if data[0] < len(self.body.channels):
-            self.body.channels[data[0]].aim(6000 + (data[1] - 127) * 15)
+            self.body.channels[data[0]].set_target(6000 + (data[1] - 127) * 15)
 
     def _run_script(self) -> None:
         """Handle the start of a script that does not exist [A]."""

@@ -39,19 +39,19 @@ class EmulatedChannel:
         return self._at8 // EIGHTHS
 
     @property
-    def limited(self) -> bool:
+    def is_limited(self) -> bool:
         """Return whether it has a limit of speed or acceleration."""
         return self.speed != 0 or self.acceleration != 0
 
     @property
-    def moving(self) -> bool:
+    def is_moving(self) -> bool:
         """Return whether it has not reached its target."""
         return self._at8 != self.target * EIGHTHS or self._velocity8 != 0
 
     @property
-    def led(self) -> bool:
+    def is_moving_under_limit(self) -> bool:
         """Return whether it moves under a limit, which the board reports as moving."""
-        return self.limited and self.moving
+        return self.is_limited and self.is_moving
 
     def limit_speed(self, speed: int) -> None:
         """Limit the speed; 0: unlimited."""
@@ -61,15 +61,15 @@ class EmulatedChannel:
         """Limit the acceleration; 0: unlimited. Values above 255 count as 255 [A]."""
         self.acceleration = min(acceleration, 255)
 
-    def aim(self, steps: int) -> None:
+    def set_target(self, steps: int) -> None:
         """Set the target, clipped to the limits; 0 ends the pulses.
 
         Without limits, or without pulses before, the output changes immediately: the board does not
         know the servo's position.
         """
         self.target = min(max(steps, self.low), self.high) if steps else 0
-        if not steps or not self._at8 or not self.limited:
-            self._arrive()
+        if not steps or not self._at8 or not self.is_limited:
+            self._jump_to_target()
 
     def limit(self, low: int, high: int) -> None:
         """Set other limits of targets."""
@@ -81,14 +81,14 @@ class EmulatedChannel:
     def restart(self, speed: int = 0, acceleration: int = 0) -> None:
         """Reset to power-on: no pulses, the configured limits of speed and acceleration."""
         self.speed, self.acceleration = speed, acceleration
-        self.aim(0)
+        self.set_target(0)
 
     def step(self) -> None:
         """Advance by 10 ms."""
-        if not self.moving:
+        if not self.is_moving:
             return
-        if not self.limited:
-            self._arrive()
+        if not self.is_limited:
+            self._jump_to_target()
             return
         way8 = self.target * EIGHTHS - self._at8
         sign = -1 if way8 < 0 else 1
@@ -106,7 +106,7 @@ class EmulatedChannel:
         there = self._at8 == self.target * EIGHTHS and abs(velocity8) <= self.acceleration
         self._velocity8 = 0 if clipped or there or not self.acceleration else velocity8
 
-    def _arrive(self) -> None:
+    def _jump_to_target(self) -> None:
         self._at8, self._velocity8 = self.target * EIGHTHS, 0
 
 
@@ -154,22 +154,22 @@ class MaestroBody:
         self.script_channel: int | None = None
         self._period = self._fed = self._awake_from = whole_periods(now_s())
         self._timed_out = False
-        self.send_all(settings.startup)
+        self.move_all_to(settings.startup)
 
     @property
-    def awake(self) -> bool:
+    def is_awake(self) -> bool:
         """Return whether it is not in a restart."""
         return self._period >= self._awake_from
 
     # --- commands
 
-    def send_all(self, where: OnError) -> None:
+    def move_all_to(self, where: OnError) -> None:
         """Send every channel to its configured position at start or on an error."""
         if where != "ignore":
             for channel in self.channels:
-                channel.aim(self.settings.home_steps if where == "home" else 0)
+                channel.set_target(self.settings.home_steps if where == "home" else 0)
 
-    def feed(self) -> None:
+    def reset_timeout(self) -> None:
         """Restart the time without valid commands."""
         self._fed, self._timed_out = self._period, False
 
@@ -193,7 +193,7 @@ class MaestroBody:
     def fail(self, error: str) -> None:
         """Register an error by its name; every channel reacts as configured."""
         self.errors |= 1 << ERRORS.index(error)
-        self.send_all(self.settings.on_error)
+        self.move_all_to(self.settings.on_error)
 
     def read_errors(self) -> int:
         """Return the error register and clear it."""
@@ -227,32 +227,36 @@ class MaestroBody:
         now = whole_periods(self.now_s())
         while now - self._period > PAUSE and self.script_channel is not None:
             self._run_periods(self._period + 2 * SWING)
-            due = self._due()
+            due = self._timeout_period()
             until = now if due is None else min(now, due - 1)
-            if self.awake and until > self._period and self._at_rest(but=self.script_channel):
+            if (
+                self.is_awake
+                and until > self._period
+                and self._are_at_rest(but=self.script_channel)
+            ):
                 self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
         self._run_periods(now)
 
     def _run_periods(self, until: int) -> None:
         while self._period < until:
             following = self._period + 1
-            if self.script_channel is None and self.awake and self._at_rest():
+            if self.script_channel is None and self.is_awake and self._are_at_rest():
                 # The next event is the end of the serial time-out, or none.
-                due = self._due()
+                due = self._timeout_period()
                 following = until if due is None else max(following, min(until, due))
             self._period = following
-            self._pass()
+            self._run_period()
 
-    def _due(self) -> int | None:
+    def _timeout_period(self) -> int | None:
         """Return the period in which the serial time-out ends, None: never."""
         if not self.settings.timeout_s or self._timed_out:
             return None
         return self._fed + round(self.settings.timeout_s * PERIODS_S)
 
-    def _at_rest(self, but: int | None = None) -> bool:
+    def _are_at_rest(self, but: int | None = None) -> bool:
         """Return whether every servo except ``but`` has followed its last pulse."""
         return all(
-            not channel.moving and servo.width_steps == self._pulse(channel) and servo.resting
+            not channel.is_moving and servo.width_steps == self._pulse(channel) and servo.is_resting
             for k, (channel, servo) in enumerate(zip(self.channels, self.servos, strict=True))
             if k != but
         )
@@ -261,18 +265,18 @@ class MaestroBody:
         """Return the pulse that reaches a servo; 0: none."""
         return channel.position if self.servo_power else 0
 
-    def _pass(self) -> None:
+    def _run_period(self) -> None:
         """Advance by one period."""
         if self._period == self._awake_from:
-            self.feed()
-            self.send_all(self.settings.startup)
-        due = self._due()
-        if due is not None and self.awake and self._period >= due:
+            self.reset_timeout()
+            self.move_all_to(self.settings.startup)
+        due = self._timeout_period()
+        if due is not None and self.is_awake and self._period >= due:
             self._timed_out = True
             self.fail("timeout")
         if self.script_channel is not None and self._period % SWING == 0:
             channel = self.channels[self.script_channel]
-            channel.aim(channel.low if self._period // SWING % 2 else channel.high)
+            channel.set_target(channel.low if self._period // SWING % 2 else channel.high)
         for servo, channel in zip(self.servos, self.channels, strict=True):
             channel.step()
             if self._period % 2 == 0:

@@ -60,7 +60,7 @@ class ParsedCommand(NamedTuple):
     end: int
     code: int
     data: bytes = b""
-    trouble: Trouble = ""
+    error: Trouble = ""
 
 
 class CommandParser:
@@ -140,15 +140,15 @@ class CommandParser:
         if self.crc and code != MINI_SSC:
             packet, check = packet[:-1], packet[-1]
             if crc7(packet) != check:
-                return (ParsedCommand(0, 0, trouble="crc"),)
+                return (ParsedCommand(0, 0, error="crc"),)
         return (ParsedCommand(0, code, packet[head:]),)
 
 
 _SIGN = bytes((POLOLU,))
-_PROTOCOL = ParsedCommand(0, 0, trouble="protocol")
+_PROTOCOL = ParsedCommand(0, 0, error="protocol")
 
 
-def word(low: int, high: int) -> int:
+def decode_word(low: int, high: int) -> int:
     """Return the number in two data bytes."""
     return low | high << 7
 

@@ -75,7 +75,7 @@ class Pca9685Body:
         self._outputs = [
             (chip, channel) for chip in self.chips.values() for channel in range(CHANNELS)
         ]
-        self._step = self._steps(now_s())
+        self._step = self._step_number(now_s())
 
     # --- transfers
 
@@ -90,17 +90,17 @@ class Pca9685Body:
         if self.stuck:
             raise BusStuck
         if self.foreign:
-            self._addressed(address)
+            self._chips_at(address)
             return
         if address == GENERAL_CALL and data == SOFTWARE_RESET:
             for chip in self.chips.values():
                 chip.reset()
             return
-        for chip in self._addressed(address):
+        for chip in self._chips_at(address):
             chip.write(data, self.now_s())
-        self._settle()
+        self._end_past_pulses()
 
-    def _addressed(self, address: int) -> list[Chip]:
+    def _chips_at(self, address: int) -> list[Chip]:
         """Return the chips that answer at an address."""
         chips = [c for own, c in self.chips.items() if address in (own, *c.further_addresses)]
         if self.absent or not chips:
@@ -117,7 +117,7 @@ class Pca9685Body:
         self.advance()
         if self.stuck:
             raise BusStuck
-        chips = self._addressed(address)
+        chips = self._chips_at(address)
         if self.foreign:
             return bytes([STRANGE] * length)
         # If several chips answer simultaneously, a 0 of any chip pulls the line down.
@@ -128,12 +128,12 @@ class Pca9685Body:
         self.advance()
         for chip in self.chips.values():
             chip.reset()
-        self._settle()
+        self._end_past_pulses()
 
     # --- time
 
     @staticmethod
-    def _steps(now_s: float) -> int:
+    def _step_number(now_s: float) -> int:
         # The margin keeps 0.03 s from being two steps.
         return int(now_s * STEPS_S + 1e-3)
 
@@ -144,19 +144,19 @@ class Pca9685Body:
 
     def advance(self) -> None:
         """Advance to the present time."""
-        until = self._steps(self.now_s())
+        until = self._step_number(self.now_s())
         while self._step < until:
             now_s = self.now_s()
             if all(
-                servo.resting and servo.width_steps == self._pulse_steps(place, now_s)
+                servo.is_resting and servo.width_steps == self._pulse_steps(place, now_s)
                 for place, servo in enumerate(self.servos)
             ):
                 self._step = until
                 return
             self._step += 1
-            self._pass(self._step)
+            self._run_step(self._step)
 
-    def _settle(self) -> None:
+    def _end_past_pulses(self) -> None:
         """End pulses that have ended immediately: a servo gets none from then on."""
         now_s = self.now_s()
         for place, servo in enumerate(self.servos):
@@ -166,7 +166,7 @@ class Pca9685Body:
     def _pulse_steps(self, place: int, now_s: float) -> int:
         return self.width_steps(place, now_s) if self.servo_power else 0
 
-    def _pass(self, step: int) -> None:
+    def _run_step(self, step: int) -> None:
         now_s = step / STEPS_S
         for place, servo in enumerate(self.servos):
             period_s = self._outputs[place][0].period_s

@@ -22,7 +22,7 @@ STATUS_REGISTER = 0x0A
 OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
 
 
-class _Part(NamedTuple):
+class _TransferPart(NamedTuple):
     """One start of a transfer; length: of a read, None for a write."""
 
     address: int
@@ -54,11 +54,11 @@ class Bridge:
 
     # --- device interface
 
-    def at_baud(self, client_baud: int) -> bool:
+    def understands_baud(self, client_baud: int) -> bool:
         """Return True, because it accepts any baud rate."""
         return True
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         """Change a property of the boards."""
         if case not in CASES:
             raise ValueError(f"set {case!r}: unknown; expected {', '.join(CASES)}")
@@ -76,7 +76,7 @@ class Bridge:
         """Restart the boards as after a dip of their supply."""
         self.body.restart()
 
-    def here(self, place: int) -> HobbyServo:
+    def find_servo(self, place: int) -> HobbyServo:
         """Return the servo of a channel, advanced to the present time."""
         self.body.advance()
         if not 0 <= place < len(self.body.servos):
@@ -98,17 +98,17 @@ class Bridge:
         """Process received bytes; return the reply to each command in them."""
         self.body.advance()
         came = data
-        if self._wire.any and self._wire.on("lose_bytes", self.now_s()):
+        if self._wire.has_any and self._wire.is_on("lose_bytes", self.now_s()):
             came = bytes(
-                b for b in data if self._wire.take("lose_bytes", None, self.now_s()) is None
+                b for b in data if self._wire.use_fault("lose_bytes", None, self.now_s()) is None
             )
         missing, replies = len(data) - len(came), []
-        for end, pieces in self._commands(came):
+        for end, pieces in self._execute_commands(came):
             if pieces:
                 replies.append(DeviceReply(missing + end, pieces))
-        return self.faults.around(replies, data) if self._wire.any else replies
+        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
 
-    def _commands(self, came: bytes) -> Iterator[tuple[int, list[Piece]]]:
+    def _execute_commands(self, came: bytes) -> Iterator[tuple[int, list[Piece]]]:
         """Execute every complete command; an incomplete one waits for the rest."""
         kept, at = len(self._unread), 0
         text = self._unread + came
@@ -121,7 +121,7 @@ class Bridge:
                 at += 3
                 yield at - kept, self._apply_faults(said)
             elif text[at] == START:
-                found = _transfer(text, at)
+                found = _parse_transfer(text, at)
                 if found is None:
                     break
                 at, parts = found
@@ -132,26 +132,26 @@ class Bridge:
 
     def _apply_faults(self, pieces: list[Piece]) -> list[Piece]:
         """Return an answer as it arrives; faults of one channel affect only its registers."""
-        if not self._wire.any or not pieces:
+        if not self._wire.has_any or not pieces:
             return pieces
         now_s = self.now_s()
-        left = [p for p in pieces if self._wire.take("lose", p.servo_id, now_s) is None]
+        left = [p for p in pieces if self._wire.use_fault("lose", p.servo_id, now_s) is None]
         return self._wire.spoil_pieces(left, False, now_s)
 
-    def _execute_transfer(self, parts: Sequence[_Part]) -> list[Piece]:
+    def _execute_transfer(self, parts: Sequence[_TransferPart]) -> list[Piece]:
         """Execute one transfer; the first part that fails ends it."""
         self._status = OK
         now_s, said = self.now_s(), []
-        if self._wire.any:
-            if self._wire.take("nack", None, now_s) is not None:
+        if self._wire.has_any:
+            if self._wire.use_fault("nack", None, now_s) is not None:
                 self._status = NO_ACKNOWLEDGE
                 return []
             asks = any(part.length is not None for part in parts)
-            if not asks and self._wire.take("lose_writes", None, now_s) is not None:
+            if not asks and self._wire.use_fault("lose_writes", None, now_s) is not None:
                 return []
-            self.body.stuck = self._wire.on("stuck", now_s)
-            self.body.absent = self._wire.on("absent", now_s)
-            self.body.foreign = self._wire.on("foreign", now_s)
+            self.body.stuck = self._wire.is_on("stuck", now_s)
+            self.body.absent = self._wire.is_on("absent", now_s)
+            self.body.foreign = self._wire.is_on("foreign", now_s)
         else:
             self.body.stuck = self.body.absent = self.body.foreign = False
         try:
@@ -168,7 +168,7 @@ class Bridge:
             self._status = TIMED_OUT
         return said
 
-    def _channel_of(self, part: _Part) -> int:
+    def _channel_of(self, part: _TransferPart) -> int:
         """Return the channel whose registers are read, NO_DEVICE unless it is exactly one."""
         register = self._pointers.get(part.address, 0) - LED0
         if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:
@@ -176,9 +176,9 @@ class Bridge:
         return self._order.get(part.address, 0) * CHANNELS + register // 4
 
 
-def _transfer(text: bytes, at: int) -> tuple[int, list[_Part]] | None:
+def _parse_transfer(text: bytes, at: int) -> tuple[int, list[_TransferPart]] | None:
     """Return the end of a transfer and its parts, None while bytes are missing."""
-    parts: list[_Part] = []
+    parts: list[_TransferPart] = []
     while True:
         if at >= len(text):
             return None
@@ -191,11 +191,11 @@ def _transfer(text: bytes, at: int) -> tuple[int, list[_Part]] | None:
         address, count = text[at + 1], text[at + 2]
         at += 3
         if address & 1:
-            parts.append(_Part(address >> 1, b"", count))
+            parts.append(_TransferPart(address >> 1, b"", count))
             continue
         if len(text) < at + count:
             return None
-        parts.append(_Part(address >> 1, text[at : at + count], None))
+        parts.append(_TransferPart(address >> 1, text[at : at + count], None))
         at += count
 
 

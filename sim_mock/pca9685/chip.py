@@ -54,7 +54,7 @@ class Chip:
         self._outputs = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
         self._pointer = 0
         self._staged = False
-        self._held_back = False
+        self._is_restart_pending = False
 
     # --- the bus
 
@@ -95,13 +95,13 @@ class Chip:
             before = self._registers[MODE1]
             # Awake for 0.5 ms first: the write that ends the sleep does not restart the outputs.
             if byte & RESTART and not (byte | before) & SLEEP and now_s >= self._awake_s:
-                self._held_back = False
+                self._is_restart_pending = False
             if (
                 byte & SLEEP
                 and not before & SLEEP
                 and any(not high & FULL for high in self._outputs[3::4])
             ):
-                self._held_back = True
+                self._is_restart_pending = True
             if before & SLEEP and not byte & SLEEP:
                 self._awake_s = now_s + START_S
             # The external clock is selected asleep, by both bits in one write, and until the next
@@ -123,7 +123,7 @@ class Chip:
 
     def _mark_restart(self) -> None:
         mode = self._registers[MODE1] & ~RESTART
-        self._registers[MODE1] = mode | (RESTART if self._held_back else 0)
+        self._registers[MODE1] = mode | (RESTART if self._is_restart_pending else 0)
 
     def _set_output(self, at: int, byte: int) -> None:
         self._registers[LED0 + at] = byte & (0x1F if at % 2 else 0xFF)
@@ -135,8 +135,8 @@ class Chip:
         """Update the outputs from the registers; outputs stopped by a sleep restart as well."""
         self._outputs = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
         self._staged = False
-        if self._held_back and not self._registers[MODE1] & SLEEP:
-            self._held_back = False
+        if self._is_restart_pending and not self._registers[MODE1] & SLEEP:
+            self._is_restart_pending = False
             self._mark_restart()
 
     # --- the outputs
@@ -159,6 +159,6 @@ class Chip:
     def width_s(self, channel: int, now_s: float) -> float:
         """Return the true length of a channel's pulses; 0: none."""
         mode = self._registers[MODE1]
-        if mode & (SLEEP | EXTCLK) or self._held_back or now_s < self._awake_s:
+        if mode & (SLEEP | EXTCLK) or self._is_restart_pending or now_s < self._awake_s:
             return 0.0
         return self.counts(channel) / COUNTS * self.period_s

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
-from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, device_data
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class _ServerProcess:
         more: dict[str, object] = {}
         if surroundings is not None:
             surroundings.write(folder)
-            more["surroundings"] = {"make": surroundings.make, "folder": str(folder)}
+            more["surroundings"] = {"factory": surroundings.make, "folder": str(folder)}
         settings = json.dumps({"buses": linked, "until_eof": True, **more})
         self._server = child_process.start(
             # The servos must outlive their client's shutdown: they end when their input does.
@@ -187,7 +187,7 @@ class PtyBus(_ServerProcess):
             RuntimeError: the server did not start; its message is on standard error.
         """
         bus: dict[str, object] = {
-            "device": packed(device),
+            "device": device_data(device),
             "wire_time": wire_time,
             "turnaround_us": turnaround_us,
             "choices": dict(choices or {}),
@@ -234,7 +234,12 @@ class PtyBuses(_ServerProcess):
                 f"two buses of this world are named {twice}: rename the head or its bus"
             )
         buses: list[dict[str, object]] = [
-            {"name": name, "device": packed(rigs[number][1][bus]), "rig": number, "rig_bus": bus}
+            {
+                "name": name,
+                "device": device_data(rigs[number][1][bus]),
+                "rig": number,
+                "rig_bus": bus,
+            }
             for name, (number, bus) in zip(names, places, strict=True)
         ]
         found: list[dict[str, str]] = [{} for _ in rigs]

@@ -77,7 +77,7 @@ class TerminalLine:
         patient = PACKET_GAP in CASES.get(settings.device.kind, {})
         choices = {PACKET_GAP: str(GAP_MS)} if patient else {}
         for case, value in {**choices, **settings.choices}.items():
-            self.device.choose(case, value)
+            self.device.choose_behaviour(case, value)
         self.line = ServoLine(self.device, settings.wire_time, settings.turnaround_us * 1e-6)
         link = None if settings.link is None else Path(os.path.abspath(settings.link))
         self.terminal = Terminal(link, settings.device.baud)
@@ -86,7 +86,7 @@ class TerminalLine:
         self.heard = False
         """Whether a client has sent anything yet."""
 
-    def where(self) -> str:
+    def address_json(self) -> str:
         """Return the path to open, the baud rate, and the name, if it has one, as JSON."""
         return self.label_message({"path": self.terminal.path, "baud": self.settings.device.baud})
 
@@ -101,7 +101,7 @@ class TerminalLine:
 
     # --- bytes
 
-    def watched(self) -> list[int]:
+    def watched_files(self) -> list[int]:
         """Return the files that become readable when ``serve`` is needed."""
         watch = self.terminal.watch
         return [fd for fd in (self.terminal.master, -1 if watch is None else watch.fd) if fd >= 0]
@@ -111,12 +111,12 @@ class TerminalLine:
         due_s = self.line.next_due_s()
         if due_s is not None:
             return max(0.0, due_s - SPIN_S - self._now_s())
-        return LOOK_S if self.device.faults.wire.any else IDLE_S
+        return LOOK_S if self.device.faults.wire.has_any else IDLE_S
 
     def serve(self, ready: Collection[int], now_s: float) -> None:
         """Process all that is due; ``ready``: the files that are readable since ``now_s``."""
         watch = self.terminal.watch
-        if watch is not None and watch.fd in ready and watch.look():
+        if watch is not None and watch.fd in ready and watch.process_events():
             self.terminal.release()
         if self.terminal.master in ready:
             data = self.terminal.read()
@@ -127,16 +127,16 @@ class TerminalLine:
             if answer:
                 self.terminal.write(answer)
             new = self.device.check_baud and data and baud != self._warned
-            if self._warn is not None and new and not self.device.at_baud(baud):
+            if self._warn is not None and new and not self.device.understands_baud(baud):
                 self._warned = baud
                 device = self.settings.device
                 rate = "another rate" if device.baud is None else device.baud
                 self._warn(f"a client speaks at {baud} bit/s; {device.listens} at {rate}")
-        if self.line.busy:
+        if self.line.is_busy:
             self._deliver()
-        if self.device.faults.wire.any or self._held or self._forbidden:
+        if self.device.faults.wire.has_any or self._held or self._forbidden:
             self._follow_faults()
-        elif not self.terminal.plugged:
+        elif not self.terminal.is_plugged:
             self._plug()
 
     def _deliver(self) -> None:
@@ -147,8 +147,8 @@ class TerminalLine:
                 return
             while self._now_s() < due_s:
                 pass
-        data = self.line.arrived()
-        if data and self.terminal.plugged:
+        data = self.line.take_arrived()
+        if data and self.terminal.is_plugged:
             self.terminal.write(data)
 
     # --- faults of the adapter
@@ -156,19 +156,19 @@ class TerminalLine:
     def _follow_faults(self) -> None:
         """Apply the faults of the adapter to the terminal."""
         faults = self.device.faults
-        if faults.on("unplug") == self.terminal.plugged:
-            if self.terminal.plugged:
+        if faults.is_on("unplug") == self.terminal.is_plugged:
+            if self.terminal.is_plugged:
                 self.terminal.unplug()
                 self.line.forget()
                 self._held = self._forbidden = False
             else:
                 self._plug()
-        if not self.terminal.plugged:
+        if not self.terminal.is_plugged:
             return
-        if faults.on("block") != self._held:
+        if faults.is_on("block") != self._held:
             self._held = not self._held
             self.terminal.hold(self._held)
-        if faults.on("deny") != self._forbidden:
+        if faults.is_on("deny") != self._forbidden:
             self._forbidden = not self._forbidden
             self.terminal.forbid(self._forbidden)
 

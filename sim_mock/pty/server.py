@@ -29,7 +29,7 @@ from typing import Any, Protocol
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process.priority import SHORT_S, request_slice
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import unpacked
+from gazerig.sim_mock.devices import device_of_data
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
 _LOOK_MS = 200
@@ -69,20 +69,20 @@ class SurroundingsSettings:
     """How to create surroundings.
 
     Attributes:
-        make: "module:function".
+        factory: "module:function".
         folder: holds their data; the function receives it and the clock.
     """
 
-    make: str
+    factory: str
     folder: str
 
-    def made(self) -> ServedSurroundings:
+    def create(self) -> ServedSurroundings:
         """Return the surroundings.
 
         Raises:
             SetupError: they cannot be used.
         """
-        module, _, function = self.make.partition(":")
+        module, _, function = self.factory.partition(":")
         make = getattr(import_module(module), function)
         made: ServedSurroundings = make(Path(self.folder), time.monotonic)
         return made
@@ -115,8 +115,8 @@ class Server:
         self._say = say
         warn = None if settings.until_eof else _warn
         self.lines: list[TerminalLine] = []
-        self._typed = b""
-        self.over = False
+        self._partial_command = b""
+        self.is_over = False
         """Set by a signal handler: an exception alone may be swallowed where it is raised."""
         names = [bus.name for bus in settings.buses]
         if not names or len(set(names)) < len(names):
@@ -125,7 +125,7 @@ class Server:
             self.surroundings: ServedSurroundings | None = None
             if settings.surroundings is not None:
                 with _exit_with_client(settings.until_eof):
-                    self.surroundings = settings.surroundings.made()
+                    self.surroundings = settings.surroundings.create()
             for bus in settings.buses:
                 device = None
                 if self.surroundings is not None:
@@ -143,8 +143,8 @@ class Server:
     def serve(self, commands: int | None) -> None:
         """Serve until ``commands`` ends, if the settings require it, or a signal stops it."""
         try:
-            while not self.over:
-                watched = [fd for line in self.lines for fd in line.watched()]
+            while not self.is_over:
+                watched = [fd for line in self.lines for fd in line.watched_files()]
                 if commands is not None:
                     watched.append(commands)
                 wait_s = min([line.wait_s() for line in self.lines])
@@ -172,7 +172,7 @@ class Server:
             came = os.read(commands, 4096)
         except OSError:  # the terminal belongs to another job now
             return False
-        *lines, self._typed = (self._typed + came).split(b"\n")
+        *lines, self._partial_command = (self._partial_command + came).split(b"\n")
         for line in lines:
             text = line.decode("utf-8", "replace").strip()
             if text:
@@ -237,7 +237,7 @@ def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool)
 
     def stop(number: int, frame: FrameType | None) -> None:
         for server in servers:
-            server.over = True
+            server.is_over = True
         raise ServerStopped
 
     signal.signal(signal.SIGTERM, stop)
@@ -253,7 +253,7 @@ def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool)
         if server.surroundings is not None:
             say(json.dumps({"joints": server.surroundings.joints()}))
         for line in server.lines:
-            say(line.where())
+            say(line.address_json())
         server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
     except (ServerStopped, BrokenPipeError):
         return
@@ -271,7 +271,9 @@ def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
     Raises:
         ValueError, TypeError: a device or one of its settings is unknown.
     """
-    buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in settings["buses"]]
+    buses = [
+        BusSettings(**{**bus, "device": device_of_data(bus["device"])}) for bus in settings["buses"]
+    ]
     around = settings.get("surroundings")
     surroundings = None if around is None else SurroundingsSettings(**around)
     return ServerSettings(tuple(buses), settings.get("until_eof", False), surroundings)

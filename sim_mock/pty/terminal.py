@@ -40,7 +40,7 @@ class ClientCounter:
             wanted = _OPEN | _CLOSE_WRITE | _CLOSE_NOWRITE
             libc.inotify_add_watch(self.fd, path.encode(), wanted)
 
-    def look(self) -> bool:
+    def process_events(self) -> bool:
         """Process events; return True when the last client has closed the file."""
         before = self.opened
         gone = False
@@ -85,7 +85,7 @@ class Terminal:
         self.plug()
 
     @property
-    def plugged(self) -> bool:
+    def is_plugged(self) -> bool:
         """Return whether the terminal exists."""
         return self.master >= 0
 
@@ -115,7 +115,7 @@ class Terminal:
 
     def unplug(self) -> None:
         """Remove the link and the terminal: a client gets an I/O error or a hang-up."""
-        if not self.plugged:
+        if not self.is_plugged:
             return
         link, own = self._link, os.ttyname(self._slave)
         if link is not None and link.is_symlink() and os.readlink(link) == own:

@@ -120,10 +120,10 @@ class FacesScene:
                 2 * n + k, "hand", self.hand(name, side, t_s), _FIST_M,
                 *self._fist_turn(name, side, phase_s), person=number,
             )
-            for n, (number, name) in enumerate(self._boxers())
+            for n, (number, name) in enumerate(self._iterate_boxers())
             for k, side in enumerate(_SIDES)
         ]  # fmt: skip
-        first = 2 * len(list(self._boxers()))
+        first = 2 * len(list(self._iterate_boxers()))
         for number, (name, thing) in enumerate(self._script.things.items(), first):
             acts = self._acts[name]
             if thing.kind == "hand":
@@ -152,7 +152,7 @@ class FacesScene:
 
     def face(self, name: str, t_s: float) -> Vec3:
         """Return a face, which may sway."""
-        x, y, z = self._standing(name, t_s % self.round_s)
+        x, y, z = self._position_without_sway(name, t_s % self.round_s)
         sway = self._script.people[name].sway
         if sway is None:
             return x, y, z
@@ -179,22 +179,24 @@ class FacesScene:
                 return _towards(at, add(self.place(one.act.to), (0.0, 0.0, beckon)), into)
         return here
 
-    def out_back_s(self, one: TimedAct) -> tuple[float, float]:
+    def reach_times_s(self, one: TimedAct) -> tuple[float, float]:
         """Return how long a hand takes to its target, and back."""
         return _OUT_BACK_S[one.act.do]
 
-    def before_head(self, p_m: Vec3) -> bool:
+    def is_before_head(self, p_m: Vec3) -> bool:
         """Return whether a point is in the field of view of a camera that points ahead."""
         return abs(atan2(p_m[1] - HEAD_M[1], p_m[0] - HEAD_M[0])) < HALF_FIELD_RAD
 
-    def _boxers(self) -> Iterator[tuple[int, str]]:
+    def _iterate_boxers(self) -> Iterator[tuple[int, str]]:
         for number, (name, person) in enumerate(self._script.people.items()):
             if person.gloves:
                 yield number, name
 
-    def _standing(self, name: str, phase_s: float) -> Vec3:
+    def _position_without_sway(self, name: str, phase_s: float) -> Vec3:
         """Return the place of a face without sway."""
-        x, y, z = _moved(self.place(self._script.people[name].start), self._steps[name], phase_s)
+        x, y, z = _position_after_moves(
+            self.place(self._script.people[name].start), self._steps[name], phase_s
+        )
         return x, y, z
 
     def _direction(self, name: str, phase_s: float, faces: dict[str, Vec3]) -> Angles2:
@@ -209,14 +211,14 @@ class FacesScene:
             share = min_jerk(min(1.0, (phase_s - last_s) / _TURN_S))
             yaw = old_yaw + share * wrap(yaw - old_yaw)
             pitch = old_pitch + share * (pitch - old_pitch)
-        turn, nod = _moved((0.0, 0.0), self._glances[name], phase_s)
+        turn, nod = _position_after_moves((0.0, 0.0), self._glances[name], phase_s)
         return yaw + radians(turn), radians(nod) + pitch
 
     def _facing(self, name: str, at: str, phase_s: float, faces: dict[str, Vec3]) -> Angles2:
         """Return yaw and pitch of a face that looks at the robot, a person or a place."""
         yaw, pitch = _yaw_pitch(sub(HEAD_M, faces[name]))
         if at == BASE:
-            x, y, _ = self._standing(name, phase_s)
+            x, y, _ = self._position_without_sway(name, phase_s)
             yaw = atan2(-y, -x)
         elif at != HEAD:
             target = faces[at] if at in faces else self.place(at)
@@ -299,7 +301,9 @@ def _acts_of_thing(thing: ThingScript) -> tuple[TimedAct, ...]:
     )
 
 
-def _moved(at: tuple[float, ...], moves: Sequence[_Change], phase_s: float) -> tuple[float, ...]:
+def _position_after_moves(
+    at: tuple[float, ...], moves: Sequence[_Change], phase_s: float
+) -> tuple[float, ...]:
     """Return a value that goes from goal to goal."""
     for one in moves:
         if phase_s < one.start_s:

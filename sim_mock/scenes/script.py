@@ -39,7 +39,7 @@ class WorldCameraParams:
     reflections: Annotated[bool, "shiny floors mirror what stands on them"] = False
     # fmt: on
 
-    def of(self, other: type) -> dict[str, Any]:
+    def from_params(self, other: type) -> dict[str, Any]:
         """Return the values of those fields that another dataclass of parameters has too."""
         names = {field.name for field in fields(other)} & {field.name for field in fields(self)}
         return {name: getattr(self, name) for name in names}

@@ -185,11 +185,11 @@ class Players(Protocol):
         """Return a place, at the height of what is looked at there."""
         ...
 
-    def out_back_s(self, one: TimedAct) -> tuple[float, float]:
+    def reach_times_s(self, one: TimedAct) -> tuple[float, float]:
         """Return how long a hand takes to its target, and back."""
         ...
 
-    def before_head(self, p_m: Vec3) -> bool:
+    def is_before_head(self, p_m: Vec3) -> bool:
         """Return whether a point is in the field of view of a camera that points ahead."""
         ...
 
@@ -231,14 +231,14 @@ def _events_of_act(
     if do == "reach":
         # A look is expected while the hand is in view of a camera that points ahead.
         times = np.arange(start_s, end_s, 0.001).tolist()
-        inside = [t_s for t_s in times if players.before_head(players.hand(name, side, t_s))]
+        inside = [t_s for t_s in times if players.is_before_head(players.hand(name, side, t_s))]
         if inside:
             hand = players.hand(name, side, middle_s)
             yield Event("reach", "look", "hand", inside[0], inside[-1], hand, 0.25)
     elif do == "wave":
         yield Event(do, "look", "hand", start_s, end_s, players.hand(name, side, middle_s), 0.5)
     elif do == "punch":
-        due_s = start_s + players.out_back_s(one)[0]
+        due_s = start_s + players.reach_times_s(one)[0]
         ends = (players.hand(name, side, t_s) for t_s in (start_s, due_s))
         x, y, z = (0.5 * (a + b) for a, b in zip(*ends, strict=True))
         yield Event(do, "look", "hand", start_s, end_s, (x, y, z), 0.5, due_s)
@@ -252,7 +252,7 @@ def _events_of_act(
             until_s = min(start_s + _RETURN_S, script.round_s)
             yield Event("return", "return", "face", start_s, until_s, face, 0.6)
         else:
-            out_s, back_s = (0.5 * one_s for one_s in players.out_back_s(one))
+            out_s, back_s = (0.5 * one_s for one_s in players.reach_times_s(one))
             yield Event(
                 "attack", "look", "attack_target", start_s + out_s, end_s - back_s, face, 0.6
             )

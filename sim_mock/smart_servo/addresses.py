@@ -32,7 +32,7 @@ class AddressTable(Generic[S]):
                 if shadow is not None and shadow != servo.id:
                     self.shadows.setdefault(shadow, []).append(servo)
 
-    def all(self) -> list[S]:
+    def all_servos(self) -> list[S]:
         """Return all servos at the client's baud rate."""
         return [*self.by_id.values(), *(twin for pair in self.twins.values() for twin in pair)]
 

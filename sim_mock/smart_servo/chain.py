@@ -16,7 +16,7 @@ from gazerig.sim_mock.smart_servo.faults import ServoFaults
 from gazerig.sim_mock.smart_servo.framing import PING, SYNC_READ, SYNC_WRITE, Framing, Instruction
 from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
 from gazerig.sim_mock.smart_servo.integration import whole_ms
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, change_quirk
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
@@ -92,7 +92,7 @@ class ServoChain(Generic[S, Q]):
         """Read addresses again before the next instruction; the old ones are valid until then."""
         self._stale = True
 
-    def at_baud(self, client_baud: int) -> bool:
+    def understands_baud(self, client_baud: int) -> bool:
         """Return whether any servo understands a client at this baud rate."""
         return not self.check_baud or any(at_baud(servo, client_baud) for servo in self.servos)
 
@@ -103,7 +103,7 @@ class ServoChain(Generic[S, Q]):
                 return servo
         raise KeyError(f"no servo {servo_id}; servos are {', '.join(map(str, self.ids()))}")
 
-    def here(self, servo_id: int) -> S:
+    def find_servo(self, servo_id: int) -> S:
         """Return a servo by its id, advanced to the present time."""
         servo = self[servo_id]
         servo.advance(whole_ms(self.now_s()), self._fed_ms)
@@ -113,20 +113,20 @@ class ServoChain(Generic[S, Q]):
         """Return the ids in the order of the servos."""
         return tuple(servo.id for servo in self.servos)
 
-    def join(self, servo_id: int) -> None:
+    def add_duplicate(self, servo_id: int) -> None:
         """Add a second servo with a taken id to the bus, slightly turned from the first."""
-        first, now_ms = self.here(servo_id), whole_ms(self.now_s())
+        first, now_ms = self.find_servo(servo_id), whole_ms(self.now_s())
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
         spec = ServoSpec(servo_id, first.model.name, start, first.firmware)
         twin = self.servo_type(spec, now_ms)
         for name in ("baud_rate", "return_delay_time"):
-            twin.memory.keep(name, first.memory.get(name))
+            twin.memory.set_permanently(name, first.memory.get(name))
         twin.on_address = self._mark_stale
         self.servos = (*self.servos, twin)
         self._apply_quirks(self.quirks)
         self.refresh()
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         """Choose a quirk by its name, or whether servos check the baud rate."""
         if case == "baud":
             if value not in ("heed", "any"):
@@ -183,7 +183,7 @@ class ServoChain(Generic[S, Q]):
             return [DeviceReply(len(data), [Piece(NO_DEVICE, garbage)])]
         found = self._framing.feed(data, now_s)
         replies = [DeviceReply(i.end, pieces) for i in found if (pieces := self._execute(i))]
-        return self.faults.around(replies, data) if self._wire.any else replies
+        return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Execute one instruction on the addressed servos; return the bytes that they send."""
@@ -192,17 +192,17 @@ class ServoChain(Generic[S, Q]):
             self.refresh()
         if servo_id != BROADCAST:
             answer = self._answer_all(servo_id, code, params)
-            return self._out([answer]) if answer is not None else []
+            return self._apply_line_faults([answer]) if answer is not None else []
         if code in self._groups:
             return self._groups[code](params)
-        for servo in self._known.all():
+        for servo in self._known.all_servos():
             if self._obeys_broadcast(servo, code, params):
                 self._answer(servo, code, params)
         return []
 
-    def _out(self, answers: list[Answer]) -> list[Piece]:
+    def _apply_line_faults(self, answers: list[Answer]) -> list[Piece]:
         """Return answers as pieces, changed by the line's faults."""
-        if not self._wire.any:
+        if not self._wire.has_any:
             return self._pieces(answers)
         spoilt = self._pieces(self._wire.spoil_answers(answers, False, self._now_s))
         return self._wire.spoil_pieces(spoilt, False, self._now_s)
@@ -218,7 +218,9 @@ class ServoChain(Generic[S, Q]):
 
     def _is_muted(self, servo_id: int) -> bool:
         """Return whether a fault keeps this servo from answering."""
-        return self._wire.any and self._wire.take("lose", servo_id, self._now_s) is not None
+        return (
+            self._wire.has_any and self._wire.use_fault("lose", servo_id, self._now_s) is not None
+        )
 
     # --- one id
 
@@ -240,7 +242,7 @@ class ServoChain(Generic[S, Q]):
         if not servo.advance(self._now_ms, self._fed_ms):
             return None
         # Read flags, id and delay first: an answer is sent with the old settings.
-        answers, flag, servo_id = servo.answers(code), servo.error_flag, servo.id
+        answers, flag, servo_id = servo.answers_instruction(code), servo.error_flag, servo.id
         said = self.instructions.carry_out(servo, code, params)
         if said is None or not answers:
             return None
@@ -251,7 +253,7 @@ class ServoChain(Generic[S, Q]):
     def _group_instructions(self) -> dict[int, GroupAction]:
         """Return the handlers of group instructions, by code."""
         return {
-            PING: lambda params: self._out(self._ping_all()),
+            PING: lambda params: self._apply_line_faults(self._ping_all()),
             SYNC_READ: lambda params: self._answer_plain(self.instructions.sync_rows(params)),
             SYNC_WRITE: self._write_each,
         }
@@ -261,7 +263,7 @@ class ServoChain(Generic[S, Q]):
         answers = (self._answer_all(servo_id, PING, b"") for servo_id in sorted(self._by_id))
         return [answer for answer in answers if answer is not None]
 
-    def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
+    def _group_part(self, servo_id: int, address: int, length: int) -> Answer | None:
         """Return a servo's part of a group read, None if it is silent."""
         servo = self._by_id.get(servo_id)
         answer = None if servo is None else self._read_part(servo, address, length)
@@ -279,11 +281,11 @@ class ServoChain(Generic[S, Q]):
 
     def _answer_plain(self, rows: Iterable[GroupRead]) -> list[Piece]:
         """Answer a group read with one status per servo, in the order of the request."""
-        if not self._wire.any and not self._twins:
+        if not self._wire.has_any and not self._twins:
             return self._answer_undisturbed(rows)
         answers, late_s, policy = list[Answer](), 0.0, self.quirks.after_missing
         for servo_id, address, length in rows:
-            answer = self._part(servo_id, address, length)
+            answer = self._group_part(servo_id, address, length)
             if answer is not None:
                 answers.append(answer if late_s == 0.0 else answer._replace(late_s=late_s))
                 late_s = 0.0
@@ -291,7 +293,7 @@ class ServoChain(Generic[S, Q]):
                 break
             elif policy == "timeout":
                 late_s += self.quirks.slot_timeout_s
-        return self._out(answers)
+        return self._apply_line_faults(answers)
 
     def _answer_undisturbed(self, rows: Iterable[GroupRead]) -> list[Piece]:
         """Answer a group read for unique ids and a line without faults: this happens every tick."""
@@ -315,7 +317,7 @@ class ServoChain(Generic[S, Q]):
     def _write_each(self, params: bytes) -> list[Piece]:
         """Execute a sync write; skip servos that already follow the same goals."""
         address, rows = self.instructions.sync_writes(params)
-        if self._wire.any or self._known.twins or self._known.shadows:
+        if self._wire.has_any or self._known.twins or self._known.shadows:
             return self._write_all([(servo_id, address, data) for servo_id, data in rows])
         servos, now_ms, fed_ms = self._by_id, self._now_ms, self._fed_ms
         for servo_id, data in rows:
@@ -328,7 +330,7 @@ class ServoChain(Generic[S, Q]):
 
     def _write_all(self, writes: Iterable[GroupWrite]) -> list[Piece]:
         """Execute a group write; no servo answers."""
-        if self._wire.any and self._wire.take("lose_writes", None, self._now_s):
+        if self._wire.has_any and self._wire.use_fault("lose_writes", None, self._now_s):
             return []
         known = self._known
         for servo_id, address, data in writes:
@@ -353,7 +355,7 @@ def build_chain(
     baud: int | None = None,
     quirks: ChainQuirks | None = None,
     seed: int = 0,
-    make_shaft: ShaftMaker = own_shaft,
+    make_shaft: ShaftMaker = create_shaft,
 ) -> C:
     """Build servos and their bus.
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import Motor, Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 from gazerig.sim_mock.smart_servo.quirks import LENGTH, SEED_APART_MS, noise_table
@@ -39,7 +39,7 @@ class Drive(ABC):
         model: Motor,
         spec: ServoSpec,
         scale: float = 1.0,
-        make_shaft: ShaftMaker = own_shaft,
+        make_shaft: ShaftMaker = create_shaft,
     ) -> None:
         physics = Physics(*spec.physics)
         self.memory = memory

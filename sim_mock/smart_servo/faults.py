@@ -3,7 +3,14 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, number, or_all, whole
+from gazerig.sim_mock.faults.grammar import (
+    Argument,
+    CommandTable,
+    Verb,
+    id_or_all,
+    integer_parser,
+    number_parser,
+)
 from gazerig.sim_mock.faults.line import LineFaults
 from gazerig.sim_mock.faults.verbs import (
     Do,
@@ -21,7 +28,7 @@ class Chain(Protocol):
 
     now_s: Callable[[], float]
 
-    def here(self, servo_id: int) -> EmulatedServo:
+    def find_servo(self, servo_id: int) -> EmulatedServo:
         """Return a servo by id, advanced to the present time."""
         ...
 
@@ -29,11 +36,11 @@ class Chain(Protocol):
         """Return the ids."""
         ...
 
-    def join(self, servo_id: int) -> None:
+    def add_duplicate(self, servo_id: int) -> None:
         """Add a second servo with this id to the chain."""
         ...
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         """Choose the servos' behaviour where documents and devices differ."""
         ...
 
@@ -48,7 +55,7 @@ class ServoFaults(LineFaults):
     def servos(self, servo_id: int | None) -> list[EmulatedServo]:
         """Return a servo, or all (None), advanced to the present time."""
         ids = self.chain.ids() if servo_id is None else (servo_id,)
-        return [self.chain.here(one) for one in ids]
+        return [self.chain.find_servo(one) for one in ids]
 
     def reports(self) -> list[dict[str, object]]:
         """Return the state of every servo."""
@@ -56,12 +63,12 @@ class ServoFaults(LineFaults):
 
 
 def _collide(faults: ServoFaults, servo_id: int) -> str:
-    faults.chain.join(servo_id)
+    faults.chain.add_duplicate(servo_id)
     return f"two servos have id {servo_id} now"
 
 
 def _reset(faults: ServoFaults, servo_id: int) -> str:
-    servo = faults.chain.here(servo_id)
+    servo = faults.chain.find_servo(servo_id)
     error = servo.reset_all()
     if error:
         raise ValueError(f"servo {servo_id} refuses with error {error}: its torque is on")
@@ -70,7 +77,9 @@ def _reset(faults: ServoFaults, servo_id: int) -> str:
 
 def _error_command(error: str) -> Do:
     """Return a command that triggers an error of one servo."""
-    return lambda faults, servo_id: f"servo {servo_id} {faults.chain.here(servo_id).fail(error)}"
+    return lambda faults, servo_id: (
+        f"servo {servo_id} {faults.chain.find_servo(servo_id).fail(error)}"
+    )
 
 
 def _servo_command(do: Callable[..., None], text: str) -> Do:
@@ -96,8 +105,8 @@ def commands_of(
     highest_id: int, quirks: type[ChainQuirks], without: Sequence[str] = (), reset: str = ""
 ) -> CommandTable:
     """Return the fault commands of one make of servos."""
-    one = Argument("ID", whole(0, highest_id, "a servo id"))
-    some = Argument("ID", or_all(one.read))
+    one = Argument("ID", integer_parser(0, highest_id, "a servo id"))
+    some = Argument("ID", id_or_all(one.read))
     verbs = {
         **line_verbs(one),
         **packet_verbs(one),
@@ -110,20 +119,20 @@ def commands_of(
         "brown-out": Verb(_servo_command(EmulatedServo.restart, "{label} restarts"), (one,),
                           "restart as after a dip of the supply: no status shows it"),
         "reset": Verb(_reset, (one,), f"restore factory settings: {reset}"),
-        "voltage": Verb(_quantity_command("supply_v", "V"), (some, Argument("V", number(0.0, 30.0, "volts"))),
+        "voltage": Verb(_quantity_command("supply_v", "V"), (some, Argument("V", number_parser(0.0, 30.0, "volts"))),
                         "change the supply voltage"),
         "temperature": Verb(_quantity_command("temperature_c", "degC"),
-                            (some, Argument("C", number(-40.0, 200.0, "degC"))),
+                            (some, Argument("C", number_parser(-40.0, 200.0, "degC"))),
                             "set the motor's temperature, which then drifts"),
         "stick": Verb(_servo_command(lambda servo: servo.jam(True), "{label} is stuck"), (some,),
                       "jam the joint at its position"),
         "free": Verb(_servo_command(lambda servo: servo.jam(False), "{label} is free"), (some,),
                      "free a jammed joint"),
         "load": Verb(_servo_command(EmulatedServo.set_load, "{label} carries {:g} Nm"),
-                     (some, Argument("NM", number(-100.0, 100.0, "Nm"))),
+                     (some, Argument("NM", number_parser(-100.0, 100.0, "Nm"))),
                      "apply a constant torque to the joint"),
         "turn": Verb(_servo_command(EmulatedServo.turn, "{label} was turned by {:g} steps"),
-                     (some, Argument("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
+                     (some, Argument("STEPS", number_parser(-1e6, 1e6, "steps"))), "turn the joint by hand"),
         **closing_verbs(one),
     }
     verbs = {name: verb for name, verb in verbs.items() if name not in without}

@@ -42,7 +42,7 @@ class InstructionSet(Generic[S]):
             PING: lambda servo, params: (0, servo.identity()),
             READ: self._read,
             WRITE: lambda servo, params: self._write(servo.write, params),
-            REG_WRITE: lambda servo, params: self._write(servo.register, params),
+            REG_WRITE: lambda servo, params: self._write(servo.store_write, params),
             ACTION: lambda servo, params: (servo.action(), b""),
             REBOOT: _reboot,
             **own,

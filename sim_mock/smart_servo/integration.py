@@ -171,7 +171,7 @@ class ShaftMotion:
         """Advance by some milliseconds, in one map if possible, else one by one."""
         loop, profile, v = self._loop, self.profile, self.v
         # Without a speed to follow, D only brakes.
-        kr = 0.0 if profile.jumps else loop.d + loop.f1
+        kr = 0.0 if profile.is_jump else loop.d + loop.f1
         led = profile.running
         linear = self._linear and self._integral == 0.0
         quick = linear and ticks == SPAN_MS
@@ -180,7 +180,7 @@ class ShaftMotion:
         if quick and v == 0.0 and not led and self._stick(kr):
             return
         before = profile.r
-        path = profile.ahead(ticks)
+        path = profile.advance(ticks)
         glides = quick and loop.slew == inf and abs(v) > self._built.dry
         if glides and self._glide(path if led else None, before, kr):
             return

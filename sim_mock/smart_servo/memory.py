@@ -44,7 +44,7 @@ class ServoMemory(ABC, Generic[R]):
         """Set a register regardless of its access."""
         self.put(self._by_name[name], value)
 
-    def keep(self, name: str, value: int) -> None:
+    def set_permanently(self, name: str, value: int) -> None:
         """Set a register permanently, if that differs from ``set``."""
         self.set(name, value)
 
@@ -57,7 +57,7 @@ class ServoMemory(ABC, Generic[R]):
         """Return whether this model has a register."""
         return name in self._by_name
 
-    def named(self, name: str) -> R:
+    def register_named(self, name: str) -> R:
         """Return a register by its name."""
         return self._by_name[name]
 

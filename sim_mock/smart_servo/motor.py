@@ -128,6 +128,6 @@ ShaftMaker = Callable[[int, Motor, Physics, float], Shaft]
 """Creates the shaft of a servo from its id, motor, physics and first position in steps."""
 
 
-def own_shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
+def create_shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
     """Return an independent shaft: only its own load acts on it."""
     return Shaft(model, physics, position_steps)

@@ -30,7 +30,7 @@ class PositionProfile:
         self.rest(position)
 
     @property
-    def jumps(self) -> bool:
+    def is_jump(self) -> bool:
         """Return whether it has no speed to follow: Velocity Trajectory of a step is 0."""
         return self.kind == STEP
 
@@ -117,7 +117,7 @@ class PositionProfile:
         self._p1 = self.r + 0.5 * (start + cruise) * first
         self._slow = 0.5 * cruise / last if last > 0.0 else 0.0
 
-    def ahead(self, ticks: int) -> list[float]:
+    def advance(self, ticks: int) -> list[float]:
         """Advance by some milliseconds and return the position after each."""
         if not self.running:
             return [self.goal] * ticks
@@ -188,7 +188,7 @@ class SpeedProfile:
     ``r`` continues from its start; only its changes matter.
     """
 
-    jumps = False
+    is_jump = False
 
     __slots__ = ("_ramp", "goal", "kind", "r", "running", "v")
 
@@ -214,7 +214,7 @@ class SpeedProfile:
         self.kind = TRAPEZOID if ramp > 0.0 else STEP
         self.running = speed != self.v or speed != 0.0
 
-    def ahead(self, ticks: int) -> list[float]:
+    def advance(self, ticks: int) -> list[float]:
         """Advance by some milliseconds and return the position after each."""
         r, v, goal, ramp, path = self.r, self.v, self.goal, self._ramp, []
         for _ in range(ticks):

@@ -96,10 +96,10 @@ class ServoProtection:
         return bits
 
     @property
-    def steady(self) -> bool:
+    def is_steady(self) -> bool:
         """Return whether further checks change nothing unless the motor changes."""
         return not self._heavy_checks and not self._strong_checks
 
-    def browned_out(self, volts: float) -> bool:
+    def is_browned_out(self, volts: float) -> bool:
         """Return whether the voltage (a share) is too low for the servo to run."""
         return volts < self._physics.brown_out_share

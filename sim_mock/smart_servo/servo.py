@@ -163,11 +163,11 @@ class EmulatedServo(ABC):
         shaft, protection = self.shaft, self.protection
         before_c = protection.temperature_c
         bits = protection.check(shaft.effort, shaft.volts, checks)
-        self._calm = protection.temperature_c == before_c and protection.steady
+        self._calm = protection.temperature_c == before_c and protection.is_steady
         self._measure_surroundings()
         if bits or self.errors:
             self._protect_from(bits)
-        if protection.browned_out(shaft.volts):
+        if protection.is_browned_out(shaft.volts):
             self.restart()
 
     def _measure_surroundings(self) -> None:
@@ -196,7 +196,7 @@ class EmulatedServo(ABC):
 
     # --- instructions
 
-    def answers(self, code: int) -> bool:
+    def answers_instruction(self, code: int) -> bool:
         """Return whether it answers an instruction that addresses it alone."""
         if code == REBOOT and self.mute_reboot:
             return False
@@ -215,7 +215,7 @@ class EmulatedServo(ABC):
     def write(self, address: int, data: bytes) -> int:
         """Write bytes as an instruction does; return the error number, 0 on success."""
 
-    def register(self, address: int, data: bytes) -> int:
+    def store_write(self, address: int, data: bytes) -> int:
         """Store a write for Action; a later one replaces it. Return the error number."""
         self._pending = (address, data)
         self.memory.set("registered_instruction", 1)
@@ -255,7 +255,7 @@ class EmulatedServo(ABC):
         if baud not in self.baud_rates:
             known = ", ".join(map(str, self.baud_rates))
             raise ValueError(f"baud {baud}: {self.model.name} knows {known}")
-        self.memory.keep("baud_rate", self.baud_rates.index(baud))
+        self.memory.set_permanently("baud_rate", self.baud_rates.index(baud))
         self._apply_settings()
 
     # --- external events

@@ -149,7 +149,7 @@ def recording(pictures: list[np.ndarray], folder: Path) -> None:
         began = time.process_time()
         for k in range(len(shots)):
             recorder.take(time.monotonic, STOP)
-            while recorder.written < k - 20:
+            while recorder.written_frames < k - 20:
                 time.sleep(0.001)
         recorder.finish()
         write_ms = (time.process_time() - began) / len(shots) * 1e3

@@ -15,7 +15,7 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
-from gazerig.sim_mock.true_gaze import gaze_off_rad, true_part
+from gazerig.sim_mock.true_gaze import gaze_error_rad, true_part
 
 _MISS_DEG = 2.0
 _WAKES_S = 0.7
@@ -77,7 +77,7 @@ class Looks:
         self.looks.append(
             Look(
                 t_s,
-                min(degrees(gaze_off_rad(part, pose)) for part in parts),
+                min(degrees(gaze_error_rad(part, pose)) for part in parts),
                 min(apart_deg(target.p_world_m, part) for part in parts),
                 apart_deg(tick.gaze.gaze_point_world_m, target.p_world_m),
             )

@@ -39,7 +39,7 @@ class Line:
 def maestro(channels=12, crc=False, **chosen):
     board = build_board(channels, lambda: 0.0, crc=crc)
     for case, value in chosen.items():
-        board.choose(case.replace("_", "-"), value)
+        board.choose_behaviour(case.replace("_", "-"), value)
     return board
 
 
@@ -58,7 +58,7 @@ BOARDS = {
 @pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS))
 @pytest.mark.parametrize("to_the_end", [False, True])
 def test_a_board_is_recognised_before_anything_could_move_it(board, to_the_end):
-    board.choose("on-error", "ignore")
+    board.choose_behaviour("on-error", "ignore")
     board.exchange(bytes.fromhex("AA0C0403102F"), 9600)
     before = [one["target"] for one in board.faults.reports()]
     line = Line(board)
@@ -84,7 +84,7 @@ def test_a_board_on_usb_tells_its_size_by_its_product():
     assert only.channels == 6 and only.board.pulses == (0,) * 6
     (unknown,) = Line(board).search()
     assert unknown.channels is None
-    assert board.faults.board()["errors"] == []
+    assert board.faults.board_status()["errors"] == []
 
 
 def test_pulses_go_on_while_it_is_asked():
@@ -168,7 +168,7 @@ def test_words_for_kinds():
 
 def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():
     chain = build_feetech([ServoSpec(5, "sts3215")], lambda: 0.0)
-    chain.choose("broadcast-ping", "silence")
+    chain.choose_behaviour("broadcast-ping", "silence")
     line = Line(chain)
     asked = plan("", ("feetech",), (1_000_000,))
     assert not any(one.found for one in search(line.port, "", asked))

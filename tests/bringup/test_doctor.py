@@ -580,7 +580,7 @@ class BoardRig:
         return visit_maestro(self.port, self.params, self.setups, self.usb)
 
     def errors(self):
-        return self.board.faults.board()["errors"]
+        return self.board.faults.board_status()["errors"]
 
 
 def test_a_good_board_and_what_no_board_tells():
@@ -606,7 +606,7 @@ def test_nothing_moves_and_no_error_is_made():
 
 def test_nobody_answers():
     rig = BoardRig()
-    rig.board.choose("mode", "mute")
+    rig.board.choose_behaviour("mode", "mute")
     (only,) = rig.check()
     assert only.level == "error" and "serial pins" in only.remedy
     rig.usb = MINI
@@ -682,10 +682,10 @@ def test_a_script_is_stopped_by_fix():
     rig.board.faults.command("script 0")
     findings = rig.check()
     assert one(findings, "warn", "the board", "runs a script")
-    assert rig.board.faults.board()["script"]  # looking alone does not stop it
+    assert rig.board.faults.board_status()["script"]  # looking alone does not stop it
     (done,) = apply_fixes(lambda _: stop_script(rig.port, rig.params), findings)
     assert str(done) == "the board: script 1 -> 0: done"
-    assert not rig.board.faults.board()["script"] and worst(rig.check()) != "warn"
+    assert not rig.board.faults.board_status()["script"] and worst(rig.check()) != "warn"
 
 
 def test_pulses_without_a_program():
@@ -706,7 +706,7 @@ def test_home():
     rig.port.setBaudRate(115_200)
     assert send_home(MaestroLink(rig.port, rig.params)) == ("serial protocol error",)
     assert [c["position"] for c in rig.board.faults.reports()] == [0] * 12
-    rig.board.choose("mode", "mute")
+    rig.board.choose_behaviour("mode", "mute")
     with pytest.raises(ServoMissing, match="no Maestro answers"):
         send_home(MaestroLink(rig.port, rig.params))
 

@@ -126,7 +126,7 @@ class Bench:
         left = self.script.pop(0)
         while left:
             step = max(-100, min(100, left))
-            self.chain.here(self.id).turn(step)
+            self.chain.find_servo(self.id).turn(step)
             left -= step
             self.clock.sleep_until(self.clock.now_s() + 0.04)
             live()
@@ -444,7 +444,7 @@ def test_a_joint_next_to_the_seam_is_calibrated_on_its_side() -> None:
 
 def test_a_servo_turned_by_whole_turns_before_gives_the_same() -> None:
     bench = Bench(EYE)
-    bench.chain.here(1).turn(4096)
+    bench.chain.find_servo(1).turn(4096)
     bench.script = [400, -800, 400]
     assert calibrate_by_hand(bench.joint, bench, 2.0).zero_step == 2100
 
@@ -651,7 +651,7 @@ def test_a_servo_that_answers_pings_alone_is_brought_to_speak() -> None:
 
 def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
     bench = Bench(EYE, 4000)
-    bench.chain.here(1).turn(200)
+    bench.chain.find_servo(1).turn(200)
     with pytest.raises(ServoMissing, match="turned over the seam"):
         bench.joint.enable_torque(GENTLY)
     assert bench.get("torque_enable") == 0
@@ -815,7 +815,7 @@ class LinkageBench:
 
     def place_us(self) -> float:
         """Return where the shaft truly is."""
-        return cast(Any, self.board).here(self.channel).place_steps / 4
+        return cast(Any, self.board).find_servo(self.channel).place_steps / 4
 
     def pulse(self) -> int:
         """Return the pulse that the board gives now."""

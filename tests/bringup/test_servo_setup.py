@@ -95,7 +95,10 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
     bench.chain.refresh()
     bench.port.setBaudRate(BAUD)
     assert ping(bench.port, kind.family, 7, BAUD, 1) is not None
-    assert kind.family.lock is None or bench.registers().read(7, kind.family.lock) == 1
+    assert (
+        kind.family.lock_register is None
+        or bench.registers().read(7, kind.family.lock_register) == 1
+    )
 
 
 @each
@@ -232,7 +235,7 @@ def test_servos_that_do_not_answer_before_or_after_a_restart(kind):
 @pytest.mark.parametrize("habit", ["mute", "answer"])
 def test_a_restart_that_some_firmware_confirms(habit):
     bench = Bench(kind=FEETECH)
-    bench.chain.choose("reboot", habit)
+    bench.chain.choose_behaviour("reboot", habit)
     bench.hold()
     assert bench.restart().after.torque is False
 

@@ -115,7 +115,7 @@ def test_a_sample_says_what_the_servos_say(kind: str) -> None:
 @each
 def test_nothing_is_ever_written(kind: str) -> None:
     bench = Bench(kind)
-    servo = cast(Any, bench.devices[""]).here(1)
+    servo = cast(Any, bench.devices[""]).find_servo(1)
     before = bytes(servo.memory.bytes[:56])
     bench.sent[""].clear()
     for _ in range(5):
@@ -280,7 +280,7 @@ class HandBench:
         self._at: dict[str, float] = {}
 
     def servo(self, joint: str) -> Any:
-        return cast(Any, self.rig.devices[""]).here(DESK.joints[joint].id)
+        return cast(Any, self.rig.devices[""]).find_servo(DESK.joints[joint].id)
 
     def hold(self, joint: str, deg: float) -> None:
         """Turn a joint by hand to an angle from where it was at first."""
@@ -318,7 +318,7 @@ def test_a_head_moved_by_hand_becomes_a_gesture_that_moves_it_so(tmp_path: Path)
     assert fitted.slowed_by == 1.0
     motion = motions(gesture, DESK.names).motion
     at = np.linspace(0.1, 2.3, 50)
-    played = np.degrees(motion.sampled(at).value)
+    played = np.degrees(motion.sample_at(at).value)
     wanted = np.array([how(t)["neck_pitch"] for t in at])
     assert np.abs(played[:, 1] - wanted).max() < TOLERANCE_DEG + 0.8
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved

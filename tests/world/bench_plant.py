@@ -42,7 +42,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
-from gazerig.sim_mock.true_gaze import gaze_off_rad, true_part
+from gazerig.sim_mock.true_gaze import gaze_error_rad, true_part
 
 NEAR_DEG = 1.0
 Goal = Callable[[float], float]
@@ -224,7 +224,7 @@ def _looked(name: str, in_world: bool, seconds: float) -> Loop:
         people = made.scene.people(tick.t_s - start[0])
         if people and tick.target.kind == "face" and tick.gaze.phase != "saccade":
             place: Vec3 = true_part(people[0], tick.target.part)
-            off.append(degrees(gaze_off_rad(place, tick.pose)))
+            off.append(degrees(gaze_error_rad(place, tick.pose)))
         if start[0] + 3.0 < tick.t_s:
             rows.append([degrees(v) for v in tick.joints.velocity_rad_s])
             efforts.append([one.shaft.effort for one in servos])

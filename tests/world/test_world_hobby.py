@@ -43,7 +43,7 @@ def test_a_hobby_servo_without_pulses_is_limp() -> None:
     bench = WorldBench("maker")
     joint = bench.rig.names[0]
     servo = bench.servos[joint]
-    assert servo.unpowered
+    assert servo.is_unpowered
     before = servo.place_steps
     servo.turn(300.0)
     bench.pass_ms(200)
@@ -60,7 +60,7 @@ def test_a_hobby_servo_strains_against_its_joints_stop() -> None:
     servo = bench.servos[joint]
     bench.devices[""].body.channels[bench.rig.joints[joint].id].aim(servo.spec.max_steps)
     bench.pass_ms(800)
-    assert servo.straining and servo.place_steps < servo.spec.max_steps - 100
+    assert servo.is_straining and servo.place_steps < servo.spec.max_steps - 100
     assert abs(servo.shaft.effort) <= 1.0
 
 

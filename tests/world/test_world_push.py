@@ -113,7 +113,7 @@ def test_upper_and_lower_lids_hold_each_other_off() -> None:
     bench.pass_ms(500)
     for name, angle in wanted.items():
         assert degrees(bench.world.joints_rad()[name]) > angle + 2.0
-        assert bench.servos[name].straining
+        assert bench.servos[name].is_straining
     assert (
         sum(degrees(bench.world.joints_rad()[name]) for name in wanted) > -29.5
     )  # they meet at -28

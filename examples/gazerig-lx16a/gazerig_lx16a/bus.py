@@ -79,7 +79,7 @@ class Lx16aBus(PortBus):
         self._port, self._params = port, params
         self._line, self._log = Line(port, params.reply_timeout_ms / 1e3), EventLog()
         self._supervisor, self.engaged = self, False
-        self._setups = self._wanted = tuple(setups)
+        self._setups = self._target_setups = tuple(setups)
         self._check_setups(setups)
         self._reset()
 
@@ -101,7 +101,7 @@ class Lx16aBus(PortBus):
         self.engaged = False
 
     def open(self) -> None:
-        self._setups = self._wanted
+        self._setups = self._target_setups
         if not self._port.setBaudRate(p.BAUD):
             raise PortError(f"{self._port.port_name} cannot run at {p.BAUD} bit/s")
         self._reset()
@@ -127,14 +127,14 @@ class Lx16aBus(PortBus):
 
     def read(self, now_s: float) -> Feedback:
         count = len(self._setups)
-        if not self._reachable(now_s):
-            return Feedback.of_none(count)
+        if not self._reopen_if_needed(now_s):
+            return Feedback.create_missing(count)
         try:
             told = [self._read_one(i, now_s) for i in range(count)]
             self._read_in_turn(told)
         except BusLost as lost:
-            self._lose(lost)
-            return Feedback.of_none(count)
+            self._record_loss(lost)
+            return Feedback.create_missing(count)
         silent_s = now_s - max(self._heard_s)
         if silent_s >= self._params.give_up_s:
             raise BusLost(
@@ -202,7 +202,7 @@ class Lx16aBus(PortBus):
         return False
 
     def enable_torque(self) -> tuple[int, ...]:
-        self._setups, goals = self._wanted, []
+        self._setups, goals = self._target_setups, []
         try:
             for setup in self._setups:
                 steps = self._insist(setup.id, p.POSITION)
@@ -233,7 +233,7 @@ class Lx16aBus(PortBus):
         try:
             self._line.send(out)
         except BusLost as lost:
-            self._lose(lost)
+            self._record_loss(lost)
 
     def faults(self) -> tuple[str, ...]:
         return ()  # these servos show errors by their lamp alone
@@ -282,4 +282,4 @@ def release(port: BusPort, params: Lx16aParams, ids: tuple[int, ...]) -> tuple[i
     if not port.setBaudRate(p.BAUD):
         raise PortError(f"{port.port_name} cannot run at {p.BAUD} bit/s")
     result = release_all(Line(port, params.reply_timeout_ms / 1e3), ids)
-    return (*result.holding, *result.unconfirmed)
+    return (*result.holding_ids, *result.unconfirmed_ids)

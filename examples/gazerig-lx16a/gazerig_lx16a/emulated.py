@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, whole
+from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, integer_parser
 from gazerig.sim_mock.faults.line import LineFaults
 from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, loss_verb
 from gazerig.sim_mock.replies import Piece
@@ -64,20 +64,20 @@ class Lx16aChain:
         for servo in servos:
             servo.advance(now_s())
 
-    def here(self, servo_id: int) -> EmulatedLx16a:
+    def find_servo(self, servo_id: int) -> EmulatedLx16a:
         """Return a servo, brought up to now."""
         servo = self.servos[servo_id]
         servo.advance(self.now_s())
         return servo
 
-    def at_baud(self, client_baud: int) -> bool:
+    def understands_baud(self, client_baud: int) -> bool:
         return True
 
-    def choose(self, case: str, value: str) -> None:
+    def choose_behaviour(self, case: str, value: str) -> None:
         raise ValueError(f"these servos have no case {case!r}")
 
     def positions_steps(self) -> tuple[float, ...]:
-        return tuple(self.here(servo_id).place for servo_id in self.servos)
+        return tuple(self.find_servo(servo_id).place for servo_id in self.servos)
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Carry out the commands in these bytes; return what is answered."""
@@ -85,17 +85,17 @@ class Lx16aChain:
         found, rest = p.frames(whole_data)
         self._rest, replies = whole_data[rest:], []
         for servo_id, command, params, end in found:
-            if command == p.MOVE and wire.take("lose_writes", None, self.now_s()):
+            if command == p.MOVE and wire.use_fault("lose_writes", None, self.now_s()):
                 continue
             for one in self.servos if servo_id == p.BROADCAST else {servo_id} & set(self.servos):
-                said = self.here(one).answer(command, params)
+                said = self.find_servo(one).answer(command, params)
                 if said is None or servo_id == p.BROADCAST:
                     continue
-                if wire.take("lose", one, self.now_s()) is None:
+                if wire.use_fault("lose", one, self.now_s()) is None:
                     pieces = [Piece(one, p.frame(one, command, said))]
                     spoilt = wire.spoil_pieces(pieces, False, self.now_s())
                     replies.append(DeviceReply(max(0, end - before), spoilt))
-        return self.faults.around(replies, data) if wire.any else replies
+        return self.faults.add_line_noise(replies, data) if wire.has_any else replies
 
 
 class ChainFaults(LineFaults):
@@ -103,7 +103,7 @@ class ChainFaults(LineFaults):
 
     def reports(self) -> list[dict[str, object]]:
         chain: Lx16aChain = self._chain  # type: ignore[assignment]
-        servos = [chain.here(servo_id) for servo_id in chain.servos]
+        servos = [chain.find_servo(servo_id) for servo_id in chain.servos]
         return [
             {"id": s.id, "position": s.place, "goal": round(s.target), "torque": s.torque}
             for s in servos
@@ -111,11 +111,11 @@ class ChainFaults(LineFaults):
 
 
 def _restart(faults: ChainFaults, servo_id: int) -> str:
-    faults._chain.here(servo_id).restart()  # type: ignore[attr-defined]
+    faults._chain.find_servo(servo_id).restart()  # type: ignore[attr-defined]
     return f"servo {servo_id} restarts"
 
 
-_ID = Argument("ID", whole(0, 253, "a servo id"))
+_ID = Argument("ID", integer_parser(0, 253, "a servo id"))
 COMMANDS = CommandTable(
     {**line_verbs(_ID), **adapter_verbs(), "brown-out": Verb(_restart, (_ID,), "restart"),
      "lose-writes": loss_verb("lose_writes", "moves"),

@@ -78,7 +78,7 @@ def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str
     lines += [f"#   {_one_line(line)}" for line in about]
     lines += [
         "#",
-        f"# {sum(fitted.visits)} fixations on the face, {fitted.outside} elsewhere,"
+        f"# {sum(fitted.visits)} fixations on the face, {fitted.outside_fixations} elsewhere,"
         f" {_transitions(fitted)} transitions between parts.",
         f"# {_smoothing(params)} Intervals hold {level}, from {params.resamples} resamples.",
         "#",
@@ -105,7 +105,7 @@ def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str
     for part, visits, mean, sd in zip(
         PARTS, fitted.visits, fitted.dwell_mean_s, fitted.dwell_sd_s, strict=True
     ):
-        few = ", too few: all parts together" if part in fitted.pooled else ""
+        few = ", too few: all parts together" if part in fitted.pooled_parts else ""
         lines.append(f"#   {part}: mean {_ends(mean)}, SD {_ends(sd)} ({visits} fixations{few})")
     lines += [
         f"dwell_mean_s: [{', '.join(f'{mean.value:.4f}' for mean in fitted.dwell_mean_s)}]",
@@ -174,12 +174,12 @@ def _report(
     shares = np.array(fitted.visits) / sum(fitted.visits)
     lines = [f"{recording}: {note}" for note in notes]
     lines.append(
-        f"{sum(fitted.visits)} fixations on the face, {fitted.outside} elsewhere,"
+        f"{sum(fitted.visits)} fixations on the face, {fitted.outside_fixations} elsewhere,"
         f" {_transitions(fitted)} transitions; {params.smoothing} smoothing"
     )
     rows = zip(PARTS, fitted.visits, shares, fitted.dwell_mean_s, fitted.dwell_sd_s, strict=True)
     for part, n, share, mean, sd in rows:
-        few = "  too few, dwell of all parts together" if part in fitted.pooled else ""
+        few = "  too few, dwell of all parts together" if part in fitted.pooled_parts else ""
         lines.append(
             f"  {PART_NAMES[part]:<11}{n:>6} fixations {100.0 * share:5.1f} %"
             f"   dwell {mean.value:.3f} s [{mean.low:.3f}, {mean.high:.3f}]"

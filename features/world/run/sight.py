@@ -160,7 +160,7 @@ class RenderedWorld(NamedTuple):
         asked = self.params
         params = PixelCameraParams(
             **{
-                **asked.of(PixelCameraParams),
+                **asked.from_params(PixelCameraParams),
                 "latency_ms": asked.latency_ms if simulated else 0.0,
                 "horizontal_field_deg": self.camera.horizontal_field_deg,
             }
@@ -214,7 +214,7 @@ def world_view(
     return WorldPicture(
         model.mj,
         place,
-        RendererParams(**params.of(RendererParams)),
+        RendererParams(**params.from_params(RendererParams)),
         hidden,
         rig.R_world_base,
         rig.p_world_base_m,
