@@ -5,6 +5,7 @@ reader writes with ``gazerig new``.
 """
 
 from collections.abc import Sequence
+from math import radians, sin
 from pathlib import Path
 
 import matplotlib as mpl
@@ -12,9 +13,11 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
 from matplotlib.axes import Axes  # noqa: E402
-from matplotlib.patches import Arc, Circle, Ellipse, FancyBboxPatch, Wedge  # noqa: E402
+from matplotlib.patches import Arc, Circle, Ellipse, FancyBboxPatch, Rectangle, Wedge  # noqa: E402
 
 from gazerig.config.new_rig import MECHANISMS  # noqa: E402
+from gazerig.config.schema import load_rig  # noqa: E402
+from gazerig.robot.description.head_shape import EYE_RADIUS  # noqa: E402
 
 HERE = Path(__file__).parent / "figures"
 INK, SOFT, EYE, SKIN = "#2c3136", "#9aa3a9", "#1c6ea4", "#f3e3d3"
@@ -25,7 +28,7 @@ EYE_AT = {"left": 1.0, "right": -1.0}
 
 def main() -> None:
     """Draw all pictures into docs/figures."""
-    for draw in (mechanisms, wiring, measures):
+    for draw in (mechanisms, wiring, measures, drawing):
         draw()
         print(f"docs/figures/start_{draw.__name__}.png")
 
@@ -93,6 +96,80 @@ def measures() -> None:
     front.text(0, -1.45, "yaw and pan: + is to the head's own left", ha="center", fontsize=8, color=SERVO)  # fmt: skip
     front.text(0, -2.0, "roll: + is its right ear down", ha="center", fontsize=8, color=SERVO)
     _saved("measures", figure)
+
+
+HORN_MM, MG90S_MM, DEG_PER_US = 12.0, (22.8, 12.2, 28.5), 0.09
+"""Length of a servo's horn, size of an MG90S without its ears, and its turn for a pulse."""
+
+
+def arm_mm(points: Sequence[Sequence[float]]) -> float:
+    """Return the length of a joint's arm whose push rod, parallel to the horn, gives these points.
+
+    The rod moves both ends by the same length: horn x sin(servo) = arm x sin(joint).
+    """
+    (low_deg, low_us), (high_deg, high_us) = points[0], points[-1]
+    servo = radians(abs(high_us - low_us) * DEG_PER_US / 2.0)
+    return HORN_MM * sin(servo) / sin(radians((high_deg - low_deg) / 2.0))
+
+
+def drawing() -> None:
+    """The head of the rig maker to build, in mm: what its file has, and the arms of its rods."""
+    rig = load_rig("maker")
+    eyes, up = rig.geometry.interocular_mm, rig.geometry.eyes_above_mm
+    ball = EYE_RADIUS * eyes
+    ahead, _, lens = rig.camera.position_mm
+    figure, (front, side) = plt.subplots(1, 2, figsize=(10, 6.2))
+    for one, title in (
+        (front, "from the front"),
+        (side, "from its right side"),
+    ):
+        _canvas(one, (-98, 98), (-50, 160))
+        one.set_title(f"{title}, mm", fontsize=10, color=INK)
+        one.plot([-70, 70], [0, 0], color=INK, lw=3)
+    for x in (-eyes / 2, eyes / 2):
+        front.add_patch(Circle((x, up), ball, fc="white", ec=EYE, lw=2))
+        front.add_patch(Circle((x, up), 0.45 * ball, fc="none", ec=EYE))
+        front.plot([x, x], [up - ball - 8, up + ball + 8], color=SOFT, lw=0.8, ls="-.")
+        front.plot([x, x], [up, up + 36], color=SOFT, lw=0.8, ls=":")
+    front.plot([-70, 70], [up, up], color=SOFT, lw=0.8, ls="-.")
+    front.text(71, up, "tilt axis, and\nof all lids", fontsize=8, va="center", color=INK)
+    _length(front, (-eyes / 2, up + 33), (eyes / 2, up + 33), f"{eyes:g}")
+    _length(front, (eyes / 2 - ball, up - 30), (eyes / 2 + ball, up - 30), f"eyeball {2 * ball:.1f}", below=True)  # fmt: skip
+    _length(front, (-62, 0), (-62, up), f"{up:g} ")
+    front.text(-eyes / 2, up - ball - 12, "pan axis", fontsize=8, ha="center", va="top", color=INK)
+    side.add_patch(Circle((0, up), ball, fc="white", ec=EYE, lw=2))
+    side.add_patch(
+        Arc((0, up), 2 * ball + 6, 2 * ball + 6, theta1=10, theta2=95, color=SERVO, lw=3)
+    )
+    side.add_patch(
+        Arc((0, up), 2 * ball + 6, 2 * ball + 6, theta1=265, theta2=350, color=SERVO, lw=3)
+    )
+    side.text(27, up + 20, "upper lid, about the\neye's centre", fontsize=8, color=SERVO)
+    side.text(20, up - 32, "lower lid", fontsize=8, color=SERVO)
+    _axis(side, (0, up), "")
+    width, depth, height = MG90S_MM
+    arm = arm_mm(rig.joints["eyes_tilt"].transmission_points)
+    shaft = (-56.0, up + arm - HORN_MM)
+    corner = (shaft[0] - width / 2, shaft[1] - height)
+    side.add_patch(Rectangle(corner, width, height, fc=SKIN, ec=SERVO))
+    size = f"MG90S\n{width:g} x {depth:g} x {height:g}"
+    side.text(shaft[0], corner[1] - 3, size, fontsize=8, ha="center", va="top", color=SERVO)
+    side.plot([shaft[0], shaft[0]], [shaft[1], shaft[1] + HORN_MM], color=SERVO, lw=4)
+    side.plot([0, 0], [up, up + arm], color=EYE, lw=4)
+    side.plot([shaft[0], 0], [up + arm] * 2, color=INK, lw=1.4)
+    side.text(-44, up + arm + 4, "push rod of eyes_tilt", fontsize=8, ha="center", color=INK)
+    side.text(shaft[0] - 3, shaft[1] + 4, f"horn {HORN_MM:g}", fontsize=8, ha="right", color=SERVO)
+    side.text(-3, up + 4, f"arm {arm:.1f}", fontsize=8, ha="right", color=EYE)
+    side.add_patch(Circle((ahead, lens), 4, fc=INK))
+    side.text(ahead + 7, lens, "camera's lens", fontsize=8, va="center", color=INK)
+    _length(side, (-84, 0), (-84, lens), f"{lens:g} ")
+    _length(side, (0, lens + 10), (ahead, lens + 10), f"{ahead:g}")
+    for number, (name, joint) in enumerate(rig.joints.items()):
+        text = f"{name}: {joint.min_deg:g} to {joint.max_deg:+g} deg, arm {arm_mm(joint.transmission_points):.1f} for a horn of {HORN_MM:g}"
+        (front if number < 3 else side).text(
+            -85, -18 - 13 * (number % 3), text, fontsize=8, color=INK
+        )
+    _saved("drawing", figure)
 
 
 def _face(axes: Axes, joints: Sequence[str]) -> None:
