@@ -55,6 +55,8 @@ WANTED = {
     "six cross: IDF1": (0.95, 1.0),
     "six walk to and fro, turning behind others: IDF1": (0.95, 1.0),
     "six stroll, for seconds behind others: IDF1": (0.95, 1.0),
+    "one comes and goes: returns with the same number, %": (60.0, 100.0),
+    "six come and go: visits with another person's number, %": (0.0, 15.0),
     "identities that go on after a cut, %": (0.0, 0.0),
     "cuts found, %": (100.0, 100.0),
     "cuts where there is none, of 1000 pictures": (0.0, 0.0),
@@ -137,6 +139,64 @@ def pictures(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: b
         if crowd is not None:
             found, _ = reader.add_clothing(crowd.image(places, k), k / RATE_HZ, found)
         yield Detections(k / RATE_HZ, k, *SIZE, faces=found), places, set(seen)
+
+
+def visits(rng: np.random.Generator, people: int, seconds: float) -> Iterator[
+    tuple[int, float, float, Way]
+]:  # fmt: skip
+    """Yield who comes, from when, until when and how: from one side, for a while, to one side."""
+    below, start = rng.normal(0.0, 0.08, people), 2.0
+    while start < seconds:
+        who, far, pace = int(rng.integers(people)), rng.uniform(0.8, 2.0), rng.uniform(0.6, 1.2)
+        side, other = rng.choice((-1.0, 1.0), 2)
+        end, wide, height = start + rng.uniform(15, 70), 0.75 * far, rng.normal(below[who], 0.03)
+
+        def way(
+            t: float, start: float = start, end: float = end, far: float = far, pace: float = pace,
+            side: float = side, other: float = other, wide: float = wide, height: float = height,
+        ) -> tuple[float, float, float]:  # fmt: skip
+            come, go = wide - pace * (t - start), wide - pace * (end - t)
+            aside = side * max(come, 0.0) + other * max(go, 0.0) + 0.05 * np.sin(0.7 * t)
+            return float(aside), height + 0.02 * np.sin(0.4 * t), far + 0.05 * np.sin(0.3 * t)
+
+        yield who, start, end, way
+        start = end + rng.uniform(4, 120)
+
+
+def come_and_go(
+    people: int, seconds: float, rng: np.random.Generator, false_per_min: float = 2.0
+) -> tuple[int, int, int, int, int]:
+    """Return visits, returns within 5 minutes, kept numbers, numbers of others, highest number.
+
+    The number of a visit is the one that it had in most pictures.
+    """
+    see, poses = perception()
+    crowd, reader = Crowd(people, rng.spawn(1)[0]), ClothingReader()
+    last: dict[int, tuple[float, int]] = {}
+    owner: dict[int, int] = {}
+    returns = kept = wrong = highest = shown = 0
+    for who, start, end, way in visits(rng, people, seconds):
+        numbers: Counter[int] = Counter()
+        for k in range(round(start * RATE_HZ), round((end + 2.0) * RATE_HZ)):
+            t, faces, places = k / RATE_HZ, [], {}
+            if t < end:
+                places[who] = p = np.array(way(t))
+                if _in_view(p) and rng.random() >= _MISSED:
+                    faces.append(detected(p, rng))
+            if rng.random() < false_per_min / 60.0 / RATE_HZ:
+                faces.append(detected(rng.uniform((-0.7, -0.2, 1.0), (0.7, 0.4, 2.0)), rng))
+            found, _ = reader.add_clothing(crowd.image(places, k), t, tuple(faces))
+            percept = see.see(Detections(t, k, *SIZE, faces=found), poses)
+            assert percept is not None
+            pairs = _matched(places, [(face.id, face.p_world_m) for face in percept.faces])
+            numbers.update(number for i, number in pairs if i is not None)
+            highest = max([highest, *(face.id for face in percept.faces)])
+        ((number, _),) = numbers.most_common(1)
+        if who in last and start - last[who][0] < 300.0:
+            returns, kept = returns + 1, kept + (number == last[who][1])
+        wrong += owner.setdefault(number, who) != who
+        last[who], shown = (end, number), shown + 1
+    return shown, returns, kept, wrong, highest
 
 
 class Crowd:
@@ -240,7 +300,7 @@ def _matched(
     people: dict[int, NDArray[np.float64]], tracks: list[tuple[int, Vec3]]
 ) -> Iterator[tuple[int | None, int]]:
     """Yield who each track is in one picture, None for nobody, and its number."""
-    p = np.array(list(people.values()))
+    p = np.array(list(people.values())).reshape(-1, 3)
     q = np.array([(-y, -z, x) for _, (x, y, z) in tracks]).reshape(-1, 3)
     far, believed = np.linalg.norm(p, axis=1), np.linalg.norm(q, axis=1)
     cos = np.clip((p / far[:, None]) @ (q / believed[:, None]).T, -1.0, 1.0)
@@ -346,10 +406,19 @@ def measure(full: bool) -> dict[str, float]:
         found += len(set(there) & set(film.cuts))
         false += len(set(there) - set(film.cuts))
         cuts, images = cuts + len(film.cuts), images + len(film.images)
+    alone = [come_and_go(1, 1200.0 if full else 400.0, np.random.default_rng(k)) for k in range(3)]
+    six = [come_and_go(6, 1200.0 if full else 400.0, np.random.default_rng(k)) for k in range(3)]
     out = {name: float(np.mean(values)) for name, values in figures.items()}
     out |= {f"{name}, worst": float(np.min(values)) for name, values in figures.items()}
     out["identities that go on after a cut, %"] = 100.0 * on / cuts
     out["identities that end without a cut"] = float(ended)
+    out["one comes and goes: returns with the same number, %"] = (
+        100.0 * sum(one[2] for one in alone) / sum(one[1] for one in alone)
+    )
+    out["one comes and goes: highest number"] = float(max(one[4] for one in alone))
+    out["six come and go: visits with another person's number, %"] = (
+        100.0 * sum(one[3] for one in six) / sum(one[0] for one in six)
+    )
     out["cuts found, %"] = 100.0 * found / cuts
     out["cuts where there is none, of 1000 pictures"] = 1e3 * false / images
     for name, wanted in (("Megamind.avi", {98, 154, 200}), ("vtest.avi", set[int]())):
