@@ -334,7 +334,8 @@ def _is_carried(trace: GazeAngles, source: Ints) -> NDArray[np.bool_]:
     most = np.max(np.where(np.isfinite(aside), aside, 0.0), axis=0)
     limited = (aside > np.maximum(most - _CARRIED_DEG, _LEAST_LIMIT_DEG)).any(axis=1)
     off_deg = size_deg(trace.planned_deg[source] - seen)
-    return moves & ((limited & (off_deg > _CARRIED_DEG)) | (off_deg > _FAR_DEG))
+    carried: NDArray[np.bool_] = (limited & (off_deg > _CARRIED_DEG)) | (off_deg > _FAR_DEG)
+    return moves & carried
 
 
 def estimate_lag(trace: GazeAngles) -> float:
