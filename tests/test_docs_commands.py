@@ -115,6 +115,52 @@ def test_a_quick_command_works(words: str, folder: Path, capfd: pytest.CaptureFi
     assert typed(*shlex.split(words)) == 0, capfd.readouterr().err
 
 
+AS_WRITTEN = re.compile(
+    r"describe |calibrate board|models list|study design|run --help|scan --mock|doctor --mock|"
+    r"jog maker .*--mock"
+)
+"""Commands that run as they are written, besides the quick ones."""
+LEFT_OUT = {
+    r".* ?myhead\.yaml": "the tutorial's, in its order: tests/test_tutorial.py",
+    r"(ctl|stop)\b": "needs a rig that runs: tests/test_cli_tune.py",
+    r"emulate ": "runs until it is ended: tests/test_emulate.py",
+    r"models fetch": "needs the network",
+    r"new ": "asks questions: tests/test_new_rig.py",
+    r"record-gesture ": "needs a hand that moves the head",
+    r".*(--camera|--oak)|calibrate (camera|face)": "needs a camera",
+    r"(scan|monitor)$|(setup|calibrate|doctor|home|jog|look-at|reboot) ": "needs servos on a port",
+    r"run .*(--port|--world|--record)": "needs another program, a renderer or minutes: tests/world",
+    r"(report|compare|sweep|fit-scanpath|export|replay|import-gesture|study) ": "needs a recording, "
+    "data or minutes: tests/lab, tests/study, tests/test_export.py, tests/test_gestures.py",
+}
+"""Commands that no test here runs, and why."""
+
+
+def commands_as_written() -> list[str]:
+    """Return the further commands that are run as they are written."""
+    return [
+        words
+        for words in COMMANDS
+        if AS_WRITTEN.match(words) and words not in quick_commands() and "myhead" not in words
+    ]
+
+
+@pytest.mark.parametrize("words", commands_as_written())
+def test_a_command_works_as_it_is_written(
+    words: str, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "my.yaml").write_bytes((folder / "myrig.yaml").read_bytes())
+    typed("study", "design", "--example", "study.yaml")
+    if "--example" not in words:
+        assert typed(*shlex.split(words)) == 0, capfd.readouterr().err
+
+
+def test_every_command_of_the_papers_is_run_or_left_out_for_a_reason() -> None:
+    run = {*quick_commands(), *commands_as_written()}
+    for words in set(COMMANDS) - run:
+        assert any(re.match(pattern, words) for pattern in LEFT_OUT), words
+
+
 @pytest.mark.parametrize("words", ["doctor --mock --fix", "setup maker --mock"])
 def test_a_paper_shows_what_is_printed(words: str, capfd: pytest.CaptureFixture[str]) -> None:
     [block] = [block for block in blocks("") if f"$ gazerig {words}\n" in block.text]
