@@ -18,8 +18,8 @@ from gazerig.config.export import Violation, abbreviate, suggestion_text, violat
 from gazerig.config.faults import ConfigError as ConfigError
 from gazerig.config.faults import ConfigFault as ConfigFault
 from gazerig.config.plugin_sections import extend_type
-from gazerig.config.shipped import SHIPPED
-from gazerig.config.shipped import shipped_names as shipped_names
+from gazerig.config.shipped_files import SHIPPED
+from gazerig.config.shipped_files import shipped_names as shipped_names
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import GESTURES, RIGS, yaml_files
 

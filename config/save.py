@@ -20,7 +20,7 @@ from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, s
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import EditRefused, Value, edit_text, format_value
 from gazerig.config.schema import load_rig
-from gazerig.config.shipped import SHIPPED
+from gazerig.config.shipped_files import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.robot.model.parameter import ParamChange, SavedFile
 

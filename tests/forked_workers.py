@@ -69,7 +69,7 @@ def run(session: pytest.Session, workers: int) -> None:
 def _read_rigs() -> None:
     """Load the shipped rigs: their YAML and what judges it are kept, once for all forks."""
     from gazerig.config.schema import load_rig
-    from gazerig.config.shipped import shipped_names
+    from gazerig.config.shipped_files import shipped_names
 
     for name in shipped_names("rigs"):
         load_rig(name)

@@ -5,7 +5,7 @@ from typing import Any
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
-from gazerig.testing.struck_machine import LINE, Case, lasting_cases
+from gazerig.testing.fault_machine import LINE, Case, lasting_cases
 
 PACKETS = [
     *lasting_cases(

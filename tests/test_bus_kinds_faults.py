@@ -12,8 +12,8 @@ import gazerig.robot.app.run_bus as run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
+from gazerig.testing.fault_machine import Case, Machine, pair_of
 from gazerig.testing.fault_suite import FaultSuite
-from gazerig.testing.struck_machine import Case, Machine, pair_of
 
 LEFT = {
     "dynamixel": {

@@ -14,7 +14,7 @@ from gazerig.config.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_o
 from gazerig.config.save import save_rig
 from gazerig.config.save_text import Value
 from gazerig.config.schema import load_rig
-from gazerig.config.shipped import SHIPPED
+from gazerig.config.shipped_files import SHIPPED
 from gazerig.robot.cli import new as command
 
 TEMPLATES = {

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.testing.struck_machine import LINE, RESTARTS, Case, Machine, pair_of
+from gazerig.testing.fault_machine import LINE, RESTARTS, Case, Machine, pair_of
 
 STRUCK_S = 0.6
 

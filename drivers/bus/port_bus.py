@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import ClassVar, Protocol
 
-from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort

@@ -16,7 +16,7 @@ from math import inf, nan
 
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import CUT, PortBus
-from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board, BoardLine

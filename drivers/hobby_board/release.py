@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.serial.port import BusPort
 

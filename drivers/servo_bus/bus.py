@@ -7,7 +7,7 @@ from math import ceil
 from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.plausibility import DISTURBED_S
 from gazerig.drivers.bus.port_bus import CUT, PortBus
-from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort

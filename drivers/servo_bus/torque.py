@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
-from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family

@@ -9,7 +9,7 @@ import numpy as np
 from gazerig.config.gestures import gestures_of
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention

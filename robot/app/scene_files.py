@@ -4,7 +4,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from gazerig.config.load import load, shipped_path
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
 from gazerig.sim_mock.scenes.script import SceneScript

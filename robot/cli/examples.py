@@ -5,7 +5,7 @@ from pathlib import Path
 
 import typer
 
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.robot.cli.command_list import Examples, shipped_commands
 
 EXAMPLES: dict[str, Examples] = {

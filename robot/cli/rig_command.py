@@ -4,7 +4,7 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperOption
 
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 
 DEFAULT_RIG = "desk"
 

@@ -29,7 +29,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.robot.control.interrupts import ENDING, Interrupts

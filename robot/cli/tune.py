@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import fault as cli_fault

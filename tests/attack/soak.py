@@ -32,8 +32,8 @@ from struck_rigs import CASES, VOLTS, quick  # noqa: E402
 from gazerig.drivers.errors import DriverError  # noqa: E402
 from gazerig.robot.model.types import JointState  # noqa: E402
 from gazerig.sim_mock.smart_servo.chain import ServoChain  # noqa: E402
-from gazerig.testing import struck_machine  # noqa: E402
-from gazerig.testing.struck_machine import NEAR_RAD, ROOM_RAD, Case, Machine, RuleViolation  # noqa: E402
+from gazerig.testing import fault_machine  # noqa: E402
+from gazerig.testing.fault_machine import NEAR_RAD, ROOM_RAD, Case, Machine, RuleViolation  # noqa: E402
 
 SEEN_RAD = 0.004
 ROOM_C, ROOM_V = 2.0, 0.15
@@ -192,7 +192,7 @@ def mix(kind: str, dice: random.Random, only: str = "") -> Case:
 
 def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> None:
     """Strike one machine after the other and print what was found."""
-    struck_machine.PATIENCE_S = 8.0  # a bus that was late long is slow for a while
+    fault_machine.PATIENCE_S = 8.0  # a bus that was late long is slow for a while
     counts, ends, seen_s, faults, nth = Counter[str](), Counter[str](), 0.0, 0, first
     start_cpu_s, printed_h = time.process_time(), 0.0
     while seen_s < 3600.0 * hours:

@@ -18,7 +18,7 @@ from rich.table import Table
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
-from gazerig.testing.struck_machine import Machine, pair_of
+from gazerig.testing.fault_machine import Machine, pair_of
 
 TESTS = Path(__file__).parents[1]
 HEADS = (

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import Rig
-from gazerig.config.shipped import SHIPPED, shipped_names
+from gazerig.config.shipped_files import SHIPPED, shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.cli.design import EXAMPLE, notes, state

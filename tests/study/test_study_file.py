@@ -17,7 +17,7 @@ from recorded_run import record
 from ruamel.yaml import YAML
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.features.study.pages.study_files import FOLDER
 from gazerig.features.study.run.study_file import checked_study, load_questionnaire, load_study
 from gazerig.features.study.shipped import HOME

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from study_runs import UTC, run_of, screens, step
 
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.answers import LONGEST_TEXT, WrongAnswer
 from gazerig.features.study.data_folder import StudyData, code_of

@@ -10,7 +10,7 @@ import pytest
 from gazerig.config.faults import ConfigError
 from gazerig.config.load import load, shipped_path
 from gazerig.config.schema import load_rig
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import world_of, world_script

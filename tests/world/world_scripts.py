@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gazerig.config.load import load, shipped_path
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.features.world.room import HOME
 from gazerig.features.world.timeline import CHECKS
 from gazerig.sim_mock.scenes.script import SceneScript

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from gazerig.drivers.bus.plausibility import Plausibility
 from gazerig.drivers.bus.port_bus import CUT, PortBus
-from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.release_result import ReleaseResult
 from gazerig.drivers.bus.servo_models import ServoModelInfo
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog

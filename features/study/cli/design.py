@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.shipped import HOME

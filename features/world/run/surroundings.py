@@ -1,7 +1,7 @@
 """Our worlds as surroundings of a run: ``gazerig run --world``."""
 
 from gazerig.config.rig import Rig
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped_files import shipped_names
 from gazerig.features.world.room import HOME
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.surroundings import GroupRun, RunRoom, Surroundings
