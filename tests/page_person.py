@@ -188,6 +188,10 @@ class Person:
             return False
 
         wait_for(is_open, f"the drawer {drawer}")
+        if drawer == "Tune":  # most of its controls are in a fold
+            fold = "document.querySelector('#drawer-tune details')"
+            opened = f"(() => {{ const d = {fold}; if (d) d.open = true; return d !== null }})()"
+            wait_for(lambda: self.run(opened), "all parameters")
 
     def press(self, key: str, code: str, number: int) -> None:
         text = {"text": key} if len(key) == 1 else {}  # others write nothing

@@ -34,11 +34,14 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
 from gazerig.robot.dashboard.panels.controls import (
     ESTIMATED,
+    FirstMenus,
     GazeTargetPanel,
     JogPanel,
     estimated_joints_note,
 )
 from gazerig.robot.dashboard.panels.param_panel import (
+    ALL,
+    FIRST,
     ParamControl,
     ParamState,
     fits_slider,
@@ -650,6 +653,45 @@ def test_who_searches_before_the_parameters_have_come_finds_them_then() -> None:
     assert slider.value == 4.0  # not yet answered: it stays where the hand has put it
     state.answered(f"{client}:tuning")
     assert slider.value == 3.5 and slider.label == "a.b (deg)"
+
+
+def test_tune_opens_with_eight_controls_and_a_fold_with_all() -> None:
+    widgets, mouth = Widgets(), Mouth()
+    tune, freed = widgets.panel("tune"), []
+    menus = FirstMenus(tune, mouth, lambda choice, who: freed.append((choice, who)))  # type: ignore[arg-type]
+    state = ParamState(widgets, tune, mouth)  # type: ignore[arg-type]
+    client = widgets.join("browser 1", lambda: None).name
+    for name in ("lids", "conversation", "behaviour", "character"):
+        menus.offer(name, ["wait", "guard"])
+    rig = load_rig("desk")
+    known = {param.key: param for param in parameters(rig, rig)}
+    state.params([known[key]._asdict() for key in FIRST])
+    state.values({"values": {key: known[key].default for key in FIRST}, "unsaved": []})
+    elements = [one.props for one in widgets._widgets.values() if one.props["in"] == "tune"]
+    (fold,) = (one for one in elements if one.get("title") == ALL)
+    assert fold["open"] is False
+    shown = [(one["order"], one["label"]) for one in elements if one is not fold]
+    assert max(shown)[0] < fold["order"]  # type: ignore[operator]
+    assert [name for _, name in sorted(shown)] == [
+        "target", "liveliness", "time on the eyes", "blinks", "head share", "conversation",
+        "activity", "character",
+    ]  # fmt: skip
+    menus.menus["conversation"].arrived("guard", WHO)
+    menus.menus["character"].arrived("wait", WHO)
+    menus.target.arrived("look straight ahead", WHO)
+    menus.target.arrived("look freely", WHO)
+    blinks = next(one for one in sliders(widgets) if one.label.startswith("blinks"))
+    blinks.arrived(30.0, client)
+    assert mouth.parse_request == [
+        (Ask("conversation", "guard"), WHO),
+        ({"do": "character", "name": "wait"}, WHO),
+        (LookAt(FirstMenus.AHEAD_M, stay=True), WHO),
+        ({"do": "set", "changes": {"gaze.lids.blinks_per_min": 30.0}}, f"{client}:tuning"),
+    ]
+    assert freed == [("look freely", WHO)]
+    state.values({"values": {"gaze.lids.blinks_per_min": 40.0}, "unsaved": []})
+    state.answered(f"{client}:tuning")
+    assert blinks.value == 40.0
 
 
 def sliders(widgets: Widgets) -> list[Slider]:

@@ -33,7 +33,7 @@ def test_a_process_is_lowered_within_its_session_and_with_it(tmp_path: Path, lea
     group.touch()
     nice = str(os.getpriority(os.PRIO_PROCESS, 0) + 4)
     assert _lowered(group, leads) == [nice, "True"]
-    assert group.read_text() == "4"
+    assert group.read_text() == "2"
 
 
 def test_a_system_without_groups_of_sessions_is_no_fault(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def lower_priority(steps: int, group: Path = Path("/proc/self/autogroup")) -> No
     """Lower the priority of this process, and that of its session, which becomes its own.
 
     Args:
-        steps: of niceness.
+        steps: of niceness; its session gets half of them, or a browser would starve it.
         group: file with the niceness of the session.
     """
     if not hasattr(os, "nice"):  # Windows has other priorities
@@ -67,5 +67,5 @@ def lower_priority(steps: int, group: Path = Path("/proc/self/autogroup")) -> No
     for wait_s in _AGAIN_S:
         threading.Event().wait(wait_s)
         with suppress(OSError):
-            group.write_text(str(steps), encoding="ascii")
+            group.write_text(str(steps // 2), encoding="ascii")
             return

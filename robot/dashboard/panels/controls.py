@@ -20,7 +20,7 @@ STEER = "steer"
 BEHAVIOUR, CONVERSATION, CHARACTER = "behaviour", "conversation", "character"
 
 _TARGET_SCALE = 0.12
-_DRAG, _FREE = "drag a target", "look freely"
+_DRAG, _FREE, _AHEAD = "drag a target", "look freely", "look straight ahead"
 
 
 class Controls:
@@ -32,6 +32,7 @@ class Controls:
         self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.let_go)
         self._tuning = ParamState(widgets, self._tune, outbox)
         self._face = AnimationPanel(self._steer, outbox)
+        self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
     def leave(self) -> None:
         """Remove all controls: a recording cannot be controlled."""
@@ -50,6 +51,7 @@ class Controls:
                 self._face.offer_gestures(choices)
             else:
                 self._lead.offer(name, choices)
+                self._first.offer(name, choices)
 
     def params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned, as the rig describes them."""
@@ -62,10 +64,12 @@ class Controls:
         characters = state.get("characters")
         if isinstance(characters, list) and characters:
             self._lead.characters(characters, str(state.get("character", "")))
+            self._first.offer(CHARACTER, characters)
 
     def show(self, snapshot: Snapshot) -> None:
         """Show measured values next to requested ones."""
         self._lead.show(snapshot)
+        self._first.show(self._lead.menus)
         self._jog.show(snapshot)
 
     def answered(self, who: str) -> None:
@@ -111,6 +115,7 @@ class GazeTargetPanel:
             self._outbox.command(LookAt(None), client)
 
         self.free.on_press(look_freely)
+        self.let_go = look_freely
 
         # A coroutine: viser runs these in order, plain functions in any order.
         @self._gizmo.on_update
@@ -170,6 +175,55 @@ class GazeTargetPanel:
         for name, word in in_force.items():
             if name in self.menus:
                 self.menus[name].current = word
+
+
+class FirstMenus:
+    """Menus with which Tune opens, next to the first parameters."""
+
+    TITLES: Mapping[str, str] = {
+        CONVERSATION: CONVERSATION, BEHAVIOUR: "activity", CHARACTER: CHARACTER,
+    }  # fmt: skip
+    """Menu -> its plain name."""
+    AHEAD_M = (1.0, 0.0, 0.15)
+
+    def __init__(
+        self, place: Container, outbox: Outbox, let_go: Callable[[str, str], None]
+    ) -> None:
+        self._place, self._outbox = place, outbox
+        self.menus: dict[str, Buttons] = {}
+        self.target = place.buttons("target", (_FREE, _AHEAD), order=0.5)
+
+        def look(choice: str, client: str) -> None:
+            if choice == _FREE:
+                let_go(choice, client)
+            else:
+                outbox.command(LookAt(self.AHEAD_M, stay=True), client)
+
+        self.target.on_press(look)
+
+    def offer(self, name: str, choices: Sequence[str]) -> None:
+        """Add a menu, or replace its choices; others than the first are ignored."""
+        if (before := self.menus.get(name)) is not None:
+            before.options = tuple(sorted(choices))
+        elif (title := self.TITLES.get(name)) is not None:
+            order = 2.0 + 0.1 * list(self.TITLES).index(name)
+            menu = self.menus[name] = self._place.buttons(
+                title, tuple(sorted(choices)), order=order
+            )
+
+            def ask(choice: str, client: str) -> None:
+                if name == CHARACTER:
+                    self._outbox.ask({"do": "character", "name": choice}, client)
+                else:
+                    self._outbox.command(Ask(name, choice), client)
+
+            menu.on_press(ask)
+
+    def show(self, shown: Mapping[str, Buttons]) -> None:
+        """Mark the same present choices as other menus."""
+        for name, menu in self.menus.items():
+            if name in shown:
+                menu.current = shown[name].current
 
 
 EXPRESSION = "expression"

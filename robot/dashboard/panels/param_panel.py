@@ -39,10 +39,13 @@ def hint(param: Parameter) -> str:
     return "; ".join(parts)
 
 
-def label(param: Parameter, unsaved: bool) -> str:
-    """Return a control's label: the last parts of the key, its unit, a mark if it is unsaved."""
-    unit = f" ({param.unit})" if param.unit else ""
-    name = ".".join(param.key.split(".")[-2:])
+def label(param: Parameter, unsaved: bool, title: str = "") -> str:
+    """Return a control's label: a mark if it is unsaved, its name and its unit.
+
+    title: plain name, without a unit; "": the last parts of the key
+    """
+    unit = f" ({param.unit})" if param.unit and not title else ""
+    name = title or ".".join(param.key.split(".")[-2:])
     return f"{'● ' if unsaved else ''}{name}{unit}"
 
 
@@ -107,10 +110,11 @@ class ParamControl:
         put: Put,
         refuse: Callable[[str], None],
         order: float,
+        title: str = "",
     ) -> None:
-        self.param, self.order = param, order
+        self.param, self.order, self.title = param, order, title
         self._put, self._refuse = put, refuse
-        self.field = self._add(place, label(param, unsaved), value, order)
+        self.field = self._add(place, label(param, unsaved, title), value, order)
         self.field.on_change(lambda shown, _: self._ask(shown))
 
     def _add(
@@ -150,7 +154,7 @@ class ParamControl:
 
     def show(self, value: object, unsaved: bool) -> None:
         """Show the present value."""
-        self.field.label = label(self.param, unsaved)
+        self.field.label = label(self.param, unsaved, self.title)
         if isinstance(self.field, TextField):
             self.field.value = format_value(self.param, value)
         elif isinstance(self.field, Choice):
@@ -169,6 +173,14 @@ class ParamControl:
         self.field.remove()
 
 
+FIRST = {
+    "gaze.scanpath.rate_scale": "liveliness",
+    "gaze.scanpath.spot_height_mm": "time on the eyes",
+    "gaze.lids.blinks_per_min": "blinks",
+    "gaze.head.head_slope": "head share",
+}
+"""Parameters with which Tune opens, and their plain names."""
+ALL = "all parameters"
 MOST_SHOWN = 30
 SAVE, REVERT = "save", "revert to the file"
 NOTHING, UNSAVED, DIFFERENT = "choose a group ...", "what is not saved", "what differs from default"
@@ -260,8 +272,10 @@ class ParamPanel:
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
+        self._first: dict[str, ParamControl] = {}
         self._unanswered = self._known = 0
-        place = place.own(client)
+        self._top = place.own(client)
+        place = self._top.section(ALL, is_open=False, order=10)
         self._find = place.text("find", on="key", hint="words of a key or its meaning", order=1)
         self._group = place.choice("group", (NOTHING,), order=2)
         self._found = place.section("parameters", order=3)
@@ -297,6 +311,9 @@ class ParamPanel:
         )
         if len(values) != self._known:  # the first arrive after the browser
             self._known = len(values)
+            for order, (key, title) in enumerate(FIRST.items()):
+                if key in values and key in self._params and key not in self._first:
+                    self._first[key] = self._control(self._top, key, 1.0 + 0.1 * order, title)
             self._show_chosen()
         if not self._unanswered:
             self._refresh()
@@ -309,12 +326,14 @@ class ParamPanel:
 
     def _refresh(self) -> None:
         with self._lock:
+            for key, control in self._first.items():
+                control.show(self._values[key], key in self._unsaved)
             for key, control in list(self._controls.items()):
                 if control.can_show(self._values[key]):
                     control.show(self._values[key], key in self._unsaved)
                 else:
                     control.remove()
-                    self._controls[key] = self._control(key, control.order)
+                    self._controls[key] = self._control(self._found, key, control.order)
 
     def _ask(self, what: Mapping[str, object]) -> None:
         if not self._outbox.ask(what, self._who):
@@ -353,19 +372,20 @@ class ParamPanel:
                 self._controls.pop(key).remove()
             for order, key in enumerate(wanted[:MOST_SHOWN]):
                 if key not in self._controls:
-                    self._controls[key] = self._control(key, float(order))
+                    self._controls[key] = self._control(self._found, key, float(order))
             more = len(wanted) - MOST_SHOWN
             self._rest.content = note(f"and {more} more: search for less") if more > 0 else ""
 
-    def _control(self, key: str, place: float) -> ParamControl:
+    def _control(self, place: Container, key: str, order: float, title: str = "") -> ParamControl:
         return ParamControl(
-            self._found,
+            place,
             self._params[key],
             self._values[key],
             key in self._unsaved,
             self._put,
             self._refuse,
-            place,
+            order,
+            title,
         )
 
 
