@@ -91,7 +91,7 @@ def value_of(rig: Rig, key: str) -> Value:
         raise ConfigError(
             [ConfigFault("", None, key, "", f"unknown key {abbreviate(step)}{near} {there}")]
         )
-    found: Value = plain(value)
+    found: Value = to_plain(value)
     return found
 
 
@@ -122,14 +122,14 @@ def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
         gazerig.config.load.ConfigError: with every fault, as in loading a file.
     """
     # Sections in which nothing changes go through the judge as they are, already checked.
-    data = _open_paths(rig, [tuple(key.split(".")) for key in changes])
+    data = _unfreeze_paths(rig, [tuple(key.split(".")) for key in changes])
     if not any([_put(_root(rig), data, key, _freeze(value)) for key, value in changes.items()]):
         into, problems = extend_type(Rig, data)
         made, _ = validate(into, data)
         if not problems and made is not None and not any(True for r in RULES for _ in r(made)):
             return made
     # Something is wrong with it: every fault of every rule is named.
-    data, faults = plain(rig), []
+    data, faults = to_plain(rig), []
     for key, value in changes.items():
         faults += _put(_root(rig), data, key, _freeze(value))
     unnamed = Entry(None, "", 0)  # as if read from a file without a name
@@ -162,15 +162,15 @@ def flatten_changes(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
     return out
 
 
-def plain(value: Any) -> Any:
+def to_plain(value: Any) -> Any:
     """Return frozen values as dicts, tuples and scalars."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = shapes_of(type(value))
-        return {name: plain(getattr(value, name)) for name in fields}
+        return {name: to_plain(getattr(value, name)) for name in fields}
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return tuple(plain(item) for item in value)
+        return tuple(to_plain(item) for item in value)
     return value
 
 
@@ -183,15 +183,15 @@ def _parts(value: Any) -> dict[str, Any] | None:
     return None
 
 
-def _open_paths(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
+def _unfreeze_paths(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
     """Return a value with plain dicts along the paths and at their ends, the rest as it is."""
     if () in paths:
-        return plain(value)
+        return to_plain(value)
     parts = _parts(value) if paths else None
     if parts is None:
         return value
     for step in {path[0] for path in paths} & parts.keys():
-        parts[step] = _open_paths(parts[step], [path[1:] for path in paths if path[0] == step])
+        parts[step] = _unfreeze_paths(parts[step], [path[1:] for path in paths if path[0] == step])
     return parts
 
 
@@ -221,7 +221,7 @@ def _leaves(
         for step in (*value, *(s for s in unlisted.get(key, ()) if s not in value)):
             yield from _leaves(inner, value.get(step, _LEFT_OUT.get(key)), (*path, step), unlisted)
     else:
-        yield key, shape, plain(value)
+        yield key, shape, to_plain(value)
 
 
 def _parameter(key: str, shape: Shape, default: Value) -> Parameter:
@@ -286,7 +286,7 @@ def _iterate_differences(
                 both = getattr(before, name), getattr(after, name)
                 yield from _iterate_differences(field, *both, (*path, name))
             else:  # the section of a plug-in that was not there before
-                yield ".".join((*path, name)), plain(getattr(after, name))
+                yield ".".join((*path, name)), to_plain(getattr(after, name))
     elif before == after and type(before) is type(after):
         return
     elif shape.form == "mapping" and shape.inner is not None:
@@ -296,9 +296,9 @@ def _iterate_differences(
                     shape.inner, before[step], after[step], (*path, step)
                 )
             else:
-                yield ".".join((*path, step)), plain(after.get(step))
+                yield ".".join((*path, step)), to_plain(after.get(step))
     else:
-        yield ".".join(path), plain(after)
+        yield ".".join(path), to_plain(after)
 
 
 def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[ConfigFault]:

@@ -19,7 +19,7 @@ from gazerig.config.bounds import Shape, shape_at
 from gazerig.config.entries import compose_yaml
 from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
 from gazerig.config.load import load
-from gazerig.config.parameters import plain
+from gazerig.config.parameters import to_plain
 from gazerig.config.schema import load_walk
 
 Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
@@ -79,8 +79,8 @@ def format_value(value: Value) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        plain = _PLAIN_TEXT.fullmatch(value) and value.lower() not in _NO_TEXT
-        return value if plain else json.dumps(value, ensure_ascii=False)
+        to_plain = _PLAIN_TEXT.fullmatch(value) and value.lower() not in _NO_TEXT
+        return value if to_plain else json.dumps(value, ensure_ascii=False)
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, float):
@@ -243,7 +243,7 @@ def params_text(params: Any) -> str:
 
     It is read back with ``gazerig.config.load.load``; values come back exactly.
     """
-    return "".join(_lines(plain(params)))
+    return "".join(_lines(to_plain(params)))
 
 
 def walk_text(name_or_path: str) -> str:
@@ -252,7 +252,7 @@ def walk_text(name_or_path: str) -> str:
     Raises:
         gazerig.config.load.ConfigError: the walk is at fault.
     """
-    return "".join(_lines(plain(load_walk(name_or_path))))
+    return "".join(_lines(to_plain(load_walk(name_or_path))))
 
 
 def gestures_text(files: Sequence[str]) -> str:
@@ -262,7 +262,7 @@ def gestures_text(files: Sequence[str]) -> str:
         gazerig.config.load.ConfigError: one is at fault.
     """
     found = {gesture_name(file): load_gesture(gesture_path(file)) for file in files}
-    return "".join(_lines(plain(GestureSet(found)))) if found else ""
+    return "".join(_lines(to_plain(GestureSet(found)))) if found else ""
 
 
 def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
@@ -274,7 +274,7 @@ def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
     files = []
     for name, gesture in load(text, GestureSet).gestures.items():
         file = folder / f"{name}.yaml"
-        file.write_text("".join(_lines(plain(gesture))), encoding="utf-8")
+        file.write_text("".join(_lines(to_plain(gesture))), encoding="utf-8")
         files.append(str(file))
     return tuple(files)
 

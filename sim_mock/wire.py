@@ -88,7 +88,9 @@ class ServoLine:
                 first = replies[0]
                 replies[0] = DeviceReply(first.end, [Piece(NO_DEVICE, before), *first.pieces])
         if self.wire_time:
-            self._on_the_wire(data, replies, baud, self.device.now_s() if now_s is None else now_s)
+            self._queue_on_line(
+                data, replies, baud, self.device.now_s() if now_s is None else now_s
+            )
             return self.take_arrived()
         if not replies:
             return b""
@@ -110,7 +112,7 @@ class ServoLine:
                     return True
         return False
 
-    def _on_the_wire(
+    def _queue_on_line(
         self, data: bytes, replies: list[DeviceReply], baud: int, now_s: float
     ) -> None:
         """Queue answers with their time on the line."""

@@ -263,7 +263,7 @@ def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent
 def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> None:
     model = planned_attention()
     assert model.top_down.behaviours == ("attack", "guard", "wait", PLANNED)
-    assert model.top_down.chosen == PLANNED
+    assert model.top_down.chosen_behaviour == PLANNED
     frames = [with_face(guarding(k * DT_S)) for k in range(20)]
     looks(model, frames[:2])
     model.top_down.behave("attack")
@@ -272,7 +272,7 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     model.top_down.behave("guard")
     target = looks(model, frames[4:6])[-1]
     assert (target.kind, target.plan) == ("hand", "guard: asked for")
-    assert model.top_down.chosen == "guard"
+    assert model.top_down.chosen_behaviour == "guard"
     model.top_down.behave("wait")
     punched = [with_face(punch(k * DT_S)) for k in range(6, 12)]
     assert {one.plan for one in looks(model, punched)} == {"wait: asked for"}

@@ -29,7 +29,7 @@ def test_a_board_as_from_the_shop():
     _, port = make()
     found = probe(port, MaestroParams())
     assert found is not None
-    assert found.forms == ("compact", "pololu")
+    assert found.command_forms == ("compact", "pololu")
     assert (found.expects_crc, found.errors, found.is_script_running, found.channels) == (
         False,
         (),
@@ -84,16 +84,18 @@ def test_the_check_byte_is_found_out(wanted, real):
 
 def test_another_device_number_answers_the_compact_form_only():
     _, port = make(device=3)
-    assert present(probe(port, MaestroParams())).forms == ("compact",)
-    assert present(probe(port, MaestroParams(device=3))).forms == ("compact", "pololu")
-    assert present(probe(port, MaestroParams(protocol="pololu"))).forms == ("compact",)
-    assert present(probe(port, MaestroParams(protocol="pololu", device=3))).forms == ("pololu",)
+    assert present(probe(port, MaestroParams())).command_forms == ("compact",)
+    assert present(probe(port, MaestroParams(device=3))).command_forms == ("compact", "pololu")
+    assert present(probe(port, MaestroParams(protocol="pololu"))).command_forms == ("compact",)
+    assert present(probe(port, MaestroParams(protocol="pololu", device=3))).command_forms == (
+        "pololu",
+    )
 
 
 def test_a_board_that_detects_its_baud_rate():
     _, port = make(chosen=[("mode", "uart-detect")])
     found = probe(port, MaestroParams())
-    assert found is not None and "compact" in found.forms
+    assert found is not None and "compact" in found.command_forms
 
 
 def test_nobody_answers():

@@ -27,7 +27,7 @@ TRIES = 3
 class DetectedMaestro(NamedTuple):
     """A board that answers.
 
-    forms: command forms that it answers; "pololu" with the given device number
+    command_forms: command forms that it answers; "pololu" with the given device number
     expects_crc: whether it expects a check byte after every command
     errors: errors of its error register, which is now cleared
     is_script_running: whether its own script runs, None if unknown
@@ -35,7 +35,7 @@ class DetectedMaestro(NamedTuple):
     channels: number of channels, None if not counted
     """
 
-    forms: tuple[Form, ...]
+    command_forms: tuple[Form, ...]
     expects_crc: bool
     errors: tuple[str, ...]
     is_script_running: bool | None

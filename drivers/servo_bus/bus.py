@@ -156,7 +156,7 @@ class SmartServoBus(PortBus):
                 feedback.apply_reply(slot, one)
             else:
                 self._line.errors["implausible"] += 1
-        supervisor.record_out(self._poll_list.out_ids, now_s)
+        supervisor.record_out_of_group(self._poll_list.out_ids, now_s)
         self._health.record_silent(
             {*self._poll_list.out_ids, *self._unconfirmed},
             now_s,

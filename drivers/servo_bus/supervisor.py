@@ -119,7 +119,7 @@ class Supervisor(ABC):
     def check_after_silence(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
         """Check a servo that was out of the group."""
 
-    def record_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
+    def record_out_of_group(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
         """Record the servos that are out of the group."""
 
     # --- servos to be set up again

@@ -117,7 +117,7 @@ class TransientFaultSupervisor(Supervisor):
             elif servo_id not in self._torque_off or not self._has_known_reason(servo_id):
                 self._doubted.add(servo_id)
 
-    def record_out(self, out: Collection[int], now_s: float) -> None:
+    def record_out_of_group(self, out: Collection[int], now_s: float) -> None:
         """Record the servos out of the group; those that return later may have restarted."""
         for servo_id in [i for i in self._out_since_s if i not in out]:
             since_s = self._out_since_s.pop(servo_id)

@@ -81,12 +81,12 @@ def approaches(bodies: Bodies, p_eye: Vec3, contact_m: float, late_s: float) -> 
         if closing_m_s > 0.0:
             contact_s = max(0.0, max(0.0, away_m - contact_m) / closing_m_s - late_s)
             miss_m = norm(cross(rel, v)) / speed_m_s
-        sd = _along_sd_m_s(bodies, row, scale(rel, 1.0 / max(away_m, 1e-6)))
+        sd = _radial_speed_sd_m_s(bodies, row, scale(rel, 1.0 / max(away_m, 1e-6)))
         found.append(Approach(bodies.ids[row], kind, away_m, contact_s, miss_m, closing_m_s, sd))
     return found
 
 
-def _along_sd_m_s(bodies: Bodies, row: int, sight: Vec3) -> float:
+def _radial_speed_sd_m_s(bodies: Bodies, row: int, sight: Vec3) -> float:
     """Return the standard deviation of a body's speed along a direction, inf if unknown."""
     if bodies.pv_cov is None:
         return inf

@@ -199,7 +199,7 @@ class TopDown:
         return (*rules, PLANNED) if self._params.planner.enabled else rules
 
     @property
-    def chosen(self) -> str:
+    def chosen_behaviour(self) -> str:
         """Return the chosen one of ``behaviours``."""
         return PLANNED if self.plans and not self._by_user else self.behaviour
 

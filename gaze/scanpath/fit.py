@@ -157,7 +157,7 @@ def _matrix(
         value = _shares(np.asarray(np.nanmean(resampled, axis=0), dtype=np.float64))
     outer = 0.5 * (1.0 - params.confidence)
     low, high = np.nanquantile(resampled, (outer, 1.0 - outer), axis=0)
-    low, high = _widen_certain(counts, low, high, params.confidence)
+    low, high = _widen_certain_intervals(counts, low, high, params.confidence)
     return tuple(
         tuple(Interval(*cell) for cell in zip(*row, strict=True))
         for row in zip(value.tolist(), low.tolist(), high.tolist(), strict=True)
@@ -182,7 +182,7 @@ def _refuse_dead_ends(counts: Floats) -> None:
         )
 
 
-def _widen_certain(
+def _widen_certain_intervals(
     counts: Floats, low: Floats, high: Floats, confidence: float
 ) -> tuple[Floats, Floats]:
     """Widen intervals of cells that resampling cannot move: seen never, or every time.

@@ -38,7 +38,7 @@ class Menus:
     def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
         menus = {
-            "behaviour": _first(top_down.chosen, top_down.behaviours),
+            "behaviour": _first(top_down.chosen_behaviour, top_down.behaviours),
             "conversation": _first(self._aversion.mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }

@@ -48,7 +48,7 @@ def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
             solids.append(_hand(thing.p_world_m, 0, thing.radius_m, p_m))
         else:
             _draw_ball(canvas, thing.p_world_m, thing.radius_m)
-    for solid in sorted(solids, key=lambda one: -one.away_m):
+    for solid in sorted(solids, key=lambda one: -one.distance_m):
         _draw_solid(canvas, solid)
     return np.asarray(cv2.GaussianBlur(canvas.image, (3, 3), 0.6), np.uint8)
 
@@ -60,7 +60,7 @@ class _PlacedShape(NamedTuple):
     R: Floats
     p_m: Floats
     scale: float
-    away_m: float
+    distance_m: float
 
 
 def _place_shape(
@@ -83,11 +83,11 @@ def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_PlacedShape]
         skull,
         # The chest is drawn before the head in any case: the neck is in its collar.
         _place_shape(torso(number, _CHEST_M), R_chest, face, eye_m)._replace(
-            away_m=float(np.linalg.norm(away)) + 0.01
+            distance_m=float(np.linalg.norm(away)) + 0.01
         ),
     ]
     if -float(away @ R_head[:, 0]) > 0.1 * float(np.linalg.norm(away)):
-        solids.append(skull._replace(shape=features, away_m=skull.away_m - 1e-3))
+        solids.append(skull._replace(shape=features, distance_m=skull.distance_m - 1e-3))
     if person.hand is not None:
         solids += _arm(person, number, person.hand, eye_m)
     return solids
@@ -133,7 +133,7 @@ def _place_link(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _PlacedSh
     R = np.stack((aside, np.cross(up, aside), up * length), axis=1)
     middle = 0.5 * (np.array(start) + np.array(end))
     placed = _place_shape(link, R, start, eye_m)
-    return placed._replace(away_m=float(np.linalg.norm(middle - np.array(eye_m))))
+    return placed._replace(distance_m=float(np.linalg.norm(middle - np.array(eye_m))))
 
 
 def _draw_solid(canvas: Canvas, solid: _PlacedShape) -> None:

@@ -68,7 +68,7 @@ class _Change(NamedTuple):
     start_s: float
     end_s: float
     goal: tuple[float, ...]
-    steady: bool = False
+    is_at_constant_speed: bool = False
 
 
 class FacesScene:
@@ -312,7 +312,11 @@ def _position_after_moves(
             at = one.goal
             continue
         lasts_s, since_s = one.end_s - one.start_s, phase_s - one.start_s
-        share = _walk_share(since_s, lasts_s) if one.steady else min_jerk(since_s / lasts_s)
+        share = (
+            _walk_share(since_s, lasts_s)
+            if one.is_at_constant_speed
+            else min_jerk(since_s / lasts_s)
+        )
         at = tuple(a + share * (b - a) for a, b in zip(at, one.goal, strict=True))
     return at
 

@@ -200,12 +200,14 @@ def visit_maestro(
     pulses = _read_pulses(line, setups, channels, found, size is not None)
     crc = "on" if found.expects_crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
-    well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
+    well = f"answers in the {' and the '.join(found.command_forms)} form, CRC {crc}, {named}, no script"
     own = []
-    if params.protocol not in found.forms:
+    if params.protocol not in found.command_forms:
         pololu = params.protocol == "pololu"
         number = f"its device number is not {params.device}; " if pololu else ""
-        own.append(ADVICE["form"].at(WHERE, form=found.forms[0], params=params, number=number))
+        own.append(
+            ADVICE["form"].at(WHERE, form=found.command_forms[0], params=params, number=number)
+        )
     if found.expects_crc != params.crc:
         own.append(ADVICE["CRC" if found.expects_crc else "no CRC"].at(WHERE))
     if size is not None and size != params.channels:
@@ -261,7 +263,7 @@ def _read_pulses(
 
 def _board_params(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
     """Return the protocol of a board that was found; the rig file may differ."""
-    form = params.protocol if params.protocol in found.forms else found.forms[0]
+    form = params.protocol if params.protocol in found.command_forms else found.command_forms[0]
     return replace(params, protocol=form, crc=found.expects_crc)
 
 

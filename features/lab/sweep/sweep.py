@@ -15,7 +15,7 @@ from typing import BinaryIO
 
 import gazerig
 from gazerig.config.export import abbreviate
-from gazerig.config.parameters import plain
+from gazerig.config.parameters import to_plain
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import gestures_text, params_text, walk_text
 from gazerig.drivers.errors import SetupError
@@ -157,7 +157,7 @@ class SweepSpec:
             },
             "seeds": list(self.seeds),
             "search": dict(self.search),
-            "rig": plain(self.rig),
+            "rig": to_plain(self.rig),
             "walk": walk_text(scanpath.transition_matrix),
             "gestures": gestures_text(self.rig.gesture_files),
         }
