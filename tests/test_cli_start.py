@@ -25,7 +25,7 @@ from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.robot.cli.command_list import shipped_commands
 from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.cli.main import CommandsByName, app, next_steps
-from gazerig.robot.cli.terminal import DEBUG_LOGGER, tidied_up
+from gazerig.robot.cli.terminal import DEBUG_LOGGER, exit_on_signals
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
@@ -224,7 +224,7 @@ def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number: signal.Si
     before = signal.signal(number, signal.SIG_DFL)
     tidied = False
     try:
-        with pytest.raises(SystemExit) as end, tidied_up():
+        with pytest.raises(SystemExit) as end, exit_on_signals():
             try:
                 signal.raise_signal(number)
             finally:

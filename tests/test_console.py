@@ -6,7 +6,7 @@ from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import browser
 from gazerig.robot.cli.browser import has_desktop, open_page
-from gazerig.robot.cli.run import had_faults, what_runs
+from gazerig.robot.cli.run import report_faults, start_text
 from gazerig.robot.control.event_text import is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 
@@ -77,11 +77,11 @@ def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
 
 def test_the_first_line_says_what_happens_and_how_it_ends() -> None:
     mock = RunOptions(mock=True).check_and_complete()
-    assert what_runs(mock) == (
+    assert start_text(mock) == (
         "desk: emulated servos; it looks at a simulated scene, visitor. "
         "Ctrl-C parks the head and ends."
     )
-    assert "its servos; it looks at a webcam" in what_runs(
+    assert "its servos; it looks at a webcam" in start_text(
         RunOptions(camera=0).check_and_complete()
     )
 
@@ -90,7 +90,7 @@ def test_a_fault_of_many_joints_is_told_once() -> None:
     said: list[str] = []
     stale = {"stale joints": {"times": 3, "seconds": 1.6}}
     figures = {"joint_faults": dict.fromkeys("abcdefghi", stale), "stopped_by": "seconds"}
-    assert had_faults(figures, said.append)
+    assert report_faults(figures, said.append)
     assert said == ["the run had faults: 9 joints stale joints (1.6 s, 3 times)"]
-    assert had_faults({**figures, "ticks": 900, "overruns": 300}, said.append)
+    assert report_faults({**figures, "ticks": 900, "overruns": 300}, said.append)
     assert said[1] == f"{said[0]}; the computer was too busy: 25% of ticks came late"

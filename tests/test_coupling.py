@@ -33,7 +33,7 @@ from gazerig.robot.model.coupling import (
     Unreachable,
     joint_rates,
 )
-from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, pairs_of
+from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -124,7 +124,7 @@ def test_impossible_servo_angles_give_finite_joint_angles() -> None:
 def test_servos_get_the_limits_that_the_whole_range_needs(kind: str) -> None:
     rig = rig_with(KINDS[kind])
     assert faults(rig) == []
-    (pair,) = pairs_of(rig.couplings)
+    (pair,) = coupled_pairs(rig.couplings)
     found = dict(zip(rig.names, servo_configs(rig), strict=True))
     plain = dict(zip(rig.names, servo_configs(load_rig("desk")), strict=True))
     assert {name for name in rig.names if found[name] != plain[name]} == {"neck_pitch", "neck_roll"}

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.main import app
-from gazerig.robot.cli.terminal import _writer, completed, speaking_of
+from gazerig.robot.cli.terminal import _writer, completed, suggest_for_rig
 from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
@@ -68,7 +68,7 @@ def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path
 
 def test_other_threads_suggest_the_same_and_inner_blocks_too() -> None:
     heard = []
-    with speaking_of("my.yaml", "/dev/ttyACM3", False), speaking_of(None, None, False):
+    with suggest_for_rig("my.yaml", "/dev/ttyACM3", False), suggest_for_rig(None, None, False):
         thread = Thread(target=lambda: heard.append(completed("gazerig home")))
         thread.start()
         thread.join()

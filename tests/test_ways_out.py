@@ -21,7 +21,7 @@ from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli.run import had_faults
+from gazerig.robot.cli.run import report_faults
 from gazerig.robot.control.interrupts import SAME_REQUEST_S, Interrupts
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.power_down import PowerDown
@@ -311,7 +311,7 @@ def test_servos_that_go_silent_at_the_end_are_named(
     monkeypatch.setattr(Robot, "stop", unplugged)
     said: list[str] = []
     figures = ran(rig, said, 1.0)
-    assert figures["joint_faults"] == {} and had_faults(figures, said.append)
+    assert figures["joint_faults"] == {} and report_faults(figures, said.append)
     assert said[-1] == (
         "stopped by seconds: parked, torque off; "
         "servos 2-3: torque-off not confirmed: cut the servo power"
@@ -335,14 +335,14 @@ def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
     count = figures["joint_faults"]["neck_yaw"]["not moving"]
     assert count["times"] >= 1 and count["seconds"] > 1.0
     last: list[str] = []
-    assert had_faults(figures, last.append)
+    assert report_faults(figures, last.append)
     assert "neck_yaw not moving" in last[0]
 
 
 def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
     said: list[str] = []
     figures = ran("desk", said, 3.0)
-    assert figures["joint_faults"] == {} and not had_faults(figures, said.append)
+    assert figures["joint_faults"] == {} and not report_faults(figures, said.append)
 
 
 # --- programs of their own

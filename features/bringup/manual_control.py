@@ -40,7 +40,7 @@ PASSING = ("starting slowly", "too hard", "too fast")
 _STILL_DEG_S = 2.0
 
 
-class JointResult(NamedTuple):
+class JointMove(NamedTuple):
     """Result of a movement for one joint, in degrees.
 
     desired, commanded: the goal, and what the guard sent of it in the end
@@ -90,7 +90,7 @@ class MoveResult(NamedTuple):
 
     ended: str
     seconds: float
-    joints: tuple[JointResult, ...]
+    joints: tuple[JointMove, ...]
     level: Level
     events: tuple[str, ...]
     last: Step
@@ -105,11 +105,11 @@ class MoveResult(NamedTuple):
         reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable()]
         return f"{self.ended} ({'; '.join(reasons)})" if reasons else self.ended
 
-    def of(self, joint: str) -> JointResult:
+    def of(self, joint: str) -> JointMove:
         """Return one joint's result."""
         return next(part for part in self.joints if part.joint == joint)
 
-    def remarkable(self) -> tuple[JointResult, ...]:
+    def remarkable(self) -> tuple[JointMove, ...]:
         """Return the joints with reasons."""
         return tuple(part for part in self.joints if part.reasons)
 
@@ -132,7 +132,7 @@ class GuardReasons:
         return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
 
 
-def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointResult, ...]:
+def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointMove, ...]:
     """Return every joint's result of a movement."""
     guard_result, joints = step.guard_result, step.joints
     has_feedback = joints.measured or (True,) * len(guard_result.joints)
@@ -145,7 +145,7 @@ def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[Join
         strict=True,
     )
     return tuple(
-        JointResult(name, degrees(asked), degrees(let), degrees(at), notes.of(name), not tells)
+        JointMove(name, degrees(asked), degrees(let), degrees(at), notes.of(name), not tells)
         for name, asked, let, at, tells in rows
     )
 

@@ -140,11 +140,11 @@ def power_of(asked: PowerQuestion, n: int) -> float:
     if n < 1:
         return 0.0
     if asked.test == "sign":
-        return _sign(asked, n)
+        return _sign_test_power(asked, n)
     rng = np.random.default_rng((_SEED, n))
     if asked.test == "rank_sum":
-        return _rank_sum(asked, n, rng)
-    return _signed_rank(asked, n, rng)
+        return _rank_sum_power(asked, n, rng)
+    return _signed_rank_power(asked, n, rng)
 
 
 @lru_cache(maxsize=64)
@@ -170,7 +170,7 @@ def _draw_ratings(asked: PowerQuestion, n: int, rng: np.random.Generator) -> Cou
     return found.reshape(_STUDIES, asked.points, asked.points)
 
 
-def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
+def _signed_rank_power(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
     """Return the power of Wilcoxon's signed-rank test, zeros left out."""
     if asked.points:
         drawn = _draw_ratings(asked, n, rng)
@@ -194,13 +194,13 @@ def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> floa
     few = np.flatnonzero(kept <= _EXACT)
     if len(few):
         patterns, which = np.unique(size[few], axis=0, return_inverse=True)
-        least = np.array([_critical(tuple(row), alpha) for row in patterns.tolist()])
+        least = np.array([_critical_rank_sum(tuple(row), alpha) for row in patterns.tolist()])
         found[few] = np.maximum(above, below)[few] >= least[which.ravel()]
     return float((found if asked.two_sided else found & (above > below)).mean())
 
 
 @lru_cache(maxsize=200_000)
-def _critical(size: tuple[int, ...], alpha: float) -> int:
+def _critical_rank_sum(size: tuple[int, ...], alpha: float) -> int:
     """Return the smallest doubled sum of ranks on one side with exact probability up to alpha.
 
     size: differences by ascending size; all signs are equally likely
@@ -217,7 +217,7 @@ def _critical(size: tuple[int, ...], alpha: float) -> int:
     return int(np.searchsorted(-tail, -alpha * (1.0 + 1e-9)))
 
 
-def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
+def _rank_sum_power(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
     """Return the power of the rank-sum test of the same participants' answers, by their swaps."""
     if asked.points:
         drawn = _draw_ratings(asked, n, rng)
@@ -249,7 +249,7 @@ def _preference_probabilities(asked: PowerQuestion) -> tuple[float, float]:
     return float(chances[at > half].sum()), float(chances[at < half].sum())
 
 
-def _sign(asked: PowerQuestion, n: int) -> float:
+def _sign_test_power(asked: PowerQuestion, n: int) -> float:
     """Return the power of the exact sign test of participants' choices."""
     alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
     above, below = _preference_probabilities(asked)

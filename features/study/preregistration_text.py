@@ -184,7 +184,7 @@ def _asked(
     for key in (*design.questionnaires, *design.after):
         one = questionnaires[key]
         items = [
-            {"key": name, "text": _cell(_in(item.text, said)), "answers": _cell(_answers(item, said)),
+            {"key": name, "text": _cell(_text_in_language(item.text, said)), "answers": _cell(_answers(item, said)),
              "scale": item.scale + (" (reversed)" if item.reverse else "")}
             for name, item in one.items.items()
         ]  # fmt: skip
@@ -194,11 +194,11 @@ def _asked(
         yield {
             "key": key, "title": one.title, "asked": asked, "source": one.source.rstrip(".") + ".",
             "licence": licence, "shuffled": shuffled, "asked_items": items,
-            "instruction": _in(one.instruction, said),
+            "instruction": _text_in_language(one.instruction, said),
         }  # fmt: skip
 
 
-def _in(texts: Texts, language: str) -> str:
+def _text_in_language(texts: Texts, language: str) -> str:
     return texts.get(language) or texts.get("en", "")
 
 
@@ -207,7 +207,7 @@ def _answers(item: Item, language: str) -> str:
         return "free text, may be left empty"
     if item.kind == "choice":
         return "the first or the second"
-    low, high = _in(item.low, language), _in(item.high, language)
+    low, high = _text_in_language(item.low, language), _text_in_language(item.high, language)
     return f"1 ({low}) to {item.points} ({high})"
 
 

@@ -38,7 +38,7 @@ from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.robot_group import NamedRobot
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
-from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
@@ -181,7 +181,9 @@ def assemble(
                 seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
             )
         gentle_deg_s = rig.guard.soft_start_speed_deg_s
-        body = Body(opened.bus, rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
+        body = Body(
+            opened.bus, rig.joints, park_rad(rig), gentle_deg_s, coupled_pairs(rig.couplings)
+        )
         # A recorded camera was on other joints: its gyro is not fused with these.
         parts = _build_components(
             rig, body, kinematics, seen, sight.mount, camera, walk, random,

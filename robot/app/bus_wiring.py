@@ -15,7 +15,7 @@ from gazerig.robot.control.body import setups
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, pickled
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.model.coupling_params import coupled_pairs
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:
 def servo_configs(rig: Rig) -> tuple[ServoConfig, ...]:
     """Return the configuration of a rig's servos for the buses, in the order of its joints."""
     gentle_deg_s = rig.guard.soft_start_speed_deg_s
-    return setups(rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
+    return setups(rig.joints, park_rad(rig), gentle_deg_s, coupled_pairs(rig.couplings))
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:

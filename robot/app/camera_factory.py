@@ -39,7 +39,7 @@ from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, label_of, re
 from gazerig.robot.app.run_bus import CameraPoses, RunBus, TrueSteps
 from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
@@ -109,7 +109,7 @@ def true_head_pose(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -
     if true_steps is None:
         return poses.head_pose
     kinematics = rig_kinematics(rig)
-    pairs = pairs_of(rig.couplings)
+    pairs = coupled_pairs(rig.couplings)
     linkages = {
         name: rig.joints[name].made()
         for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}

@@ -43,7 +43,7 @@ from gazerig.robot.app.rig_limits import (
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Tune, Value
-from gazerig.robot.model.coupling_params import pairs_of, partners
+from gazerig.robot.model.coupling_params import coupled_pairs, partners
 from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics
@@ -119,7 +119,7 @@ class LiveParams:
         self.parts = parts
         self._placed = placed
         self._started = rig
-        self._coupled = partners(pairs_of(rig.couplings))
+        self._coupled = partners(coupled_pairs(rig.couplings))
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _PreparedChange] = {}
 

@@ -25,7 +25,7 @@ from gazerig.robot.app.bus_wiring import (
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.mass import HEAD_LOAD_KG_M2
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.coupling_params import pair_setups, pairs_of
+from gazerig.robot.model.coupling_params import coupled_pairs, pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
@@ -168,7 +168,7 @@ def _hobby_spec(rig: Rig, name: str) -> HobbySpec:
 def start_angles_rad(rig: Rig) -> dict[str, float]:
     """Return the start angles of a rig's emulated joints."""
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
-    for first, second, _ in pairs_of(rig.couplings):
+    for first, second, _ in coupled_pairs(rig.couplings):
         # Push rods have no angles far outside the range.
         for name in (first, second):
             limit = rig.joints[name].limit()
@@ -178,7 +178,7 @@ def start_angles_rad(rig: Rig) -> dict[str, float]:
 
 def _start_step(rig: Rig, name: str) -> int:
     crooked = start_angles_rad(rig)
-    for first, second, coupling in pairs_of(rig.couplings):
+    for first, second, coupling in coupled_pairs(rig.couplings):
         crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
     return round(rig.joints[name].steps(crooked[name]))
 
@@ -186,7 +186,7 @@ def _start_step(rig: Rig, name: str) -> int:
 def _mechanical_stops(rig: Rig, name: str) -> tuple[float, float]:
     """Return the first and last step of the servo that its mechanics allow."""
     joint = rig.joints[name]
-    for pair in pairs_of(rig.couplings):
+    for pair in coupled_pairs(rig.couplings):
         if name in pair[:2]:
             own = pair_setups(pair, rig.joints, {})[name]
             beyond = joint.made().steepest * radians(STOP_BEYOND_DEG)

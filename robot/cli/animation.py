@@ -55,7 +55,7 @@ def level(
         values = (
             (_number(line) for line in sys.stdin if line.strip())
             if value == "-"
-            else _kept(_number(value), seconds)
+            else _repeat_value(_number(value), seconds)
         )
         with RobotClient.connect(pid, "gazerig ctl level") as rig:
             with contextlib.suppress(KeyboardInterrupt):
@@ -82,12 +82,12 @@ def play(
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
         if gesture is None or listed:
             for one in rig.gestures():
-                say(_described(one))
+                say(_gesture_line(one))
             return
         say(rig.play("" if gesture == NO_GESTURE else gesture, speed, count).text())
 
 
-def _described(gesture: Mapping[str, Any]) -> str:
+def _gesture_line(gesture: Mapping[str, Any]) -> str:
     """Return one line about a gesture."""
     head = f"{gesture['name']:<14}{gesture['description']}"
     if gesture["refused"]:
@@ -96,7 +96,7 @@ def _described(gesture: Mapping[str, Any]) -> str:
     return f"{head} ({gesture['duration_s']:.1f} s{slower})"
 
 
-def _kept(value: float, seconds: float | None) -> Iterator[float]:
+def _repeat_value(value: float, seconds: float | None) -> Iterator[float]:
     """Repeat a value for a time, often enough to keep it."""
     clock = RealClock()
     end_s = clock.now_s() + (inf if seconds is None else seconds)

@@ -25,7 +25,7 @@ def has_desktop(environ: Mapping[str, str], platform: str, terminal: bool) -> bo
     return bool(environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY"))
 
 
-def desktop_here() -> bool:
+def is_desktop_here() -> bool:
     """Return ``has_desktop`` of this process."""
     terminal = sys.stdout is not None and sys.stdout.isatty()
     return has_desktop(os.environ, sys.platform, terminal)

@@ -114,12 +114,12 @@ def shipped_commands() -> Mapping[str, CommandEntry]:
         for panel, entries in PANELS.items()
         for name, entry in entries.items()
     }
-    return found | _loaded([find(COMMAND, name) for name in SHIPPED[COMMAND]])
+    return found | _load_entries([find(COMMAND, name) for name in SHIPPED[COMMAND]])
 
 
 def package_commands() -> Mapping[str, CommandEntry]:
     """Return the commands of installed packages, by name."""
-    return _loaded([one for one in registrations(COMMAND) if not one.is_ours])
+    return _load_entries([one for one in registrations(COMMAND) if not one.is_ours])
 
 
 def in_order(commands: Mapping[str, CommandEntry]) -> list[str]:
@@ -128,7 +128,7 @@ def in_order(commands: Mapping[str, CommandEntry]) -> list[str]:
     return sorted(commands, key=lambda name: panels.index(commands[name].panel))
 
 
-def _loaded(parts: list[Registration]) -> dict[str, CommandEntry]:
+def _load_entries(parts: list[Registration]) -> dict[str, CommandEntry]:
     """Return the commands of the parts that can be loaded."""
     found = {}
     for one in parts:

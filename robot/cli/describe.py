@@ -49,11 +49,11 @@ def describe(
             make_folder(path)
         for path, data in paths.items():
             write_file(path, data, force)
-        for line in (*_written(folder, files), *collision_lines(rig)):
+        for line in (*_file_lines(folder, files), *collision_lines(rig)):
             say(line)
 
 
-def _written(folder: Path, files: dict[str, bytes]) -> list[str]:
+def _file_lines(folder: Path, files: dict[str, bytes]) -> list[str]:
     """Return what was written, and how it is opened."""
     lines = []
     for name, data in files.items():

@@ -71,9 +71,9 @@ def emulate(
             number = options.DEFAULT_DEVICE if device is None else device
             devices = {"": MaestroLine(maestro, number, crc)}
         elif pca9685 is not None:
-            devices = {"": _boards(pca9685)}
+            devices = {"": _parse_boards(pca9685)}
         else:
-            devices = _of_rig(rig or "", firmware)
+            devices = _rig_devices(rig or "", firmware)
         several = len(devices) > 1
         if baud is not None and several:
             raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
@@ -87,14 +87,14 @@ def emulate(
             )
             for name, device in devices.items()
         ]
-        served = ServerSettings(_chosen(buses, case or []), until_eof)
+        served = ServerSettings(_apply_choices(buses, case or []), until_eof)
         try:
-            run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
+            run(served, _print_answer if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
         except ValueError as error:
             raise SetupError(str(error)) from None
 
 
-def _boards(text: str) -> Pca9685Line:
+def _parse_boards(text: str) -> Pca9685Line:
     try:
         return Pca9685Line(tuple(int(one, 16) for one in text.split(",")))
     except ValueError:
@@ -103,7 +103,7 @@ def _boards(text: str) -> Pca9685Line:
         ) from None
 
 
-def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
+def _rig_devices(name: str, firmware: int | None) -> dict[str, Emulated]:
     """Return what is on every bus of a rig by the bus's name, "" for the only one."""
     lines = emulated_lines(load_rig(name))
     for bus, line in lines.items():
@@ -126,7 +126,7 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
     return replace(device, baud=None if any_baud else baud)
 
 
-def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
+def _apply_choices(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
     """Return every bus the choices that its kind knows."""
     known = {case: None for bus in buses for case in CASES.get(bus.device.kind, {})}
     choices = {}
@@ -145,7 +145,7 @@ def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSett
     )
 
 
-def _plain(line: str) -> None:
+def _print_answer(line: str) -> None:
     """Show an answer to a person at a terminal: long texts as they are."""
     answer = json.loads(line)
     text = answer.get("ok", answer.get("error", ""))

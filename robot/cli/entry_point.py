@@ -20,7 +20,7 @@ def main() -> None:
     # While modules load nothing has been begun that would have to be ended, and an exception
     # raised among them may be lost or shown as a traceback.
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
-        signal.signal(signal.SIGINT, _gone)
+        signal.signal(signal.SIGINT, _exit_interrupted)
     hold_standard_files()
     try:
         if is_quick(sys.argv[1:], os.environ):
@@ -36,7 +36,7 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _gone(number: int, frame: FrameType | None) -> None:
+def _exit_interrupted(number: int, frame: FrameType | None) -> None:
     """End at once, with the one line that Ctrl-C always gives."""
     if sys.stderr is not None:
         os.write(2, b"interrupted\n")

@@ -29,7 +29,7 @@ def kinds(
 ) -> None:
     """List buses, cameras, detectors, rules, gestures and rigs, of this program and of packages."""
     with clear_errors():
-        rows = [_row(one) for group in GROUPS for one in registrations(group)]
+        rows = [_part_row(one) for group in GROUPS for one in registrations(group)]
         taken = [line for group in GROUPS for line in name_conflicts(group)]
         if as_json:
             print(json.dumps({"kinds": rows, "left_out": taken}))
@@ -44,7 +44,7 @@ def kinds(
             print(line)
 
 
-def _row(found: Registration) -> dict[str, Any]:
+def _part_row(found: Registration) -> dict[str, Any]:
     """Return the listing of a part; a part that cannot be loaded has a fault."""
     row: dict[str, Any] = {
         "name": found.name, "group": GROUPS[found.group], "package": found.package,

@@ -74,11 +74,11 @@ def new(
         rig = NewRig(
             file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
         )
-        from gazerig.robot.cli.rig_check import checked_line
+        from gazerig.robot.cli.rig_check import check_line
 
         write_file(file, rig_text(rig), force)
         try:
-            say(checked_line(str(file)))
+            say(check_line(str(file)))
         except ConfigError:  # a faulty one is not left there
             file.unlink()
             raise
@@ -124,7 +124,7 @@ class Questions:
         for number, (name, what) in enumerate(choices.items(), 1):
             say(f"  {number}  {name:10} {what}")
         while True:
-            answer = _answer(f"1 to {len(names)}", str(names.index(usual) + 1), option)
+            answer = _missing_answer(f"1 to {len(names)}", str(names.index(usual) + 1), option)
             if answer.isdecimal() and 0 < int(answer) <= len(names):
                 return names[int(answer) - 1]
             if answer in choices or (others and "_" in answer):
@@ -143,7 +143,7 @@ class Questions:
             return usual
         say(question)
         while True:
-            answer = _answer("10 to 500", f"{usual:g}", option)
+            answer = _missing_answer("10 to 500", f"{usual:g}", option)
             try:
                 if 10.0 <= (value := float(answer)) <= 500.0:
                     return value
@@ -182,7 +182,7 @@ def _plugged_in(board: str) -> str:
     return (usb[0].by_id or usb[0].device) if len(usb) == 1 else ""
 
 
-def _answer(what: str, usual: str, option: str) -> str:
+def _missing_answer(what: str, usual: str, option: str) -> str:
     try:
         return input(f"{what} [{usual}]: ").strip() or usual
     except EOFError:

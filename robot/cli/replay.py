@@ -296,7 +296,7 @@ def beside(
             inner = [value if isinstance(value, Mapping) else {} for value in (one, other)]
             yield from beside(inner[0], inner[1], f"{within}{name} ".replace("_", " "))
         else:
-            yield f"{within}{name}".replace("_", " "), _words(one), _words(other)
+            yield f"{within}{name}".replace("_", " "), _value_text(one), _value_text(other)
 
 
 def _warn(note: str) -> None:
@@ -304,7 +304,7 @@ def _warn(note: str) -> None:
         say(note)
 
 
-def _words(value: object) -> str:
+def _value_text(value: object) -> str:
     if value is None:
         return "-"
     if isinstance(value, list | tuple):

@@ -17,12 +17,12 @@ app = typer.Typer()
 def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
-        say(checked_line(rig))
+        say(check_line(rig))
         for line in collision_lines(rig):
             say(line)
 
 
-def checked_line(rig: str) -> str:
+def check_line(rig: str) -> str:
     """Load a rig and return one line of success.
 
     Raises:

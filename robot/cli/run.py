@@ -14,16 +14,16 @@ from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.app.computer import level_text
 from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.cli import run_options as options
-from gazerig.robot.cli.browser import desktop_here, open_page
+from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     FAULT,
     RigArgument,
     clear_errors,
+    exit_on_signals,
     say,
     signals,
     status,
-    tidied_up,
 )
 from gazerig.robot.control.joint_faults import JointFault, joints_text
 
@@ -88,9 +88,9 @@ def run(
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from gazerig.robot.app import session
 
-        browse = open_page if not no_browser and desktop_here() else None
-        opening = Opening("" if fast else what_runs(asked))
-        with tidied_up():
+        browse = open_page if not no_browser and is_desktop_here() else None
+        opening = Opening("" if fast else start_text(asked))
+        with exit_on_signals():
             group = None
             if asked.world is not None:
                 from gazerig.robot.app.surroundings import surroundings
@@ -109,7 +109,7 @@ def run(
                 print(text, end="")
             else:
                 write_file(Path(summary), text, force)
-    if had_faults(figures, say) or "not_written" in figures:
+    if report_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
 
 
@@ -135,7 +135,7 @@ class Opening:
             say(line)
 
 
-def what_runs(asked: RunOptions) -> str:
+def start_text(asked: RunOptions) -> str:
     """Return what is started, and how it is ended, in one line."""
     servos = "emulated servos" if asked.mock else "its servos"
     sight = f"it looks at {asked.camera_source or f'a simulated scene, {asked.scene}'}"
@@ -145,7 +145,7 @@ def what_runs(asked: RunOptions) -> str:
     return text if asked.computer is None else f"{text}\n{level_text(asked.computer)}"
 
 
-def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
+def report_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
     """Return whether a run had faults, and print the joints that they held."""
     alike: dict[tuple[str, int, float], list[str]] = {}
     for joint, reasons in figures["joint_faults"].items():

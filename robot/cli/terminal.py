@@ -137,7 +137,7 @@ _given: list[Mapping[str, object]] = [{}]
 
 
 @contextlib.contextmanager
-def speaking_of(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
+def suggest_for_rig(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
     """Make messages within the block suggest commands for this rig and port.
 
     A block that names no rig speaks of the one around it.
@@ -149,7 +149,7 @@ def speaking_of(rig: str | None, port: str | None, mock: bool) -> Iterator[None]
         _given.pop()
 
 
-def with_doctor(text: str) -> str:
+def suggest_doctor(text: str) -> str:
     """Return a fault of servos with the command that finds its cause, where none is named yet."""
     given = _given[-1]
     reaches = isinstance(given.get("rig"), str) and given.get("mock") is not True
@@ -230,21 +230,21 @@ def clear_errors(
 
     rig, port, mock: as the command was given them, for the commands that messages suggest
     """
-    with speaking_of(rig, port, mock), _errors_said():
+    with suggest_for_rig(rig, port, mock), _report_errors():
         yield
 
 
 @contextlib.contextmanager
-def _errors_said() -> Iterator[None]:
+def _report_errors() -> Iterator[None]:
     try:
         yield
     except (ConfigError, SetupError) as error:
         _show_origin()
-        say(with_doctor(str(error)) if isinstance(error, ServoMissing) else str(error))
+        say(suggest_doctor(str(error)) if isinstance(error, ServoMissing) else str(error))
         raise typer.Exit(BAD_INPUT) from None
     except DriverError as error:
         _show_origin()
-        say(with_doctor(str(error)) if isinstance(error, ServoFault) else str(error))
+        say(suggest_doctor(str(error)) if isinstance(error, ServoFault) else str(error))
         raise typer.Exit(FAULT) from None
     except BrokenPipeError:
         raise  # for run_app: standard output was closed
@@ -268,7 +268,7 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
 
     again: what to do about an unexpected error
     """
-    threading.excepthook, before = _thread_failed, threading.excepthook
+    threading.excepthook, before = _report_thread_error, threading.excepthook
     code: str | int | None = None
     try:
         try:
@@ -312,7 +312,7 @@ def _drop_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _thread_failed(args: threading.ExceptHookArgs) -> None:
+def _report_thread_error(args: threading.ExceptHookArgs) -> None:
     """Report in one line that a thread has ended by an error; the others go on."""
     name = args.thread.name if args.thread is not None else "a thread"
     what = " ".join(str(args.exc_value).split())
@@ -325,7 +325,7 @@ def signals() -> Interrupts:
 
 
 @contextlib.contextmanager
-def tidied_up() -> Iterator[None]:
+def exit_on_signals() -> Iterator[None]:
     """Let a request to end that comes while a run is made end it as Ctrl-C does, files and all."""
 
     def end(number: int, frame: object) -> None:

@@ -73,7 +73,7 @@ def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
             param = rig.parameter(given[-1])
     except DriverError:
         return []
-    values = ("true", "false") if param.kind == "bool" else tuple(map(_written, param.choices))
+    values = ("true", "false") if param.kind == "bool" else tuple(map(_value_text, param.choices))
     return [value for value in values if value.startswith(incomplete)]
 
 
@@ -155,7 +155,7 @@ def get(
     for line in _table(found, values, unsaved):
         print(line)
     if len(found) == 1:
-        print(_rule(found[0]))
+        print(_rule_text(found[0]))
 
 
 @ctl.command("set", context_settings=_NEGATIVE)
@@ -176,12 +176,12 @@ def put(
         with RobotClient.connect(pid) as rig:
             notes = rig.set_many(changes)
             unsaved = len(rig.unsaved())
-        _tell(notes)
+        _print_notes(notes)
         if not notes:
             say("all of that is in force already")
         if unsaved:
             say(
-                f"not saved yet: {_count(unsaved)}; gazerig ctl save keeps, gazerig ctl revert takes back"
+                f"not saved yet: {_count_text(unsaved)}; gazerig ctl save keeps, gazerig ctl revert takes back"
             )
 
 
@@ -195,7 +195,7 @@ def save(
     """Write what was set into the rig's YAML; comments stay, the old file is kept as a backup."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         saved = rig.save(path)
-    _tell(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
+    _print_notes(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
     if not saved.changes and saved.backup is not None:
         say(f"{saved.path} had faults: what is in force is in it; as it was: {saved.backup}")
         return
@@ -203,7 +203,7 @@ def save(
         say(f"{saved.path} says all of it already: nothing to save")
         return
     kept = f"; as it was: {saved.backup}" if saved.backup is not None else ""
-    say(f"{saved.path}: {_count(len(saved.changes))} written{kept}")
+    say(f"{saved.path}: {_count_text(len(saved.changes))} written{kept}")
 
 
 @ctl.command()
@@ -211,8 +211,8 @@ def revert(pid: PidOption = None) -> None:
     """Apply the values of the rig's file again."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         notes = rig.revert()
-    _tell(notes)
-    say(f"{_count(len(notes))} taken back")
+    _print_notes(notes)
+    say(f"{_count_text(len(notes))} taken back")
 
 
 @ctl.command()
@@ -224,7 +224,7 @@ def character(
 ) -> None:
     """Apply another character to the running rig."""
     with clear_errors(), RobotClient.connect(pid) as rig:
-        _tell(rig.character(name))
+        _print_notes(rig.character(name))
         say(f"character {name} is in force")
 
 
@@ -250,7 +250,7 @@ def ask(
         if menu is not None and menu not in menus:
             raise SetupError(f"{menu}: no menu of this rig; there is {', '.join(menus)}")
         shown = menus if menu is None else {menu: menus[menu]}
-        _tell(
+        _print_notes(
             f"{name}: {', '.join((f'{first} (in force)', *others))}"
             for name, (first, *others) in shown.items()
         )
@@ -267,7 +267,7 @@ def status(
     if as_json:
         print(json.dumps(now, indent=2))
     else:
-        _tell(state_lines(now))
+        _print_notes(state_lines(now))
 
 
 def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
@@ -325,7 +325,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         *(f"camera: {text}" for text in now.get("camera", ())),
         f"joints in deg: {joints}",
-        f"not saved: {_count(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
+        f"not saved: {_count_text(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_SAID:]),
     ]
 
@@ -336,8 +336,8 @@ def _table(
     """Lay parameters out in columns, never cut: the lines are also read by programs."""
     rows = [("", "key", "value", "unit", "default", "")]
     for param in found:
-        value = _written(values[param.key])
-        default = _written(param.default)
+        value = _value_text(values[param.key])
+        default = _value_text(param.default)
         rows.append(
             (
                 "*" if param.key in unsaved else "",
@@ -355,25 +355,25 @@ def _table(
     ]
 
 
-def _rule(param: Parameter) -> str:
+def _rule_text(param: Parameter) -> str:
     """Return what one parameter is, its range, and when a change takes effect."""
     bounds = "" if param.low is None or param.high is None else f"{param.low:g} .. {param.high:g}"
-    choices = ", ".join(map(_written, param.choices))
+    choices = ", ".join(map(_value_text, param.choices))
     allowed = " ".join(part for part in (bounds, param.unit if bounds else "") if part) or choices
     return "; ".join(
         part for part in (param.description, allowed, f"changes at the {param.live}") if part
     )
 
 
-def _written(value: object) -> str:
+def _value_text(value: object) -> str:
     """Write a value as it can be given to ``set``."""
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _count(number: int) -> str:
+def _count_text(number: int) -> str:
     return f"{number} value" if number == 1 else f"{number} values"
 
 
-def _tell(notes: Iterable[str]) -> None:
+def _print_notes(notes: Iterable[str]) -> None:
     for note in notes:
         print(note)

@@ -24,7 +24,7 @@ from gazerig.robot.description.links import (
     LinkJoint,
 )
 from gazerig.robot.description.own_meshes import OwnMesh, with_own_meshes
-from gazerig.robot.model.coupling_params import CouplingParams, pairs_of
+from gazerig.robot.model.coupling_params import CouplingParams, coupled_pairs
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
@@ -44,7 +44,7 @@ def joint_torques_nm(
         # Where the turns of the servo for one of the joint are the most.
         own[name] = shaft_nm * (joint.made().steepest * 2.0 * pi / joint.facts.steps_per_turn)
     found = dict(own)
-    for first, second, coupling in pairs_of(couplings):
+    for first, second, coupling in coupled_pairs(couplings):
         if first in joints and second in joints:
             rates = coupling.rates((0.0, 0.0))
             for j, name in enumerate((first, second)):
@@ -114,10 +114,12 @@ class _Builder:
                 self._add_lid(name)
         for name in further(rig.joints):
             if name not in LOWER_NECK:
-                place, axis = parts.further_axis(name, self._measures)
+                place, axis = parts.facial_joint_axis(name, self._measures)
                 joint = self._joint(name, axis)
-                self._links.append(parts.further(link_of(name), HEAD, place, joint, self._measures))
-        self._links.insert(first, self._head(neck, self._links[first:]))
+                self._links.append(
+                    parts.further(link_name(name), HEAD, place, joint, self._measures)
+                )
+        self._links.insert(first, self._build_head(neck, self._links[first:]))
         camera = rig.camera
         x, y, z = camera.position_mm
         angles = radians(camera.yaw_deg), radians(camera.pitch_deg), radians(camera.roll_deg)
@@ -172,17 +174,17 @@ class _Builder:
             place = (0.0, 0.0, height - at)
             above = following - height
             self._links.append(
-                parts.neck(link_of(name), parent, place, joint, self._measures, below, above)
+                parts.neck(link_name(name), parent, place, joint, self._measures, below, above)
             )
-            parent, at, below = link_of(name), height, 0.0
+            parent, at, below = link_name(name), height, 0.0
         self._pivot_m: Vec3 = (0.0, 0.0, pivot - at)
         return parent
 
-    def _head(self, neck: str, carried: list[Link]) -> Link:
+    def _build_head(self, neck: str, carried: list[Link]) -> Link:
         """Return the head, balanced with all it carries about the axes of the neck."""
         x, y, z = self._pivot_m
         ahead, _, above = self._eyes_m
-        rest = mass.joined(_in_head(carried))
+        rest = mass.joined(_inertias_in_head(carried))
         whole = max(mass.head_mass_kg(self._measures.interocular_m), 2.0 * rest.mass_kg)
         # With this centre of its own mass the whole is centred on the pivot.
         share = rest.mass_kg / (whole - rest.mass_kg)
@@ -191,7 +193,7 @@ class _Builder:
             for place, off in zip(self._measures.pivot_m, rest.com_m, strict=True)
         )
         still = [
-            (side, self._meet_rad(side))
+            (side, self._lid_meeting_rad(side))
             for side in SIDES
             if f"{side}_upper_lid" in self._rig.lids and f"{side}_lower_lid" not in self._rig.lids
         ]
@@ -222,7 +224,7 @@ class _Builder:
                 joint = self._joint(name, _AXES[turn], both, Follows(both))
             else:
                 joint = self._joint(both, _AXES[turn])
-            name = link_of(joint.name)
+            name = link_name(joint.name)
             ring = mass.gimbal(self._measures.eye_radius_m)
             self._links.append(Link(name, parent, place, joint=joint, inertia=ring))
             parent, place = name, (0.0, 0.0, 0.0)
@@ -234,7 +236,7 @@ class _Builder:
         shut, wide = self._rig.lids[name]
         opens = 1.0 if wide > shut else -1.0
         up = opens if which == "upper" else -opens
-        meet = self._meet_rad(side)
+        meet = self._lid_meeting_rad(side)
         # Height of the edge above the eye's equator with the joint at 0.
         edge = meet - up * shut
         opened = parts.awake_opening_rad(which == "upper", meet, abs(wide - shut))
@@ -242,10 +244,10 @@ class _Builder:
         joint = self._joint(name, (0.0, -up, 0.0))._replace(awake_rad=awake)
         place = parts.eye_m(side, self._measures.interocular_m)
         self._links.append(
-            parts.lid(link_of(name), HEAD, place, joint, self._measures, which == "upper", edge)
+            parts.lid(link_name(name), HEAD, place, joint, self._measures, which == "upper", edge)
         )
 
-    def _meet_rad(self, side: str) -> float:
+    def _lid_meeting_rad(self, side: str) -> float:
         """Return the elevation at which the lids of an eye meet."""
         spans = [
             abs(wide - shut)
@@ -257,14 +259,14 @@ class _Builder:
         return parts.meeting_rad(spans[0], spans[1])
 
 
-def link_of(joint: str) -> str:
+def link_name(joint: str) -> str:
     """Return the name of the link that a joint moves."""
     name = f"{joint}_link"
     # A joint may be called base or camera.
     return f"{name}_" if name in (BASE, CAMERA) else name
 
 
-def _in_head(links: list[Link]) -> list[Inertia]:
+def _inertias_in_head(links: list[Link]) -> list[Inertia]:
     """Return the inertias of links that the head carries, in its frame, all joints at 0."""
     at: dict[str, Vec3] = {HEAD: (0.0, 0.0, 0.0)}
     found = []

@@ -43,10 +43,10 @@ def collisions(rig: RigShape) -> tuple[Collision, ...]:
 
     Every joint is tried alone, and every two joints of the necks together.
     """
-    return (*_lids(rig), *_bodies(describe(rig, looks=False)))
+    return (*_lid_collisions(rig), *_body_collisions(describe(rig, looks=False)))
 
 
-def _lids(rig: RigShape) -> Iterator[Collision]:
+def _lid_collisions(rig: RigShape) -> Iterator[Collision]:
     for side in ("left", "right"):
         names = [f"{side}_{which}_lid" for which in ("upper", "lower")]
         if not all(name in rig.lids and name in rig.joints for name in names):
@@ -67,10 +67,10 @@ def _lids(rig: RigShape) -> Iterator[Collision]:
             yield Collision(ends, (names[0], names[1]), cure)
 
 
-def _bodies(description: Description) -> Iterator[Collision]:
-    pairs = _pairs(description)
+def _body_collisions(description: Description) -> Iterator[Collision]:
+    pairs = _movable_pairs(description)
     found: set[tuple[str, str]] = set()
-    for angles in _poses(description):
+    for angles in _test_poses(description):
         left = [pair for pair in pairs if pair not in found]
         if not left:
             return
@@ -79,7 +79,7 @@ def _bodies(description: Description) -> Iterator[Collision]:
             if _depth_m(description, poses, one, other) <= _DEEP_M:
                 continue
             found.add((one, other))
-            first = _first(description, angles, one, other)
+            first = _first_collision(description, angles, one, other)
             named = {joint: degrees(angle) for joint, angle in first.items()}
             joint, angle = max(named.items(), key=lambda item: abs(item[1]))
             key = "min_deg" if angle < 0.0 else "max_deg"
@@ -96,7 +96,7 @@ def _placed_links(description: Description, angles: Mapping[str, float]) -> dict
     return description.poses(description.angles(tuple(angles), tuple(angles.values())))
 
 
-def _first(
+def _first_collision(
     description: Description, angles: Mapping[str, float], one: str, other: str
 ) -> dict[str, float]:
     """Return the first pose on the path to another at which the bodies of two links touch."""
@@ -109,10 +109,10 @@ def _first(
     return {name: met * angle for name, angle in angles.items()}
 
 
-def _pairs(description: Description) -> list[tuple[str, str]]:
+def _movable_pairs(description: Description) -> list[tuple[str, str]]:
     """Return links whose bodies could meet: some joint moves one against the other."""
     touching = {frozenset(pair) for pair in description.may_touch}
-    solid = [link.name for link in description.links if _shapes(description, link.name)]
+    solid = [link.name for link in description.links if _link_shapes(description, link.name)]
     return [
         (other, one)
         for one, other in combinations(solid, 2)
@@ -120,18 +120,18 @@ def _pairs(description: Description) -> list[tuple[str, str]]:
     ]
 
 
-def _shapes(description: Description, name: str) -> tuple[CollisionShape, ...]:
+def _link_shapes(description: Description, name: str) -> tuple[CollisionShape, ...]:
     return tuple(shape for shape in description.link(name).collisions if shape.layer == "body")
 
 
-def _poses(description: Description) -> Iterator[dict[str, float]]:
+def _test_poses(description: Description) -> Iterator[dict[str, float]]:
     """Yield angles of one joint, then of two joints of the necks, small ones first."""
     limits = {
         joint.name: (joint.low_rad, joint.high_rad)
         for joint in description.joints
         if joint.follows is None
     }
-    solid = {link.name for link in description.links if _shapes(description, link.name)}
+    solid = {link.name for link in description.links if _link_shapes(description, link.name)}
     moving = [name for name in limits if "neck" in name or f"{name}_link" in solid]
     for share in np.linspace(0.0, 1.0, _STEPS)[1:].tolist():
         for name in moving:
@@ -147,21 +147,23 @@ def _poses(description: Description) -> Iterator[dict[str, float]]:
 def _depth_m(description: Description, poses: Mapping[str, Pose], one: str, other: str) -> float:
     """Return how deep two links' bodies are in each other, negative where they are apart."""
     deepest = -np.inf
-    for a in _shapes(description, one):
-        for b in _shapes(description, other):
+    for a in _link_shapes(description, one):
+        for b in _link_shapes(description, other):
             for inner, outer, first, second in ((a, b, one, other), (b, a, other, one)):
-                points = _placed(_surface(inner.kind, inner.half_m), inner, poses[first])
+                points = _place_points(
+                    _surface_points(inner.kind, inner.half_m), inner, poses[first]
+                )
                 deepest = max(deepest, -float(_distances(outer, poses[second], points).min()))
     return deepest
 
 
-def _placed(points: Floats, shape: CollisionShape, pose: Pose) -> Floats:
+def _place_points(points: Floats, shape: CollisionShape, pose: Pose) -> Floats:
     in_link = points @ np.array(shape.R).T + shape.p_m
     return np.asarray(in_link @ np.array(pose[0]).T + pose[1])
 
 
 @lru_cache(maxsize=64)
-def _surface(kind: str, half_m: tuple[float, float, float]) -> Floats:
+def _surface_points(kind: str, half_m: tuple[float, float, float]) -> Floats:
     """Return points all over the surface of a shape."""
     at = np.arange(_POINTS) + 0.5
     up, around = 1.0 - 2.0 * at / _POINTS, at * np.pi * (1.0 + np.sqrt(5.0))

@@ -86,11 +86,11 @@ def skin() -> HeadSkin:
         mesh = Mesh(side.mesh.vertices, side.mesh.faces[:, ::-1])
         cheeks.append(Painted(mesh, side.colours, smooth_normals(mesh)))
     return HeadSkin(
-        merged([*stays, *_rims(), upper, line]), merged([jaw, *sides, lower]), merged(cheeks)
+        merged([*stays, *_eye_rims(), upper, line]), merged([jaw, *sides, lower]), merged(cheeks)
     )
 
 
-def _rims() -> tuple[Painted, Painted]:
+def _eye_rims() -> tuple[Painted, Painted]:
     """Return the skin about the left and the right eye."""
     points, normals = eye_rim()
     # Lit as if it were a little flatter and higher: bags below the eyes look tired.
@@ -276,7 +276,7 @@ def bust() -> Painted:
     around = np.linspace(0.0, 2.0 * pi, 44, endpoint=False)
     points = np.array(
         [
-            [(x * _super(cos(a)), y * _super(sin(a)), z) for a in around.tolist()]
+            [(x * _superellipse(cos(a)), y * _superellipse(sin(a)), z) for a in around.tolist()]
             for x, y, z in rows[::-1]
         ]
     )
@@ -286,6 +286,6 @@ def bust() -> Painted:
     return Painted(mesh, colours, smooth_normals(mesh))
 
 
-def _super(value: float) -> float:
+def _superellipse(value: float) -> float:
     """Round a circle's sine or cosine outwards, so that an ellipse fills its box a little."""
     return float(np.sign(value) * abs(value) ** 0.82)

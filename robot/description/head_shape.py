@@ -121,14 +121,14 @@ def field(points: Floats) -> Floats:
     """Return how far points (n, 3) are outside the head."""
     folded = points * (1.0, 1.0, 1.0)
     folded[:, 1] = np.abs(folded[:, 1])
-    solid = carve(_unopened(folded), _SOCKET(folded), 0.06)
+    solid = carve(_field_without_mouth(folded), _SOCKET(folded), 0.06)
     folded[:, 2] = smiling(folded[:, 1], folded[:, 2])
     for part, round_by in _LIPS:
         solid = union(solid, part(folded), round_by)
     return solid
 
 
-def _unopened(points: Floats) -> Floats:
+def _field_without_mouth(points: Floats) -> Floats:
     """Return how far points (n, 3) of the left half are outside a head without eyes and lips."""
     solid = _SOLIDS[0][0](points)
     for part, round_by in _SOLIDS[1:]:
@@ -176,13 +176,15 @@ def eye_rim() -> Surface:
     )
     # Skin that was cut into triangles stays below it.
     flat = points[1:].reshape(-1, 3)
-    flat += np.maximum(0.0, _RIM_OFF - _unopened(flat))[:, None] * normals(_unopened, flat)
+    flat += np.maximum(0.0, _RIM_OFF - _field_without_mouth(flat))[:, None] * normals(
+        _field_without_mouth, flat
+    )
     points[1:] = flat.reshape(points[1:].shape)
     points[-1] -= 2.0 * _RIM_OFF * outwards
     points = np.concatenate((((edge - _EYE) * 0.90 + _EYE)[None], points))
     found = smooth_normals(grid(points, closed=True)).reshape(points.shape)
     as_skin = np.concatenate(((0.0,), np.linspace(0.0, 1.0, _RIM_ROWS) ** 0.8))[:, None, None]
-    skin_normals = normals(_unopened, points.reshape(-1, 3)).reshape(points.shape)
+    skin_normals = normals(_field_without_mouth, points.reshape(-1, 3)).reshape(points.shape)
     found = (1.0 - as_skin) * found + as_skin * skin_normals
     return Surface(points, found / np.linalg.norm(found, axis=-1, keepdims=True))
 

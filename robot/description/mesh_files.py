@@ -18,7 +18,7 @@ from gazerig.robot.description.texture import textured
 
 def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
     """Return the content of ``name``.obj, .mtl and .png by file name; lengths in metres."""
-    written = _written(_Content(painted))
+    written = _write_obj(_Content(painted))
     obj = f"mtllib {name}.mtl\no {name}\n{written.points}usemtl {name}\n{written.faces}"
     return {
         f"{name}.obj": obj.encode(),
@@ -47,7 +47,7 @@ class _Content:
         return isinstance(other, _Content) and self._numbers == other._numbers
 
 
-class _Written(NamedTuple):
+class _ObjText(NamedTuple):
     """A mesh in its formats, but for its name: points and faces of the OBJ file, and the PNG."""
 
     points: str
@@ -58,14 +58,14 @@ class _Written(NamedTuple):
 # A world is built once for its physics and once for its pictures, with one or more heads of a rig:
 # all parts of four rigs.
 @lru_cache(maxsize=64)
-def _written(content: _Content) -> _Written:
+def _write_obj(content: _Content) -> _ObjText:
     mesh = textured(content.painted)
-    points, point_of = _once(mesh.vertices, 6)
-    normals, normal_of = _once(mesh.normals, 3)
+    points, point_of = _unique_rows(mesh.vertices, 6)
+    normals, normal_of = _unique_rows(mesh.normals, 3)
     # In this format an image begins at its left lower corner.
-    corners, corner_of = _once(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
+    corners, corner_of = _unique_rows(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
     table = np.stack((point_of, corner_of, normal_of), axis=-1)[mesh.faces] + 1
-    return _Written(
+    return _ObjText(
         _rows("v %.6f %.6f %.6f\n", points)
         + _rows("vt %.5f %.5f\n", corners)
         + _rows("vn %.3f %.3f %.3f\n", normals),
@@ -88,7 +88,7 @@ def png(image: np.ndarray) -> bytes:
     return bytes(data)
 
 
-def _once(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
+def _unique_rows(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
     """Return the different rows of rounded values, sorted, and which of them each row is."""
     rounded = np.round(values, digits) + 0.0
     # Column by column: a tenth of the time of np.unique, which compares whole rows.

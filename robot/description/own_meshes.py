@@ -91,7 +91,7 @@ def read_mesh(params: MeshParams) -> Painted:
         raise MeshUnusable(
             f"{path}: {size / 1e6:.0f} MB, more than {_MOST_BYTES / 1e6:.0f}; reduce its triangles"
         )
-    mesh = _loaded(path)
+    mesh = _load_mesh(path)
     if not 0 < len(mesh.faces) <= _MOST_FACES:
         cure = f"reduce them to {_MOST_FACES}" if len(mesh.faces) else "it needs a closed surface"
         raise MeshUnusable(f"{path}: {len(mesh.faces)} triangles; {cure}")
@@ -121,7 +121,7 @@ def read_mesh(params: MeshParams) -> Painted:
     )
 
 
-def _loaded(path: Path) -> Any:
+def _load_mesh(path: Path) -> Any:
     """Return all of a file as one mesh of trimesh."""
     import trimesh  # takes a while to import, and few rigs need it
 

@@ -107,7 +107,7 @@ def base(name: str, measures: HeadMeasures, head_m: Vec3, column_m: float, necke
     top = shoulders_m(measures, head_m)
     tall = max(LEAST_M, top - FLOOR_M)
     looks = [
-        Visual("bust", _stretched(head_mesh.bust(), (BUST * unit, BUST * unit, tall)), "cloth",
+        Visual("bust", _stretch(head_mesh.bust(), (BUST * unit, BUST * unit, tall)), "cloth",
                (x, y, top))
     ]  # fmt: skip
     end = column_m if necked else throat[2]
@@ -268,7 +268,7 @@ def lid(
     return Link(name, parent, p_m, joint=joint, inertia=weight, visuals=(look,), collisions=shapes)
 
 
-def further_axis(name: str, measures: HeadMeasures) -> tuple[Vec3, Vec3]:
+def facial_joint_axis(name: str, measures: HeadMeasures) -> tuple[Vec3, Vec3]:
     """Return where in the head a joint that gaze does not move turns, and its axis.
 
     A jaw opens down about a hinge below the ears; brows turn up about an axis behind them; ears
@@ -371,10 +371,10 @@ def _lid_look(name: str, measures: HeadMeasures, upper: bool, edge_rad: float, p
 
 def _tube(unit: float, length_m: float) -> Painted:
     radius = NECK_RADIUS * unit
-    return _stretched(head_mesh.neck(), (radius, radius, length_m))
+    return _stretch(head_mesh.neck(), (radius, radius, length_m))
 
 
-def _stretched(one: Painted, by: Vec3) -> Painted:
+def _stretch(one: Painted, by: Vec3) -> Painted:
     """Return the same, longer or shorter along each axis."""
     mesh = Mesh(one.mesh.vertices * by, one.mesh.faces)
     if one.normals is None:

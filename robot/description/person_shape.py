@@ -331,7 +331,7 @@ def hand(number: int) -> Painted:
 @lru_cache(maxsize=8)
 def hand_of(look: PersonLook, rows: int = 34) -> Painted:
     """Return the open right hand of a look; fewer rows are fewer triangles."""
-    mitten = Solid(_mitten, (0.0, 0.0, -0.1), 2.2)
+    mitten = Solid(_mitten_field, (0.0, 0.0, -0.1), 2.2)
     found = mitten.all_round(rows, rows)
     points, normals = found.points.reshape(-1, 3), found.normals.reshape(-1, 3)
     colours = np.broadcast_to(np.array(look.skin, float), points.shape)
@@ -341,7 +341,7 @@ def hand_of(look: PersonLook, rows: int = 34) -> Painted:
     return Painted(grid(found.points, closed=True), colours, normals)
 
 
-def _mitten(points: Floats) -> Floats:
+def _mitten_field(points: Floats) -> Floats:
     palm = ellipsoid((0.0, 0.0, -0.22), (0.17, 0.46, 0.52))(points)
     fingers = ellipsoid((0.02, 0.0, 0.45), (0.13, 0.38, 0.55))(points)
     thumb = capsule((0.04, 0.34, -0.30), (0.12, 0.66, 0.10), 0.13, 0.10)(points)

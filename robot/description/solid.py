@@ -66,7 +66,7 @@ def carve(solid: Floats, tool: Floats, round_by: float) -> Floats:
 
 def crossings(field: Field, centre: Vec3, directions: Floats, farthest: float) -> Floats:
     """Return the outermost points (n, 3) of a solid along unit vectors (n, 3) from its centre."""
-    outside, inside = _bracketed(field, centre, directions, farthest)
+    outside, inside = _bracket_crossings(field, centre, directions, farthest)
     for _ in range(_HALVINGS):
         middle = 0.5 * (outside + inside)
         within = field(directions * middle[:, None] + centre) < 0.0
@@ -74,7 +74,7 @@ def crossings(field: Field, centre: Vec3, directions: Floats, farthest: float) -
     return np.asarray(directions * (0.5 * (outside + inside))[:, None] + centre)
 
 
-def _bracketed(
+def _bracket_crossings(
     field: Field, centre: Vec3, directions: Floats, farthest: float
 ) -> tuple[Floats, Floats]:
     """Return distances from the centre (n,) between which each ray enters a solid from outside."""

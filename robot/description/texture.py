@@ -52,7 +52,7 @@ class _TexturePart(NamedTuple):
 def textured(painted: Painted) -> TexturedMesh:
     """Return a painted mesh with its colours as a texture; the triangles stay the same."""
     parts = [_part(piece) for piece in _pieces(painted)]
-    corners, size = _packed([part.texels.shape[:2] for part in parts])
+    corners, size = _pack_rectangles([part.texels.shape[:2] for part in parts])
     image = np.zeros((*size, painted.colours.shape[1]))
     first, uv, faces = 0, [], []
     for part, (row, column) in zip(parts, corners, strict=True):
@@ -98,7 +98,7 @@ def _part(piece: Painted) -> _TexturePart:
         shape = _grid_shape(faces[:, ::-1] if backwards else faces, len(vertices))
         if shape is not None:
             return _grid_part(piece, *shape, backwards=backwards)
-    return _patched_part(piece)
+    return _part_in_patches(piece)
 
 
 def _grid_shape(faces: NDArray[np.uint32], vertices: int) -> tuple[int, int, bool] | None:
@@ -135,7 +135,7 @@ def _grid_part(
     )
 
 
-def _patched_part(piece: Painted) -> _TexturePart:
+def _part_in_patches(piece: Painted) -> _TexturePart:
     """Return a part with a square of texels for every two triangles, in the order of the faces.
 
     A square holds one triangle above and one below the diagonal. Two triangles (a, b, c) and
@@ -188,7 +188,7 @@ def _quadrangles(faces: NDArray[np.uint32]) -> NDArray[np.int64]:
     return np.array(table)
 
 
-def _packed(sizes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:
+def _pack_rectangles(sizes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:
     """Lay rectangles in rows, the tallest first; return their corners and the whole's size."""
     widest = max(columns for _, columns in sizes) + 2 * _MARGIN
     area = sum((rows + 2 * _MARGIN) * (columns + 2 * _MARGIN) for rows, columns in sizes)

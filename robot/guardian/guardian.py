@@ -137,7 +137,7 @@ class Guardian:
             return
         self._check_s = now_s + CHECK_S
         code = self._process.poll()
-        hangs = code is None and self._hangs(self._process.pid, now_s)
+        hangs = code is None and self._is_hung(self._process.pid, now_s)
         if code is None and not hangs or now_s < self._restart_s:
             return
         self._restart_s = now_s + RESTART_S
@@ -186,7 +186,7 @@ class Guardian:
             ending.kill()
             ending.wait()
 
-    def _hangs(self, pid: int, now_s: float) -> bool:
+    def _is_hung(self, pid: int, now_s: float) -> bool:
         """Return whether the guardian is suspended or has not read the heartbeat for too long."""
         if self._heartbeat.looks != self._looks[0]:
             self._looks = self._heartbeat.looks, now_s

@@ -53,7 +53,7 @@ def releaser(plan: ReleasePlan) -> Releaser:
     The function opens the port and returns the ids that did not confirm. It raises PortError if
     the port cannot be opened and BusLost if it is lost. Its modules are imported here.
     """
-    return RELEASERS.get(plan.kind, _of_package)(plan)
+    return RELEASERS.get(plan.kind, _package_releaser)(plan)
 
 
 def _smart(plan: ReleasePlan) -> Releaser:
@@ -82,7 +82,7 @@ def _pca9685(plan: ReleasePlan) -> Releaser:
     return lambda port: stop_pulses(port, params.baud, Pca9685Board(port, params), plan.ids)
 
 
-def _of_package(plan: ReleasePlan) -> Releaser:
+def _package_releaser(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.plugins import BUS, BusPlugin, load
 
     release = load(BUS, plan.kind, BusPlugin).release

@@ -62,7 +62,7 @@ class BoardParams:
         )
 
 
-class SeenBoard(NamedTuple):
+class DetectedBoard(NamedTuple):
     """The corners of the board found in one image.
 
     Attributes:
@@ -91,7 +91,7 @@ class CharucoBoard:
         self.corners_m: Floats = np.array(self._board.getChessboardCorners(), dtype=np.float64)
         self.size_m = (par.columns * par.square_mm / 1e3, par.rows * par.square_mm / 1e3)
 
-    def find(self, image: ImageArray) -> SeenBoard | None:
+    def find(self, image: ImageArray) -> DetectedBoard | None:
         """Find the board's inner corners; return None if too few are visible.
 
         Args:
@@ -110,7 +110,7 @@ class CharucoBoard:
         # Corners on a line determine no pose.
         if np.linalg.matrix_rank(flat_m, tol=1e-6) < 2 or not np.isfinite(places).all():
             return None
-        return SeenBoard(numbers, places, on_board_m)
+        return DetectedBoard(numbers, places, on_board_m)
 
     def image(self, px_per_mm: float) -> ImageArray:
         """Draw the board, edge to edge, black on white.

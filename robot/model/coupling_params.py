@@ -96,7 +96,7 @@ class CoupledPair(NamedTuple):
     coupling: Coupling
 
 
-def pairs_of(couplings: Mapping[str, CouplingParams]) -> tuple[CoupledPair, ...]:
+def coupled_pairs(couplings: Mapping[str, CouplingParams]) -> tuple[CoupledPair, ...]:
     """Return the coupled pairs of a rig."""
     return tuple(CoupledPair(one.first, one.second, one.made()) for one in couplings.values())
 

@@ -248,7 +248,7 @@ class GestureFit:
             for at, now in zip((2, 3), begins, strict=True)
         ]
         for factor in _LONGER:
-            if self._keeps(_fade(state, factor * least_s), most):
+            if self._keeps_limits(_fade(state, factor * least_s), most):
                 return factor * least_s
         return _LONGER[-1] * least_s
 
@@ -275,11 +275,11 @@ class GestureFit:
             both = MotionSamples(
                 fade.times_s, *(a + b for a, b in zip(fade[1:], also[1:], strict=True))
             )
-            if self._keeps(both, most):
+            if self._keeps_limits(both, most):
                 return wait * fade_s
         return fade_s
 
-    def _keeps(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
+    def _keeps_limits(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
         """Return whether speeds and accelerations stay below given ones."""
         return all(
             bool((np.abs(column @ self._matrix) <= limit).all())

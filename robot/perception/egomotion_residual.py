@@ -51,7 +51,7 @@ class TrackedPoint(NamedTuple):
     v_world_m_s: Vec3
 
 
-class _Frame(NamedTuple):
+class _ResidualFrame(NamedTuple):
     """One frame as received.
 
     turn_rad_s: returns the angular velocity of the camera at the capture, along the world's axes
@@ -64,7 +64,7 @@ class _Frame(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Turn:
+class _HeadTurn:
     """Apparent motion of one thing since the head was last still.
 
     shifts: (seen shift, shift that the head's change of speed makes in a second, seconds
@@ -83,9 +83,9 @@ class EgomotionResidual:
         self._speeds: deque[float] = deque(maxlen=_SAMPLES)
         self._shift_by_turn = self._turn_by_turn = 0.0
         self._before: tuple[float, Vec3, dict[int, Vec3]] | None = None
-        self._turns: dict[int, _Turn] = {}
+        self._turns: dict[int, _HeadTurn] = {}
         self._stood = False  # in the frame before
-        self._waiting: _Frame | None = None
+        self._waiting: _ResidualFrame | None = None
 
     def step(
         self,
@@ -104,7 +104,7 @@ class EgomotionResidual:
             seen: the things tracked in the frame.
             at_most_rad_s: rough upper bound of the camera's speed of turning.
         """
-        frame = _Frame(t_s, turn_rad_s, p_world_eye_m, seen)
+        frame = _ResidualFrame(t_s, turn_rad_s, p_world_eye_m, seen)
         stands = at_most_rad_s < _STANDS_RAD_S
         if stands and self._stood:
             self._waiting = frame  # the waiting frame neither begins nor ends a turn
@@ -115,7 +115,7 @@ class EgomotionResidual:
         self._evaluate(frame)
         self._stood = stands
 
-    def _evaluate(self, frame: _Frame) -> None:
+    def _evaluate(self, frame: _ResidualFrame) -> None:
         """Compare the apparent positions of things with the frame evaluated before."""
         t_s, turn_rad_s, seen = frame.t_s, frame.turn_rad_s(), frame.seen
         views = {s.id: unit(sub(s.p_world_m, frame.p_world_eye_m)) for s in seen}
@@ -129,7 +129,7 @@ class EgomotionResidual:
             change = cross(sub(turn_rad_s, turn_before), views[id_])
             self._turns[id_].shifts.append((shift, change, t_s - before_s, speed > _TURNS_RAD_S))
         if speed < _STANDS_RAD_S:
-            self._settle(t_s, views, seen)
+            self._use_turns(t_s, views, seen)
 
     def figures(self) -> ResidualFigures:
         """Return the figures."""
@@ -140,7 +140,7 @@ class EgomotionResidual:
             round(degrees(median(self._speeds)), 3), round(1e3 * late, 2), len(self._speeds)
         )
 
-    def _settle(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
+    def _use_turns(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
         """Use the turns of things that are at their former positions, and begin new ones."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
@@ -152,7 +152,7 @@ class EgomotionResidual:
                     if fast:
                         self._speeds.append(norm(shift) / dt_s)
         self._turns = {
-            s.id: _Turn(t_s, views[s.id]) for s in seen if norm(s.v_world_m_s) < _STILL_M_S
+            s.id: _HeadTurn(t_s, views[s.id]) for s in seen if norm(s.v_world_m_s) < _STILL_M_S
         }
 
 

@@ -44,7 +44,7 @@ def without_own_motion(
         if owner is None:
             others.append(thing)
         elif owner < len(faces):
-            off = _off(thing, known[owner][0], p_camera)
+            off = _offset_from_face(thing, known[owner][0], p_camera)
             if off is not None and hypot(*off) < _HEAD_M:
                 spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
     turned = [
@@ -72,7 +72,7 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
     if thing.kind != UNNAMED:
         return None
     for k, (p_face, v_face) in enumerate(faces):
-        if (off := _off(thing, p_face, p_camera)) is None:
+        if (off := _offset_from_face(thing, p_face, p_camera)) is None:
             continue
         if hypot(*off) < _HEAD_M:
             return k
@@ -82,7 +82,9 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
     return None
 
 
-def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
+def _offset_from_face(
+    thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3
+) -> tuple[float, float] | None:
     """Return the offset of a patch from a face, aside and above; None if its depth differs.
 
     A patch whose distance is only assumed is placed at the face's distance.

@@ -167,7 +167,7 @@ class Hands:
         free = self._accept_palms(palms or (), faces, p_camera)
         found = [self._label(thing, faces, p_camera, t_s, free) for thing in things]
         for palm in free:
-            self._hold(palm, found, p_camera, t_s)
+            self._keep_palm(palm, found, p_camera, t_s)
         if not self._resting:
             return found
         # Hands at rest that show no motion; the detector would recognise its own hands again.
@@ -196,12 +196,14 @@ class Hands:
         """
         if not palms or not faces:
             return [one for one in palms if one.confidence >= _SURE]
-        p_face = min([face[0] for face in faces], key=partial(_level, p_camera=p_camera))
-        far, found = _level(p_face, p_camera), []
+        p_face = min(
+            [face[0] for face in faces], key=partial(_horizontal_distance_m, p_camera=p_camera)
+        )
+        far, found = _horizontal_distance_m(p_face, p_camera), []
         for palm in palms:
-            there = _place_as_far(palm, far, p_camera)
-            on_head = hypot(*_off(there, p_face)) < _HEAD_M
-            if _level(palm.p_world_m, p_camera) > far:
+            there = _place_at_distance(palm, far, p_camera)
+            on_head = hypot(*_offset_from_face(there, p_face)) < _HEAD_M
+            if _horizontal_distance_m(palm.p_world_m, p_camera) > far:
                 palm = replace(palm, p_world_m=there)
             if (palm.confidence >= _SURE and not on_head) or self._is_recent(palm, p_camera):
                 found.append(palm)
@@ -211,9 +213,9 @@ class Hands:
         """Return whether something is at the position of a recent hand."""
         hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
         hands += [one.hand for one in self._resting.values()]
-        return any(_apart(thing, hand, p_camera) < _AGAIN_M for hand in hands)
+        return any(_distance_from_hand(thing, hand, p_camera) < _AGAIN_M for hand in hands)
 
-    def _hold(
+    def _keep_palm(
         self, palm: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
     ) -> None:
         """Keep a palm without a patch until the next search, under the number of its hand."""
@@ -244,7 +246,11 @@ class Hands:
         p_face, v_face = arm.face[0], arm.face[1] or (0.0, 0.0, 0.0)
         speed = norm(perpendicular(sub(arm.tip_m_s, v_face), unit(sub(arm.tip_m, p_camera))))
         named = known is not None and known.frames >= _FRAMES
-        begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
+        begins = (
+            _BEFORE_HEAD_M_S
+            if hypot(*_offset_from_face(arm.tip_m, p_face)) < _HEAD_M
+            else _BEGINS_M_S
+        )
         # Relative to a walking person, their legs and parts of the trunk are no faster than that.
         comes = arm.ratio * thing.radius_m >= _ALONE_M and _approaches(thing, p_camera)
         palm = next((one for one in palms if _is_at(one, thing, p_camera)), None)
@@ -258,7 +264,9 @@ class Hands:
             if palm is not None:
                 palms.remove(palm)
                 known.palm_s = t_s
-                known.nearer = _level(palm.p_world_m, p_camera) / _level(arm.tip_m, p_camera)
+                known.nearer = _horizontal_distance_m(
+                    palm.p_world_m, p_camera
+                ) / _horizontal_distance_m(arm.tip_m, p_camera)
             elif t_s - known.palm_s > _PALM_S:
                 known.update_distance(thing, arm)
             hand = _as_hand(thing, arm, known.nearer, p_camera)
@@ -302,20 +310,27 @@ class Hands:
 
 def _is_at(palm: LocalisedDetection, thing: LocalisedDetection, p_camera: Vec3) -> bool:
     """Return whether a patch or a hand is at a palm."""
-    far = _level(palm.p_world_m, p_camera)
-    if thing.depth_measured and abs(_level(thing.p_world_m, p_camera) - far) > _REACH_M:
+    far = _horizontal_distance_m(palm.p_world_m, p_camera)
+    if (
+        thing.depth_measured
+        and abs(_horizontal_distance_m(thing.p_world_m, p_camera) - far) > _REACH_M
+    ):
         return False
-    radius_m = thing.radius_m * far / _level(thing.p_world_m, p_camera)
-    if _apart(thing, palm, p_camera) < _AT_PALM_M + radius_m:
+    radius_m = thing.radius_m * far / _horizontal_distance_m(thing.p_world_m, p_camera)
+    if _distance_from_hand(thing, palm, p_camera) < _AT_PALM_M + radius_m:
         return True
     if thing.kind != UNNAMED or thing.fastest_m is None:
         return False
-    return _apart(replace(thing, p_world_m=thing.fastest_m), palm, p_camera) < _AT_PALM_M
+    return (
+        _distance_from_hand(replace(thing, p_world_m=thing.fastest_m), palm, p_camera) < _AT_PALM_M
+    )
 
 
-def _apart(thing: LocalisedDetection, hand: LocalisedDetection, p_camera: Vec3) -> float:
+def _distance_from_hand(
+    thing: LocalisedDetection, hand: LocalisedDetection, p_camera: Vec3
+) -> float:
     """Return the distance of a thing from a hand; unmeasured depth counts as the hand's."""
-    place = _place_as_far(thing, _level(hand.p_world_m, p_camera), p_camera)
+    place = _place_at_distance(thing, _horizontal_distance_m(hand.p_world_m, p_camera), p_camera)
     return norm(sub(place, hand.p_world_m))
 
 
@@ -323,8 +338,10 @@ def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_ca
     """Return whether a hand moves at the position of one at rest, as far as known."""
     for one in found:
         if one.kind == HAND:
-            nearer, farther = sorted((hand, one), key=lambda each: _level(each.p_world_m, p_camera))
-            if _apart(nearer, farther, p_camera) < _AGAIN_M:
+            nearer, farther = sorted(
+                (hand, one), key=lambda each: _horizontal_distance_m(each.p_world_m, p_camera)
+            )
+            if _distance_from_hand(nearer, farther, p_camera) < _AGAIN_M:
                 return True
     return False
 
@@ -358,16 +375,16 @@ def _arm_of(
     """
     p_tip = thing.p_world_m if thing.fastest_m is None else thing.fastest_m
     v_tip = thing.v_world_m_s if thing.fastest_m_s is None else thing.fastest_m_s
-    away = _level(p_tip, p_camera)
+    away = _horizontal_distance_m(p_tip, p_camera)
     best, least = None, inf
     for face in faces:
-        far, ratio = _level(face[0], p_camera), 1.0
+        far, ratio = _horizontal_distance_m(face[0], p_camera), 1.0
         if not thing.depth_measured:
             ratio = far / away
         elif abs(away - far) > _REACH_M + 2.0 * thing.along_sd_m:
             continue
         tip = add(p_camera, scale(sub(p_tip, p_camera), ratio))
-        aside, up = _off(tip, face[0])
+        aside, up = _offset_from_face(tip, face[0])
         large = ratio * thing.radius_m >= _LARGEST_M
         if large or not -_BELOW_M < up < _ABOVE_M or hypot(aside, up) >= _REACH_M:
             continue
@@ -396,7 +413,7 @@ def _arm_of(
 
 def _off_shoulder(p_m: Vec3, p_face: Vec3) -> float:
     """Return the distance of a position from the person's shoulder on its side."""
-    aside, up = _off(p_m, p_face)
+    aside, up = _offset_from_face(p_m, p_face)
     return hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
 
 
@@ -425,20 +442,20 @@ def _as_hand(
     )
 
 
-def _place_as_far(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Vec3:
+def _place_at_distance(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Vec3:
     """Return the position of a thing at a distance, unless its own was measured."""
     if thing.depth_measured:
         return thing.p_world_m
-    ratio = far_m / _level(thing.p_world_m, p_camera)
+    ratio = far_m / _horizontal_distance_m(thing.p_world_m, p_camera)
     return add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
 
 
-def _level(p_m: Vec3, p_camera: Vec3) -> float:
+def _horizontal_distance_m(p_m: Vec3, p_camera: Vec3) -> float:
     """Return the horizontal distance of a position."""
     return max(hypot(p_m[0] - p_camera[0], p_m[1] - p_camera[1]), 1e-6)
 
 
-def _off(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
+def _offset_from_face(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
     """Return the offset of a position from a face: aside and above."""
     x, y, z = sub(p_m, p_face)
     return hypot(x, y), z

@@ -82,7 +82,7 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
     rigid = points[_RIGID]
     seen = rays(rigid[:, :2], intrinsics)
     focal_px = sqrt(intrinsics.fx_px * intrinsics.fy_px)
-    towards = _towards(seen.mean(axis=0))
+    towards = _rotation_towards(seen.mean(axis=0))
     turn = _turn(seen @ towards, rigid[:, 2] - rigid[:, 2].mean(), focal_px)
     if turn is None:
         return None
@@ -124,7 +124,7 @@ def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
     return None if flip == 0.0 else np.asarray(vt.T @ np.diag([1.0, 1.0, flip]) @ u.T)
 
 
-def _towards(ray: Floats) -> Floats:
+def _rotation_towards(ray: Floats) -> Floats:
     """Return the smallest rotation from the optical axis to a ray."""
     x, y, z = ray / np.linalg.norm(ray)
     cross = np.array([(0.0, 0.0, x), (0.0, 0.0, y), (-x, -y, 0.0)])

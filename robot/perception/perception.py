@@ -38,7 +38,7 @@ from gazerig.robot.perception.kalman import Variances
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.track import (
     UNNAMED,
-    SeenEyes,
+    EyeObservation,
     Track,
     angle_off_head_rad,
     looks_at_head,
@@ -224,7 +224,7 @@ class Perception:
             if track.seen_s == t_s:
                 track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
                 if signs.eye_opening is not None:
-                    track.eyes = SeenEyes(found.gaze_world, signs.eye_opening, t_s)
+                    track.eyes = EyeObservation(found.gaze_world, signs.eye_opening, t_s)
             eyes = None if track.eyes is None else track.eyes.at(t_s)
         gaze = found.gaze_world if eyes is None else eyes.gaze_world
         off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))

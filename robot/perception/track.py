@@ -24,7 +24,7 @@ _EDGE_OF_CONE, _EDGE_OF_SD = 0.2, 0.5
 """Distance of inner and outer edge from the cone: share of the cone, and of the uncertainty."""
 
 
-class SeenEyes(NamedTuple):
+class EyeObservation(NamedTuple):
     """State of a person's eyes in the last frame that showed them.
 
     gaze_world: unit vector of their gaze, None if they were shut
@@ -261,7 +261,7 @@ class Track:
     depth_s: float | None = None
     looks_at_head: bool | None = None
     speech: Speech = NO_SPEECH
-    eyes: SeenEyes | None = None
+    eyes: EyeObservation | None = None
     faced_s: float = -inf
     frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)

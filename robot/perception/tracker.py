@@ -193,7 +193,7 @@ class Tracker:
             track.at_s = t_s
         pairs = assign(self._costs(detections, p_world_camera_m), UNPAIRED)
         for i, j in pairs:
-            self._update(self._tracks[i], detections[j], p_world_camera_m)
+            self._update_track(self._tracks[i], detections[j], p_world_camera_m)
         if self._worn is not None:
             given = {t.id for t in self._tracks if t.is_person and t.returned is None}
             settle(self._tracks, self._worn, dict(pairs), detections, self._params)
@@ -206,7 +206,7 @@ class Tracker:
         ids = {t.detection.mark: t.id for t in self._tracks if _is_another_now(t, renamed)}
         for j, detection in enumerate(detections):
             if j not in taken:
-                track = self._begin(detection, p_world_camera_m, t_s)
+                track = self._begin_track(detection, p_world_camera_m, t_s)
                 if detection.kind not in (UNNAMED, FACE):
                     track.id = ids.pop(detection.mark, track.id)
                 self._tracks.append(track)
@@ -288,7 +288,7 @@ class Tracker:
         )
         return pair_costs(tracks, rows, self._params, self._worn)
 
-    def _begin(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
+    def _begin_track(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
         track = Track(
             0,
             detection,
@@ -356,7 +356,7 @@ class Tracker:
         else:
             self._free.add(track.id)
 
-    def _update(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
+    def _update_track(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update a track with a detection."""
         place = correct_distance(track, detection, p_camera)
         covered = _is_covered(track, detection)

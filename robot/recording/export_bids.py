@@ -247,7 +247,7 @@ def _write_eye(
     }
     sidecar |= {name: {"Description": says, "Units": unit} for name, unit, says, _ in eye.more}
     values = np.column_stack([trace.time_s, eye.gaze_deg, *(m[3] for m in eye.more)])
-    return _pair(f"{stem}_physio", sidecar, _even_rows(values, about.rate_hz), force)
+    return _write_pair(f"{stem}_physio", sidecar, _even_rows(values, about.rate_hz), force)
 
 
 def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
@@ -314,10 +314,10 @@ def _write_events(
         },
         "message": {"Description": "message of the machine, or a command to it"},
     }
-    return _pair(f"{stem}_physioevents", sidecar, (row for _, row in rows), force)
+    return _write_pair(f"{stem}_physioevents", sidecar, (row for _, row in rows), force)
 
 
-def _pair(
+def _write_pair(
     stem: str, sidecar: Mapping[str, object], rows: Iterable[Sequence[str]], force: bool
 ) -> tuple[Path, Path]:
     table, beside = Path(f"{stem}.tsv.gz"), Path(f"{stem}.json")

@@ -163,7 +163,7 @@ class Recorder:
 
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
-        before = self._before(tick)
+        before = self._records_before(tick)
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
         self.stream.append(tick, dt_s, before)
@@ -176,7 +176,7 @@ class Recorder:
             self._link.post(writer.HEALTH, encode(((sent, received, dict(errors)), self.lost)))
             self._link.listen()
 
-    def _before(self, tick: Tick) -> Before:
+    def _records_before(self, tick: Tick) -> Before:
         """Return the body's records since the last tick, without the tick's own joints."""
         records = self._body_records
         if (

@@ -139,9 +139,9 @@ class PlaybackClock:
         match request:
             case {"play": bool(play), **rest} if not rest:
                 (self.play if play else self.pause)(now_s)
-            case {"seek_s": int() | float() as at_s, **rest} if not rest and _real(at_s):
+            case {"seek_s": int() | float() as at_s, **rest} if not rest and _is_real(at_s):
                 self.seek(float(at_s), now_s)
-            case {"speed": int() | float() as speed, **rest} if not rest and _real(speed):
+            case {"speed": int() | float() as speed, **rest} if not rest and _is_real(speed):
                 self.set_speed(float(speed), now_s)
             case {"step": str(where), **rest} if not rest:
                 self.step(where, now_s)
@@ -156,7 +156,7 @@ class PlaybackClock:
         self._from_s, self._since_s = at_s, now_s
 
 
-def _real(value: float) -> bool:
+def _is_real(value: float) -> bool:
     return not isinstance(value, bool) and isfinite(value)
 
 

@@ -89,7 +89,7 @@ def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json
         "timestamp": stamp(at_ns), "frame_id": "world", "id": "gaze", "lifetime": _FOREVER,
         "frame_locked": False,
         "spheres": [
-            *(_ball(face, 2.0 * _FACE_M, _SKIN) for face in faces), _ball(point_m, 0.02, _AIM),
+            *(_sphere(face, 2.0 * _FACE_M, _SKIN) for face in faces), _sphere(point_m, 0.02, _AIM),
         ],
         "lines": [{
             "type": _LINE_LIST, "pose": _AT_HEAD, "thickness": 2.0, "scale_invariant": True,
@@ -112,7 +112,7 @@ def _transform(parent: str, child: str, p: Vec3, R: Mat3, at_ns: int) -> Json:
     }  # fmt: skip
 
 
-def _ball(p: Vec3, across_m: float, colour: Json) -> Json:
+def _sphere(p: Vec3, across_m: float, colour: Json) -> Json:
     size = {"x": across_m, "y": across_m, "z": across_m}
     return {"pose": {"position": _xyz(p), "orientation": _STILL}, "size": size, "color": colour}
 

@@ -143,7 +143,7 @@ def main(socket_fd: int, file_fd: int) -> None:
         writer = RunWriter(file_fd, about, started_ns)
         end = _write(messages, writer, rig, RealClock())
         writer.close(end)
-        _answer(rig, FAILED if writer.failed else DONE, writer.failed or tuple(writer.written))
+        _send_reply(rig, FAILED if writer.failed else DONE, writer.failed or tuple(writer.written))
 
 
 def _write(
@@ -177,7 +177,7 @@ def _write(
             writer.sync()
         if writer.failed and not reported:
             reported = True
-            _answer(rig, FAILED, writer.failed)
+            _send_reply(rig, FAILED, writer.failed)
     return end
 
 
@@ -208,7 +208,7 @@ def _messages(rig: socket.socket, parent: int) -> Iterator[_Message | None]:
             yield _Message(body[:1], body[1:], fd)
 
 
-def _answer(rig: socket.socket, kind: str, values: Any) -> None:
+def _send_reply(rig: socket.socket, kind: str, values: Any) -> None:
     """Send a reply, if the client still exists."""
     with contextlib.suppress(OSError):
         rig.send(pickle.dumps((kind, values)))

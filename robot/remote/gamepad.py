@@ -22,7 +22,7 @@ class GamepadLost(DriverError):
     """The gamepad is unplugged or its battery is empty."""
 
 
-class GamepadNews(NamedTuple):
+class GamepadInput(NamedTuple):
     """Position of a gamepad's stick, and the actions of the buttons pressed since the last call."""
 
     stick: Stick
@@ -83,7 +83,7 @@ class Gamepad:
         }
         self._at = dict.fromkeys((_X, _Y, _HAT_X, _HAT_Y), 0.0)
 
-    def news(self) -> GamepadNews:
+    def news(self) -> GamepadInput:
         """Return the stick's position and the buttons pressed since the last call.
 
         Raises:
@@ -99,7 +99,7 @@ class Gamepad:
         except OSError:
             raise GamepadLost(f"{self.name} is gone: plug it in and start again") from None
         x, y = (self._at[hat] or self._at[axis] for hat, axis in ((_HAT_X, _X), (_HAT_Y, _Y)))
-        return GamepadNews(Stick(x, -y), tuple(pressed))
+        return GamepadInput(Stick(x, -y), tuple(pressed))
 
     def close(self) -> None:
         """Close the device."""

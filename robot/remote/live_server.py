@@ -288,7 +288,7 @@ class StopOnlyServer:
     ) -> None:
         self._say = say
         self._pulse = Pulse(clock)
-        only = _OnlyStops(command)
+        only = _StopOnlyRobot(command)
         requests = RequestHandler(only, None, self._pulse, about, fixed=_FIXED)
         self._server = RemoteServer(requests, say)
 
@@ -308,7 +308,7 @@ class StopOnlyServer:
         self._server.close()
 
 
-class _OnlyStops:
+class _StopOnlyRobot:
     """Robot that executes only stop and resume."""
 
     def __init__(self, command: CommandTaker) -> None:

@@ -132,7 +132,7 @@ class Pulse:
         }
 
 
-class _NotDone(ValueError):
+class _CommandRefused(ValueError):
     """The robot has received a command and refused it."""
 
     def __init__(self, reply: CommandReply) -> None:
@@ -207,9 +207,9 @@ class RequestHandler:
             match request:
                 case {"do": "hello", "version": int(version), **rest} if not rest:
                     return {"ok": self._greeting(version), **tag}
-            done = handler.do(request, partial(_signed, peer))
+            done = handler.do(request, partial(_with_client, peer))
             return {"ok": self._outcome_json(done), **tag}
-        except _NotDone as error:
+        except _CommandRefused as error:
             return {"refused": str(error), "reply": error.reply.as_json(), **tag}
         except handler.refusals as error:
             return {"refused": str(error), **tag}
@@ -245,7 +245,7 @@ class RequestHandler:
                 if reply is None:
                     raise ValueError(_HANGS)
                 if reply.refused:
-                    raise _NotDone(reply)
+                    raise _CommandRefused(reply)
                 if not isinstance(command, REPEATED):
                     self._pulse.taken_up(ticks=1)  # so that the status includes it
                 return {"notes": [], "reply": reply.as_json()}
@@ -265,7 +265,7 @@ class RequestHandler:
         return {"notes": list(notes)}
 
 
-def _signed(peer: str, command: Command) -> Command:
+def _with_client(peer: str, command: Command) -> Command:
     """Return a command with the client's process: it cannot pose as another, or as the page."""
     who = str(getattr(command, "who", ""))
     return signed(command, f"{who} ({peer})" if who else peer) if peer else command

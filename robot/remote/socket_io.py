@@ -115,7 +115,7 @@ def sockets(path: Path) -> dict[Path, int]:
     return {place: int(pid) for place, pid in pids.items() if pid.isdecimal()}
 
 
-def free_name(path: Path, pid: int) -> Path:
+def unused_path(path: Path, pid: int) -> Path:
     """Return an unused socket path of a process: 7.sock, for its second head 7-2.sock."""
     count, name = 1, path / f"{pid}.sock"
     while name.exists():

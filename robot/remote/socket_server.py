@@ -105,7 +105,7 @@ class RemoteServer:
         remote_socket.make_private(folder, uid)
         remote_socket.clear_dead(folder)
         with _NAMING:
-            self.path = remote_socket.free_name(folder, os.getpid())
+            self.path = remote_socket.unused_path(folder, os.getpid())
             self._listener = remote_socket.listen(self.path)
         self._start(self._accept, self._listener)
         return self.path

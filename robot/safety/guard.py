@@ -197,7 +197,7 @@ class Guard:
         if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
             motion.ease(dt_s)
         command, speed, goal = motion.command, motion.speed, motion.goal
-        usual = self._all_well(joints) and not no_frame
+        usual = self._are_all_well(joints) and not no_frame
         stale_s = self._t_s - self._params.joint_timeout_ms / 1e3
         short: dict[int, tuple[int, str]] = {}
         followed = True
@@ -231,7 +231,7 @@ class Guard:
         level, reasons, why, critical = self._findings
         return GuardResult(tuple(command), level, reasons, desired_rad, why, critical, self._names)
 
-    def _all_well(self, joints: JointState) -> bool:
+    def _are_all_well(self, joints: JointState) -> bool:
         """Return whether only limits, ages and distances must be checked."""
         calm = self._calm or not (
             any(self._gentle) or any(self._held) or self._change.waiting or self._change.outside

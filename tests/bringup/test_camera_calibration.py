@@ -37,9 +37,9 @@ from gazerig.features.bringup.calibration.charuco_views import (
     RULER_MM,
     BoardView,
     ViewParams,
+    board_view,
     coverage,
     page,
-    view_of,
     write_page,
 )
 from gazerig.features.bringup.calibration.field_of_view import LEAST_FRAMES, estimate_field
@@ -53,7 +53,7 @@ from gazerig.features.bringup.calibration.hand_eye import (
 from gazerig.features.bringup.cli.calibrate import camera as command
 from gazerig.gaze.types import Angles3, Mat3, Vec3
 from gazerig.robot.cli.main import app
-from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard, SeenBoard
+from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard, DetectedBoard
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraParams
@@ -76,12 +76,12 @@ RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 
 def seen_board(
     R: Mat3, p: Vec3, lens: Intrinsics, noise_px: float, rng: np.random.Generator
-) -> SeenBoard:
+) -> DetectedBoard:
     """Return the corners that a detector would find, without a picture."""
     px = project(BOARD.corners_m @ np.array(R).T + p, lens)
     inside = ((px > 0.0) & (px < np.array(SIZE) - 1.0)).all(axis=1)
     px += rng.normal(0.0, noise_px, px.shape)
-    return SeenBoard(np.flatnonzero(inside), px[inside], BOARD.corners_m[inside])
+    return DetectedBoard(np.flatnonzero(inside), px[inside], BOARD.corners_m[inside])
 
 
 LENS = true_lens(*SIZE)
@@ -89,19 +89,21 @@ GUESS = intrinsics_of_view(radians(69.0), *SIZE)
 VIEWS = 16
 
 
-def corners(number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics) -> SeenBoard:
+def corners(
+    number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics
+) -> DetectedBoard:
     """What a detector would find of the board, without a picture."""
     return seen_board(
         *hand_held_pose(number, BoardCameraParams(), lens, BOARD), lens, noise_px, rng
     )
 
 
-def some_views(noise_px: float = 0.3, seed: int = 0, count: int = VIEWS) -> list[SeenBoard]:
+def some_views(noise_px: float = 0.3, seed: int = 0, count: int = VIEWS) -> list[DetectedBoard]:
     rng = np.random.default_rng(seed)
     return [corners(k, noise_px, rng, LENS) for k in range(count)]
 
 
-def calibrated(views: list[SeenBoard], **params: Any) -> LensCalibration:
+def calibrated(views: list[DetectedBoard], **params: Any) -> LensCalibration:
     """Calibrate from fewer views than 0.3 px of noise would really ask for."""
     params.setdefault("most_focal_error_percent", 0.6)
     return calibrate_lens(views, GUESS, *SIZE, LensCalibrationParams(**params))
@@ -186,8 +188,8 @@ def test_a_view_that_does_not_fit_is_dropped() -> None:
     assert_true(found, LENS)
 
 
-def flat(view: SeenBoard) -> bool:
-    how = view_of(view, GUESS, *SIZE)
+def flat(view: DetectedBoard) -> bool:
+    how = board_view(view, GUESS, *SIZE)
     return how is not None and abs(how.tilt_right_deg) < 14 and abs(how.tilt_down_deg) < 14
 
 
@@ -205,7 +207,7 @@ def flat(view: SeenBoard) -> bool:
     ],
 )
 def test_views_that_do_not_show_the_lens_are_refused(
-    made: Callable[[], list[SeenBoard]], message: str
+    made: Callable[[], list[DetectedBoard]], message: str
 ) -> None:
     with pytest.raises(CameraCalibrationRefused, match=message):
         calibrated(made())
@@ -252,7 +254,9 @@ def test_tilt_is_told_from_the_right_side() -> None:
     centre = np.array((0.126, 0.09, 0.0))
     points = (BOARD.corners_m - centre) @ R.T + (0.0, 0.0, 0.5)
     assert points[5, 2] < points[0, 2]  # the right side is nearer
-    how = view_of(SeenBoard(np.arange(24), project(points, GUESS), BOARD.corners_m), GUESS, *SIZE)
+    how = board_view(
+        DetectedBoard(np.arange(24), project(points, GUESS), BOARD.corners_m), GUESS, *SIZE
+    )
     assert how is not None
     assert (how.tilt_right_deg, how.tilt_down_deg) == pytest.approx((25.0, 0.0), abs=0.1)
 

@@ -22,7 +22,7 @@ from gazerig.features.bringup.calibration.endstop_search import (
     go,
     search,
 )
-from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoHandle
+from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
@@ -52,7 +52,7 @@ from gazerig.features.bringup.calibration.linkage_calibration import (
 )
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
-    SingleJoint,
+    SmartServoAccess,
 )
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.robot.app.run_bus import emulated_lines
@@ -93,7 +93,7 @@ class Bench:
         self.said: list[str] = []
         self.agreed = True
         name = "neck_yaw" if joint is NECK else "left_eye_pan"
-        self.joint = SingleJoint(name, joint, self.port, self.clock, lambda: self.why)
+        self.joint = SmartServoAccess(name, joint, self.port, self.clock, lambda: self.why)
 
     def get(self, register: str) -> int:
         value = self.registers.read(self.id, register)
@@ -616,7 +616,7 @@ def test_a_servo_set_up_in_another_way_is_refused(
 def test_a_wrong_model_is_named() -> None:
     bench = Bench(EYE)
     other = replace(EYE, model="xc330-m288")
-    wrong = SingleJoint("left_eye_pan", other, bench.port, bench.clock, lambda: None)
+    wrong = SmartServoAccess("left_eye_pan", other, bench.port, bench.clock, lambda: None)
     with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
         wrong.check()
 
@@ -689,7 +689,7 @@ def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
         STS, min_deg=-20.0, max_deg=20.0, transmission_points=((-25.0, 1800.0), (25.0, 2400.0))
     )
     bench = Reader(STS)
-    single = SingleJoint("left_eye_pan", rod, bench.port, bench.clock, lambda: None)
+    single = SmartServoAccess("left_eye_pan", rod, bench.port, bench.clock, lambda: None)
     bench.script = [0, 250, -490, 120, 240]
     bench.angles = [22.0, -21.0, None, 10.0]
     made = calibrate_by_marks(HandMarker(single, bench), bench, 1.0, 1)
@@ -808,7 +808,7 @@ class LinkageBench:
         self.answers = list(answers)
         self.said: list[str] = []
         self.channel = MAKER.joints[name].id
-        self.hobby = HobbyServoHandle(
+        self.hobby = HobbyServoAccess(
             name, MAKER.joints[name], self.port, BOARD, self.clock, lambda: self.why, pulses
         )
         self.placer = HobbyMarker(self.hobby, self)
@@ -934,7 +934,7 @@ def test_the_board_s_own_range_is_where_it_ends_and_is_named() -> None:
     )
     bench.board = build(replace(narrow, servos=servos), bench.clock.now_s)  # type: ignore[arg-type]
     bench.port = InProcessPort(bench.board, sleep_until=bench.clock.sleep_until)
-    bench.hobby = HobbyServoHandle(
+    bench.hobby = HobbyServoAccess(
         "eyes_pan", MAKER.joints["eyes_pan"], bench.port, BOARD, bench.clock,
         lambda: None, (500.0, 2500.0),
     )  # fmt: skip

@@ -63,7 +63,7 @@ RECORDING = (
            "percepts are kept in memory for ever", ("run_recording",)),
     Mutant("robot/recording/viewer_messages.py", '"position": q, "velocity": v', '"position": q, "velocity": q',
            "a viewer's joint speeds are angles", ("run_recording",)),
-    Mutant("robot/recording/viewer_messages.py", "*(_ball(face, 2.0 * _FACE_M, _SKIN) for face in faces), ", "",
+    Mutant("robot/recording/viewer_messages.py", "*(_sphere(face, 2.0 * _FACE_M, _SKIN) for face in faces), ", "",
            "a viewer sees no faces", ("run_recording",)),
     # ---- reading
     Mutant("robot/recording/read.py", "not 0.0 <= t_s - before_s < _LONGEST_GAP_S", "not t_s - before_s < _LONGEST_GAP_S",

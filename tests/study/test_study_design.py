@@ -30,7 +30,7 @@ from gazerig.features.study.order import (
     practice,
     williams,
 )
-from gazerig.features.study.run.study_file import LoadedStudy, checked_study, load_study
+from gazerig.features.study.run.study_file import LoadedStudy, load_checked_study, load_study
 from gazerig.features.study.shipped import HOME
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
@@ -84,14 +84,14 @@ def test_a_design_that_people_have_answered_is_not_stated_anew(
 ) -> None:
     file = elsewhere / "study.yaml"
     file.write_text(EXAMPLE, encoding="utf-8")
-    first = checked_study("study.yaml")
+    first = load_checked_study("study.yaml")
     StudyData(elsewhere / "study-data").claim("study", first.canonical)  # the first participant
     assert typed("study", "design") == 0
     capfd.readouterr()
     file.write_text(EXAMPLE.replace("seconds: 20", "seconds: 25"), encoding="utf-8")
     assert typed("study", "design", "--force") == 2
     said = capfd.readouterr().err
-    other = checked_study("study.yaml").sha256
+    other = load_checked_study("study.yaml").sha256
     assert first.sha256[:12] in said and other[:12] in said and "--data NEW_FOLDER" in said
     stated = (elsewhere / "study-data" / "preregistration.md").read_text(encoding="utf-8")
     assert first.sha256 in stated
@@ -101,27 +101,27 @@ def test_a_design_that_people_have_answered_is_not_stated_anew(
 def test_a_study_is_stated_before_somebody_takes_part(elsewhere: Path, capfd: Terminal) -> None:
     file, folder = elsewhere / "study.yaml", elsewhere / "d"
     file.write_text(EXAMPLE, encoding="utf-8")
-    first = checked_study("study.yaml")
+    first = load_checked_study("study.yaml")
     state("study.yaml", first, folder)
     stated = (folder / "preregistration.md").read_text(encoding="utf-8")
     assert first.sha256 in stated
     state("study.yaml", first, folder)
     file.write_text(EXAMPLE.replace("seconds: 20", "seconds: 25"), encoding="utf-8")
     with pytest.raises(SetupError, match="gazerig study design study.yaml --force"):
-        state("study.yaml", checked_study("study.yaml"), folder)
+        state("study.yaml", load_checked_study("study.yaml"), folder)
     StudyData(folder).claim("study", first.canonical)  # the first participant
     with pytest.raises(SetupError, match="begin a new study with --data"):
-        state("study.yaml", checked_study("study.yaml"), folder)
+        state("study.yaml", load_checked_study("study.yaml"), folder)
     (folder / "preregistration.md").unlink()
     with pytest.raises(SetupError, match="data of another design"):
-        state("study.yaml", checked_study("study.yaml"), folder)
+        state("study.yaml", load_checked_study("study.yaml"), folder)
     assert not (folder / "preregistration.md").exists()
 
 
 def test_a_preregistration_states_all_that_a_reviewer_asks_for(elsewhere: Path) -> None:
     assert typed("study", "design", "default_against_papers") == 0
     text = (elsewhere / "default_against_papers-data" / "preregistration.md").read_text("utf-8")
-    study = checked_study("default_against_papers")
+    study = load_checked_study("default_against_papers")
     assert study.sha256 in text
     for heading in (
         *("Hypotheses", "Conditions", "Design", "Measures", "Analysis", "Sample size"),
@@ -168,7 +168,7 @@ def test_what_is_allowed_and_should_be_known_is_said(elsewhere: Path) -> None:
     text = EXAMPLE.replace("[nakamoto_tsuruno]", "[nakamoto_tsuruno, godspeed]")
     text = text[: text.index("hypotheses")] + "privacy: {pictures: true}\nlanguage: ja\n"
     (elsewhere / "s.yaml").write_text(text + "plan: {participants: 2}\n", encoding="utf-8")
-    said = " ".join(notes(checked_study("./s.yaml")))
+    said = " ".join(notes(load_checked_study("./s.yaml")))
     assert "exploratory" in said and "pictures of participants are kept" in said
     assert "godspeed is not all in 'ja'" in said and "nakamoto_tsuruno is not" not in said
     assert "privacy.contact is empty" in said
@@ -190,7 +190,7 @@ def test_pairs_are_stated_as_pairs(elsewhere: Path, capfd: Terminal) -> None:
 
 @pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) -> None:
-    study = checked_study(name)
+    study = load_checked_study(name)
     shown = study.design.presentation
     asked = RunOptions(
         mock=True, fast=True, bus="ideal", scene=shown.scene, seconds=6.0, rig=shown.rig

@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.features.study.pages.study_files import FOLDER
-from gazerig.features.study.run.study_file import checked_study, load_questionnaire, load_study
+from gazerig.features.study.run.study_file import load_checked_study, load_questionnaire, load_study
 from gazerig.features.study.shipped import HOME
 from gazerig.gaze.attention.top_down import PLANNED
 
@@ -45,7 +45,7 @@ def faults(tmp_path: Path, text: str, name: str = "s.yaml") -> list[str]:
     file = tmp_path / name
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as raised:
-        checked_study(str(file))
+        load_checked_study(str(file))
     assert all(fault.file == str(file) for fault in raised.value.faults)
     return [str(fault).removeprefix(f"{file}:") for fault in raised.value.faults]
 
@@ -56,7 +56,7 @@ def conditions(text: str, more: str = "") -> str:
 
 @pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_every_shipped_study_is_good_and_its_conditions_differ(name: str) -> None:
-    study = checked_study(name)
+    study = load_checked_study(name)
     keys = list(study.design.conditions)
     assert study.name == name and set(study.rigs) == set(keys) and study.text
     for i, before in enumerate(keys):
@@ -67,7 +67,7 @@ def test_every_shipped_study_is_good_and_its_conditions_differ(name: str) -> Non
 
 @pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_what_participants_read_before_names_no_condition(name: str) -> None:
-    design = checked_study(name).design
+    design = load_checked_study(name).design
     assert design.welcome and design.debriefing and design.hypotheses
     assert set(design.translations) == {"de", "ja"}
     every = (design.welcome, *(texts.welcome for texts in design.translations.values()))
@@ -233,7 +233,7 @@ def test_a_world_is_any_surroundings_that_there_are(tmp_path: Path) -> None:
     install(tmp_path, "hall", {"gazerig.surroundings": {"hall": "hall:Hall"}}, {})
     (tmp_path / "s.yaml").write_text(f"{HEAD}{TWO}presentation: {{world: hall}}\n")
     with on_path(tmp_path):
-        assert checked_study(str(tmp_path / "s.yaml")).design.presentation.world == "hall"
+        assert load_checked_study(str(tmp_path / "s.yaml")).design.presentation.world == "hall"
         said = faults(tmp_path, f"{HEAD}{TWO}presentation: {{world: hal}}\n")
     assert any("no world 'hal'; did you mean 'hall'?" in one for one in said), said
 
@@ -466,7 +466,7 @@ def test_whatever_stands_in_a_study_is_right_or_told_with_file_and_line(
     with file.open("w", encoding="utf-8") as out:
         YAML(typ="safe").dump(design, out)
     try:
-        assert len(checked_study(str(file)).sha256) == 64
+        assert len(load_checked_study(str(file)).sha256) == 64
     except ConfigError as error:
         assert all(fault.file == str(file) and fault.line for fault in error.faults)
 

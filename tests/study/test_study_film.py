@@ -13,7 +13,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.film_writer import film_seconds, film_writer
 from gazerig.drivers.types import ImageArray
 from gazerig.features.study.run import film
-from gazerig.features.study.run.study_file import LoadedStudy, checked_study, load_study
+from gazerig.features.study.run.study_file import LoadedStudy, load_checked_study, load_study
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ plan: {participants: 6}
     (tmp_path / "s.yaml").write_text(text)
     monkeypatch.chdir("/")
     with pytest.raises(ConfigError) as raised:
-        checked_study(str(tmp_path / "s.yaml"))
+        load_checked_study(str(tmp_path / "s.yaml"))
     told = [str(one).removeprefix(f"{tmp_path}/") for one in raised.value.faults]
     assert len(told) == 2
     assert told[0].startswith("s.yaml:4:") and "conditions.b.film: lasts 2.0 s" in told[0]

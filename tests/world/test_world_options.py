@@ -16,7 +16,7 @@ from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import world_of, world_script
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose
-from gazerig.robot.cli.run import what_runs
+from gazerig.robot.cli.run import start_text
 from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 ASKED = RunOptions(mock=True, world="living-room")
@@ -25,7 +25,7 @@ ASKED = RunOptions(mock=True, world="living-room")
 def test_a_world_is_what_is_looked_at() -> None:
     found = ASKED.check_and_complete()
     assert (found.world, found.scene, found.camera_source) == ("living-room", None, None)
-    assert "a world, living-room" in what_runs(found)
+    assert "a world, living-room" in start_text(found)
     assert (
         replace(ASKED, fast=True).check_and_complete().seconds is None
     )  # a whole round, as of a scene

@@ -17,7 +17,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.charuco_views import ViewCollector, ViewParams
 from gazerig.params import Bounds
-from gazerig.robot.model.charuco_board import SeenBoard
+from gazerig.robot.model.charuco_board import DetectedBoard
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import project, rays
 
@@ -101,7 +101,7 @@ class _Fit(NamedTuple):
 
 
 def calibrate_lens(
-    views: Sequence[SeenBoard],
+    views: Sequence[DetectedBoard],
     guess: Intrinsics,
     width_px: int,
     height_px: int,
@@ -142,7 +142,7 @@ def calibrate_lens(
 
 
 def _usable(
-    views: Sequence[SeenBoard], guess: Intrinsics, width: int, height: int, params: ViewParams
+    views: Sequence[DetectedBoard], guess: Intrinsics, width: int, height: int, params: ViewParams
 ) -> list[int]:
     """Return the numbers of the views that show something new, or refuse if they are too few."""
     collector = ViewCollector(guess, width, height, params)
@@ -156,7 +156,7 @@ def _usable(
     return usable
 
 
-def _fit(views: Sequence[SeenBoard], kept: Sequence[int], width: int, height: int) -> _Fit:
+def _fit(views: Sequence[DetectedBoard], kept: Sequence[int], width: int, height: int) -> _Fit:
     """Fit a lens; with the third radial coefficient if the views prove it."""
     plain = _run_opencv([views[k] for k in kept], width, height, cv2.CALIB_FIX_K3)
     full = _run_opencv([views[k] for k in kept], width, height, 0)
@@ -165,7 +165,7 @@ def _fit(views: Sequence[SeenBoard], kept: Sequence[int], width: int, height: in
     return full if proven and not _folds(full.lens, width, height) else plain
 
 
-def _run_opencv(views: Sequence[SeenBoard], width: int, height: int, flags: int) -> _Fit:
+def _run_opencv(views: Sequence[DetectedBoard], width: int, height: int, flags: int) -> _Fit:
     """Run OpenCV's calibration."""
     points = [view.corners_board_m.astype(np.float32)[:, None] for view in views]
     corners = [view.corners_px.astype(np.float32)[:, None] for view in views]

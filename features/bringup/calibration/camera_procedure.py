@@ -24,7 +24,7 @@ from gazerig.features.bringup.calibration.charuco_views import Coverage, ViewCol
 from gazerig.features.bringup.calibration.hand_eye import NeckView
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry
 from gazerig.params import Bounds
-from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
+from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, DetectedBoard
 
 Look = Callable[[], Shot | None]
 """Returns the newest frame at once, None before the first."""
@@ -118,7 +118,9 @@ class LensSteps:
         Raises:
             CameraCalibrationRefused: the views do not show it.
         """
-        views: Sequence[SeenBoard] = self._collector.views if self._collector is not None else ()
+        views: Sequence[DetectedBoard] = (
+            self._collector.views if self._collector is not None else ()
+        )
         width, height = self._size if self._collector is not None else (1, 1)
         guess = intrinsics_of_view(self._view_rad, width, height)
         return calibrate_lens(views, guess, width, height, self._params)
@@ -211,9 +213,9 @@ def neck_steps(
 
 def _average_view(
     neck: Neck, look: Look, now_s: Callable[[], float], board: CharucoBoard, params: NeckStepParams
-) -> tuple[SeenBoard | None, Angles3, str]:
+) -> tuple[DetectedBoard | None, Angles3, str]:
     """Average the board over some frames taken while the head was still."""
-    sights: list[SeenBoard] = []
+    sights: list[DetectedBoard] = []
     stood: list[Angles3] = []
     last_s = start_s = now_s()
     why = "no new frame came"
@@ -242,6 +244,8 @@ def _average_view(
     kept = [np.isin(seen.ids, sorted(common)) for seen in sights]
     places = [seen.corners_px[keep] for seen, keep in zip(sights, kept, strict=True)]
     first, of_first = sights[0], kept[0]
-    mean = SeenBoard(first.ids[of_first], np.mean(places, axis=0), first.corners_board_m[of_first])
+    mean = DetectedBoard(
+        first.ids[of_first], np.mean(places, axis=0), first.corners_board_m[of_first]
+    )
     yaw, pitch, roll = np.mean(stood, axis=0).tolist()
     return mean, (yaw, pitch, roll), ""

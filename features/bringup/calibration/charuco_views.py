@@ -24,7 +24,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import output_file
 from gazerig.drivers.types import ImageArray
 from gazerig.params import Bounds
-from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
+from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, DetectedBoard
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class BoardPose(NamedTuple):
     error_px: float
 
 
-def board_poses(seen: SeenBoard, lens: Intrinsics) -> tuple[BoardPose, ...]:
+def board_poses(seen: DetectedBoard, lens: Intrinsics) -> tuple[BoardPose, ...]:
     """Return the one or two poses that explain the corners, the better one first."""
     if len(seen.ids) < LEAST_CORNERS:
         return ()
@@ -115,7 +115,9 @@ class Coverage(NamedTuple):
         return not self.missing
 
 
-def view_of(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> BoardView | None:
+def board_view(
+    seen: DetectedBoard, guess: Intrinsics, width_px: int, height_px: int
+) -> BoardView | None:
     """Return position and tilt of the board, None if its pose cannot be found.
 
     guess: a lens that is about right; the field of view of the data sheet will do
@@ -161,18 +163,18 @@ class ViewCollector:
         self.params = params if params is not None else ViewParams()
         self._guess, self._size = guess, (width_px, height_px)
         self._held: list[BoardView] = []
-        self.views: list[SeenBoard] = []
+        self.views: list[DetectedBoard] = []
 
     @property
     def coverage(self) -> Coverage:
         """Return what the kept views cover and what is missing."""
         return coverage(self._held, self.params)
 
-    def offer(self, seen: SeenBoard | None) -> str:
+    def offer(self, seen: DetectedBoard | None) -> str:
         """Keep a view if it is new; return the reason if it was not kept, else ""."""
         if seen is None:
             return "no board seen"
-        how = view_of(seen, self._guess, *self._size)
+        how = board_view(seen, self._guess, *self._size)
         if how is None:
             return "the board's pose cannot be found"
         if not all(how.differs(other, self.params) for other in self._held):

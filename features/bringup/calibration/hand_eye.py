@@ -31,7 +31,7 @@ from gazerig.features.bringup.calibration.camera_calibration import (
 from gazerig.features.bringup.calibration.charuco_views import board_poses
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
-from gazerig.robot.model.charuco_board import SeenBoard
+from gazerig.robot.model.charuco_board import DetectedBoard
 from gazerig.robot.model.frames import CameraParams, mounted_at
 from gazerig.robot.model.intrinsics import project
 
@@ -123,7 +123,7 @@ class Observations(NamedTuple):
 
     @staticmethod
     def of(
-        views: Sequence[tuple[Mat3, Vec3, SeenBoard]],
+        views: Sequence[tuple[Mat3, Vec3, DetectedBoard]],
         lens: Intrinsics,
         lens_error: Floats,
         joint_error_rad: float,
@@ -163,7 +163,7 @@ class Observations(NamedTuple):
 
     def residuals(self, estimate: Estimate) -> Floats:
         """Return the errors over a corner's usual one, then lens and turns over theirs."""
-        off = np.concatenate((estimate.lens_off, estimate.turns_rad.ravel())) / self._usual()
+        off = np.concatenate((estimate.lens_off, estimate.turns_rad.ravel())) / self._usual_errors()
         return np.concatenate((self.errors(estimate) / _CORNER_PX, off))
 
     def jacobian(self, estimate: Estimate) -> Floats:
@@ -175,10 +175,10 @@ class Observations(NamedTuple):
         at = _SHARED + 3 * np.repeat(self.view, 2)
         for k in range(3):
             slopes[np.arange(rows), at + k] = own[:, k] / _CORNER_PX
-        slopes[rows:, 12:] = np.diag(1.0 / self._usual())
+        slopes[rows:, 12:] = np.diag(1.0 / self._usual_errors())
         return slopes
 
-    def _usual(self) -> Floats:
+    def _usual_errors(self) -> Floats:
         """Return the usual errors of lens and joints: (3 + 3 views,)."""
         return np.concatenate((self.lens_error, np.full(3 * self.views, self.joint_error_rad)))
 
@@ -332,7 +332,7 @@ class NeckView(NamedTuple):
 
     R_world_head: Mat3
     p_world_head_m: Vec3
-    seen: SeenBoard
+    seen: DetectedBoard
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ TIMEOUT_S = 1.0
 SILENT_S = 2.0
 
 
-class HobbyServoHandle:
+class HobbyServoAccess:
     """The servo of one joint.
 
     Args:

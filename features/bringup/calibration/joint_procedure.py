@@ -19,7 +19,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     is_lid,
     zero_of,
 )
-from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint
+from gazerig.features.bringup.calibration.smart_servo_access import SmartServoAccess
 
 ZeroReference = Literal["middle", "person"]
 
@@ -47,7 +47,7 @@ class Operator(Protocol):
 class PositionTracker:
     """A joint's position followed over the seam, with a line that shows it."""
 
-    def __init__(self, single: SingleJoint) -> None:
+    def __init__(self, single: SmartServoAccess) -> None:
         self._single = single
         self._track = PositionUnwrapper()
         self._first: int | None = None
@@ -68,7 +68,7 @@ class PositionTracker:
         return self._track.see(*self._single.position())
 
 
-def calibrate_by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibration:
+def calibrate_by_hand(single: SmartServoAccess, person: Operator, margin_deg: float) -> Calibration:
     """Let the user turn the joint, with torque off, to its ends and straight ahead.
 
     Raises:
@@ -96,7 +96,7 @@ def calibrate_by_hand(single: SingleJoint, person: Operator, margin_deg: float) 
 
 
 def calibrate_by_motion(
-    single: SingleJoint,
+    single: SmartServoAccess,
     person: Operator,
     margin_deg: float,
     params: StopSearchParams,
@@ -137,7 +137,9 @@ def calibrate_by_motion(
     return calibration(single.name, marks, single.joint, margin_deg)
 
 
-def _find_stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:
+def _find_stop(
+    single: SmartServoAccess, person: Operator, params: StopSearchParams, way: int
+) -> int:
     """Find one stop; return its position."""
     stop: EndStop = single.find_stop(params, way)
     if stop.kind == "limit":

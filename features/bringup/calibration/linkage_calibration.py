@@ -12,7 +12,7 @@ from dataclasses import replace
 from math import degrees
 from typing import Protocol
 
-from gazerig.features.bringup.calibration.hobby_access import HobbyServoHandle
+from gazerig.features.bringup.calibration.hobby_access import HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
     SMALLEST_RANGE_DEG,
     CalibrationRefused,
@@ -23,7 +23,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     zero_of,
 )
 from gazerig.features.bringup.calibration.joint_procedure import Operator, PositionTracker
-from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint
+from gazerig.features.bringup.calibration.smart_servo_access import SmartServoAccess
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 
@@ -149,7 +149,7 @@ class Marker(Protocol):
 class HobbyMarker:
     """Moves a hobby servo as a person steers it; implements Marker."""
 
-    def __init__(self, hobby: HobbyServoHandle, person: Jogger) -> None:
+    def __init__(self, hobby: HobbyServoAccess, person: Jogger) -> None:
         self.name, self.joint = hobby.name, hobby.joint
         self._hobby, self._person = hobby, person
 
@@ -220,7 +220,7 @@ class HobbyMarker:
 class HandMarker:
     """Lets a person turn a servo without torque that reports its position; implements Marker."""
 
-    def __init__(self, single: SingleJoint, person: Operator) -> None:
+    def __init__(self, single: SmartServoAccess, person: Operator) -> None:
         self.name, self.joint = single.name, single.joint
         self._single, self._person = single, person
         self._watched = PositionTracker(single)

@@ -37,7 +37,7 @@ class CalibrationStopped(DriverError):
     """The user or the system requested the end: torque off. The message names which."""
 
 
-class SingleJoint:
+class SmartServoAccess:
     """One joint and its servo.
 
     Changes in the servo are restored. Every method raises BusLost if the servo does not answer

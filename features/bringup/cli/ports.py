@@ -28,14 +28,14 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Yes to every question.")
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one line of JSON instead of text.")]
 
 
-def ports_here() -> tuple[SerialPort, ...]:
+def list_ports() -> tuple[SerialPort, ...]:
     """List the serial ports of this computer."""
     return serial_ports(host)
 
 
 def usb_id(path: str) -> str:
     """Return the USB vendor and product id of a port, "" if it has none."""
-    return usb_id_of(path, ports_here())
+    return usb_id_of(path, list_ports())
 
 
 @contextlib.contextmanager
@@ -114,7 +114,7 @@ def rig_ports(
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        paths, here = bus_ports(rig, port), ports_here()
+        paths, here = bus_ports(rig, port), list_ports()
         for name, path in paths.items():
             check_owner(path, rig.bus_named(name).kind, here)
         yield RigPorts(paths, None)

@@ -80,7 +80,7 @@ def scan(
             kinds = parse_kinds(kind or "all")
         except ValueError as error:
             raise SetupError(f"--kind {error}") from None
-        found_ports = bench.ports_here()
+        found_ports = bench.list_ports()
         if not as_json:
             for bus in sorted(Path("/dev").glob("i2c-*")):
                 say(f"I2C bus {bus}")
@@ -92,7 +92,7 @@ def scan(
             answered = [
                 _boards(path, as_json)
                 if i2c or kind == "pca9685"
-                else _one(path, kinds, rates, thorough, kind, as_json)
+                else _search_port(path, kinds, rates, thorough, kind, as_json)
                 for path, i2c in paths
             ]
     if not any(answered):
@@ -171,7 +171,7 @@ def _only_port(ports: Sequence[SerialPort]) -> str:
     )
 
 
-def _one(
+def _search_port(
     path: str,
     kinds: Sequence[BusKind],
     rates: Sequence[int] | None,
@@ -287,7 +287,7 @@ def remarks(
     elif unasked and found:
         yield f"{' and '.join(unasked)} was not searched, as others answered: --kind all searches it too"
     for one in rounds:
-        yield from _odd(one, {rate.baud for rate in rounds if rate.has_answer})
+        yield from _unusual_lines(one, {rate.baud for rate in rounds if rate.has_answer})
     if not found and not boards:
         yield (
             "no servo answers: is the servo supply on? does each servo's LED flash once when it "
@@ -297,7 +297,7 @@ def remarks(
         )
 
 
-def _odd(one: SearchRound, heard: Container[int]) -> Iterator[str]:
+def _unusual_lines(one: SearchRound, heard: Container[int]) -> Iterator[str]:
     """Return what was unusual at one baud rate."""
     twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
     for servo_id in sorted({*one.shared, *twice}):

@@ -95,11 +95,11 @@ def read_recording(path: Path) -> Samples | FixationTable:
 
 
 def _samples(table: _TrackerTable) -> Samples:
-    time = _needed(table, "time")
-    x, y = _needed(table, "x"), _needed(table, "y")
+    time = _require_column(table, "time")
+    x, y = _require_column(table, "x"), _require_column(table, "y")
     raw = _numbers(table, time, _finite)
     _refuse_unsorted(table, time, raw)
-    xs, ys = _numbers(table, x, _or_lost), _numbers(table, y, _or_lost)
+    xs, ys = _numbers(table, x, _parse_or_lost), _numbers(table, y, _parse_or_lost)
     lost = ~(np.isfinite(xs) & np.isfinite(ys))
     if lost.all():
         raise SetupError(
@@ -121,17 +121,17 @@ def _samples(table: _TrackerTable) -> Samples:
 
 
 def _fixations(table: _TrackerTable) -> FixationTable:
-    start, duration = _needed(table, "start"), _needed(table, "duration")
+    start, duration = _require_column(table, "start"), _require_column(table, "duration")
     part = _find(table, "part")
     starts, durations = _numbers(table, start, _finite), _numbers(table, duration, _above_0)
     _refuse_unsorted(table, start, starts)
     if part is None and (_find(table, "x") is None or _find(table, "y") is None):
-        raise _missing(table, "part")
+        raise _missing_column_error(table, "part")
     places = [(nan, nan)] * len(table.rows)
     parts: list[str | None] = [None] * len(table.rows)
     if part is None:
-        x, y = _needed(table, "x"), _needed(table, "y")
-        xs, ys = _numbers(table, x, _or_lost), _numbers(table, y, _or_lost)
+        x, y = _require_column(table, "x"), _require_column(table, "y")
+        xs, ys = _numbers(table, x, _parse_or_lost), _numbers(table, y, _parse_or_lost)
         places = list(zip(xs.tolist(), ys.tolist(), strict=True))
     else:
         parts = [_part(table, part, line, row[part.at]) for line, row in table.rows]
@@ -191,14 +191,14 @@ def _find(table: _TrackerTable, wanted: str) -> _Column | None:
     return None
 
 
-def _needed(table: _TrackerTable, wanted: str) -> _Column:
+def _require_column(table: _TrackerTable, wanted: str) -> _Column:
     column = _find(table, wanted)
     if column is None:
-        raise _missing(table, wanted)
+        raise _missing_column_error(table, wanted)
     return column
 
 
-def _missing(table: _TrackerTable, wanted: str) -> SetupError:
+def _missing_column_error(table: _TrackerTable, wanted: str) -> SetupError:
     found = ", ".join(name or "(no name)" for name in table.names[:8])
     return SetupError(
         f"{table.path}:{table.header_line}: no column {wanted}; found: {found}; wanted: time, x, y"
@@ -234,7 +234,7 @@ def _above_0(cell: str) -> float:
     return number
 
 
-def _or_lost(cell: str) -> float:
+def _parse_or_lost(cell: str) -> float:
     return nan if cell.lower() in _LOST else _finite(cell)
 
 

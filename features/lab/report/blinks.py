@@ -63,7 +63,7 @@ def evoked_blinks(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
-def tied_blinks(run: GazeTrace) -> Floats:
+def saccade_blinks(run: GazeTrace) -> Floats:
     """Return (n,) whether each blink begins at the same moment as a saccade."""
     onsets = np.array([saccade.onset_s for saccade in run.saccades])
     if not len(onsets):
@@ -90,7 +90,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         *shape,
         MeasuredValue("evoked", large[:, 1], mean),
         MeasuredValue("blink_partial", partial, mean),
-        MeasuredValue("blink_tied", tied_blinks(run), mean),
+        MeasuredValue("blink_tied", saccade_blinks(run), mean),
     ]
 
 

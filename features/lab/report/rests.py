@@ -61,7 +61,7 @@ def small_shifts(run: GazeTrace) -> Floats:
     jumps = planned_saccades(run)
     size = jumps[:, 2]
     small = jumps[(size >= _SMALL_DEG[0]) & (size <= _SMALL_DEG[1]) & (jumps[:, 3] > 0.0)]
-    return _pieces(run, small[:, 0], run.column("on_face") > 0.0)
+    return _events_per_piece(run, small[:, 0], run.column("on_face") > 0.0)
 
 
 def idle_shifts(run: GazeTrace) -> Floats:
@@ -69,10 +69,10 @@ def idle_shifts(run: GazeTrace) -> Floats:
     idle = run.column("idle") > 0.0
     onsets = planned_saccades(run)[:, 0]
     at = np.searchsorted(run.column("t"), onsets)
-    return _pieces(run, onsets[idle[at]] if len(onsets) else onsets, idle)
+    return _events_per_piece(run, onsets[idle[at]] if len(onsets) else onsets, idle)
 
 
-def _pieces(run: GazeTrace, onsets_s: Floats, here: np.ndarray) -> Floats:
+def _events_per_piece(run: GazeTrace, onsets_s: Floats, here: np.ndarray) -> Floats:
     t = run.column("t")
     if len(t) < 2:
         return np.zeros((0, 2))

@@ -78,9 +78,9 @@ def design(
             raise SetupError(
                 f"there is no {study} here: name a study, or gazerig study design --example {study}"
             )
-        from gazerig.features.study.run.study_file import checked_study
+        from gazerig.features.study.run.study_file import load_checked_study
 
-        found = checked_study(study)
+        found = load_checked_study(study)
         for line in summary(study, found):
             print(line)
         folder = data_folder(found, data)

@@ -11,7 +11,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.study.cli.design import DataOption, StudyArgument, data_folder, state
 from gazerig.robot.app.options import RunOptions, parse_camera, parse_host_port
 from gazerig.robot.cli import run_options as options
-from gazerig.robot.cli.browser import desktop_here, open_page
+from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.terminal import clear_errors, say, signals
 
@@ -58,9 +58,9 @@ def run(
         if (participant is None) == (not simulate):
             raise SetupError("say --participant N, or --simulate N for simulated ones")
         from gazerig.features.study.data_folder import StudyData
-        from gazerig.features.study.run.study_file import checked_study
+        from gazerig.features.study.run.study_file import load_checked_study
 
-        found = checked_study(study)
+        found = load_checked_study(study)
         folder = StudyData(data_folder(found, data))
         if participant is None:
             from gazerig.features.study.run.simulated_session import simulate_study
@@ -89,7 +89,7 @@ def run(
         head = _head(found, asked)
         films = {} if head is not None else _films(found, folder)
         plan = SessionPlan(found, folder, participant, parse_host_port(page), films, head)
-        browse = open_page if not no_browser and desktop_here() else None
+        browse = open_page if not no_browser and is_desktop_here() else None
         with signals() as stopped:
             print(run_session(plan, stopped, say, RealClock(), browse))
 
@@ -98,9 +98,9 @@ def film(study: StudyArgument = "study.yaml", data: DataOption = None) -> None:
     """Make the films of a study's conditions; those that are there already are kept."""
     with clear_errors():
         from gazerig.features.study.data_folder import StudyData
-        from gazerig.features.study.run.study_file import checked_study
+        from gazerig.features.study.run.study_file import load_checked_study
 
-        found = checked_study(study)
+        found = load_checked_study(study)
         for key, path in _films(found, StudyData(data_folder(found, data))).items():
             print(f"{key}: {path}")
 

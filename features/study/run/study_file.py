@@ -123,7 +123,7 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     Raises:
         gazerig.config.load.ConfigError: with every fault, each with the study's line.
     """
-    path = _find("studies", name_or_path)
+    path = _find_file("studies", name_or_path)
     folder = path.parent
 
     def located(check: Check[StudyDesign]) -> Check[StudyDesign]:
@@ -153,7 +153,7 @@ def load_questionnaire(name_or_path: str) -> Questionnaire:
     Raises:
         gazerig.config.load.ConfigError: with every fault.
     """
-    path = _find("questionnaires", name_or_path)
+    path = _find_file("questionnaires", name_or_path)
     return load(path, Questionnaire, checks=(questionnaire_rules,))
 
 
@@ -189,7 +189,7 @@ def _differences(before: Rig, after: Rig) -> dict[str, Value]:
     return {key: value for key, value in found.items() if key not in _WHILE_READ}
 
 
-def _find(kind: str, name_or_path: str) -> Path:
+def _find_file(kind: str, name_or_path: str) -> Path:
     """Return the path of a file given by path (a slash or a YAML ending) or by shipped name."""
     return (
         Path(name_or_path).expanduser()
@@ -341,7 +341,7 @@ def _faults_at_key(key: str, error: ConfigError) -> Iterator[tuple[str, str]]:
         yield key, fault.rule if fault.file.startswith("config/") else str(fault)
 
 
-def checked_study(name_or_path: str) -> LoadedStudy:
+def load_checked_study(name_or_path: str) -> LoadedStudy:
     """Return a study by shipped name or path, with every rule checked.
 
     Raises:

@@ -15,7 +15,7 @@ from gazerig.features.world.rig_in_world import (
 )
 from gazerig.robot.app.bus_wiring import servo_configs
 from gazerig.robot.app.run_bus import STOP_BEYOND_DEG, start_angles_rad
-from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.model.coupling_params import coupled_pairs
 
 if TYPE_CHECKING:
     from gazerig.features.world.ideal_bus import WorldIdealBus
@@ -91,7 +91,7 @@ def _servo(rig: Rig, name: str) -> ServoInWorld:
     joint = rig.joints[name]
     joints: tuple[str, ...] = (name,)
     transmission: Transmission = JointTransmission(joint.made())
-    for first, second, coupling in pairs_of(rig.couplings):
+    for first, second, coupling in coupled_pairs(rig.couplings):
         if name in (first, second):
             joints = first, second
             transmission = PairTransmission(coupling, joints.index(name), joint.made())

@@ -14,7 +14,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port import port_at_path
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
-from gazerig.features.bringup.calibration.hobby_access import HobbyServoHandle
+from gazerig.features.bringup.calibration.hobby_access import HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
@@ -33,7 +33,7 @@ from gazerig.features.bringup.calibration.linkage_calibration import (
 )
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
-    SingleJoint,
+    SmartServoAccess,
 )
 from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.ports import (
@@ -59,9 +59,9 @@ from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import pairs_of, partners
+from gazerig.robot.model.coupling_params import coupled_pairs, partners
 
-JointResult = Calibration | LinkageFit
+JointMove = Calibration | LinkageFit
 
 
 class ActuationMode(StrEnum):
@@ -107,14 +107,14 @@ class CalibrationJob(NamedTuple):
 
 def measure(
     bench: CalibrationJob, names: Sequence[str]
-) -> tuple[dict[str, JointResult], tuple[str, ...]]:
+) -> tuple[dict[str, JointMove], tuple[str, ...]]:
     """Calibrate one joint after the other, bus by bus; return results and refused joints.
 
     Raises:
         SetupError: a port cannot be opened, or there are no answers left.
         CalibrationStopped: the user or the system requested the end.
     """
-    found: dict[str, JointResult] = {}
+    found: dict[str, JointMove] = {}
     refused: list[str] = []
     for bus in bus_names(bench.rig):
         for name in (name for name in joints_on(bench.rig, bus) if name in names):
@@ -162,10 +162,10 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
         raise SetupError(f"--pulses {low:g}:{high:g}: must ascend within {least:g}:{most:g} us")
 
 
-def _calibrate_smart_servo(bench: CalibrationJob, name: str, bus: str) -> JointResult:
+def _calibrate_smart_servo(bench: CalibrationJob, name: str, bus: str) -> JointMove:
     guardian, joint, person = _guardian(bench, name, bus), bench.rig.joints[name], bench.person
     with open_port(bench.rig, bench.wire, bus, guardian) as port:
-        single = SingleJoint(name, joint, port, RealClock(), bench.stopped, guardian)
+        single = SmartServoAccess(name, joint, port, RealClock(), bench.stopped, guardian)
         person.hand = None
         if (buses := bench.wire.buses) is not None:
             person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
@@ -179,7 +179,9 @@ def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
 
-def _calibrate(single: SingleJoint, how: CalibrationOptions, person: TerminalJogger) -> JointResult:
+def _calibrate(
+    single: SmartServoAccess, how: CalibrationOptions, person: TerminalJogger
+) -> JointMove:
     if how.clear_offset:
         was = single.clear_offset()
         if was:
@@ -214,13 +216,13 @@ def _calibrate(single: SingleJoint, how: CalibrationOptions, person: TerminalJog
 _VOID = "until this calibration is written the rig file's zero is wrong by that"
 
 
-def _calibrate_hobby_servo(bench: CalibrationJob, name: str, bus: str) -> JointResult:
+def _calibrate_hobby_servo(bench: CalibrationJob, name: str, bus: str) -> JointMove:
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
     port = port_at_path(bench.wire.paths[bus], on_traffic=guardian.beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
     params = config.maestro if config.kind == "maestro" else config.pca9685
-    hobby = HobbyServoHandle(
+    hobby = HobbyServoAccess(
         name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian
     )
     person.hand = None
@@ -343,7 +345,7 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
-    coupled = partners(pairs_of(rig.couplings))
+    coupled = partners(coupled_pairs(rig.couplings))
     for name in rig.names:
         if name in coupled and (not asked or name in asked):
             text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"
