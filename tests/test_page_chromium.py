@@ -4,6 +4,7 @@ The rig ticks in simulated time, slower than real, so that it leaves the process
 browser.
 """
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
@@ -256,9 +257,13 @@ def test_the_head_follows_a_finger_and_the_view_does_not_turn(
     touch("touchStart", 0.45)
     points = []
     for across in (0.48, 0.55):
-        before = len(rig.orders)
-        touch("touchMove", across)
-        wait_for(lambda n=before: len(rig.orders) > n, "the finger's point")  # type: ignore[misc]
+        before, shifts = len(rig.orders), itertools.cycle((0.0, 0.004))
+
+        def points_on(across: float = across, before: int = before, by: Any = shifts) -> bool:
+            touch("touchMove", across + next(by))
+            return len(rig.orders) > before
+
+        wait_for(points_on, "the finger's point")
         look = rig.orders[-1]
         assert isinstance(look, LookAt) and look.pointer
         points.append(present(look.p_world_m))
