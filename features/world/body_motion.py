@@ -270,15 +270,9 @@ class BodyMotion:
         hand = motions.hand(
             frame, self.t_s, [one for one, _ in mine], [target for _, target in mine], rest
         )
-        elbow, wrist, plane = two_bones(
-            shoulder, hand.wrist_m, body.upper_arm_m, body.forearm_m, hand.pole
-        )
-        ahead_of_plane = np.cross(plane, unit(shoulder - elbow))
-        found[f"{name}_upper_arm"] = (shoulder, axes_along(shoulder - elbow, ahead_of_plane))
-        forearm = np.cross(plane, unit(elbow - wrist))
-        found[f"{name}_forearm"] = (elbow, axes_along(elbow - wrist, forearm))
-        self.hands[name] = (wrist, motions.hand_axes(hand, elbow, wrist))
-        found[f"{name}_hand"] = self.hands[name]
+        upper, fore, own = arm_poses(shoulder, hand, body)
+        found[f"{name}_upper_arm"], found[f"{name}_forearm"] = upper, fore
+        found[f"{name}_hand"] = self.hands[name] = own
 
     def _swing(self, side: float) -> Floats:
         """Return how far an arm swings ahead: as far as the other side's foot is."""
@@ -314,3 +308,17 @@ class BodyMotion:
         shank = np.cross(unit(knee - ankle), plane)
         found[f"{name}_shank"] = (knee, axes_along(knee - ankle, shank))
         found[f"{name}_foot"] = (ankle, yaw_pitch_roll(yaw, -self.heel(foot)))
+
+
+def arm_poses(shoulder: Floats, hand: motions.HandPose, body: Measures) -> tuple[Pose, Pose, Pose]:
+    """Return upper arm, forearm and hand that reach from a shoulder to a hand."""
+    elbow, wrist, plane = two_bones(
+        shoulder, hand.wrist_m, body.upper_arm_m, body.forearm_m, hand.pole
+    )
+    ahead_of_plane = np.cross(plane, unit(shoulder - elbow))
+    forearm = np.cross(plane, unit(elbow - wrist))
+    return (
+        (shoulder, axes_along(shoulder - elbow, ahead_of_plane)),
+        (elbow, axes_along(elbow - wrist, forearm)),
+        (wrist, motions.hand_axes(hand, elbow, wrist)),
+    )

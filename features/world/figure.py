@@ -16,13 +16,20 @@ import numpy as np
 from gazerig.features.world import object_handover
 from gazerig.features.world.body_motion import SEGMENTS as SEGMENTS
 from gazerig.features.world.body_motion import SIDES as SIDES
-from gazerig.features.world.body_motion import BodyMotion
+from gazerig.features.world.body_motion import BodyMotion, arm_poses
 from gazerig.features.world.gait import RATE_HZ
 from gazerig.features.world.measures import Measures, measures
+from gazerig.features.world.motions import FIST_M, Frame, fist
+from gazerig.features.world.opponent import Opponent, OpponentRow, OpponentTrack
+from gazerig.features.world.rotations import quaternions, rotation_matrix, unit
+from gazerig.features.world.time_profiles import rise
 from gazerig.features.world.timeline import timed_acts
-from gazerig.gaze.types import Floats
+from gazerig.gaze.types import Floats, Vec3
 from gazerig.sim_mock.scenes.script import SceneScript
 from gazerig.sim_mock.scenes.timeline import TimedAct
+
+_PUNCH_OUT_M = 0.35
+"""A fist so far ahead of its guard is turned as in a punch."""
 
 
 class Segments(NamedTuple):
@@ -104,7 +111,75 @@ class Figures:
         row = int(at)
         before, after = self._table[row], self._table[row + 1]
         now = before + (at - row) * (after - before)
+        if self.boxer is not None and (step := self._track.at(t_s)) is not None:
+            now = self._moved(now, step)
         quat = now[:, 3:]
         found = Segments(now[:, :3], quat / np.sqrt((quat * quat).sum(axis=1, keepdims=True)))
         self._last = (t_s, found)
         return found
+
+    # --- the boxer that a person moves
+
+    @cached_property
+    def boxer(self) -> str | None:
+        """Return the name of the first person with gloves, None without one."""
+        return next((name for name, one in self.script.people.items() if one.gloves), None)
+
+    @cached_property
+    def _track(self) -> OpponentTrack:
+        return OpponentTrack(self.shared and self.shared.with_suffix(".moved"))
+
+    @cached_property
+    def opponent(self) -> Opponent | None:
+        """Return the boxer as a person moves it, None without one; of one process alone."""
+        return None if self.boxer is None else Opponent(lambda: self._home_m, lambda: self._track)
+
+    @cached_property
+    def _home_m(self) -> Vec3:
+        hand = self._guard[f"{self.boxer}/left_hand"]
+        x, y, z = (hand[:3] - FIST_M * rotation_matrix(hand[3:])[:, 2]).tolist()
+        return x, y, z
+
+    @cached_property
+    def _guard(self) -> Mapping[str, Floats]:
+        """Return the boxer's segments (7,) at the first time at which nothing but guard is done."""
+        own = [
+            one
+            for one in self.timelines[self.boxer or ""]
+            if one.act.do not in ("guard", "look_at")
+        ]
+        times = np.arange(0.5, self.script.round_s, 0.05).tolist()
+        free = (t for t in times if not any(one.start_s <= t <= one.end_s for one in own))
+        table = self._table[int(next(free, 0.0) * RATE_HZ)]
+        return {name: np.array(table[self.row[name]]) for name in self.names}
+
+    def _moved(self, now: Floats, row: OpponentRow) -> Floats:
+        """Return all segments with the boxer between the script's pose and the person's."""
+        name = self.boxer or ""
+        found, body = dict(self._guard), self.measures[name]
+        R = rotation_matrix(found[f"{name}/torso"][3:])
+        ahead = unit(R[None, :, 0] * (1.0, 1.0, 0.0))
+        left = np.cross((0.0, 0.0, 1.0), ahead)
+        shift = np.append(row.body_m, 0.0)
+        for segment in SEGMENTS:
+            found[f"{name}/{segment}"] = found[f"{name}/{segment}"] + np.append(shift, np.zeros(4))
+        by = row.fist_m - self._home_m - shift
+        for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+            # The other hand stays in guard, and sinks with the first one.
+            by_m = by if side == "left" else np.array((0.0, 0.0, min(0.0, by[2])))
+            shoulder = found[f"{name}/{side}_upper_arm"][None, :3]
+            wrist = found[f"{name}/{side}_hand"][None, :3] + by_m
+            frame = Frame(shoulder, shoulder, shoulder, ahead, left, sign, body)
+            hand = fist(frame, wrist, rise((by_m * ahead).sum(axis=1) / _PUNCH_OUT_M))
+            arm = zip(
+                ("upper_arm", "forearm", "hand"), arm_poses(shoulder, hand, body), strict=True
+            )
+            for segment, (p_m, R_segment) in arm:
+                found[f"{name}/{side}_{segment}"] = np.append(p_m, quaternions(R_segment))
+        moved = np.array(now)
+        for segment in SEGMENTS:
+            at, to = self.row[f"{name}/{segment}"], found[f"{name}/{segment}"]
+            if now[at, 3:] @ to[3:] < 0.0:  # the same rotation, on the near side
+                to = to * (1, 1, 1, -1, -1, -1, -1)
+            moved[at] += row.share * (to - now[at])
+        return moved

@@ -184,6 +184,15 @@ def _open(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPos
     )
 
 
+def fist(frame: Frame, wrist_m: Floats, out: Floats) -> HandPose:
+    """Return a fist at a place, from the guard (out 0) to a stretched punch (out 1), (n,)."""
+    one = np.ones(len(wrist_m))
+    guard = resting(frame, PostureShares(0.0 * one, one, 0.0 * one), 0.0 * one, boxes=True)
+    to = unit(wrist_m - frame.shoulder_m)
+    punch = HandPose(wrist_m, to, _way(frame, 0.0, -0.2, -1.0), _way(frame, 0.0, 0.6, -0.8))
+    return guard._replace(wrist_m=wrist_m).towards(punch, out)
+
+
 _Motion = Callable[[Frame, TimedAct, Floats, Floats, HandPose], HandPose]
 _MOTIONS: Mapping[str, _Motion] = {
     "wave": _wave,

@@ -9,6 +9,7 @@ import numpy as np
 
 from gazerig.features.world.figure import SIDES, Figures
 from gazerig.features.world.motions import FIST_M, OUT_S
+from gazerig.features.world.opponent import Opponent
 from gazerig.features.world.rotations import rotation_matrix
 from gazerig.features.world.timeline import HEAD_M, place_m
 from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub, yaw_pitch
@@ -72,6 +73,11 @@ class WorldScene:
     @cached_property
     def _events(self) -> tuple[Event, ...]:
         return events_of(self.figures.script, self.figures.timelines, self)
+
+    @property
+    def opponent(self) -> Opponent | None:
+        """Return the boxer that a person can move, None without one."""
+        return self.figures.opponent
 
     def place(self, name: str) -> Vec3:
         """Return a place, at the height of what is looked at there."""

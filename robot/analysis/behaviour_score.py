@@ -14,6 +14,7 @@ guards, by ``Target.plan`` and the events of a scene: "punch", with the time at 
 arrives, and "attack", while the opponent's guard is open.
 """
 
+from collections import deque
 from collections.abc import Iterable
 from math import dist
 from statistics import median
@@ -21,6 +22,7 @@ from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.moved_opponent import MovableOpponent
 
 
 class ExpectedResponse(Protocol):
@@ -69,6 +71,10 @@ class ExpectedResponse(Protocol):
         ...
 
 
+_MOST_TICKS = 2000
+"""Number of ticks kept to judge an event of a person's motion: 10 s at 200 Hz."""
+
+
 class _EventOutcome(NamedTuple):
     """Outcome of one event.
 
@@ -112,20 +118,29 @@ class _EventObservation:
 class BehaviourScore:
     """Scores a run, tick by tick."""
 
-    def __init__(self, events: Iterable[ExpectedResponse], round_s: float) -> None:
+    def __init__(
+        self,
+        events: Iterable[ExpectedResponse],
+        round_s: float,
+        moved: MovableOpponent | None = None,
+    ) -> None:
         self._events = tuple(events)
+        self._moved, self._judged = moved, 0
+        self._looks: deque[tuple[float, float, str, Vec3]] = deque(maxlen=_MOST_TICKS)
         self._round_s = round_s
         self._observations: dict[int, _EventObservation] = {}
         self._outcomes: dict[str, list[_EventOutcome]] = {event.name: [] for event in self._events}
         self._first_s: float | None = None
         self._last_s = 0.0
         self._round = 0
+        self._round_of: dict[int, int] = {}
 
     def update(self, tick: Tick) -> None:
         """Count one tick; the first one is the scene's beginning."""
         if self._first_s is None:
             self._first_s = self._last_s = tick.t_s
         dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
+        self._judge_moved(tick.t_s - self._first_s, dt_s, tick)
         number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
         if number != self._round:
             self._round = int(number)
@@ -133,6 +148,7 @@ class BehaviourScore:
                 self._close_event(i)
         for i, event in enumerate(self._events):
             if event.start_s <= phase_s < event.end_s:
+                self._round_of[i] = self._round
                 watch, target = self._observations.setdefault(i, _EventObservation()), tick.target
                 away_m = dist(target.p_world_m, event.place_world_m)
                 on = target.kind == event.kind and away_m <= event.within_m
@@ -143,7 +159,27 @@ class BehaviourScore:
     def _close_event(self, i: int) -> None:
         """Write down how an event went."""
         event = self._events[i]
-        self._outcomes[event.name].append(self._observations.pop(i).outcome(event.response))
+        outcome = self._observations.pop(i).outcome(event.response)
+        start_s = self._round_s * self._round_of[i]
+        if not _is_moved(self._moved, start_s + event.start_s, start_s + event.end_s):
+            self._outcomes[event.name].append(outcome)
+
+    def _judge_moved(self, now_s: float, dt_s: float, tick: Tick) -> None:
+        """Judge the events of a person's motion, which are known when they are over."""
+        if self._moved is None or not self._moved.spans_s:
+            return
+        self._looks.append((now_s, dt_s, tick.target.kind, tick.target.p_world_m))
+        while self._judged < len(events := self._moved.events):
+            event = events[self._judged]
+            if event.end_s > now_s:
+                break
+            self._judged += 1
+            watch = _EventObservation()
+            for at_s, step_s, kind, p_m in self._looks:
+                if event.start_s <= at_s < event.end_s:
+                    near = dist(p_m, event.place_world_m) <= event.within_m
+                    watch.update(kind == event.kind and near, at_s - event.start_s, step_s)
+            self._outcomes.setdefault(event.name, []).append(watch.outcome(event.response))
 
     def figures(self) -> dict[str, dict[str, float | int | None]]:
         """Return for each name: how many were seen, of how many, and how.
@@ -200,14 +236,20 @@ class _Attack(NamedTuple):
     looked: bool
 
 
+_Time = tuple[float, float, float]
+"""Start, end, and time by which an event must be answered."""
+
+
 class PlannerScore:
     """Scores a planner, tick by tick; the first tick is the beginning of a round."""
 
-    def __init__(self, events: Iterable[BoxingEvent], round_s: float) -> None:
-        events = tuple(events)
-        self._punches = tuple(event for event in events if event.name == "punch")
-        self._openings = tuple(event for event in events if event.name == "attack")
-        self._round_s = round_s
+    def __init__(
+        self,
+        events: Iterable[BoxingEvent],
+        round_s: float,
+        moved: MovableOpponent | None = None,
+    ) -> None:
+        self._events, self._round_s, self._moved = tuple(events), round_s, moved
         self._first_s: float | None = None
         self._last_s = 0.0
         self._action = ""
@@ -241,24 +283,18 @@ class PlannerScore:
             return {}
         # Of all punches that are over: by how much a guard came before the fist.
         leads, punches = [], 0
-        for number in range(int(self._last_s // self._round_s) + 1):
-            start_s = self._round_s * number
-            for punch in self._punches:
-                if start_s + punch.end_s > self._last_s:
-                    continue
-                punches += 1
-                due_s = start_s + (punch.end_s if punch.due_s is None else punch.due_s)
-                # A tick before it is over is as good as its end.
-                in_force = [at_s for at_s, end_s in self._guards if at_s <= due_s <= end_s + 0.05]
-                if in_force:
-                    leads.append(due_s - max(in_force))
-        false = sum(
-            not self._is_during(at_s, self._punches, 0.0, _LATE_S) for at_s, _ in self._guards
-        )
-        opens = sum(self._is_during(one.start_s, self._openings, 0.1, 0.0) for one in self._attacks)
-        counters = sum(
-            self._is_during(one.start_s, self._punches, 0.0, _COUNTER_S) for one in self._attacks
-        )
+        thrown, openings = self._happened("punch"), self._happened("attack")
+        for _, end_s, due_s in thrown:
+            if end_s > self._last_s:
+                continue
+            punches += 1
+            # A tick before it is over is as good as its end.
+            in_force = [at_s for at_s, end_s in self._guards if at_s <= due_s <= end_s + 0.05]
+            if in_force:
+                leads.append(due_s - max(in_force))
+        false = sum(not _is_during(at_s, thrown, 0.0, _LATE_S) for at_s, _ in self._guards)
+        opens = sum(_is_during(one.start_s, openings, 0.1, 0.0) for one in self._attacks)
+        counters = sum(_is_during(one.start_s, thrown, 0.0, _COUNTER_S) for one in self._attacks)
         return {
             "punches": punches,
             "guards_in_time": len(leads),
@@ -270,9 +306,30 @@ class PlannerScore:
             "looked_at": sum(one.looked for one in self._attacks),
         }
 
-    def _is_during(
-        self, at_s: float, events: tuple[BoxingEvent, ...], before_s: float, after_s: float
-    ) -> bool:
-        """Return whether a time is within an event, or near one."""
-        phase_s = at_s % self._round_s
-        return any(e.start_s - before_s <= phase_s <= e.end_s + after_s for e in events)
+    def _happened(self, name: str) -> list[_Time]:
+        """Return the times of all events of a name: scripted ones, and those of a person."""
+        found = []
+        for number in range(int(self._last_s // self._round_s) + 1):
+            start_s = self._round_s * number
+            for event in self._events:
+                time = _time(event, start_s)
+                if event.name == name and not _is_moved(self._moved, time[0], time[1]):
+                    found.append(time)
+        moved = () if self._moved is None else self._moved.events
+        return found + [_time(event, 0.0) for event in moved if event.name == name]
+
+
+def _time(event: BoxingEvent, after_s: float) -> _Time:
+    due_s = event.end_s if event.due_s is None else event.due_s
+    return after_s + event.start_s, after_s + event.end_s, after_s + due_s
+
+
+def _is_during(at_s: float, times: Iterable[_Time], before_s: float, after_s: float) -> bool:
+    """Return whether a time is within an event, or near one."""
+    return any(start - before_s <= at_s <= end + after_s for start, end, _ in times)
+
+
+def _is_moved(moved: MovableOpponent | None, start_s: float, end_s: float) -> bool:
+    """Return whether a person moved the opponent during a scripted event, which then was not."""
+    spans = () if moved is None else moved.spans_s
+    return any(start <= end_s and start_s <= end for start, end in spans)

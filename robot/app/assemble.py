@@ -42,6 +42,7 @@ from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.moved_opponent import BoxingScene, MovedOpponent
 from gazerig.robot.model.types import JointAngles, further
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
@@ -194,6 +195,8 @@ def assemble(
         )
         live = LiveParams(parts, rig, placement)
         robot = _build_robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
+        if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
+            robot.let_move(MovedOpponent(scene.opponent, room.start_s))
     except BaseException:
         opened.close()
         raise

@@ -26,6 +26,7 @@ from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.control.real_time import SWITCH_INTERVAL
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.moved_opponent import BoxingScene
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -42,7 +43,11 @@ class SceneScore(NamedTuple):
     def from_scene(cls, scene: Scene) -> "SceneScore":
         """Return the score of a scene before its first tick."""
         events = scene.events()
-        return cls(BehaviourScore(events, scene.round_s), PlannerScore(events, scene.round_s))
+        moved = scene.opponent if isinstance(scene, BoxingScene) else None
+        return cls(
+            BehaviourScore(events, scene.round_s, moved),
+            PlannerScore(events, scene.round_s, moved),
+        )
 
 
 def run_figures(

@@ -22,6 +22,7 @@ from gazerig.robot.model.commands import (
     Express,
     Jog,
     LookAtPerson,
+    MoveOpponent,
     Play,
     Renew,
     Resume,
@@ -30,6 +31,7 @@ from gazerig.robot.model.commands import (
     Tune,
 )
 from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.moved_opponent import MovedOpponent
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.guard import Guard
@@ -40,6 +42,7 @@ class CommandExecutor:
 
     Attributes:
         commanded_rad: Joint angles last sent to the servos; joints are held from there.
+        opponent: Boxer in the emulated world, None without one.
 
     Args:
         body: The joints on their bus.
@@ -80,6 +83,7 @@ class CommandExecutor:
         self._taken_over = False
         self._trigger = GestureTrigger()
         self.commanded_rad: JointAngles = ()
+        self.opponent: MovedOpponent | None = None
 
     def reset(self) -> None:
         """Forget the gestures that rules have played."""
@@ -92,6 +96,8 @@ class CommandExecutor:
 
     def end_lapsed(self, t_s: float) -> None:
         """End a client's control that was not renewed or has expired, and expired levels."""
+        if self.opponent is not None:
+            self.opponent.update(t_s)
         lead, levels = self._lead, self._animation.levels
         if lead.words and (why := lead.over(t_s)):
             self._messages.append(f"{lead.words}: {why}, so the gaze leads again")
@@ -120,6 +126,9 @@ class CommandExecutor:
                 return _call_or_refuse(lambda: self._animation.expressions.express(name, strength))
             case SetLevel(name, value):
                 return _call_or_refuse(lambda: self._animation.levels.set(name, value, t_s))
+            case MoveOpponent(p):
+                if self.opponent is not None:  # a repeated run has no world
+                    self.opponent.move(p, t_s)
             case Renew():
                 if not self._lead.renew(command, t_s):
                     return CommandReply(f"{command.who or 'you'} lead nothing now")

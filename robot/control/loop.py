@@ -31,10 +31,11 @@ from gazerig.robot.control.tick import stopped_result
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import check
-from gazerig.robot.model.commands import Ask, Command, Jog, Tune
+from gazerig.robot.model.commands import Ask, Command, Jog, MoveOpponent, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.moved_opponent import MovedOpponent
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
@@ -139,6 +140,8 @@ class Robot:
         check(command)
         if isinstance(command, Jog):
             refuse_out_of_range(command, self.body.names, self._guard.limits)
+        if isinstance(command, MoveOpponent) and self._executor.opponent is None:
+            raise ValueError("no opponent to move: the run is in no world with a boxer")
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
@@ -150,6 +153,10 @@ class Robot:
         check(command)
         refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
         return self._commands.add(command)
+
+    def let_move(self, opponent: MovedOpponent) -> None:
+        """Let commands move a boxer of the emulated world."""
+        self._executor.opponent = opponent
 
     def report(self, line: str) -> None:
         """Add a line to the events of the next tick; only for the loop's thread."""

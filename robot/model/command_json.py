@@ -8,6 +8,7 @@ from math import pi
 from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.model.commands import (
     COMMANDS,
+    OPPONENT_BOX_M,
     Ask,
     Command,
     ControlCommand,
@@ -19,6 +20,7 @@ from gazerig.robot.model.commands import (
     LookAtInHead,
     LookAtPerson,
     LookAtPixel,
+    MoveOpponent,
     Play,
     Renew,
     Resume,
@@ -81,6 +83,13 @@ def check(command: Command) -> None:
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
                 raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
             _check_who(who)
+        case MoveOpponent(p):
+            if not _numbers(p, 3, MAX_COORDINATE_M) or any(
+                not least <= one <= most
+                for one, (least, most) in zip(p, OPPONENT_BOX_M, strict=True)
+            ):
+                box = ", ".join(f"{least:g}..{most:g}" for least, most in OPPONENT_BOX_M)
+                raise ValueError(f"the opponent's fist is moved to three numbers in m within {box}")
         case Renew(who):
             _check_who(who)
         case Stop(why, who):

@@ -169,6 +169,20 @@ class Play(NamedTuple):
     who: str = ""
 
 
+OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))
+"""Least and greatest x, y and z to which the opponent's fist can be moved."""
+
+
+class MoveOpponent(NamedTuple):
+    """Move the leading fist of a boxing world's opponent; after 1 s its script continues.
+
+    Attributes:
+        p_world_m: Point in m within ``OPPONENT_BOX_M``; the fist follows within its limits.
+    """
+
+    p_world_m: Vec3
+
+
 class Renew(NamedTuple):
     """The heartbeat of the client in control of gaze or joints; others' have no effect."""
 
@@ -210,16 +224,18 @@ class Tune(NamedTuple):
 Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
 ControlCommand = Look | Jog
 """Commands that take control of gaze or joints."""
-Command = Ask | ControlCommand | Express | SetLevel | Play | Renew | Stop | Resume | Tune
+Command = (
+    Ask | ControlCommand | Express | SetLevel | Play | MoveOpponent | Renew | Stop | Resume | Tune
+)
 
-REPEATED = (Renew, SetLevel)
+REPEATED = (Renew, SetLevel, MoveOpponent)
 """Commands that programs send many times per second; they give no message and no mark."""
 
 COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
     "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
     "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
-    "play": Play,
+    "play": Play, "opponent": MoveOpponent,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 

@@ -170,7 +170,7 @@ MUTANTS = (
            "attacks without a rest between them", ("action_planner",)),
     Mutant("gaze/attention/action_planner.py", "par.release_ratio if one.id == guarded else 1.0", "1.0",
            "a guard drops as soon as the fist fails a limit", ("action_planner",)),
-    Mutant("robot/analysis/behaviour_score.py", "phase_s = at_s % self._round_s", "phase_s = at_s",
+    Mutant("robot/analysis/behaviour_score.py", "time = _time(event, start_s)", "time = _time(event, 0.0)",
            "attacks of later rounds are never into an open guard", ("behaviours", "rerun")),
     # ---- looks
     Mutant("features/lab/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(first == 0)",

@@ -1,0 +1,206 @@
+"""A boxer whose leading fist a person moves: bounded motion, its share of the pose, its events.
+
+The run's process computes the motion in steps of 10 ms, a little ahead of the time, and writes it
+where every process reads it. A second after the last order the script takes over again.
+"""
+
+import mmap
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.features.world.time_profiles import rise
+from gazerig.features.world.timeline import HEAD_M
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.sim_mock.scenes.scene import Event
+
+STEP_S, AHEAD = 0.01, 5
+"""Period of the rows, and how many are written ahead, so that no reader has to extrapolate."""
+HOLD_S, TAKE_S = 1.0, 0.6
+"""An order holds for ``HOLD_S``; hand-over between script and person takes ``TAKE_S``."""
+MAX_M_S, MAX_M_S2, _RATE_HZ = 3.0, 40.0, 16.0
+"""Limits of the fist: a scripted punch has 2.6 m/s."""
+BODY_M_S, _BODY_RATE_HZ, _BODY_FROM_M, _BODY_TO_M = 0.8, 4.0, (-0.15, -0.5), (0.4, 0.5)
+_PUNCH_M_S, _ARRIVED_M_S, _PUNCH_M, _OVER_S = 0.8, 0.3, 0.15, 0.25
+_OPEN_M, _OPEN_S = 0.2, 0.3
+_KEPT = 1024
+"""Number of rows that readers can read: 10 s."""
+
+
+class OpponentRow(NamedTuple):
+    """One step: its number, the share of the person in the pose, the fist, the body's shift."""
+
+    number: float
+    share: float
+    fist_m: Floats
+    body_m: Floats
+
+
+class OpponentMotion:
+    """The motion of a fist to ordered points, with limits of speed and acceleration; pure.
+
+    Attributes:
+        spans_s: times in which a person moved it, (start, end).
+        events: punches and open guards that are over, derived from the motion.
+    """
+
+    def __init__(self, home_m: Vec3) -> None:
+        self.spans_s: list[tuple[float, float]] = []
+        self.events: list[Event] = []
+        self._home = np.array(home_m)
+        self._target, self._ordered_s = self._home, -np.inf
+        self._share, self._fist, self._speed = 0.0, self._home, np.zeros(3)
+        self._body, self._body_speed = np.zeros(2), np.zeros(2)
+        self._punch: tuple[float, float] | None = None
+        self._open_s: float | None = None
+
+    @property
+    def rests(self) -> bool:
+        """Return whether the script alone moves the boxer."""
+        return self._share == 0.0
+
+    def order(self, p_m: Vec3, t_s: float) -> None:
+        """Move the fist to a point from now on."""
+        self._target, self._ordered_s = np.array(p_m), t_s
+
+    def step(self, number: int) -> OpponentRow:
+        """Move by one step; return the row of this number."""
+        t_s = number * STEP_S
+        held = t_s - self._ordered_s <= HOLD_S
+        if self.rests and held:
+            self.spans_s.append((t_s, t_s))
+            self._fist, self._speed = self._home, np.zeros(3)
+            self._body, self._body_speed = np.zeros(2), np.zeros(2)
+        before_m = self._fist
+        self._fist, self._speed = _follow(
+            self._fist, self._speed, self._target if held else self._home, _RATE_HZ, MAX_M_S
+        )
+        aside = np.clip((self._fist - self._home)[:2], _BODY_FROM_M, _BODY_TO_M)
+        self._body, self._body_speed = _follow(
+            self._body, self._body_speed, aside, _BODY_RATE_HZ, BODY_M_S
+        )
+        change = STEP_S / TAKE_S if held else -STEP_S / TAKE_S
+        self._share = float(np.clip(self._share + change, 0.0, 1.0))
+        if self.spans_s:
+            self.spans_s[-1] = (self.spans_s[-1][0], t_s)
+        self._find_events(before_m, t_s)
+        return OpponentRow(number, float(rise(np.array(self._share))), self._fist, self._body)
+
+    def _find_events(self, before_m: Floats, t_s: float) -> None:
+        """Note a fast approach that has ended near the head, and a guard that was open."""
+        far_m = float(np.linalg.norm(self._fist - HEAD_M))
+        closing_m_s = (float(np.linalg.norm(before_m - HEAD_M)) - far_m) / STEP_S
+        if self._punch is None and closing_m_s >= _PUNCH_M_S:
+            self._punch = t_s - STEP_S, far_m
+        elif self._punch is not None and closing_m_s < _ARRIVED_M_S:
+            (start_s, from_m), self._punch = self._punch, None
+            if from_m - far_m >= _PUNCH_M:
+                self._note("punch", "hand", start_s, t_s + _OVER_S, due_s=t_s)
+        low = self._fist[2] < self._home[2] - _OPEN_M
+        if low and self._open_s is None:
+            self._open_s = t_s
+        elif not low and self._open_s is not None:
+            start_s, self._open_s = self._open_s, None
+            if t_s - start_s >= _OPEN_S:
+                self._note("attack", "attack_target", start_s, t_s)
+
+    def _note(
+        self, name: str, kind: str, start_s: float, end_s: float, due_s: float | None = None
+    ) -> None:
+        x, y, z = self._fist.tolist()
+        self.events.append(Event(name, "look", kind, start_s, end_s, (x, y, z), 0.6, due_s))
+
+
+def _follow(
+    p: Floats, v: Floats, target: Floats, rate_hz: float, most_m_s: float
+) -> tuple[Floats, Floats]:
+    """Return place and speed a step later: critically damped, within the limits."""
+    push = _limited(rate_hz * (rate_hz * (target - p) - 2.0 * v), MAX_M_S2)
+    v = _limited(v + STEP_S * push, most_m_s)
+    return p + STEP_S * v, v
+
+
+def _limited(v: Floats, most: float) -> Floats:
+    return np.asarray(v * (most / max(most, float(np.linalg.norm(v)))))
+
+
+class OpponentTrack:
+    """The rows of a motion where several processes read them; one of them writes.
+
+    Args:
+        file: in which they are, created by whoever comes first; None: in this process alone.
+    """
+
+    def __init__(self, file: Path | None) -> None:
+        columns = 7
+        size = 1 + _KEPT * columns
+        if file is None:
+            numbers: Floats = np.zeros(size)
+        else:
+            with os.fdopen(os.open(file, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as opened:
+                opened.truncate(8 * size)
+                numbers = np.frombuffer(mmap.mmap(opened.fileno(), 0), np.float64)
+        self._newest, self._rows = numbers[:1], numbers[1:].reshape(_KEPT, columns)
+
+    def write(self, row: OpponentRow) -> None:
+        """Write the next row."""
+        at = self._rows[int(row.number) % _KEPT]
+        at[1], at[2:5], at[5:] = row.share, row.fist_m, row.body_m
+        at[0] = row.number
+        self._newest[0] = row.number
+
+    def at(self, t_s: float) -> OpponentRow | None:
+        """Return the row of a time, None while the script alone moves the boxer."""
+        newest = int(self._newest[0])
+        if newest == 0:
+            return None
+        number = min(int(t_s / STEP_S), newest)
+        row = self._rows[number % _KEPT].copy()
+        if row[0] != number:
+            return None
+        after = self._rows[(number + 1) % _KEPT]
+        if after[0] == number + 1:
+            row += (t_s / STEP_S - number) * (after - row)
+        return None if row[1] == 0.0 else OpponentRow(row[0], float(row[1]), row[2:5], row[5:])
+
+
+class Opponent:
+    """The boxer of a script, as a person moves it.
+
+    Args:
+        home: returns the place of the leading fist in guard.
+        track: receives the motion.
+    """
+
+    def __init__(self, home: Callable[[], Vec3], track: Callable[[], OpponentTrack]) -> None:
+        self._home, self._track = home, track
+        self._motion: OpponentMotion | None = None
+        self._next = 0
+
+    @property
+    def spans_s(self) -> Sequence[tuple[float, float]]:
+        """Return the times in which a person moved it."""
+        return () if self._motion is None else self._motion.spans_s
+
+    @property
+    def events(self) -> Sequence[Event]:
+        """Return the events of its motion that are over."""
+        return () if self._motion is None else self._motion.events
+
+    def move(self, p_m: Vec3, t_s: float) -> None:
+        """Move the fist to a point; t_s: time of the scene."""
+        if self._motion is None:
+            self._motion = OpponentMotion(self._home())
+        if self._motion.rests:
+            self._next = int(t_s / STEP_S) + 2
+        self._motion.order(p_m, t_s)
+        self.update(t_s)
+
+    def update(self, t_s: float) -> None:
+        """Write the rows up to a little after a time, if a person moves it."""
+        while self._motion and self._next and self._next <= int(t_s / STEP_S) + AHEAD:
+            self._track().write(self._motion.step(self._next))
+            self._next = 0 if self._motion.rests else self._next + 1

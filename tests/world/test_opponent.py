@@ -1,0 +1,183 @@
+"""A boxer whose fist a person moves: limits, take-over and return, score, and a repeated run."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fakes.runs import record
+
+pytest.importorskip("mujoco")
+
+from gazerig.config.schema import load_rig  # noqa: E402
+from gazerig.features.world.figure import Figures  # noqa: E402
+from gazerig.features.world.opponent import (  # noqa: E402
+    HOLD_S,
+    MAX_M_S,
+    MAX_M_S2,
+    TAKE_S,
+    OpponentMotion,
+    OpponentTrack,
+)
+from gazerig.features.world.run.run_world import world_scene  # noqa: E402
+from gazerig.features.world.world_scene import WorldScene  # noqa: E402
+from gazerig.gaze.types import Vec3  # noqa: E402
+from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore  # noqa: E402
+from gazerig.robot.app.assemble import (  # noqa: E402
+    Assembly,
+    assemble,
+    with_options,  # noqa: E402
+)
+from gazerig.robot.app.options import RunOptions  # noqa: E402
+from gazerig.robot.app.resimulate import rerun  # noqa: E402
+from gazerig.robot.control.tick import Tick  # noqa: E402
+from gazerig.robot.model.command_json import as_json, from_json  # noqa: E402
+from gazerig.robot.model.commands import OPPONENT_BOX_M, MoveOpponent  # noqa: E402
+from gazerig.robot.recording.read import RunRecording  # noqa: E402
+
+BOXING = RunOptions(mock=True, fast=True, seed=1, rig="desk", world="boxing", no_pictures=True)
+READY, HIT, LOW = (0.7, 0.0, 0.05), (0.36, 0.0, 0.12), (0.7, 0.0, -0.3)
+
+
+def path(t_s: float) -> Vec3 | None:
+    """Return the orders: a punch at 2 s, an open guard from 3 to 4 s, none after 5 s."""
+    if not 1.0 <= t_s < 5.0:
+        return None
+    return HIT if 2.0 <= t_s < 2.5 else LOW if 3.0 <= t_s < 4.0 else READY
+
+
+@pytest.fixture
+def scene() -> WorldScene:
+    return world_scene("boxing", 0)
+
+
+def hands(scene: WorldScene, orders: Callable[[float], Vec3 | None] = path) -> np.ndarray:
+    """Return places of both hands and the face, (n, 3, 3), every 10 ms of 7 s."""
+    opponent, found = scene.opponent, []
+    assert opponent is not None
+    for k in range(700):
+        t_s = 0.01 * k
+        if k % 5 == 0 and (p_m := orders(t_s)) is not None:
+            opponent.move(p_m, t_s)
+        opponent.update(t_s)
+        left, right = (scene.hand("rival", side, t_s) for side in ("left", "right"))
+        found.append((left, right, scene.face("rival", t_s)))
+    return np.array(found)
+
+
+def test_the_fist_follows_within_its_limits(scene: WorldScene) -> None:
+    at = hands(scene)
+    m_s = np.linalg.norm(np.diff(at, axis=0), axis=2) / 0.01
+    assert m_s.max(axis=0) == pytest.approx([2.65, 2.5, 0.25], abs=0.2) and m_s.max() < MAX_M_S
+    # The leading fist is where it was ordered; a low one takes the other hand along.
+    assert at[245, 0] == pytest.approx(HIT, abs=0.05)
+    assert at[390, 0] == pytest.approx(LOW, abs=0.06)
+    assert at[390, 1, 2] < -0.25 < at[240, 1, 2]
+
+
+def test_jumping_orders_never_break_the_limits() -> None:
+    motion, rng = OpponentMotion((0.7, 0.0, 0.0)), np.random.default_rng(2)
+    low, high = np.array(OPPONENT_BOX_M).T
+    rows = []
+    for k in range(2000):
+        if k % 3 == 0:
+            x, y, z = rng.uniform(low, high).tolist()
+            motion.order((x, y, z), 0.01 * k)
+        rows.append(motion.step(k))
+    fist = np.array([row.fist_m for row in rows])
+    v = np.diff(fist, axis=0) / 0.01
+    assert np.linalg.norm(v, axis=1).max() <= MAX_M_S + 1e-6
+    assert np.linalg.norm(np.diff(v, axis=0), axis=1).max() / 0.01 <= MAX_M_S2 + 1e-6
+    assert (fist > low - 0.05).all() and (fist < high + 0.05).all()
+
+
+def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
+    alone = hands(world_scene("boxing", 0), lambda t_s: None)
+    at = hands(scene)
+    assert (at[:100] == alone[:100]).all()
+    ends_s = 4.95 + HOLD_S + TAKE_S
+    (span,) = scene.figures.opponent.spans_s
+    assert span == pytest.approx((1.02, ends_s), abs=0.05)
+    assert (at[int(100 * ends_s) + 5 :] == alone[int(100 * ends_s) + 5 :]).all()
+    # The punch of the script at 1.9 s was not thrown, that of the person at 2 s was.
+    assert alone[210:230, 0, 0].min() < 0.36 and at[190:200, 0, 0].min() > 0.6
+
+
+def test_another_process_sees_the_same_motion(scene: WorldScene, tmp_path: Path) -> None:
+    shared = scene.figures.sharing(tmp_path / "people.npy")
+    other = Figures(shared.script, shared.seed, shared.shared)
+    at = hands(WorldScene("boxing", shared))
+    seen = WorldScene("boxing", other).hand("rival", "left", 6.3)
+    assert seen == pytest.approx(at[630, 0], abs=1e-9)
+    assert OpponentTrack(tmp_path / "people.moved").at(1.0) is None  # before it was moved
+
+
+def test_events_follow_from_the_motion(scene: WorldScene) -> None:
+    hands(scene)
+    punch, opened = scene.figures.opponent.events
+    assert punch.name == "punch" and punch.due_s is not None
+    assert 2.0 < punch.start_s < 2.15 < punch.due_s < 2.5
+    assert opened.name == "attack" and 3.0 < opened.start_s < 3.4 and 4.0 < opened.end_s < 4.4
+
+
+def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(scene: WorldScene) -> None:
+    rig, options = load_rig("desk", "strong_boxer"), replace(BOXING, character="strong_boxer")
+    made = assemble(rig, options)
+    moved = made.scene.opponent
+    score = PlannerScore(made.scene.events(), made.scene.round_s, moved)
+    looks = BehaviourScore(made.scene.events(), made.scene.round_s, moved)
+    made.robot.start(made.clock)
+    for k in range(1400):
+        t_s = 0.005 * k
+        if k % 10 == 0 and (p_m := path(t_s)) is not None:
+            made.robot.command(MoveOpponent(p_m))
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        score.update(tick)
+        looks.update(tick)
+    made.robot.stop()
+    made.close()
+    figures = score.figures()
+    assert figures["punches"] == figures["guards_in_time"] == 1
+    assert figures["lead_ms"] > 50.0 and figures["attacks"] >= 1 <= figures["open"]
+    assert looks.figures()["punch"]["of"] == looks.figures()["punch"]["seen"] == 1
+
+
+@pytest.mark.parametrize(
+    "p_m", [(nan, 0.0, 0.0), (0.7, 0.0), (0.1, 0.0, 0.0), (0.7, 0.7, 0.0), ("a", 0.0, 0.0), None]
+)
+def test_a_bad_point_gets_one_clear_error(p_m: object) -> None:
+    with pytest.raises(ValueError, match=r"^the opponent's fist is moved to .* 0\.36\.\.1\.2, "):
+        from_json({"do": "opponent", "p_world_m": p_m})
+    assert from_json(as_json(MoveOpponent(READY))) == MoveOpponent(READY)
+
+
+def test_only_a_world_with_a_boxer_has_an_opponent() -> None:
+    for options in (
+        replace(BOXING, world=None, scene="visitor"),
+        replace(BOXING, world="conversation"),
+    ):
+        made = assemble(load_rig("desk"), options)
+        with pytest.raises(ValueError, match="^no opponent to move: "):
+            made.robot.command(MoveOpponent(READY))
+        made.close()
+
+
+def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path) -> None:
+    def order(number: int, made: Assembly) -> None:
+        if number % 10 == 0 and (p_m := path(0.005 * number)) is not None:
+            made.robot.command(MoveOpponent(p_m))
+
+    options = replace(BOXING, character="strong_boxer")
+    rig = with_options(load_rig("desk", "strong_boxer"), options)
+    ticks: list[list[Tick]] = [
+        record(tmp_path / f"{n}.mcap", rig, 3.0, options, order) for n in range(2)
+    ]
+    ordered = [one for tick in ticks[0] for one in tick.commands]
+    assert len(ordered) == 40 and all(isinstance(one, MoveOpponent) for one in ordered)
+    assert [t.commands for t in ticks[0]] == [t.commands for t in ticks[1]]
+    assert [t.target for t in ticks[0]] == [t.target for t in ticks[1]]
+    found = rerun(RunRecording(tmp_path / "0.mcap"))
+    assert found.is_same and found.agreeing_ticks == found.ticks == 599
