@@ -22,7 +22,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import run
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
-from gazerig.robot.recording.read import RunRecording, used
+from gazerig.robot.recording.read import RunRecording, report_bad_contents
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.replay import SnapshotIndex
 from gazerig.robot.recording.run_info import RunInfo
@@ -162,12 +162,12 @@ DAMAGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (
 
 
 def _exported(file: Path) -> object:
-    with used(file):
+    with report_bad_contents(file):
         return collect_gaze_angles(RunRecording(file).ticks()).time_s.tolist()
 
 
 def _shown(file: Path) -> object:
-    with used(file):
+    with report_bad_contents(file):
         found = RunRecording(file)
         frames = SnapshotIndex(found.ticks(), found.frames(), found.info.rate_hz)
     try:
@@ -177,7 +177,7 @@ def _shown(file: Path) -> object:
 
 
 def _again(file: Path) -> object:
-    with used(file):
+    with report_bad_contents(file):
         done = rerun(RunRecording(file))
     return done.ticks, done.is_same
 

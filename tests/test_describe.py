@@ -32,10 +32,10 @@ from gazerig.robot.description.mass import (
     HEAD_LOAD_KG_M2,
     SHELL_M,
     about,
-    joined,
+    in_parent_frame,
+    join_inertias,
     sheet,
     skull,
-    turned,
 )
 from gazerig.robot.description.mesh import merged
 from gazerig.robot.description.mjcf import mjcf
@@ -303,12 +303,12 @@ def test_the_head_is_balanced_and_weighs_what_its_emulated_servos_carry() -> Non
     description = description_of(shipped("desk"))
     poses = description.poses(description.angles((), ()))
     carried = [
-        turned(link.inertia, *poses[link.name])
+        in_parent_frame(link.inertia, *poses[link.name])
         for link in description.links
         if link.inertia is not None and link.name not in ("base_link", "neck_yaw_link")
         and link.name != "neck_pitch_link" and link.name != "neck_roll_link"
     ]  # fmt: skip
-    whole = joined(carried)
+    whole = join_inertias(carried)
     pivot = poses["neck_roll_link"][1]
     assert whole.mass_kg == pytest.approx(0.6)
     assert np.linalg.norm(np.subtract(whole.com_m, pivot)) < 0.002

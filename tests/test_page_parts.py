@@ -81,7 +81,7 @@ from gazerig.robot.dashboard.view.people import fixated_part
 from gazerig.robot.dashboard.view.scene_node import along, turned_up
 from gazerig.robot.dashboard.widgets.widget import Html, Widget
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lathe, lid, ring
 from gazerig.robot.model.control_source import ControlSource
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
@@ -346,7 +346,7 @@ def test_closed_shapes_have_their_volume_and_look_outwards() -> None:
     assert volume(cap(1.0, math.pi, 40)) == pytest.approx(ball, rel=0.02)
     assert volume(ellipsoid((1.0, 2.0, 3.0), rings=41)) == pytest.approx(6.0 * ball, rel=0.02)
     assert volume(ring(1.0, 0.1)) == pytest.approx(2.0 * math.pi**2 * 0.01, rel=0.05)
-    cylinder = turned([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)])
+    cylinder = lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)])
     assert volume(cylinder) == pytest.approx(2.0 * math.pi, rel=0.02)
 
 

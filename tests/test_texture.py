@@ -15,7 +15,7 @@ from gazerig.robot.description.mesh import (
     Painted,
     cap,
     merged,
-    mirrored,
+    mirror,
     mix,
     moved,
     painted,
@@ -27,7 +27,7 @@ from gazerig.robot.description.texture import TexturedMesh, textured
 SHAPES: dict[str, Callable[[], Painted]] = {
     "eye": head_mesh.eye,
     "lid": lambda: head_mesh.eyelid(False),
-    "other brow": lambda: mirrored(head_mesh.brow()),
+    "other brow": lambda: mirror(head_mesh.brow()),
     "skin": lambda: head_mesh.skin().head,
     "jaw": lambda: head_mesh.skin().jaw,
     "person": lambda: person_shape.head(1, 0.6),

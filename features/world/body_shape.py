@@ -17,13 +17,13 @@ from gazerig.robot.description.mesh import (
     Painted,
     grid,
     merged,
-    mirrored,
+    mirror,
     mix,
     painted,
     spot,
     step,
 )
-from gazerig.robot.description.person_shape import PersonLook, hand_of
+from gazerig.robot.description.person_shape import PersonLook, open_right_hand
 from gazerig.robot.description.solid import Solid, capsule, ellipsoid, union
 
 _AROUND = 18
@@ -87,7 +87,7 @@ def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str
     for side in ("left", "right"):
         found[f"{side}_upper_arm"] = painted(upper, look.shirt)
         found[f"{side}_forearm"] = painted(fore, sleeve)
-        found[f"{side}_hand"] = right if side == "right" else mirrored(right)
+        found[f"{side}_hand"] = right if side == "right" else mirror(right)
         found[f"{side}_thigh"] = painted(thigh, look.trousers)
         found[f"{side}_shank"] = painted(shank, look.trousers)
         found[f"{side}_foot"] = painted(_shoe(body), look.shoes)
@@ -151,7 +151,7 @@ def _neck(neck_m: float, k: float) -> Mesh:
 
 def _hand(look: PersonLook, k: float) -> Painted:
     """Return a right hand: hanging, its fingers down."""
-    mesh, colours, normals = hand_of(look, 22)
+    mesh, colours, normals = open_right_hand(look, 22)
     size, turn = _HAND_SCALE * k, np.array((1.0, -1.0, -1.0))
     # Fingers end bluntly, not in the point of an ellipsoid.
     u = np.clip((mesh.vertices[:, 2] - 0.45) / 0.55, 0.0, 0.99)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Mesh, Painted, ellipsoid, merged, smooth_normals, turned
+from gazerig.robot.description.mesh import Mesh, Painted, ellipsoid, lathe, merged, smooth_normals
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 
@@ -191,7 +191,7 @@ def _cylinder(model: Any, geom: int) -> _Surface:
     edge = [(0.0, -half), (radius, -half)]
     # Repeated rows make sharp edges.
     profile = [*edge, (radius, -half), (radius, half), (radius, half), (0.0, half)]
-    return _smooth(model, geom, turned(profile, _ROUND))
+    return _smooth(model, geom, lathe(profile, _ROUND))
 
 
 def _capsule(model: Any, geom: int) -> _Surface:
@@ -199,7 +199,7 @@ def _capsule(model: Any, geom: int) -> _Surface:
     turn = [0.5 * pi * k / 6 for k in range(7)]
     below = [(radius * sin(a), -half - radius * cos(a)) for a in turn]
     above = [(radius * cos(a), half + radius * sin(a)) for a in turn]
-    return _smooth(model, geom, turned(below + above, _ROUND // 2))
+    return _smooth(model, geom, lathe(below + above, _ROUND // 2))
 
 
 def _ball(model: Any, geom: int) -> _Surface:

@@ -105,14 +105,14 @@ def export(
             find_intervals,
             label_samples,
         )
-        from gazerig.robot.recording.read import RunRecording, used
+        from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         recording = RunRecording(file)
         stem = out or file.with_suffix("")
         if not bids:
             refuse_existing(*csv_files(stem), force=force)
         _warn(recording.note)
-        with used(file):
+        with report_bad_contents(file):
             with _progress("reading", recording.duration_s) as read:
                 trace = collect_gaze_angles(_with_progress(recording.ticks(), read))
             labels = label_samples(trace)
@@ -156,13 +156,13 @@ def _show(
     from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState, rig_message, state_message
     from gazerig.robot.dashboard.feed.page_process import PageProcess
     from gazerig.robot.model.clock import RealClock
-    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.recording.read import RunRecording, report_bad_contents
     from gazerig.robot.recording.replay import PlaybackState, Replay, SnapshotIndex
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
     built, rate_hz = _built(recording.info.config_yaml), recording.info.rate_hz
-    with used(file), _progress("reading", recording.duration_s) as read:
+    with report_bad_contents(file), _progress("reading", recording.duration_s) as read:
         frames = SnapshotIndex(
             recording.ticks(), recording.frames(), rate_hz, recording.info.character or "", built,
             read,
@@ -251,10 +251,10 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
     Only joints as recorded can come out the same; nothing else was then to change.
     """
     from gazerig.robot.app.resimulate import rerun
-    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
     recording = RunRecording(file)
-    with used(file), _progress("running again", recording.duration_s) as read:
+    with report_bad_contents(file), _progress("running again", recording.duration_s) as read:
         count, start_s = 0, 0.0
 
         def on_tick(tick: "Tick") -> None:

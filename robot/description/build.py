@@ -184,7 +184,7 @@ class _Builder:
         """Return the head, balanced with all it carries about the axes of the neck."""
         x, y, z = self._pivot_m
         ahead, _, above = self._eyes_m
-        rest = mass.joined(_inertias_in_head(carried))
+        rest = mass.join_inertias(_inertias_in_head(carried))
         whole = max(mass.head_mass_kg(self._measures.interocular_m), 2.0 * rest.mass_kg)
         # With this centre of its own mass the whole is centred on the pivot.
         share = rest.mass_kg / (whole - rest.mass_kg)

@@ -16,15 +16,15 @@ from gazerig.robot.description.mesh import (
     Painted,
     ellipsoid,
     grid,
+    lathe,
     merged,
-    mirrored,
+    mirror,
     mix,
     painted,
     plain,
     smooth_normals,
     spot,
     step,
-    turned,
 )
 from gazerig.robot.description.solid import cut
 
@@ -100,7 +100,7 @@ def _eye_rims() -> tuple[Painted, Painted]:
     colours = _complexion(points, normals)
     colours[0] = colours[1] = colours[1] * 0.82
     left = Painted(mesh, colours.reshape(-1, 3), normals.reshape(-1, 3))
-    return left, mirrored(left)
+    return left, mirror(left)
 
 
 def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted:
@@ -183,7 +183,7 @@ def eye() -> Painted:
     radius = 1.0 + _CORNEA * inside**1.25
     profile = list(zip(radius * np.sin(angles), radius * np.cos(angles), strict=True))
     columns = 48
-    dome = turned([(r, h) for r, h in profile], around=columns)
+    dome = lathe([(r, h) for r, h in profile], around=columns)
     mesh = Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
     colours = np.repeat(_eye_colours(angles, columns).reshape(-1, 3), 1, axis=0)
     return Painted(mesh, colours, smooth_normals(mesh))
@@ -247,7 +247,7 @@ def eyelid(upper: bool) -> Painted:
 def ear() -> Painted:
     """Return a round ear of radius 1 that faces z."""
     profile = [(1.0, -0.6), (1.0, 0.18), (0.93, 0.30), (0.80, 0.34), (0.70, 0.30), (0.62, 0.16)]
-    mesh = turned([*profile, (0.30, 0.13), (0.0, 0.13)])
+    mesh = lathe([*profile, (0.30, 0.13), (0.0, 0.13)])
     radius = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1])
     accent = np.exp(-(((radius - 0.62) / 0.10) ** 2))
     return Painted(mesh, mix(plain(mesh, CAP), (64, 190, 220), accent), smooth_normals(mesh))
@@ -258,7 +258,7 @@ def neck() -> Painted:
     """Return a neck of length 1 along z and radius 1 of bellows."""
     height = np.linspace(0.0, 1.0, 55)
     profile = [(1.0 + 0.05 * cos(18.0 * pi * h), h) for h in height]
-    mesh = turned(profile, around=28)
+    mesh = lathe(profile, around=28)
     groove = np.repeat(0.5 - 0.5 * np.cos(18.0 * pi * height), len(mesh.vertices) // 55)
     return Painted(mesh, mix(plain(mesh, (104, 110, 124)), (44, 47, 56), groove * 0.8),
                    smooth_normals(mesh))  # fmt: skip

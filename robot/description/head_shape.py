@@ -65,7 +65,7 @@ _NOSE_TIP: Vec3 = (0.425, 0.0, -0.54)
 _HINGE: Vec3 = (-0.85, 0.0, -0.55)
 
 
-def smiling(y: Floats, z: Floats) -> Floats:
+def heights_before_smile(y: Floats, z: Floats) -> Floats:
     """Return heights as they were before a smile lifted the corners of the mouth."""
     return np.asarray(z - _SMILE * y * y)
 
@@ -122,7 +122,7 @@ def field(points: Floats) -> Floats:
     folded = points * (1.0, 1.0, 1.0)
     folded[:, 1] = np.abs(folded[:, 1])
     solid = carve(_field_without_mouth(folded), _SOCKET(folded), 0.06)
-    folded[:, 2] = smiling(folded[:, 1], folded[:, 2])
+    folded[:, 2] = heights_before_smile(folded[:, 1], folded[:, 2])
     for part, round_by in _LIPS:
         solid = union(solid, part(folded), round_by)
     return solid
@@ -192,7 +192,7 @@ def eye_rim() -> Surface:
 def _above_mouth(points: Floats) -> Floats:
     """Return how far points (n, 3) are above the line between the lips, and on to the hinge."""
     x, y, z = points.T
-    z = smiling(np.minimum(np.abs(y), JAW_HALF), z)
+    z = heights_before_smile(np.minimum(np.abs(y), JAW_HALF), z)
     return np.asarray(z - _MOUTH_Z - 0.42 * np.maximum(0.0, -0.16 - x))
 
 

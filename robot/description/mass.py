@@ -95,7 +95,7 @@ def balanced(shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, at_m
     """
     rest = mass_kg - shell.mass_kg
     if rest <= 0.0:  # a very large head has a thinner shell
-        return scaled(shell, mass_kg)
+        return scale_mass(shell, mass_kg)
     middle = np.array(middle_m)
     wanted = (mass_kg * np.array(at_m) - shell.mass_kg * np.array(shell.com_m)) / rest
     off = wanted - middle
@@ -103,16 +103,16 @@ def balanced(shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, at_m
     off *= min(1.0, farthest / max(float(np.linalg.norm(off)), 1e-9))
     x, y, z = ((half * unit_m) ** 2 / 5.0 for half in _CONTENT_HALF)
     tensor = diagonal(rest * (y + z), rest * (x + z), rest * (x + y))
-    return joined((shell, Inertia(rest, _vector(middle + off), tensor)))
+    return join_inertias((shell, Inertia(rest, _vector(middle + off), tensor)))
 
 
-def scaled(one: Inertia, mass_kg: float) -> Inertia:
+def scale_mass(one: Inertia, mass_kg: float) -> Inertia:
     """Return the same shape of another mass."""
     share = mass_kg / one.mass_kg
     return Inertia(mass_kg, one.com_m, _matrix(np.array(one.tensor_kg_m2) * share))
 
 
-def joined(parts: Iterable[Inertia]) -> Inertia:
+def join_inertias(parts: Iterable[Inertia]) -> Inertia:
     """Return several bodies as one, all in the same frame."""
     bodies = tuple(parts)
     mass = sum(body.mass_kg for body in bodies)
@@ -123,7 +123,7 @@ def joined(parts: Iterable[Inertia]) -> Inertia:
     return Inertia(mass, _vector(com), _matrix(tensor))
 
 
-def turned(one: Inertia, R: Mat3, p_m: Vec3) -> Inertia:
+def in_parent_frame(one: Inertia, R: Mat3, p_m: Vec3) -> Inertia:
     """Return a body as seen from a frame in which its own has this pose."""
     turn = np.array(R)
     com = turn @ np.array(one.com_m) + p_m

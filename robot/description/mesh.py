@@ -24,7 +24,7 @@ class Mesh(NamedTuple):
     faces: NDArray[np.uint32]
 
 
-def turned(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mesh:
+def lathe(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mesh:
     """Turn a profile of (radius, height) about z; a repeated point makes a sharp edge."""
     angles = np.arange(around) * (2.0 * pi / around)
     radius, height = np.asarray(profile, float).T
@@ -42,21 +42,21 @@ def turned(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mes
 def cap(radius_m: float, half_angle_rad: float, rings: int = 12, around: int = _AROUND) -> Mesh:
     """Return the part of a sphere within an angle of its x axis; pi is the whole sphere."""
     angles = np.linspace(half_angle_rad, 0.0, rings)
-    dome = turned([(radius_m * sin(a), radius_m * cos(a)) for a in angles], around)
+    dome = lathe([(radius_m * sin(a), radius_m * cos(a)) for a in angles], around)
     return Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
 
 
 def ellipsoid(half_axes_m: Vec3, bulge: float = 1.0, rings: int = 13) -> Mesh:
     """Return an ellipsoid; a bulge below 1 fills it out towards a rounded box."""
     angles = np.linspace(-pi / 2, pi / 2, rings)
-    ball = turned([(cos(a), sin(a)) for a in angles], around=2 * rings)
+    ball = lathe([(cos(a), sin(a)) for a in angles], around=2 * rings)
     filled = np.sign(ball.vertices) * np.abs(ball.vertices) ** bulge
     return Mesh(filled * np.asarray(half_axes_m), ball.faces)
 
 
 def disc(radius_m: float) -> Mesh:
     """Return a flat disc that faces up."""
-    return turned([(radius_m, 0.0), (0.0, 0.0)])
+    return lathe([(radius_m, 0.0), (0.0, 0.0)])
 
 
 def lid(radius_m: float, sweep_rad: float) -> Mesh:
@@ -77,7 +77,7 @@ def lid(radius_m: float, sweep_rad: float) -> Mesh:
 def ring(radius_m: float, thickness_m: float) -> Mesh:
     """Return a torus about x."""
     angles = np.linspace(0.0, 2.0 * pi, 17)
-    band = turned([(radius_m + thickness_m * cos(a), thickness_m * sin(a)) for a in angles])
+    band = lathe([(radius_m + thickness_m * cos(a), thickness_m * sin(a)) for a in angles])
     return Mesh(band.vertices[:, (2, 0, 1)], band.faces)
 
 
@@ -146,7 +146,7 @@ def spot(points: Floats, at: Vec3, size: float) -> Floats:
     return np.asarray(np.exp(-away / (size * size)))
 
 
-def mirrored(one: Painted) -> Painted:
+def mirror(one: Painted) -> Painted:
     """Return the same on the other side of y = 0."""
     other = np.array((1.0, -1.0, 1.0))
     mesh = Mesh(one.mesh.vertices * other, one.mesh.faces[:, ::-1])

@@ -19,7 +19,7 @@ from gazerig.robot.description.mesh import (
     Painted,
     ellipsoid,
     merged,
-    mirrored,
+    mirror,
     moved,
     painted,
 )
@@ -305,8 +305,8 @@ def further(name: str, parent: str, p_m: Vec3, joint: LinkJoint, measures: HeadM
         looks = (_ear(side, unit, back),)
     weight = mass.servo(0.3)
     if looks:
-        weight = mass.joined(
-            mass.turned(
+        weight = mass.join_inertias(
+            mass.in_parent_frame(
                 mass.sheet(one.painted.mesh.vertices, one.painted.mesh.faces, 2.0e-3),
                 one.R,
                 one.p_m,
@@ -348,7 +348,7 @@ def _body(measures: HeadMeasures, centre: Vec3, half: Vec3, by: Vec3 = _ORIGIN) 
 
 def _brow(side: str, unit: float, by: Vec3) -> Painted:
     brow = head_mesh.brow()
-    return moved(brow if side == "left" else mirrored(brow), by, unit)
+    return moved(brow if side == "left" else mirror(brow), by, unit)
 
 
 def _ear(side: str, unit: float, by: Vec3) -> Visual:

@@ -20,7 +20,7 @@ from gazerig.robot.description.mesh import (
     cap,
     grid,
     merged,
-    mirrored,
+    mirror,
     mix,
     moved,
     painted,
@@ -131,7 +131,7 @@ def head_parts(number: int, fineness: float = 1.0) -> HeadParts:
     # Both eyes with their lids' edges, and the brows.
     eye, glint, lid, still = _eye_parts(look, fineness)
     left = [*(moved(part, _EYE) for part in (*eye, glint, lid)), *still]
-    face = merged([*left, *map(mirrored, left), *lips(_HEAD, _MOUTH, red, dark)])
+    face = merged([*left, *map(mirror, left), *lips(_HEAD, _MOUTH, red, dark)])
     return HeadParts(solid, moved(face, (0.0, 0.0, 0.0), PUPIL_DISTANCE_M))
 
 
@@ -176,7 +176,7 @@ def head_segments(look: PersonLook, fineness: float = 1.0) -> HeadSegments:
     # The glint is flat on the eyeball, so that the lid goes over it.
     flat = moved(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
     solid = _head_solid(look, fineness)
-    features = [*still, *(mirrored(part) for part in still), mouth.upper, mouth.line, open_mouth]
+    features = [*still, *(mirror(part) for part in still), mouth.upper, mouth.line, open_mouth]
     back = tuple(-one / PUPIL_DISTANCE_M for one in MOUTH_FACE_M)
     size, here = PUPIL_DISTANCE_M, (0.0, 0.0, 0.0)
     # The lower lip is in front of the open mouth, which it covers while it is up.
@@ -292,7 +292,7 @@ def _hair(look: PersonLook, fineness: float) -> list[Painted]:
         back = moved(
             painted(ellipsoid_mesh((0.45, 1.05, 1.35), 0.9, 13), look.hair), (-2.35, 0.0, -0.55)
         )
-        parts += [left, mirrored(left), back]
+        parts += [left, mirror(left), back]
     return parts
 
 
@@ -325,11 +325,11 @@ def torso(number: int, length_m: float) -> Painted:
 
 def hand(number: int) -> Painted:
     """Return an open right hand of radius 1 m: x out of the palm, z along the fingers."""
-    return hand_of(LOOKS[number % len(LOOKS)])
+    return open_right_hand(LOOKS[number % len(LOOKS)])
 
 
 @lru_cache(maxsize=8)
-def hand_of(look: PersonLook, rows: int = 34) -> Painted:
+def open_right_hand(look: PersonLook, rows: int = 34) -> Painted:
     """Return the open right hand of a look; fewer rows are fewer triangles."""
     mitten = Solid(_mitten_field, (0.0, 0.0, -0.1), 2.2)
     found = mitten.all_round(rows, rows)

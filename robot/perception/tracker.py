@@ -44,7 +44,7 @@ _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
 _DOUBT_KEPT = 0.9
 
 
-def settle(
+def resolve_identities(
     tracks: list[Track],
     worn: list[list[float]],
     column: dict[int, int],
@@ -196,7 +196,7 @@ class Tracker:
             self._update_track(self._tracks[i], detections[j], p_world_camera_m)
         if self._worn is not None:
             given = {t.id for t in self._tracks if t.is_person and t.returned is None}
-            settle(self._tracks, self._worn, dict(pairs), detections, self._params)
+            resolve_identities(self._tracks, self._worn, dict(pairs), detections, self._params)
             self._free |= given - {t.id for t in self._tracks}
         taken = {j for _, j in pairs}
         renamed = {

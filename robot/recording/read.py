@@ -310,7 +310,7 @@ def _select_messages(
 
 
 @contextmanager
-def used(path: Path) -> Iterator[None]:
+def report_bad_contents(path: Path) -> Iterator[None]:
     """Turn errors caused by impossible contents of a recording into one line.
 
     Use it around code that processes a recording: a well-formed file may contain impossible

@@ -14,7 +14,7 @@ import numpy as np
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import Painted, painted, turned
+from gazerig.robot.description.mesh import Painted, lathe, painted
 from gazerig.robot.description.person_shape import LOOKS, hand, head_parts, torso
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.cameras.canvas import Canvas
@@ -117,7 +117,7 @@ def _limb(number: int, sleeve: bool) -> Painted:
     """Return an arm's link of length 1 along z; the radius is already in metres."""
     look = LOOKS[number % len(LOOKS)]
     thick, thin = (_SLEEVE_M, 0.9 * _SLEEVE_M) if sleeve else (0.9 * _SLEEVE_M, _WRIST_M)
-    mesh = turned(
+    mesh = lathe(
         [(0.0, -0.10), (0.7 * thick, -0.06), (thick, 0.0), (thin, 1.0), (0.0, 1.04)], around=16
     )
     return painted(mesh, look.shirt if sleeve else look.skin)

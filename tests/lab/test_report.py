@@ -682,9 +682,9 @@ def test_an_eye_at_the_end_of_its_range_has_not_landed() -> None:
 def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
     dice = np.random.default_rng(2)
     smooth = [dice.lognormal(-1.4, 0.45, 600) for _ in range(40)]
-    found = [rests.spike(each) for each in smooth]
+    found = [rests.largest_slot_excess(each) for each in smooth]
     assert abs(np.mean(found)) < 0.005 and max(found) < 0.04  # chance makes none
-    assert all(rests.spike(np.maximum(each, 0.2)) > 0.2 for each in smooth)
+    assert all(rests.largest_slot_excess(np.maximum(each, 0.2)) > 0.2 for each in smooth)
 
 
 @pytest.mark.parametrize(("gain", "verdict"), [(0.97, "pass"), (1.2, "outside")])

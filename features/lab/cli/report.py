@@ -74,7 +74,7 @@ def report(
         # Drawing and models are heavy; `--help` does not import them.
         from gazerig.features.lab.report.page import banner, files_of, refuse_foreign
         from gazerig.features.lab.report.report import FIGURE_KEYS, read, report_of
-        from gazerig.robot.recording.read import RunRecording, used
+        from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         default = Path(f"report-{scene}.html") if file is None else file.with_suffix(".html")
         target = page_file(out or default)
@@ -83,7 +83,7 @@ def report(
             if file is not None:
                 recording = RunRecording(file)
                 about = _recording_header(recording, file.stem)
-                with used(file):
+                with report_bad_contents(file):
                     run = read(recording.ticks(), about, tell)
             else:
                 from gazerig.robot.app.options import RunOptions
@@ -129,7 +129,7 @@ def compare(
         from gazerig.features.lab.report.compare import compare as comparing
         from gazerig.features.lab.report.page import files_of, refuse_foreign
         from gazerig.features.lab.report.report import FIGURE_KEYS
-        from gazerig.robot.recording.read import RunRecording, used
+        from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         target = page_file(out)
         refuse_foreign(files_of(target, FIGURE_KEYS), force)
@@ -139,7 +139,7 @@ def compare(
             _recording_header(recordings[0], names[0]),
             _recording_header(recordings[1], names[1]),
         )
-        with used(Path(f"{first} or {second}")), progress_bar() as tell:
+        with report_bad_contents(Path(f"{first} or {second}")), progress_bar() as tell:
             ticks = recordings[0].ticks(), recordings[1].ticks()
             made = comparing(ticks, abouts, target, tell, force)
         if made.warning:
@@ -158,7 +158,7 @@ def compare(
 def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
     """Read the mutual gaze of two heads of one run."""
     from gazerig.features.lab.report.heads import mutual_gaze_report
-    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
     a, b = RunRecording(first), RunRecording(second)
     if a.info.scene != b.info.scene:
@@ -166,7 +166,7 @@ def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
             f"{first} is of the world {a.info.scene}, {second} of {b.info.scene}: --with takes the "
             "recording of another head of the same run"
         )
-    with used(Path(f"{first} or {second}")):
+    with report_bad_contents(Path(f"{first} or {second}")):
         return mutual_gaze_report(
             (a.ticks(), b.ticks()), (a.info.placement, b.info.placement), _names(first, second)
         )

@@ -35,7 +35,7 @@ def face_rests(run: GazeTrace) -> Floats:
     return np.array([end - begin for _, begin, end in rests])
 
 
-def spike(rests_s: Floats) -> float:
+def largest_slot_excess(rests_s: Floats) -> float:
     """Return the largest excess share of rests in one slot of 10 ms over its neighbours.
 
     A plausible law of dwell times is smooth; a floor gathers rests at one length. The slot is
@@ -93,7 +93,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     rests, small, idle = face_rests(run), small_shifts(run), idle_shifts(run)
     return [
         MeasuredValue("short_rests", (rests < SHORT_S).astype(float), mean),
-        MeasuredValue("rest_spike", rests, spike),
+        MeasuredValue("rest_spike", rests, largest_slot_excess),
         MeasuredValue("refixations", small, per_second, count=round(small[:, 1].sum())),
         MeasuredValue("idle_rate", idle, per_second, count=round(idle[:, 1].sum())),
     ]

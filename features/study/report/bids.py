@@ -26,7 +26,7 @@ from gazerig.robot.recording.export_bids import (
     write_bids,
 )
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
-from gazerig.robot.recording.read import RunRecording, used
+from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
 COLUMNS = (
     "trial", "condition", "questionnaire", "question", "response", "response_time", "left_out",
@@ -171,7 +171,7 @@ def _write_recordings(
     for number, name in enumerate(names, start=1):
         file = folder / name
         try:
-            with used(file):
+            with report_bad_contents(file):
                 recording = RunRecording(file)
                 trace = collect_gaze_angles(recording.ticks())
                 labels = label_samples(trace)

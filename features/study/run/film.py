@@ -28,7 +28,7 @@ from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.description.files import description_files
 from gazerig.robot.model.types import in_order
-from gazerig.robot.recording.read import RunRecording, used
+from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
 SIZE_PX, RATE_HZ = 720, 25.0
 SETTLES_S = 3.0
@@ -167,7 +167,7 @@ def _ticks(study: LoadedStudy, key: str) -> Iterator[Tick]:
     """Yield the ticks of a film."""
     recording = study.design.conditions[key].recording
     if recording is not None:
-        with used(Path(recording)):
+        with report_bad_contents(Path(recording)):
             yield from RunRecording(recording).ticks()
         return
     seen = list[Tick]()

@@ -29,7 +29,7 @@ from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.analysis.mutual_gaze import HALF_HIGH_M, HALF_WIDE_M
 from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.recording.read import RunRecording, used
+from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
 SWITCH_S = 0.5
 """Time before and after a switch in which steps of the joints belong to it, seconds."""
@@ -60,7 +60,7 @@ def measure_presentations(
     for name in dict.fromkeys(one.recording for one in wanted):
         ends = [one for one in wanted if one.recording == name]
         try:
-            with used(folder / name):
+            with report_bad_contents(folder / name):
                 # The ticks of each presentation and those shortly before it, in one pass.
                 runs: list[list[Tick]] = [[] for _ in ends]
                 for tick in RunRecording(folder / name).ticks():

@@ -15,7 +15,7 @@ import viser
 from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import Colour, Mesh, Painted, plain, smooth_normals, turned
+from gazerig.robot.description.mesh import Colour, Mesh, Painted, lathe, plain, smooth_normals
 from gazerig.robot.description.texture import TexturedMesh
 
 
@@ -230,7 +230,7 @@ def glb_file(
 def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
     """Return a flat disc of radius 1, facing up, that fades out from its middle."""
     radius = np.linspace(1.0, 0.0, rings)
-    mesh = turned([(r, 0.0) for r in radius.tolist()])
+    mesh = lathe([(r, 0.0) for r in radius.tolist()])
     alpha = np.repeat(
         (0.5 + 0.5 * np.cos(pi * radius)) ** 1.3 * inner[3], len(mesh.vertices) // rings
     )
