@@ -8,8 +8,10 @@ import re
 from pathlib import Path
 
 import pytest
-from command_line import gazerig, typed
+from command_line import gazerig, options, typed
 
+import gazerig as gazerig_package
+from gazerig.config.faults import ConfigError
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.run import run
 
@@ -29,6 +31,10 @@ DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
         (("--mock", "--scene", "visitor", "--video", "x.avi"), "exclude each other"),
         (("--mock", "--fast", "--video", "x.avi"), "--seconds"),
         (("--fast", "--scene", "visitor", "--seconds", "1"), "--mock"),
+        (("--fast",), "--fast needs --mock"),
+        (("--port", "/dev/ttyNOPE"), "no serial port /dev/ttyNOPE"),
+        (("--port", "/dev/ttyNOPE", "--camera", "97"), "no serial port /dev/ttyNOPE"),
+        (("--camera", "97"), "no serial port /dev/ttyUSB0"),
         ((), "nothing to look at"),
         (("--mock", "--page", "8080"), "HOST:PORT"),
         (("nosuchrig", "--mock"), "nosuchrig"),
@@ -40,6 +46,27 @@ def test_what_a_person_can_mend_is_one_line_and_exit_code_2(
 ) -> None:
     code = typed("run", "--no-page", *words)
     one_line_and_exit_code_2(code, capfd.readouterr().err, message)
+
+
+def test_a_name_that_is_not_shipped_is_refused_at_once() -> None:
+    with pytest.raises(ConfigError, match="did you mean 'desk'"):
+        gazerig_package.open("dessk")
+    with pytest.raises(ConfigError, match="did you mean 'shy'"):
+        gazerig_package.open("desk", character="shyy")
+
+
+@pytest.mark.parametrize("rig", [(), ("my.yaml",)])
+def test_a_point_of_two_numbers_names_the_missing_one(
+    rig: tuple[str, ...], capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("gazerig.features.bringup")
+    assert typed("look-at", *rig, "1", "2") == 2
+    said = " ".join(re.sub(r"[│\n]", " ", capfd.readouterr().err).split())
+    assert "Y (Metres to the left), Z (Metres up): there is no Z" in said
+
+
+def test_no_option_is_a_double_negation() -> None:
+    assert not [option for option in options() if option.startswith("--no-no-")]
 
 
 def test_a_shell_sees_that_line_and_that_exit_code() -> None:
