@@ -13,6 +13,7 @@ from gazerig.robot.dashboard.requests.pointer_to_look import (
     Pointer,
     PointerToLook,
     ViewCamera,
+    opponent_at,
     pointed_at,
     pointer_of,
 )
@@ -113,3 +114,36 @@ def test_a_pointer_is_handed_on_with_who_points_and_no_faster_than_a_burst() -> 
     assert taken == len(looks) == BURST - 1
     assert {who for _, who in looks} == {"ana"}
     assert looks[0][0][0] > EYES[0]
+
+
+LOOKS_AT_THE_OPPONENT = ViewCamera(
+    (-0.5, 0.0, 0.1), ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)), radians(50.0)
+)
+
+
+def test_the_fist_of_the_opponent_is_under_the_pointer_and_within_its_box() -> None:
+    point = present(opponent_at(Pointer(0.6, 0.4, 1.5), LOOKS_AT_THE_OPPONENT))
+    assert seen_at(point, LOOKS_AT_THE_OPPONENT, 1.5) == pytest.approx((0.6, 0.4))
+    assert point[0] == pytest.approx(0.7)
+    # A pointer outside of the box moves the fist to its edge; nothing behind the viewer is moved.
+    assert opponent_at(Pointer(1.0, 1.0, 1.5), LOOKS_AT_THE_OPPONENT) == pytest.approx(
+        (0.7, -0.6, -0.4)
+    )
+    near = AHEAD_OF_IT._replace(p_world_m=(0.6, 0.0, 0.14))
+    assert opponent_at(Pointer(0.5, 0.5, 1.5), near) is None
+
+
+def test_a_pointer_moves_either_gaze_or_opponent() -> None:
+    looks: list[Vec3] = []
+    moves: list[Vec3] = []
+    pointer = PointerToLook(
+        lambda who: LOOKS_AT_THE_OPPONENT,
+        lambda p, who: looks.append(p),
+        SimulatedClock(),
+        moves.append,
+    )
+    pointer.p_world_eyes_m = EYES
+    at = {"x": 0.5, "y": 0.5, "aspect": 1.0}
+    assert pointer.take({**at, "opponent": True}, "a browser") and not looks and len(moves) == 1
+    assert pointer.take(at, "a browser") and len(looks) == len(moves) == 1
+    assert not pointer.take({**at, "x": nan, "opponent": True}, "a browser")

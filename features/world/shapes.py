@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.features.world.figure import Figures
+from gazerig.features.world.opponent import Opponent
 from gazerig.features.world.other_heads import OtherHeads
 from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.rotations import rotation_matrix
@@ -62,6 +63,11 @@ class SpecShapes(NamedTuple):
                 for name, shape in moving.items()
             ),
         )
+
+    @property
+    def opponent(self) -> Opponent | None:
+        """Return the boxer that a person can move, None without one."""
+        return None if self.spec.figures is None else self.spec.figures.opponent
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
         """Return the poses of all moving parts; see ``WorldShapes.poses``."""

@@ -49,7 +49,7 @@ from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import as_json
-from gazerig.robot.model.commands import LookAt
+from gazerig.robot.model.commands import LookAt, MoveOpponent
 
 _FRAME_S = 0.04
 _SILENT_AFTER_S = 1.0
@@ -124,6 +124,7 @@ def serve(
         lambda browser: camera_of(server, browser),
         # Not as a browser in control: only its points show that a pointer is present.
         lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
+        move_opponent=lambda point: outbox.ask(as_json(MoveOpponent(point)), DOOR),
     )
     door = AuthProxy(
         host, open_port, inside, outbox.hand_on, stop, token, browsers, widgets, pointer.take,

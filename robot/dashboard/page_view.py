@@ -29,6 +29,7 @@ from gazerig.robot.dashboard.view.viewpoints import NAMES, Viewpoints
 from gazerig.robot.dashboard.view.world_view import WorldView
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.control_source import ControlSource, sentence
+from gazerig.robot.model.moved_opponent import has_opponent
 from gazerig.robot.model.types import Snapshot
 
 _REFUSED = "refused: "
@@ -113,6 +114,7 @@ class PageView:
                     # Joints without feedback jump when the torque is switched on.
                     "without_feedback": len(shot.estimated),
                     "emulated": self.emulated,
+                    "opponent": self._world_now is not None and has_opponent(self._world_now.shapes),
                     "refused": refused_moves(self._menus, shot.joints),
                     **control_state_json(shot.leader, shot),
                 })  # fmt: skip

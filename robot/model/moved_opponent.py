@@ -39,6 +39,11 @@ class BoxingScene(Protocol):
         ...
 
 
+def has_opponent(scene: object) -> bool:
+    """Return whether a scene, or its shapes, has a boxer that a person can move."""
+    return isinstance(scene, BoxingScene) and scene.opponent is not None
+
+
 class MovedOpponent:
     """A boxer, on the clock of the ticks.
 

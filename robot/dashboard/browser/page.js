@@ -61,6 +61,7 @@ function show(now) {
   $("#dock").hidden = Boolean(state.recording);
   document.body.classList.toggle("recording", Boolean(state.recording));
   followUnasked();
+  $("#opponent").hidden = !state.opponent;
   for (const button of moves) {
     const why = state.refused?.[button.textContent.trim()];
     if (why) button.setAttribute("aria-disabled", "true");
@@ -98,6 +99,8 @@ const POINT_MS = 50, AGAIN_MS = 250;
 const RESTED_MS = 3000; // the rig ends the control a second after the last point
 const FREE = new Set(["", "gaze", "gesture", "pointer"]); // that the pointer may replace
 const following = () => $("#pointer").getAttribute("aria-pressed") === "true";
+// The pointer moves the opponent of a boxing world instead of the gaze.
+const boxing = () => !$("#opponent").hidden && $("#opponent").getAttribute("aria-pressed") === "true";
 let pointer = null; // over the view: {x, y, aspect}
 let moved = false, movedAt = 0, sentAt = 0;
 let takesOver = false; // the button was pressed: replace any control
@@ -106,7 +109,7 @@ let held = false; // a finger is on the view
 function pointed(event) {
   // Dragging turns the view; a finger, which cannot point otherwise, is followed instead.
   if (event.pointerType === "touch") {
-    if (!following()) return;
+    if (!following() && !boxing()) return;
     if (!event.isPrimary) return;
     held = true;
     event.stopImmediatePropagation();
@@ -124,13 +127,14 @@ const pointerGone = () => { pointer = null; held = false; };
 setInterval(() => {
   const now = performance.now();
   if (state.leads === "pointer") takesOver = false;
-  if (!pointer || !following() || document.hidden) return;
+  if (!pointer || !(following() || boxing()) || document.hidden) return;
   if (!held && now - movedAt > RESTED_MS) return;
-  if (state.stopped || state.recording || !(takesOver || FREE.has(state.leads ?? ""))) return;
+  const free = takesOver || FREE.has(state.leads ?? "");
+  if (state.stopped || state.recording || !(boxing() || free)) return;
   if (!moved && now - sentAt < AGAIN_MS) return;
   moved = false;
   sentAt = now;
-  tell({ point: pointer });
+  tell({ point: boxing() ? { ...pointer, opponent: true } : pointer });
 }, POINT_MS);
 
 // On from the start if no real head would turn away from the people in front of it.
@@ -143,6 +147,10 @@ function followUnasked() {
 
 $("#pointer").addEventListener("click", () => { takesOver = toggled($("#pointer")); });
 
+$("#opponent").addEventListener("click", () => {
+  if (toggled($("#opponent"))) say("Look at both or over its shoulder, and point at the opponent.");
+});
+
 function watchPointer() {
   const inside = $("#view").contentWindow;
   for (const kind of ["pointermove", "pointerdown"]) inside.addEventListener(kind, pointed, true);
@@ -153,7 +161,7 @@ function watchPointer() {
   }
   // Else the browser scrolls by the finger, and sends no more of its places.
   inside.addEventListener("touchmove", (event) => {
-    if (following() && event.touches.length === 1) event.preventDefault();
+    if ((following() || boxing()) && event.touches.length === 1) event.preventDefault();
   }, { passive: false });
   inside.document.documentElement.addEventListener("pointerleave", pointerGone);
 }

@@ -14,6 +14,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.dashboard.requests.outbox import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.commands import OPPONENT_BOX_M
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 PER_S, BURST = 40.0, 40.0
@@ -21,6 +22,7 @@ PER_S, BURST = 40.0, 40.0
 TOWARDS_HEAD = 0.6
 """Position of the pointer's plane, as a share of the distance to the head."""
 _NEAREST_M = 0.02
+_GUARD_M: Vec3 = (0.7, 0.0, 0.0)
 _WIDEST, _NARROWEST = 10.0, 0.1  # aspect ratios of the view
 
 
@@ -65,14 +67,36 @@ def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Ve
     to_head = sub(p_world_eyes_m, camera.p_world_m)
     if norm(to_head) < _NEAREST_M:
         return None
+    return _on_plane(pointer, camera, to_head, TOWARDS_HEAD * dot(to_head, to_head))
+
+
+def opponent_at(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
+    """Return the point at a pointer for the opponent's fist, None if that is behind the viewer.
+
+    It is in the plane parallel to the screen through the fist's guard, and within its box.
+    """
+    ahead = tuple(row[2] for row in camera.R_world_camera)
+    normal = (ahead[0], ahead[1], ahead[2])
+    away = dot(normal, sub(_GUARD_M, camera.p_world_m))
+    point = _on_plane(pointer, camera, normal, away) if away > _NEAREST_M else None
+    if point is None:
+        return None
+    x, y, z = (
+        min(max(one, least), most) for one, (least, most) in zip(point, OPPONENT_BOX_M, strict=True)
+    )
+    return x, y, z
+
+
+def _on_plane(pointer: Pointer, camera: ViewCamera, normal: Vec3, away: float) -> Vec3 | None:
+    """Return where the line of sight of a pointer meets a plane, None if it does not."""
     half = tan(0.5 * camera.fov_rad)
     right, down, ahead = zip(*camera.R_world_camera, strict=True)
     across = scale(right, (2.0 * pointer.x - 1.0) * half * pointer.aspect)
     ray = add(ahead, add(across, scale(down, (2.0 * pointer.y - 1.0) * half)))
-    towards = dot(ray, to_head)
-    if towards <= 0.0:  # the head is behind the viewer
+    towards = dot(ray, normal)
+    if towards <= 0.0:  # it is behind the viewer
         return None
-    point = add(camera.p_world_m, scale(ray, TOWARDS_HEAD * dot(to_head, to_head) / towards))
+    point = add(camera.p_world_m, scale(ray, away / towards))
     return point if all(map(isfinite, point)) else None
 
 
@@ -87,19 +111,29 @@ class PointerToLook:
         camera: Callable[[str], ViewCamera | None],
         look: Callable[[Vec3, str], object],
         clock: Clock | None = None,
+        move_opponent: Callable[[Vec3], object] = lambda point: None,
     ) -> None:
-        self._camera, self._look = camera, look
+        self._camera, self._look, self._move_opponent = camera, look, move_opponent
         self._clock = clock if clock is not None else RealClock()
         self._rate = TokenBucket(PER_S, BURST)
         self.p_world_eyes_m: Vec3 | None = None
 
     def take(self, asked: object, who: str) -> bool:
-        """Send the target of a browser's pointer; return False if there is none."""
+        """Send the target of a browser's pointer; return False if there is none.
+
+        A pointer with "opponent" moves the opponent of a boxing world instead of the gaze.
+        """
         pointer, eyes_m = pointer_of(asked), self.p_world_eyes_m
         if pointer is None or eyes_m is None or not self._rate.take(self._clock.now_s()):
             return False
         camera = self._camera(who)
-        point = pointed_at(pointer, camera, eyes_m) if camera is not None else None
+        if camera is None:
+            return False
+        if isinstance(asked, dict) and asked.get("opponent") is True:
+            if (to := opponent_at(pointer, camera)) is not None:
+                self._move_opponent(to)
+            return to is not None
+        point = pointed_at(pointer, camera, eyes_m)
         if point is None:
             return False
         self._look(point, who)
