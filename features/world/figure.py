@@ -28,6 +28,8 @@ from gazerig.gaze.types import Floats, Vec3
 from gazerig.sim_mock.scenes.script import SceneScript
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
+_SEGMENT = {name: number for number, name in enumerate(SEGMENTS)}
+_KEPT_POSES = 16
 _PUNCH_OUT_M = 0.35
 """A fist so far ahead of its guard is turned as in a punch."""
 
@@ -56,6 +58,7 @@ class Figures:
         )
         self.row = {name: i for i, name in enumerate(self.names)}
         self._last: tuple[float, Segments] | None = None
+        self._poses: dict[float, Floats] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.script, self.seed, self.shared)
@@ -111,8 +114,8 @@ class Figures:
         row = int(at)
         before, after = self._table[row], self._table[row + 1]
         now = before + (at - row) * (after - before)
-        if self.boxer is not None and (step := self._track.at(t_s)) is not None:
-            now = self._moved(now, step)
+        if self.boxer is not None and (rows := self._track.rows(t_s)) is not None:
+            now = self._moved(now, rows)
         quat = now[:, 3:]
         found = Segments(now[:, :3], quat / np.sqrt((quat * quat).sum(axis=1, keepdims=True)))
         self._last = (t_s, found)
@@ -136,50 +139,61 @@ class Figures:
 
     @cached_property
     def _home_m(self) -> Vec3:
-        hand = self._guard[f"{self.boxer}/left_hand"]
+        hand = self._guard[_SEGMENT["left_hand"]]
         x, y, z = (hand[:3] - FIST_M * rotation_matrix(hand[3:])[:, 2]).tolist()
         return x, y, z
 
     @cached_property
-    def _guard(self) -> Mapping[str, Floats]:
-        """Return the boxer's segments (7,) at the first time at which nothing but guard is done."""
-        own = [
-            one
-            for one in self.timelines[self.boxer or ""]
-            if one.act.do not in ("guard", "look_at")
-        ]
+    def _of_boxer(self) -> slice:
+        first = self.row[f"{self.boxer}/{SEGMENTS[0]}"]
+        return slice(first, first + len(SEGMENTS))
+
+    @cached_property
+    def _guard(self) -> Floats:
+        """Return the boxer's segments (n, 7) at the first time with nothing but guard."""
+        acts = self.timelines[self.boxer or ""]
+        own = [one for one in acts if one.act.do not in ("guard", "look_at")]
         times = np.arange(0.5, self.script.round_s, 0.05).tolist()
         free = (t for t in times if not any(one.start_s <= t <= one.end_s for one in own))
-        table = self._table[int(next(free, 0.0) * RATE_HZ)]
-        return {name: np.array(table[self.row[name]]) for name in self.names}
+        return np.array(self._table[int(next(free, 0.0) * RATE_HZ)][self._of_boxer])
 
-    def _moved(self, now: Floats, row: OpponentRow) -> Floats:
-        """Return all segments with the boxer between the script's pose and the person's."""
-        name = self.boxer or ""
-        found, body = dict(self._guard), self.measures[name]
-        R = rotation_matrix(found[f"{name}/torso"][3:])
+    def _boxer_at(self, row: OpponentRow) -> Floats:
+        """Return the boxer's segments (n, 7) as the person moves them; the last rows are kept."""
+        if (kept := self._poses.get(row.number)) is not None:
+            return kept
+        found, body = self._guard.copy(), self.measures[self.boxer or ""]
+        found[:, :2] += row.body_m
+        R = rotation_matrix(found[_SEGMENT["torso"], 3:])
         ahead = unit(R[None, :, 0] * (1.0, 1.0, 0.0))
         left = np.cross((0.0, 0.0, 1.0), ahead)
-        shift = np.append(row.body_m, 0.0)
-        for segment in SEGMENTS:
-            found[f"{name}/{segment}"] = found[f"{name}/{segment}"] + np.append(shift, np.zeros(4))
-        by = row.fist_m - self._home_m - shift
+        by = row.fist_m - self._home_m - np.append(row.body_m, 0.0)
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             # The other hand stays in guard, and sinks with the first one.
             by_m = by if side == "left" else np.array((0.0, 0.0, min(0.0, by[2])))
-            shoulder = found[f"{name}/{side}_upper_arm"][None, :3]
-            wrist = found[f"{name}/{side}_hand"][None, :3] + by_m
+            at = [_SEGMENT[f"{side}_{part}"] for part in ("upper_arm", "forearm", "hand")]
+            shoulder, wrist = found[None, at[0], :3], found[None, at[2], :3] + by_m
             frame = Frame(shoulder, shoulder, shoulder, ahead, left, sign, body)
             hand = fist(frame, wrist, rise((by_m * ahead).sum(axis=1) / _PUNCH_OUT_M))
-            arm = zip(
-                ("upper_arm", "forearm", "hand"), arm_poses(shoulder, hand, body), strict=True
-            )
-            for segment, (p_m, R_segment) in arm:
-                found[f"{name}/{side}_{segment}"] = np.append(p_m, quaternions(R_segment))
-        moved = np.array(now)
-        for segment in SEGMENTS:
-            at, to = self.row[f"{name}/{segment}"], found[f"{name}/{segment}"]
-            if now[at, 3:] @ to[3:] < 0.0:  # the same rotation, on the near side
-                to = to * (1, 1, 1, -1, -1, -1, -1)
-            moved[at] += row.share * (to - now[at])
+            arm = arm_poses(shoulder, hand, body)
+            found[at, :3] = np.concatenate([p_m for p_m, _ in arm])
+            for segment, (_, R_segment) in zip(at, arm, strict=True):
+                found[segment, 3:] = quaternions(R_segment)[0]
+        if len(self._poses) >= _KEPT_POSES:
+            del self._poses[next(iter(self._poses))]
+        self._poses[row.number] = found
+        return found
+
+    def _moved(self, now: Floats, rows: tuple[OpponentRow, OpponentRow, float]) -> Floats:
+        """Return all segments with the boxer between the script's pose and the person's."""
+        before, after, between = rows
+        first, moved, own = self._boxer_at(before), now.copy(), now[self._of_boxer]
+        pose = first + between * (_near(self._boxer_at(after), first) - first)
+        share = before.share + between * (after.share - before.share)
+        moved[self._of_boxer] += share * (_near(pose, own) - own)
         return moved
+
+
+def _near(poses: Floats, others: Floats) -> Floats:
+    """Return the same poses (n, 7), each quaternion with the sign that is nearer to another."""
+    away = (poses[:, 3:] * others[:, 3:]).sum(axis=1, keepdims=True) < 0.0
+    return np.concatenate((poses[:, :3], np.where(away, -poses[:, 3:], poses[:, 3:])), axis=1)

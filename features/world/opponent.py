@@ -152,19 +152,28 @@ class OpponentTrack:
         at[0] = row.number
         self._newest[0] = row.number
 
-    def at(self, t_s: float) -> OpponentRow | None:
-        """Return the row of a time, None while the script alone moves the boxer."""
+    def rows(self, t_s: float) -> tuple[OpponentRow, OpponentRow, float] | None:
+        """Return the rows before and after a time and the share between them.
+
+        None: the script alone moves the boxer. If nothing newer is written, the last row holds.
+        """
         newest = int(self._newest[0])
         if newest == 0:
             return None
         number = min(int(t_s / STEP_S), newest)
+        before = self._row(number)
+        if before is None:
+            return None
+        after = self._row(number + 1) or before
+        if before.share == after.share == 0.0:
+            return None
+        return before, after, min(1.0, t_s / STEP_S - number)
+
+    def _row(self, number: int) -> OpponentRow | None:
         row = self._rows[number % _KEPT].copy()
         if row[0] != number:
             return None
-        after = self._rows[(number + 1) % _KEPT]
-        if after[0] == number + 1:
-            row += (t_s / STEP_S - number) * (after - row)
-        return None if row[1] == 0.0 else OpponentRow(row[0], float(row[1]), row[2:5], row[5:])
+        return OpponentRow(number, float(row[1]), row[2:5], row[5:])
 
 
 class Opponent:

@@ -111,7 +111,7 @@ def test_another_process_sees_the_same_motion(scene: WorldScene, tmp_path: Path)
     at = hands(WorldScene("boxing", shared))
     seen = WorldScene("boxing", other).hand("rival", "left", 6.3)
     assert seen == pytest.approx(at[630, 0], abs=1e-9)
-    assert OpponentTrack(tmp_path / "people.moved").at(1.0) is None  # before it was moved
+    assert OpponentTrack(tmp_path / "people.moved").rows(1.0) is None  # before it was moved
 
 
 def test_events_follow_from_the_motion(scene: WorldScene) -> None:
