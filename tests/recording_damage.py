@@ -183,8 +183,14 @@ def _again(file: Path) -> object:
 
 
 def _reported(file: Path) -> object:
-    read_run = pytest.importorskip("gazerig.features.lab.cli.report")._read_run
-    return len(read_run(file, "x", lambda words, share: None)[1].rows)
+    pytest.importorskip("gazerig.features.lab")
+    from gazerig.features.lab.cli.report import _recording_header
+    from gazerig.features.lab.report.report import read
+
+    recording = RunRecording(file)
+    about = _recording_header(recording, "x")
+    with report_bad_contents(file):
+        return len(read(recording.ticks(), about, lambda words, share: None).rows)
 
 
 USES: dict[str, Callable[[Path], object]] = {

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -30,6 +31,7 @@ from gazerig.robot.guardian.heartbeat import (
     shared_file,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
+from gazerig.robot.model.joint import JointParams
 from gazerig.testing.bus_bench import rows
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
@@ -61,19 +63,22 @@ def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
 
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     access = pytest.importorskip("gazerig.features.bringup.calibration.smart_servo_access")
+    params = access.StopSearchParams()
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
-    servo = access.SingleServo("eye", 1, "sts3215", rig.port, guardian)
+    joint = JointParams(id=1, model="sts3215", zero_step=2048)
+    clock = SimpleNamespace(now_s=lambda: rig.now_s, sleep_until=rig.sleep_until)
+    servo = access.SmartServoAccess("eye", joint, rig.port, clock, lambda: None, guardian)
     servo.check()
     assert not guardian.other.armed(0)
-    servo.enable_torque(0.2, 100.0)
-    assert guardian.other.armed(0) and servo.torque_is_on()
-    servo.send(2010)
+    servo.enable_torque(params)
+    assert guardian.other.armed(0) and rig.get(1, TORQUE_ENABLE)
+    servo.go(params, 2060)
     guardian.other.set_state(0, RELEASING)
     with pytest.raises(ServoFault, match="stood still"):
-        servo.send(2020)
+        servo.go(params, 2020)
     servo.restore()
-    assert not guardian.other.armed(0) and not servo.torque_is_on()
+    assert not guardian.other.armed(0) and not rig.get(1, TORQUE_ENABLE)
 
 
 # --- which ports
@@ -136,6 +141,9 @@ def test_silence_adds_up_to_a_hang(looks_s):
 
 
 # --- the program's side
+
+
+TORQUE_ENABLE = 40  # of an STS servo
 
 
 class Unattended(Guardian):

@@ -58,6 +58,10 @@ EXAMPLES: dict[str, Examples] = {
         ("ctl set gaze.saccade.max_speed_deg_s 400", "change a parameter at the next tick"),
         ("ctl look 1 0.2 0.3", "the running head looks there"),
     ),
+    "rigs": (
+        ("ctl rigs", "name, process and page of every rig that runs"),
+        ("ctl rigs --json", "the same for a program"),
+    ),
     "get": (
         ("ctl get", "every parameter of the running rig"),
         ("ctl get gaze.saccade", "those of the saccades"),

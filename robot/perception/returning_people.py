@@ -26,7 +26,7 @@ _HEIGHT_SD_M, _SIZE_SD, _MOST = 0.12, 0.06, 6.0
 _AT_ONCE_M, _WALKS_M_S = 0.5, 2.0
 
 
-class Person(NamedTuple):
+class SeenPerson(NamedTuple):
     """Known features of one person at one time.
 
     p_world_m: position of the head at ``seen_s``
@@ -41,7 +41,7 @@ class Person(NamedTuple):
     colours: Floats | None = None
 
 
-def return_cost(gone: Person, new: Person) -> float:
+def return_cost(gone: SeenPerson, new: SeenPerson) -> float:
     """Return the cost of a new person being one who left; infinite if impossible."""
     gone_s = new.seen_s - gone.seen_s
     if norm(sub(gone.p_world_m, new.p_world_m)) > _AT_ONCE_M + _WALKS_M_S * gone_s:
@@ -56,7 +56,7 @@ def return_cost(gone: Person, new: Person) -> float:
     return cost + (worn[0][0] if worn else 0.0)
 
 
-def find_returned(left: Sequence[Person], new: Person) -> Person | None:
+def find_returned(left: Sequence[SeenPerson], new: SeenPerson) -> SeenPerson | None:
     """Return who of the people who left is back as a new person, None for nobody."""
     costs = [return_cost(one, new) for one in left]
     return left[costs.index(min(costs))] if min(costs, default=inf) < 0.0 else None

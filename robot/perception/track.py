@@ -11,7 +11,7 @@ from gazerig.gaze.angles import add, angle_between, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.kalman import TrackFilter
-from gazerig.robot.perception.returning_people import Person
+from gazerig.robot.perception.returning_people import SeenPerson
 
 _EYES_HELD_S = 0.12
 """Time for which the eyes' gaze holds if the next frames show a mesh, but not the irises."""
@@ -265,7 +265,7 @@ class Track:
     faced_s: float = -inf
     frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)
-    returned: Person | None = None
+    returned: SeenPerson | None = None
     numbered: bool = False
     box_m: float = 0.0
     lower_face: float = 0.0

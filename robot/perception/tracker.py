@@ -26,7 +26,7 @@ from gazerig.robot.perception.data_association import (
     pair_costs,
 )
 from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, sight
-from gazerig.robot.perception.returning_people import Person, find_returned
+from gazerig.robot.perception.returning_people import SeenPerson, find_returned
 from gazerig.robot.perception.track import FACE, UNNAMED, KnownClothes, LocalisedDetection, Track
 
 # Number of frames with clothes after which they identify a person; number below which the person
@@ -155,7 +155,7 @@ class Tracker:
         self._tracks: list[Track] = []
         self._next_person, self._next_thing = 1, FIRST_THING
         self._free: set[int] = set()
-        self._left: list[Person] = []
+        self._left: list[SeenPerson] = []
         self._worn: list[list[float]] | None = None
         self.retune(params)
 
@@ -399,14 +399,14 @@ class Tracker:
         track.depth_s = track.at_s
 
 
-def _person(track: Track) -> Person:
+def _person(track: Track) -> SeenPerson:
     """Return the features of the person of a track."""
     before, worn = track.returned, track.clothes.colours
     size = None if track.depth_s is None else track.face_size
     if before is not None:
         size = before.face_size if size is None else size
         worn = before.colours if worn is None else worn
-    return Person(track.id, track.p_world_m, track.seen_s, size, worn)
+    return SeenPerson(track.id, track.p_world_m, track.seen_s, size, worn)
 
 
 def _is_covered(track: Track, found: LocalisedDetection) -> bool:
