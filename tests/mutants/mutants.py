@@ -99,7 +99,7 @@ MUTANTS = (
     Mutant("gaze/attention/aversion.py", "looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))",
            "looking = add(scale(ahead, cos(angle)), scale(aside, -sin(angle)))",
            "looks away to the opposite side", ("aversion",)),
-    Mutant("gaze/attention/aversion.py", 'kept = ordered and self._mode == "none"', "kept = False",
+    Mutant("gaze/attention/aversion.py", '(ordered and self._mode == "none") or target', "target",
            "who was told to look at a person looks away", ("aversion",)),
     # ---- scanpath
     Mutant("gaze/scanpath/scanpath.py", "np.array(walk.dwell_mean_s) / params.rate_scale",
