@@ -13,19 +13,19 @@ ROOT = Path(__file__).parents[1]
 TRY = """
 import json
 from gazerig.config.export import json_schema
-from gazerig.config.parameters import changed, parameters
+from gazerig.config.parameters import apply_changes, parameters
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 
 rig, key = load_rig("desk"), "gaze.saccade.rise_share"
 (knob,) = [one for one in parameters(rig, rig) if one.key == key]
-other = changed(rig, {key: 0.3})
-model = SaccadeModel(changed(rig, {"gaze.saccade.profile": "human"}).gaze.saccade)
+other = apply_changes(rig, {key: 0.35})
+model = SaccadeModel(apply_changes(rig, {"gaze.saccade.profile": "human"}).gaze.saccade)
 before = model.displacement_rad(0.1, 0.01)
-model.retune(changed(other, {"gaze.saccade.profile": "human"}).gaze.saccade)
+model.retune(apply_changes(other, {"gaze.saccade.profile": "human"}).gaze.saccade)
 try:
-    changed(rig, {key: 0.6})
+    apply_changes(rig, {key: 0.6})
     refused = ""
 except ConfigError as error:
     refused = str(error)
@@ -70,8 +70,8 @@ def test_adding_a_parameter_takes_what_the_paper_says(tmp_path: Path) -> None:
     assert found.returncode == 0, found.stderr
     made = json.loads(found.stdout)
     knob = made["knob"]
-    assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.3, 0.5, 0.38, "")
+    assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.2, 0.5, 0.25, "")
     assert knob["live"] == "next tick" and "share of the rise" in knob["description"]
-    assert (made["schema"]["minimum"], made["schema"]["maximum"]) == (0.3, 0.5)
+    assert (made["schema"]["minimum"], made["schema"]["maximum"]) == (0.2, 0.5)
     assert "gaze.saccade.rise_share: 0.6 is above 0.5" in made["refused"]
-    assert made["moved"] > 1e-4
+    assert made["moved"] < -1e-4  # a longer rise

@@ -66,7 +66,9 @@ def test_register_changes_are_told_from_what_happens(event: str, is_one: bool) -
 @pytest.mark.parametrize("verbose", [False, True])
 def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
     said: list[str] = []
-    options = RunOptions(mock=True, fast=True, seconds=0.1, verbose=verbose).check_and_complete()
+    options = RunOptions(
+        mock=True, fast=True, profile="nakamoto", seconds=0.1, verbose=verbose
+    ).check_and_complete()
     session.run(session.compose(options), Interrupts(signals=False), said.append)
     register = [line for line in said if "->" in line or "Indirect Addresses" in line]
     table = [line for line in said if "do not all sum to 1" in line]

@@ -64,7 +64,7 @@ class RunObservers:
     It must be created before the robot starts.
 
     Args:
-        made: the robot and its surroundings.
+        assembly: the robot and its surroundings.
         options: address of the page, and whether time is simulated, without any user.
         say: prints a line.
         status: rewrites the status line; None: there is none.
