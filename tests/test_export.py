@@ -240,7 +240,9 @@ def test_a_gaze_carried_by_the_head_is_no_fixation() -> None:
                 head.look_at(0.2, aside_m, 0.3)
             for _ in range(round(seconds * RATE_HZ)):
                 head.step()
-                building.update(head._feed.newest)
+                tick = head._feed.newest
+                assert tick is not None
+                building.update(tick)
     run = building.trace()
     movement = label_samples(run).movement
     late = run.time_s > 2.5

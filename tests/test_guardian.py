@@ -7,6 +7,7 @@ import sys
 import time
 from contextlib import suppress
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -66,8 +67,11 @@ def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     params = access.StopSearchParams()
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
-    joint = JointParams(id=1, model="sts3215", zero_step=2048)
-    clock = SimpleNamespace(now_s=lambda: rig.now_s, sleep_until=rig.sleep_until)
+    joint = JointParams(
+        id=1, model="sts3215", zero_step=2048, min_deg=-40.0, max_deg=40.0,
+        max_speed_deg_s=200.0, max_accel_deg_s2=5000.0,
+    )  # fmt: skip
+    clock: Any = SimpleNamespace(now_s=lambda: rig.now_s, sleep_until=rig.sleep_until)
     servo = access.SmartServoAccess("eye", joint, rig.port, clock, lambda: None, guardian)
     servo.check()
     assert not guardian.other.armed(0)

@@ -1,6 +1,7 @@
 """The head between shifts and from shift to shift: pursuit, recentring, scatter, search."""
 
 from math import degrees, pi, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ NECK = ((-1.3, 1.3), (-0.6, 0.6))
 ROLL = (-0.4, 0.4)
 
 
-def model(seed: int | None = 0, **params: float) -> HeadModel:
+def model(seed: int | None = 0, **params: Any) -> HeadModel:
     rng = None if seed is None else np.random.default_rng(seed)
     return HeadModel(HeadParams(**params), radians(35.0), NECK, ROLL, rng)
 

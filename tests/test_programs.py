@@ -26,6 +26,7 @@ from shown_page import free_port, wait_for
 from slow_rigs import at_rate
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
 from gazerig.drivers.errors import DriverError
@@ -137,7 +138,7 @@ def free(rig: Rig) -> Iterator[None]:
     rig.client.jog_free()
 
 
-def heard(end: ClientConnection, key: str, value: object = None) -> dict[str, Any]:
+def heard(end: Connection, key: str, value: object = None) -> dict[str, Any]:
     """Return the next message with a key, and a value if one is given."""
     stop_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < stop_s:
@@ -147,7 +148,7 @@ def heard(end: ClientConnection, key: str, value: object = None) -> dict[str, An
     raise TimeoutError(key)
 
 
-def ask(end: ClientConnection, **message: object) -> None:
+def ask(end: Connection, **message: object) -> None:
     end.send(json.dumps(message))
 
 
@@ -262,7 +263,8 @@ def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
     with rig.dial() as end:
         ask(end, do="look_at", p_world_m=LEFT, tag=1)
         heard(end, "tag", 1)
-        rig.client.look_at(*RIGHT)
+        x, y, z = RIGHT
+        rig.client.look_at(x, y, z)
     time.sleep(1.5)
     assert rig.client.status()["led"].startswith("the test")
 

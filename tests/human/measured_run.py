@@ -191,11 +191,10 @@ def world_targets(world: str, seed: int, seconds: float) -> Counter[str]:
 @contextmanager
 def _scenes(scene: str | Scene) -> Any:
     """Have a scene of a test's own among those that a run can be put into."""
-    shipped = run_rig.load_scene
+    shipped: Any = run_rig.load_scene
     if not isinstance(scene, str):
-        run_rig.load_scene = lambda name, seed=0: (
-            scene if name == scene.name else shipped(name, seed)
-        )
+        one: Any = scene
+        run_rig.load_scene = lambda name, seed=0: one if name == one.name else shipped(name, seed)
     try:
         yield
     finally:

@@ -8,7 +8,7 @@ from functools import cache
 from math import atan2, pi
 from pathlib import Path
 from types import CodeType
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import pytest
 
@@ -99,7 +99,7 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
     rig = apply_changes(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
-    run_rig.load_scene = lambda name, seed: scene
+    run_rig.load_scene = cast(Any, lambda name, seed: scene)
     calls.enable()
     try:
         simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))

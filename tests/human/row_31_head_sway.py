@@ -92,7 +92,8 @@ def _slope(hz: np.ndarray, power: np.ndarray) -> float:
         for a, b in zip(edges, edges[1:], strict=False)
         if ((hz >= a) & (hz < b)).any()
     ]
-    return float(np.polyfit(*np.array(rows).T, 1)[0])
+    log_hz, log_power = np.array(rows).T
+    return float(np.polyfit(log_hz, log_power, 1)[0])
 
 
 def _off(one: MeasuredRun) -> np.ndarray:

@@ -153,10 +153,9 @@ def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
         (seen[None, :, 0] <= spans[:, None, 1]) & (seen[None, :, 1] >= spans[:, None, 0])
         for spans in (run.commanded, run.blinks)
     )
+    known = np.asarray(over.any(axis=0) | blink.any(axis=0))
     ours, theirs = _judged(run, run.commanded, with_fast), _judged(run, seen, with_fast)
-    return Marks(
-        over.any(axis=1)[ours], seen[theirs], (over.any(axis=0) | blink.any(axis=0))[theirs]
-    )
+    return Marks(over.any(axis=1)[ours], seen[theirs], known[theirs])
 
 
 def _judged(run: Exported, spans: np.ndarray, with_fast: bool) -> np.ndarray:
