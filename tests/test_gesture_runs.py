@@ -23,7 +23,7 @@ POINT = (1.0, 0.0, 0.25)
 
 
 def steady(name: str) -> Rig:
-    """Return a rig that moves by gestures alone, not by breath, sway, recentring or eye turns of blinks."""
+    """Return a rig without breath, sway, recentring, and eye turns of blinks."""
     rig = load_rig(name)
     gaze = rig.gaze
     gaze = replace(
