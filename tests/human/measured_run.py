@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 import pytest
@@ -194,7 +194,9 @@ def _scenes(scene: str | Scene) -> Any:
     shipped: Any = run_rig.load_scene
     if not isinstance(scene, str):
         one: Any = scene
-        run_rig.load_scene = lambda name, seed=0: one if name == one.name else shipped(name, seed)
+        run_rig.load_scene = cast(
+            Any, lambda name, seed=0: one if name == one.name else shipped(name, seed)
+        )
     try:
         yield
     finally:

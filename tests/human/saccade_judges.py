@@ -155,7 +155,7 @@ def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
     )
     known = np.asarray(over.any(axis=0) | blink.any(axis=0))
     ours, theirs = _judged(run, run.commanded, with_fast), _judged(run, seen, with_fast)
-    return Marks(over.any(axis=1)[ours], seen[theirs], known[theirs])
+    return Marks(np.asarray(over.any(axis=1))[ours], seen[theirs], known[theirs])
 
 
 def _judged(run: Exported, spans: np.ndarray, with_fast: bool) -> np.ndarray:
