@@ -5,7 +5,7 @@ alone. The motion of a whole round is computed once, with a row every 10 ms, and
 linearly between rows. The frames of segments are those of body_motion.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -159,28 +159,35 @@ class Figures:
 
     def _boxer_at(self, row: OpponentRow) -> Floats:
         """Return the boxer's segments (n, 7) as the person moves them; the last rows are kept."""
-        if (kept := self._poses.get(row.number)) is not None:
-            return kept
-        found, body = self._guard.copy(), self.measures[self.boxer or ""]
-        found[:, :2] += row.body_m
-        R = rotation_matrix(found[_SEGMENT["torso"], 3:])
-        ahead = unit(R[None, :, 0] * (1.0, 1.0, 0.0))
+        if row.number not in self._poses:
+            rows = self._track.following(row)  # a whole array of times takes as long as one
+            for one, pose in zip(rows, self._boxer_over(rows), strict=True):
+                self._poses[one.number] = pose
+            while len(self._poses) > _KEPT_POSES:
+                del self._poses[next(iter(self._poses))]
+        return self._poses[row.number]
+
+    def _boxer_over(self, rows: Sequence[OpponentRow]) -> Floats:
+        """Return the boxer's segments (rows, n, 7) as the person moves them."""
+        found, body = (
+            np.repeat(self._guard[None], len(rows), axis=0),
+            self.measures[self.boxer or ""],
+        )
+        shift = np.array([(*row.body_m, 0.0) for row in rows])
+        found[:, :, :3] += shift[:, None]
+        R = rotation_matrix(self._guard[_SEGMENT["torso"], 3:])
+        ahead = np.repeat(unit(R[None, :, 0] * (1.0, 1.0, 0.0)), len(rows), axis=0)
         left = np.cross((0.0, 0.0, 1.0), ahead)
-        by = row.fist_m - self._home_m - np.append(row.body_m, 0.0)
+        by = np.array([row.fist_m for row in rows]) - self._home_m - shift
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             # The other hand stays in guard, and sinks with the first one.
-            by_m = by if side == "left" else np.array((0.0, 0.0, min(0.0, by[2])))
+            by_m = by if side == "left" else np.minimum(by, 0.0) * (0.0, 0.0, 1.0)
             at = [_SEGMENT[f"{side}_{part}"] for part in ("upper_arm", "forearm", "hand")]
-            shoulder, wrist = found[None, at[0], :3], found[None, at[2], :3] + by_m
+            shoulder, wrist = found[:, at[0], :3].copy(), found[:, at[2], :3] + by_m
             frame = Frame(shoulder, shoulder, shoulder, ahead, left, sign, body)
             hand = fist(frame, wrist, rise((by_m * ahead).sum(axis=1) / _PUNCH_OUT_M))
-            arm = arm_poses(shoulder, hand, body)
-            found[at, :3] = np.concatenate([p_m for p_m, _ in arm])
-            for segment, (_, R_segment) in zip(at, arm, strict=True):
-                found[segment, 3:] = quaternions(R_segment)[0]
-        if len(self._poses) >= _KEPT_POSES:
-            del self._poses[next(iter(self._poses))]
-        self._poses[row.number] = found
+            for segment, (p_m, R_segment) in zip(at, arm_poses(shoulder, hand, body), strict=True):
+                found[:, segment] = np.concatenate((p_m, quaternions(R_segment)), axis=1)
         return found
 
     def _moved(self, now: Floats, rows: tuple[OpponentRow, OpponentRow, float]) -> Floats:

@@ -169,6 +169,11 @@ class OpponentTrack:
             return None
         return before, after, min(1.0, t_s / STEP_S - number)
 
+    def following(self, row: OpponentRow) -> list[OpponentRow]:
+        """Return a row and those after it that are written already."""
+        after = (self._row(int(row.number) + n) for n in range(1, AHEAD + 1))
+        return [row, *(one for one in after if one is not None)]
+
     def _row(self, number: int) -> OpponentRow | None:
         row = self._rows[number % _KEPT].copy()
         if row[0] != number:
