@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from math import degrees, dist, inf, radians
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,6 +23,7 @@ from gazerig.features.bringup.calibration.face_steering import (
     Key,
     apply_key,
     changes,
+    exact_gaze,
     initial_calibration,
     place_in_face_mm,
     point_world_m,
@@ -214,7 +216,7 @@ def steered() -> FaceSteering:
 @pytest.fixture
 def made(steered: FaceSteering) -> Iterator[Assembly]:
     options = RunOptions(mock=True, fast=True, seed=1, scene="sits-still")
-    found = assemble(RIG, options, Substitutes(chooser=lambda own: steered))
+    found = assemble(exact_gaze(RIG), options, Substitutes(chooser=lambda own: steered))
     yield found
     found.close()
 
@@ -279,6 +281,16 @@ def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
     assert steered.update(tick._replace(t_s=tick.t_s + 0.1, pose=aside)) is None
     why = steered.update(tick._replace(t_s=tick.t_s + WAIT_S + 0.1, pose=aside))
     assert why is not None and "not taken" in why and steered.state.part == "N"
+
+
+def test_the_gaze_rests_on_the_part_itself(made: Assembly, steered: FaceSteering) -> None:
+    made.robot.start(made.clock)
+    ticks(made, steered, 1.5)
+    errors = []
+    for _ in range(40):
+        ticks(made, steered, 0.1)
+        errors.append(steered.error_deg)
+    assert np.median(errors) < 0.25 and np.mean(np.array(errors) < AIMED_DEG) > 0.9
 
 
 def test_eyes_in_a_saccade_are_not_on_the_part(made: Assembly, steered: FaceSteering) -> None:

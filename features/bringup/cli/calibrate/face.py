@@ -19,6 +19,7 @@ from gazerig.features.bringup.calibration.face_steering import (
     FaceCalibration,
     FaceSteering,
     changes,
+    exact_gaze,
     initial_calibration,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
@@ -130,7 +131,7 @@ def _calibrate(
     rest_m = (idle.rest_distance_m, 0.0, idle.rest_height_m)
     begin = initial_calibration(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
-    made = assemble(rig, options, Substitutes(chooser=lambda own: steering))
+    made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
     # Input from a pipe is a script, too: no user can end it.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
