@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
 
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotation, sub
@@ -32,8 +32,9 @@ from gazerig.robot.perception.track import LocalisedDetection
 from gazerig.robot.perception.tracker import Tracker
 
 
-def made(seed: int = 0) -> Assembly:
-    return assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
+def made(seed: int = 0, rig: Rig | None = None) -> Assembly:
+    rig = load_rig("desk") if rig is None else rig
+    return assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
 
 
 def ticks(assembly: Assembly, seconds: float) -> list[Tick]:
@@ -48,7 +49,11 @@ def until(seconds: float) -> Callable[[float], str | None]:
 
 
 def test_it_starts_slowly_from_where_the_joints_are() -> None:
-    seen = ticks(made(), 3.0)
+    # The face is within comfort of the eyes, where the head stays for seconds unless told to hurry.
+    rig = load_rig("desk")
+    head = replace(rig.gaze.head, recentre_after_ms=800.0, recentre_spread_ms=0.0, comfort_deg=5.0)
+    rig = replace(rig, gaze=replace(rig.gaze, head=head))
+    seen = ticks(made(rig=rig), 3.0)
     neck = np.degrees([tick.joints.position_rad[6] for tick in seen])
     eye = np.degrees([tick.joints.position_rad[0] for tick in seen])
     assert neck[0] == pytest.approx(-12.0, abs=0.1)
