@@ -15,7 +15,7 @@ arrives, and "attack", while the opponent's guard is open.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import dist
 from statistics import median
 from typing import Literal, NamedTuple, Protocol
@@ -123,9 +123,10 @@ class BehaviourScore:
         events: Iterable[ExpectedResponse],
         round_s: float,
         moved: MovableOpponent | None = None,
+        start_s: Callable[[], float | None] = lambda: None,
     ) -> None:
         self._events = tuple(events)
-        self._moved, self._judged = moved, 0
+        self._moved, self._judged, self._start_s = moved, 0, start_s
         self._looks: deque[tuple[float, float, str, Vec3]] = deque(maxlen=_MOST_TICKS)
         self._round_s = round_s
         self._observations: dict[int, _EventObservation] = {}
@@ -140,7 +141,7 @@ class BehaviourScore:
         if self._first_s is None:
             self._first_s = self._last_s = tick.t_s
         dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
-        self._judge_moved(tick.t_s - self._first_s, dt_s, tick)
+        self._judge_moved(dt_s, tick)
         number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
         if number != self._round:
             self._round = int(number)
@@ -164,10 +165,12 @@ class BehaviourScore:
         if not _is_moved(self._moved, start_s + event.start_s, start_s + event.end_s):
             self._outcomes[event.name].append(outcome)
 
-    def _judge_moved(self, now_s: float, dt_s: float, tick: Tick) -> None:
+    def _judge_moved(self, dt_s: float, tick: Tick) -> None:
         """Judge the events of a person's motion, which are known when they are over."""
         if self._moved is None or not self._moved.spans_s:
             return
+        start_s = self._start_s()
+        now_s = tick.t_s - ((self._first_s or 0.0) if start_s is None else start_s)
         self._looks.append((now_s, dt_s, tick.target.kind, tick.target.p_world_m))
         while self._judged < len(events := self._moved.events):
             event = events[self._judged]
@@ -248,8 +251,10 @@ class PlannerScore:
         events: Iterable[BoxingEvent],
         round_s: float,
         moved: MovableOpponent | None = None,
+        start_s: Callable[[], float | None] = lambda: None,
     ) -> None:
         self._events, self._round_s, self._moved = tuple(events), round_s, moved
+        self._start_s = start_s
         self._first_s: float | None = None
         self._last_s = 0.0
         self._action = ""
@@ -316,7 +321,9 @@ class PlannerScore:
                 if event.name == name and not _is_moved(self._moved, time[0], time[1]):
                     found.append(time)
         moved = () if self._moved is None else self._moved.events
-        return found + [_time(event, 0.0) for event in moved if event.name == name]
+        scene_s, first_s = self._start_s(), self._first_s
+        late_s = 0.0 if scene_s is None or first_s is None else scene_s - first_s
+        return found + [_time(event, late_s) for event in moved if event.name == name]
 
 
 def _time(event: BoxingEvent, after_s: float) -> _Time:

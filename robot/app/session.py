@@ -40,13 +40,15 @@ class SceneScore(NamedTuple):
     planner: PlannerScore
 
     @classmethod
-    def from_scene(cls, scene: Scene) -> "SceneScore":
-        """Return the score of a scene before its first tick."""
+    def from_scene(
+        cls, scene: Scene, start_s: Callable[[], float | None] = lambda: None
+    ) -> "SceneScore":
+        """Return the score of a scene before its first tick; start_s: its start, None before."""
         events = scene.events()
         moved = scene.opponent if isinstance(scene, BoxingScene) else None
         return cls(
-            BehaviourScore(events, scene.round_s, moved),
-            PlannerScore(events, scene.round_s, moved),
+            BehaviourScore(events, scene.round_s, moved, start_s),
+            PlannerScore(events, scene.round_s, moved, start_s),
         )
 
 
@@ -201,7 +203,11 @@ class Session:
         self._summary = Summary() if summarised else None
         self._faults = JointFaults(tried, self._run_observers.busy)
         scene = assembly.scene
-        self._score = SceneScore.from_scene(scene) if summarised and scene is not None else None
+        room = assembly.room
+        start_s = (lambda: None) if room is None else room.start_s
+        self._score = (
+            SceneScore.from_scene(scene, start_s) if summarised and scene is not None else None
+        )
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._lasting = OverdueReport()
         self._start_s = 0.0

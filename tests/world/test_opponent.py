@@ -122,13 +122,15 @@ def test_events_follow_from_the_motion(scene: WorldScene) -> None:
     assert opened.name == "attack" and 3.0 < opened.start_s < 3.4 and 4.0 < opened.end_s < 4.4
 
 
-def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(scene: WorldScene) -> None:
+@pytest.mark.parametrize("early_s", [0.0, 0.7])  # the scene may start before the first tick
+def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(early_s: float) -> None:
     rig, options = load_rig("desk", "strong_boxer"), replace(BOXING, character="strong_boxer")
     made = assemble(rig, options)
     moved = made.scene.opponent
-    score = PlannerScore(made.scene.events(), made.scene.round_s, moved)
-    looks = BehaviourScore(made.scene.events(), made.scene.round_s, moved)
     made.robot.start(made.clock)
+    made.clock.sleep_until(made.clock.now_s() + early_s)
+    from_scene = made.scene.events(), made.scene.round_s, moved, made.room.start_s
+    score, looks = PlannerScore(*from_scene), BehaviourScore(*from_scene)
     for k in range(1400):
         t_s = 0.005 * k
         if k % 10 == 0 and (p_m := path(t_s)) is not None:
