@@ -576,7 +576,7 @@ def test_scan_of_a_maestro():
         assert "nothing else was sent" in out and "searched dynamixel" not in out
         code, out, _ = invoked("scan", "--port", path, "--json", "--kind", "maestro")
         (board,) = json.loads(out)["boards"]
-        assert code == 0 and board["script"] is True and board["errors"] == []
+        assert code == 0 and board["is_script_running"] is True and board["errors"] == []
 
 
 def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
