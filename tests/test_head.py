@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gazerig.gaze.angles import direction
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.params import HeadParams
@@ -53,6 +54,15 @@ def test_two_dimensional_targets_are_shortened_along_the_great_circle() -> None:
     yaw, pitch = goal_deg(head(), 40.0, 0.5, pitch=20.0)
     assert yaw == pytest.approx(25.71, abs=0.01)
     assert pitch == pytest.approx(13.80, abs=0.01)
+
+
+@pytest.mark.parametrize("short_deg", [5.0, 40.0, 70.0, 120.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_head_turns_to_the_side_of_a_target_behind_it(short_deg: float, side: float) -> None:
+    """The shorter arc to it goes through the back, where no neck turns."""
+    start = direction((radians(-11.0 * side), 0.0))
+    yaw, pitch = head().goal_rad((radians(174.0 * side), 0.1), radians(short_deg), start)
+    assert yaw == 2.0 * side and 0.1 <= pitch < 0.2
 
 
 def test_offset_and_trigger_stay_inside_a_small_eye_range() -> None:

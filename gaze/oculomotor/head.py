@@ -195,12 +195,17 @@ class HeadModel:
     def goal_rad(self, facing_rad: Angles2, offset_rad: float, start: Vec3 = _AHEAD) -> Angles2:
         """Return the head's yaw and pitch goal: the arc to the target, shortened, in range.
 
+        An arc through the back ends at the limit next to the target: no neck turns that far.
+
         Args:
             facing_rad: neck angles that would point the face straight at the target.
             offset_rad: angle by which the head stops short of it.
             start: direction at the head's start; it is the goal if it is nearer to the target.
         """
         yaw, pitch = yaw_pitch(shorten_arc(direction(facing_rad), offset_rad, start))
+        start_yaw = yaw_pitch(start)[0]
+        if (yaw - start_yaw) * (facing_rad[0] - start_yaw) < 0.0:
+            yaw, pitch = facing_rad
         return self.clip_to_range((yaw, pitch, 0.0))[:2]
 
     def clip_to_range(self, head_rad: Angles3) -> Angles3:
