@@ -80,7 +80,7 @@ def test_a_board_that_is_not_the_one(
 def test_a_bus_without_the_right_to_open_it_names_the_group(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(i2c, "group_of", lambda path: "gpio")
+    monkeypatch.setattr(i2c, "device_group", lambda path: "gpio")
 
     def refused(path: str) -> None:
         raise PermissionError(errno.EACCES, "Permission denied")
