@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event
+from gazerig.robot.model.scene_events import SceneEvent
 
 
 class MovableOpponent(Protocol):
@@ -16,7 +16,7 @@ class MovableOpponent(Protocol):
         ...
 
     @property
-    def events(self) -> Sequence[Event]:
+    def events(self) -> Sequence[SceneEvent]:
         """Return the events of its motion that are over."""
         ...
 

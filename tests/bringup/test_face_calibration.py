@@ -23,11 +23,11 @@ from gazerig.features.bringup.calibration.face_steering import (
     Key,
     apply_key,
     changes,
-    exact_gaze,
     initial_calibration,
     place_in_face_mm,
     point_world_m,
 )
+from gazerig.features.bringup.cli.calibrate.face import exact_gaze
 from gazerig.gaze.angles import add, angle_between, compose, rotate, rotation, sub
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import line_of_sight

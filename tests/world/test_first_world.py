@@ -44,10 +44,11 @@ def test_no_room_on_a_computer_that_is_too_busy_for_it(
 def test_one_line_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(first_world, "load_level", lambda figures: "small")
     monkeypatch.setattr(first_world, "find_spec", lambda name: None)
     main()
     out, err = capsys.readouterr()
-    assert out == "" and install_command("world") in err and err.count("\n") == 1
+    assert out == "--computer small\n" and install_command("world") in err and err.count("\n") == 1
 
     def none(make: object) -> object:
         raise NoRenderer("no pictures of a world: egl: it is missing")

@@ -11,7 +11,7 @@ however it turns. Up to ``FaceSteering`` it is pure: keys and poses in, values o
 
 ``FaceSteering`` chooses the target instead of attention: one part of the nearest face, placed again
 with the face's full pose at every tick, so the person may move while judging. After it come the
-oculomotor model of an ``exact_gaze``, guard and servos.
+oculomotor model of an gaze without refixations and scatter, guard and servos.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from math import degrees, inf
 from typing import Literal
 
-from gazerig.config.rig import Rig
 from gazerig.gaze.angles import add, norm, rotate, rotate_back, sub
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Face, GazeState, Mat3, Percept, Target, Vec3
@@ -187,21 +186,6 @@ _LOST_S = 5.0
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 # The head turns to the face as far as it can, which leaves the eyes their whole range.
 _PULL = 1.0
-
-
-def exact_gaze(rig: Rig) -> Rig:
-    """Return a rig whose gaze rests on the part itself.
-
-    Refixations look up to 1.1 deg past it, as much as ``AIMED_DEG``.
-    """
-    exact = replace(
-        rig.gaze.oculomotor,
-        refixation_deg=0.0,
-        undershoot=0.0,
-        endpoint_scatter_along=0.0,
-        endpoint_scatter_across=0.0,
-    )
-    return replace(rig, gaze=replace(rig.gaze, oculomotor=exact))
 
 
 class FaceSteering:

@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -19,7 +20,6 @@ from gazerig.features.bringup.calibration.face_steering import (
     FaceCalibration,
     FaceSteering,
     changes,
-    exact_gaze,
     initial_calibration,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
@@ -121,6 +121,21 @@ def calibrate_face(
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
+
+
+def exact_gaze(rig: Rig) -> Rig:
+    """Return a rig whose gaze rests on the part itself.
+
+    Refixations look up to 1.1 deg past it, as much as ``AIMED_DEG``.
+    """
+    exact = replace(
+        rig.gaze.oculomotor,
+        refixation_deg=0.0,
+        undershoot=0.0,
+        endpoint_scatter_along=0.0,
+        endpoint_scatter_across=0.0,
+    )
+    return replace(rig, gaze=replace(rig.gaze, oculomotor=exact))
 
 
 def _calibrate(
