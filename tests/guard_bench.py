@@ -14,7 +14,7 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"
-PARTS = ("motion_limiter", "stall_detector", "health", "collisions", "late_ticks", "guard")
+PARTS = ("motion_limiter", "health", "collisions", "guard")
 DT = 0.005
 YAW, PITCH, LID = 6, 7, 4
 JOINT = YAW

@@ -325,7 +325,7 @@ def there_is_none() -> None:
     assert gazerig("stop") == none
     assert whole_gazerig("stop") == none
     done = gazerig("stop", "--pid", "1")
-    assert done.stderr == "no rig runs as process 1: start one with gazerig run ...\n"
+    assert done.stderr == "no rig of process 1 is running: start one with gazerig run ...\n"
 
 
 def completing(words: tuple[str, ...]) -> dict[str, str]:

@@ -173,7 +173,7 @@ def test_an_unknown_shipped_name_lists_those_that_exist(
     (tmp_path / "rigs").mkdir()
     for name in ("shake.yaml", "nod.yaml", "notes.txt"):
         write(tmp_path / "rigs", GOOD, name)
-    for module in ("load", "shipped"):
+    for module in ("load", "shipped_files"):
         monkeypatch.setattr(f"gazerig.config.{module}.SHIPPED", tmp_path)
     assert shipped_path("rigs", "nod") == tmp_path / "rigs" / "nod.yaml"
     with pytest.raises(ConfigError) as caught:

@@ -124,10 +124,10 @@ def test_short_times_are_lived_through_to_the_millisecond():
 def test_profiles_go_on_at_once_as_they_do_step_by_step(ramp, skipped):
     for make in (_led, _spun):
         one, other = make(ramp), make(ramp)
-        one.ahead(100)
-        other.ahead(100)
+        one.advance(100)
+        other.advance(100)
         one.skip(skipped)
-        other.ahead(skipped)
+        other.advance(skipped)
         assert (one.r, one.v) == pytest.approx((other.r, other.v), rel=1e-6, abs=1.0)
         assert one.running == other.running
 
@@ -164,7 +164,7 @@ def test_a_maestro_whose_script_runs_all_night_answers(timeout_s, monkeypatch):
     passed = []
     body = type(world.board.body)
     through = body._run_period
-    monkeypatch.setattr(body, "_pass", lambda self: (passed.append(1), through(self)))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(body, "_run_period", lambda self: (passed.append(1), through(self)))  # type: ignore[func-returns-value]
     world.after(HOUR_S)
     here = world.positions()
     assert len(passed) < 12_000

@@ -77,7 +77,7 @@ def test_another_package_brings_a_command_and_a_schema(tmp_path: Path) -> None:
 
 
 HALL = """
-from gazerig.robot.app.camera_factory import locator_of, scene_camera, true_head
+from gazerig.robot.app.camera_factory import frame_locator, scene_camera, true_head
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.surroundings import Surroundings
 from gazerig.robot.recording.run_format import WORLD
@@ -90,7 +90,7 @@ class Room:
         self.wires = run_bus(rig, options, clock)
     def camera(self, rig, options, sight, placed, rng, own, say):
         where = true_head(self.wires.true_steps, rig, sight.poses)
-        look = locator_of(placed)
+        look = frame_locator(placed)
         return scene_camera(rig, options, self.scene, sight.mount, where, rng, look, own)
     def start_s(self):
         return 0.0
@@ -134,11 +134,13 @@ def test_make_run_has_a_scene_where_there_is_no_world(tmp_path: Path) -> None:
     program.parent.mkdir(parents=True)
     program.write_text('#!/bin/sh\necho "$@"\n')
     program.chmod(0o755)
+    (program.parent / "python").write_text("#!/bin/sh\necho --computer small\n")
+    (program.parent / "python").chmod(0o755)
     (tmp_path / ".venv" / ".installed").touch()
     done = subprocess.run(
         ["make", "--silent", "-C", str(tmp_path), "-f", str(ROOT / "Makefile"), "run"],
         capture_output=True, text=True, check=True,
         env={key: value for key, value in os.environ.items() if not key.startswith("MAKE")},
     )  # fmt: skip
-    assert done.stdout == "run --mock\n"
+    assert done.stdout == "run --mock --computer small\n"
     assert done.stderr == "a visitor without a room: features/world is not there\n"

@@ -287,7 +287,7 @@ def test_the_largest_first_step_is_the_largest(way, limit):
 
 
 _ORDERS = st.one_of(
-    st.tuples(st.just("aim"), st.integers(0, 16_383)),
+    st.tuples(st.just("set_target"), st.integers(0, 16_383)),
     st.tuples(st.just("limit_speed"), st.integers(0, 400)),
     st.tuples(st.just("limit_acceleration"), st.integers(0, 255)),
     st.tuples(st.just("step"), st.integers(1, 60)),

@@ -76,13 +76,13 @@ def test_fisheye_is_refused_where_frames_are_not_straightened():
 
 def test_stereo_cameras_gyro_and_focus_are_read():
     whole = found()
-    assert whole.left_m == pytest.approx((-0.0375, 0.0, 0.0))
-    assert whole.right_m == pytest.approx((0.0375, 0.0, 0.0))
+    assert whole.left_camera_m == pytest.approx((-0.0375, 0.0, 0.0))
+    assert whole.right_camera_m == pytest.approx((0.0375, 0.0, 0.0))
     assert whole.R_camera_imu == pytest.approx(np.array(R_CAMERA_IMU))
     assert whole.imu_rotation_deg == pytest.approx((0.0, 0.0, 90.0))
     assert whole.focus == 130 and whole.label == "OAK-D"
     poor = found(stereo=False, imu=False)
-    assert (poor.left_m, poor.right_m, poor.imu_rotation_deg) == (None, None, None)
+    assert (poor.left_camera_m, poor.right_camera_m, poor.imu_rotation_deg) == (None, None, None)
 
 
 def test_memory_without_a_lens_is_told():

@@ -71,7 +71,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     slow_joint,
 )
 
-MOTION, STUCK, HEALTH, COLLISIONS, LATE, GUARD = PARTS
+MOTION, HEALTH, COLLISIONS, GUARD = PARTS
 Mutation = tuple[str, str, str, Callable[[ModuleType], None]]
 MUTATIONS: tuple[Mutation, ...] = (
     # position, and the way to brake before its end
@@ -133,10 +133,10 @@ MUTATIONS: tuple[Mutation, ...] = (
         no_overshoot,
     ),
     # time
-    (LATE, "return pace_s, since_s", "return since_s, since_s", stopped_loop),
-    (LATE, "return pace_s, since_s", "return since_s, since_s", late),
-    (LATE, "        recent_s.append(since_s)\n        if", "        if", slow_host),
-    (LATE, "self.soft_until_s = t_s + soft_s", "pass", late),
+    (MOTION, "return pace_s, since_s", "return since_s, since_s", stopped_loop),
+    (MOTION, "return pace_s, since_s", "return since_s, since_s", late),
+    (MOTION, "        recent_s.append(since_s)\n        if", "        if", slow_host),
+    (MOTION, "self.soft_until_s = t_s + soft_s", "pass", late),
     (GUARD, "            self._motion.record_gap(missed_s)", "            pass", late),
     (GUARD, "soft = min(soft, self._late_accel)", "pass", late),
     (MOTION, "- limit.accel_rad_s2 * for_s", "", late),
@@ -152,7 +152,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "        if not fresh:", "        if False:", stale_joints),
     (GUARD, "fresh = fresh and isfinite(position)", "pass", stale_joints),
     (GUARD, "(no_frame and self._neck[i])\n            or", "", stale_picture),
-    (GUARD, "self._all_well(joints) and not no_frame", "self._all_well(joints)", stale_picture),
+    (GUARD, "self._are_all_well(joints) and not no_frame", "self._are_all_well(joints)", stale_picture),
     (GUARD, '_Hold("stale frame") if unseen else None', "None", stale_picture),
     (GUARD, "no_frame = not frame_age_s <=", "no_frame = frame_age_s >", stale_picture),
     # heat
@@ -176,17 +176,17 @@ MUTATIONS: tuple[Mutation, ...] = (
     (HEALTH, "outside_s >= self._outside_full_s and", "False and", voltage),
     (HEALTH, "max(room / self._params.voltage_margin_v, 0.0)", "1.0", voltage),
     # jams
-    (STUCK, "if at_s - self._since_s[i] < self._stuck_s:", "if True:", not_moving),
-    (STUCK, "-self.far_rad <= lead <= self.far_rad", "-self.far_rad <= lead", not_moving),
-    (STUCK, "-self.far_rad <= lead <= self.far_rad", "lead <= self.far_rad", not_moving),
-    (STUCK, "* side > self._moved_rad", "* side > 9.9", not_moving),
+    (HEALTH, "if at_s - self._since_s[i] < self._stuck_s:", "if True:", not_moving),
+    (HEALTH, "-self.far_rad <= lead <= self.far_rad", "-self.far_rad <= lead", not_moving),
+    (HEALTH, "-self.far_rad <= lead <= self.far_rad", "lead <= self.far_rad", not_moving),
+    (HEALTH, "* side > self._moved_rad", "* side > 9.9", not_moving),
     (
-        STUCK,
+        HEALTH,
         "(position - self._anchor_rad[i]) * side >",
         "abs(position - self._anchor_rad[i]) >",
         not_moving,
     ),
-    (STUCK, "self._until_s[i] = t_s + self._retry_s", "self._until_s[i] = t_s", not_moving),
+    (HEALTH, "self._until_s[i] = t_s + self._retry_s", "self._until_s[i] = t_s", not_moving),
     (GUARD, "not watched", "True", not_moving),
     (GUARD, "near = -far <= p - position <= far and", "near =", not_moving),
     (GUARD, "if joints.measured and not joints.measured[i]:", "if False:", reckoned),

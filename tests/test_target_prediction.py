@@ -135,8 +135,8 @@ def test_a_glance_elsewhere_does_not_forget_a_swing() -> None:
     assert path(t) + y_of(prediction.displacement(t + AGE_S)) == pytest.approx(
         path(t + AGE_S), abs=0.01
     )
-    prediction.see(at(0.0, 0.0, t + 1.0, name=2), EYE, FAST)
-    prediction.see(target(path, t + 4.0), EYE, FAST)
+    prediction.record_target(at(0.0, 0.0, t + 1.0, name=2), EYE, FAST)
+    prediction.record_target(target(path, t + 4.0), EYE, FAST)
     assert prediction.sine is None  # that was too long ago
 
 

@@ -107,14 +107,14 @@ def test_with_wire_time_an_answer_takes_as_long_as_its_bytes(bench):
 def test_a_board_is_quiet_while_it_is_unplugged(bench):
     one = bench(BOARD)
     assert json.loads(one.line.obey("unplug"))["ok"].startswith("unplugged")
-    assert one.line.watched() == []
+    assert one.line.watched_files() == []
     assert json.loads(one.line.obey("plug")) == {"ok": "no longer: unplugged"}
-    assert len(one.line.watched()) == 2
+    assert len(one.line.watched_files()) == 2
 
 
 def test_without_a_link_the_new_path_is_told_with_the_name(bench):
     one = bench(BOARD, name="eyes")
-    before = json.loads(one.line.where())
+    before = json.loads(one.line.address_json())
     assert before == {"bus": "eyes", "path": one.line.terminal.path, "baud": None}
     one.line.obey("unplug")
     keep = os.openpty()  # takes the number that the terminal had

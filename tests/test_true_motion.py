@@ -141,7 +141,7 @@ def test_a_maestros_pulse_outside_its_range_comes_inside_slowly(rigs: dict[str, 
     joint = rig.joints[name]
     board = cast(Any, bench.shafts.devices[""]).body
     outside = round(joint.steps(radians(joint.max_deg + 3.0)))
-    board.channels[joint.id].aim(outside)
+    board.channels[joint.id].set_target(outside)
     bench.shafts.sleep_until(2.0)
     assert bench.shafts.truth()[rig.names.index(name)] > radians(joint.max_deg + 2.5)
     bench.start()

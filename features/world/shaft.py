@@ -391,7 +391,7 @@ class WorldHobbyServo(HobbyServo):
             self.shaft.jam(stuck)
 
     @property
-    def resting(self) -> bool:
+    def is_resting(self) -> bool:
         """Return whether it does not move."""
         return -REST_STEPS_MS < self.shaft.v < REST_STEPS_MS
 

@@ -120,7 +120,7 @@ def _moved(move: Move) -> dict[str, Trace]:
             arm(servo, joint.gains or ())
     if not smart:
         for board in boards:
-            board.body.channels[joint.id].aim(round(joint.steps(0.0)))
+            board.body.channels[joint.id].set_target(round(joint.steps(0.0)))
     bench.pass_ms(400)
     places = {"alone": own, "world": world}
     began = {key: _angle(joint, one) for key, one in places.items()}
@@ -134,7 +134,7 @@ def _moved(move: Move) -> dict[str, Trace]:
                 if smart:
                     write(servo, "goal_position", max(0, steps))
                 else:
-                    boards[nth].body.channels[joint.id].aim(steps)
+                    boards[nth].body.channels[joint.id].set_target(steps)
         bench.pass_ms(1)
         for key, servo in places.items():
             angle = _angle(joint, servo) - began[key]

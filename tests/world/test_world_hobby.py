@@ -20,10 +20,10 @@ def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(n
     bench = WorldBench(name)
     joint = bench.rig.names[0]
     for board in (*bench.devices.values(), *bench.own_devices.values()):
-        board.body.channels[bench.rig.joints[joint].id].aim(6000)
+        board.body.channels[bench.rig.joints[joint].id].set_target(6000)
     bench.pass_ms(600)
     for board in (*bench.devices.values(), *bench.own_devices.values()):
-        board.body.channels[bench.rig.joints[joint].id].aim(6000 + MOVE)
+        board.body.channels[bench.rig.joints[joint].id].set_target(6000 + MOVE)
     halfway_ms = [0, 0]
     for servo in bench.both(joint):
         assert abs(servo.place_steps - 6000) <= 2 * servo.spec.dead_steps
@@ -35,7 +35,7 @@ def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(n
     assert halfway_ms[0] and abs(halfway_ms[0] - halfway_ms[1]) <= 20
     for servo in bench.both(joint):
         assert abs(servo.place_steps - 6000 - MOVE) <= 1.5 * servo.spec.dead_steps
-        assert servo.resting
+        assert servo.is_resting
 
 
 def test_a_hobby_servo_without_pulses_is_limp() -> None:
@@ -48,7 +48,7 @@ def test_a_hobby_servo_without_pulses_is_limp() -> None:
     servo.turn(300.0)
     bench.pass_ms(200)
     assert servo.place_steps == pytest.approx(before + 300.0, abs=3.0)
-    bench.devices[""].body.channels[bench.rig.joints[joint].id].aim(round(before))
+    bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(round(before))
     bench.pass_ms(400)
     assert abs(servo.place_steps - before) <= 30.0
 
@@ -58,7 +58,7 @@ def test_a_hobby_servo_strains_against_its_joints_stop() -> None:
     bench = WorldBench("maker")
     joint = bench.rig.names[0]
     servo = bench.servos[joint]
-    bench.devices[""].body.channels[bench.rig.joints[joint].id].aim(servo.spec.max_steps)
+    bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(servo.spec.max_steps)
     bench.pass_ms(800)
     assert servo.is_straining and servo.place_steps < servo.spec.max_steps - 100
     assert abs(servo.shaft.effort) <= 1.0
@@ -71,7 +71,7 @@ def test_a_jammed_hobby_servo_does_not_move() -> None:
     servo = bench.servos[joint]
     before = servo.place_steps
     servo.stuck = True
-    bench.devices[""].body.channels[bench.rig.joints[joint].id].aim(round(before) + MOVE)
+    bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(round(before) + MOVE)
     bench.pass_ms(300)
     assert servo.place_steps == pytest.approx(before, abs=2.0)
 

@@ -109,7 +109,7 @@ def test_upper_and_lower_lids_hold_each_other_off() -> None:
     wanted = {"left_upper_lid": -24.0, "left_lower_lid": -12.0}
     for name, angle in wanted.items():
         joint = bench.rig.joints[name]
-        bench.devices[""].body.channels[joint.id].aim(round(joint.steps(radians(angle))))
+        bench.devices[""].body.channels[joint.id].set_target(round(joint.steps(radians(angle))))
     bench.pass_ms(500)
     for name, angle in wanted.items():
         assert degrees(bench.world.joints_rad()[name]) > angle + 2.0

@@ -64,7 +64,7 @@ class WorldBench:
 
 def write(servo: Any, name: str, value: int) -> None:
     """Write a register as an instruction does."""
-    register = servo.memory.named(name)
+    register = servo.memory.register_named(name)
     assert (
         servo.write(register.address, value.to_bytes(register.size, "little", signed=value < 0))
         == 0
@@ -73,7 +73,7 @@ def write(servo: Any, name: str, value: int) -> None:
 
 def read(servo: Any, name: str) -> int:
     """Return a register as an instruction reads it."""
-    register = servo.memory.named(name)
+    register = servo.memory.register_named(name)
     return int.from_bytes(servo.read(register.address, register.size), "little", signed=True)
 
 
