@@ -77,26 +77,26 @@ def test_another_package_brings_a_command_and_a_schema(tmp_path: Path) -> None:
 
 
 HALL = """
-from gazerig.robot.app.camera_factory import frame_locator, scene_camera, true_head
+from gazerig.robot.app.camera_factory import frame_locator, scene_camera, true_head_pose
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.surroundings import Surroundings
 from gazerig.robot.recording.run_format import WORLD
 from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.robot.app.scene_files import load_scene
 class Room:
-    stands = ()
+    placement = ()
     def __init__(self, rig, options, clock):
         self.scene, self.clock = load_scene("visitor"), clock
-        self.wires = run_bus(rig, options, clock)
+        self.run_bus = run_bus(rig, options, clock)
     def camera(self, rig, options, sight, placed, rng, own, say):
-        where = true_head(self.wires.true_steps, rig, sight.poses)
+        where = true_head_pose(self.run_bus.true_steps, rig, sight.poses)
         look = frame_locator(placed)
         return scene_camera(rig, options, self.scene, sight.mount, where, rng, look, own)
     def start_s(self):
         return 0.0
     def shapes(self):
         return None
-    def recorded(self):
+    def world_info(self):
         return WorldInfo("hall", "a hall", 7, 0.0)
 class Hall(Surroundings):
     def scene(self, options):

@@ -56,7 +56,7 @@ def serve(path: Path) -> None:
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
-    about = {"rig": str(path), "pid": os.getpid()}
+    about = {"rig": str(path), "name": "my", "pid": os.getpid()}
     tuning = ParamStore(made.live_params, robot.command, str(path), elsewhere=here)
     live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
     live._watch._every_s = 0.1
