@@ -112,7 +112,7 @@ def test_the_sweep_shows_what_speeds_do_and_repeats_itself(shown: Shown) -> None
     rows = [numbers(line) for line in lines[1:]]
     met = {(eyes, head): gaze_s for eyes, head, gaze_s, _ in rows}
     assert len(met) == 4
-    assert met[150.0, 120.0] > met[500.0, 120.0]  # faster eyes are there earlier
+    assert met[150.0, 120.0] >= met[500.0, 120.0]  # the head limits a gaze that is far aside
     assert all(met[eyes, 30.0] > met[eyes, 120.0] for eyes in (150.0, 500.0))
     again = runpy.run_path(str(EXAMPLES / "sweep.py"))["measure"](500.0, 120.0)
     assert again[0] == pytest.approx(met[500.0, 120.0], abs=0.0051)  # two decimals

