@@ -52,7 +52,11 @@ def test_the_page_comes_with_its_stop_button(near: Rig) -> None:
 
 def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:
     status, headers, text = near.get("/view/")
-    assert status == 200 and '<link rel="stylesheet" href="/rig/view.css"><script src="/rig/view.js"></script></head>' in text
+    assert (
+        status == 200
+        and '<link rel="stylesheet" href="/rig/view.css"><script src="/rig/view.js"></script></head>'
+        in text
+    )
     assert headers["X-Frame-Options"] == "SAMEORIGIN"
     assert headers["Content-Security-Policy"] == "frame-ancestors 'self'"
     status, headers, _ = near.get("/view")

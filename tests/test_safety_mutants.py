@@ -152,7 +152,12 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "        if not fresh:", "        if False:", stale_joints),
     (GUARD, "fresh = fresh and isfinite(position)", "pass", stale_joints),
     (GUARD, "(no_frame and self._neck[i])\n            or", "", stale_picture),
-    (GUARD, "self._are_all_well(joints) and not no_frame", "self._are_all_well(joints)", stale_picture),
+    (
+        GUARD,
+        "self._are_all_well(joints) and not no_frame",
+        "self._are_all_well(joints)",
+        stale_picture,
+    ),
     (GUARD, '_Hold("stale frame") if unseen else None', "None", stale_picture),
     (GUARD, "no_frame = not frame_age_s <=", "no_frame = frame_age_s >", stale_picture),
     # heat

@@ -4,10 +4,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from fakes.runs import record
+from present import present
 
 pytest.importorskip("mujoco")
 
@@ -98,7 +100,7 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
     at = hands(scene)
     assert (at[:100] == alone[:100]).all()
     ends_s = 4.95 + HOLD_S + TAKE_S
-    (span,) = scene.figures.opponent.spans_s
+    (span,) = present(scene.figures.opponent).spans_s
     assert span == pytest.approx((1.02, ends_s), abs=0.05)
     assert (at[int(100 * ends_s) + 5 :] == alone[int(100 * ends_s) + 5 :]).all()
     # The punch of the script at 1.9 s was not thrown, that of the person at 2 s was.
@@ -116,7 +118,7 @@ def test_another_process_sees_the_same_motion(scene: WorldScene, tmp_path: Path)
 
 def test_events_follow_from_the_motion(scene: WorldScene) -> None:
     hands(scene)
-    punch, opened = scene.figures.opponent.events
+    punch, opened = present(scene.figures.opponent).events
     assert punch.name == "punch" and punch.due_s is not None
     assert 2.0 < punch.start_s < 2.15 < punch.due_s < 2.5
     assert opened.name == "attack" and 3.0 < opened.start_s < 3.4 and 4.0 < opened.end_s < 4.4
@@ -126,10 +128,11 @@ def test_events_follow_from_the_motion(scene: WorldScene) -> None:
 def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(early_s: float) -> None:
     rig, options = load_rig("desk", "strong_boxer"), replace(BOXING, character="strong_boxer")
     made = assemble(rig, options)
-    moved = made.scene.opponent
+    played: Any = made.scene
+    moved, room = played.opponent, present(made.room)
     made.robot.start(made.clock)
     made.clock.sleep_until(made.clock.now_s() + early_s)
-    from_scene = made.scene.events(), made.scene.round_s, moved, made.room.start_s
+    from_scene = played.events(), played.round_s, moved, room.start_s
     score, looks = PlannerScore(*from_scene), BehaviourScore(*from_scene)
     for k in range(1400):
         t_s = 0.005 * k
@@ -141,7 +144,7 @@ def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(early_s: float) 
         looks.update(tick)
     made.robot.stop()
     made.close()
-    figures = score.figures()
+    figures: Any = score.figures()
     assert figures["punches"] == figures["guards_in_time"] == 1
     assert figures["lead_ms"] > 50.0 and figures["attacks"] >= 1 <= figures["open"]
     assert looks.figures()["punch"]["of"] == looks.figures()["punch"]["seen"] == 1
