@@ -577,7 +577,7 @@ def _names(rigs: list[RobotClient]) -> str:
                 names.append(f"{rig.name} (process {rig.pid})")
             except DriverError as error:
                 names.append(f"process {rig.pid} ({error})")
-    return ", ".join(names)
+    return ", ".join(sorted(names))
 
 
 def _changes(rows: object) -> tuple[ParamChange, ...]:
