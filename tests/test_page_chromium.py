@@ -240,6 +240,7 @@ def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Per
     assert rig.orders[before:] == []
 
 
+@pytest.mark.own_timeouts
 def test_the_head_follows_a_finger_and_the_view_does_not_turn(
     at_the_rig: tuple[Rig, Person],
 ) -> None:
