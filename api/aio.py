@@ -80,7 +80,7 @@ class AsyncHead:
     """A head that runs in another program; ``connect`` creates it.
 
     The methods are those of ``gazerig.Head``, called in threads: orders return an ``AsyncOrder``,
-    which is on its way at once, all others something to await. The event loop never waits.
+    which is sent immediately, and the other methods a task. The event loop never waits.
     """
 
     def __init__(self, connect: Callable[[], RemoteHead]) -> None:

@@ -25,7 +25,7 @@ from typing import Annotated
 import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub, wrap, yaw_pitch
-from gazerig.gaze.types import Angles2, Target, Vec3, body_name
+from gazerig.gaze.types import SEARCH, Angles2, Target, Vec3, body_name
 from gazerig.params import Bounds
 
 LOST = "lost, waiting"
@@ -120,7 +120,7 @@ class Idle:
             left_s *= params.rest_ms / before.rest_ms
         elif self._now.kind == "glance":
             left_s *= params.glance_ms / before.glance_ms
-        elif self._now.kind != "search":
+        elif self._now.kind != SEARCH:
             # The wait for a lost target.
             left_s += (params.hold_ms - before.hold_ms) / 1e3
             self._search_until_s = since_s + left_s + params.search_ms / 1e3
@@ -212,7 +212,7 @@ class Idle:
 
     def _search(self, gone: Target, t_s: float, rng: np.random.Generator) -> None:
         """Start a search fixation: first a step in the direction of the loss, then around."""
-        par, first = self._params, self._now.kind != "search"
+        par, first = self._params, self._now.kind != SEARCH
         rel = sub(gone.p_world_m, self._eye)
         out = self._heading_yaw_pitch(rel, gone.v_world_m_s)
         share = 1.0 if first else float(rng.uniform(-0.2, 1.2))
@@ -230,7 +230,7 @@ class Idle:
             here + step,
             min(radians(45.0), max(-radians(45.0), to_pitch)),
         )
-        self._look("search", place, norm(rel), t_s, f"looking for {body_name(gone.kind, gone.id)}")
+        self._look(SEARCH, place, norm(rel), t_s, f"looking for {body_name(gone.kind, gone.id)}")
         until_s = t_s + self._time_s(par.search_fixation_ms, rng)
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
 
@@ -249,14 +249,14 @@ class Idle:
     def _is_far_aside(self) -> bool:
         """Return whether a search has ended more than a step from straight ahead."""
         yaw = yaw_pitch(sub(self._now.p_world_m, self._eye))[0]
-        return self._now.kind == "search" and abs(degrees(yaw)) > self._params.search_step_deg
+        return self._now.kind == SEARCH and abs(degrees(yaw)) > self._params.search_step_deg
 
     def _look_back(self, t_s: float, rng: np.random.Generator) -> None:
         """Take a step back from a far side."""
         par, (yaw, pitch) = self._params, yaw_pitch(sub(self._now.p_world_m, self._eye))
         back = self._step_rad(rng) * (-1.0 if yaw > 0.0 else 1.0)
         place = yaw + back, 0.5 * pitch
-        self._look("search", place, par.rest_distance_m, t_s, "looking back from the side")
+        self._look(SEARCH, place, par.rest_distance_m, t_s, "looking back from the side")
         self._until_s = t_s + self._time_s(par.search_fixation_ms, rng)
 
     def _heading_yaw_pitch(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:

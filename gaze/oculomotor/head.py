@@ -33,9 +33,8 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
-from gazerig.gaze.types import Angles2, Angles3, Target, Vec3
+from gazerig.gaze.types import SEARCH, Angles2, Angles3, Target, Vec3
 
-SEARCH = "search"
 OWN_LOOKS = ("glance", SEARCH, "rest")
 """Kinds of targets that nothing seen has caused (gazerig.gaze.attention.idle)."""
 

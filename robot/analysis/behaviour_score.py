@@ -23,8 +23,7 @@ from typing import Literal, NamedTuple
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.moved_opponent import MovableOpponent
-from gazerig.robot.model.scene_events import BoxingEvent as BoxingEvent
-from gazerig.robot.model.scene_events import ExpectedResponse as ExpectedResponse
+from gazerig.robot.model.scene_events import BoxingEvent, ExpectedResponse
 
 _MOST_TICKS = 2000
 """Number of ticks kept to judge an event of a person's motion: 10 s at 200 Hz."""

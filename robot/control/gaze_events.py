@@ -47,9 +47,7 @@ class GazeEvents:
         other = gaze.saccades != last.gaze.saccades
         if ballistic[0] and (other or not ballistic[1]):
             found.append(_change("the eyes land at", "saccade_landing", last.target))
-        if target is not last.target and target[3:5] + (target.part,) != (
-            last.target[3:5] + (last.target.part,)
-        ):
+        if target is not last.target and _identity(target) != _identity(last.target):
             found.append(_change("the target is", "target", target))
         if ballistic[1] and (other or not ballistic[0]):
             found.append(_change("saccade to", "saccade_start", target))
@@ -74,6 +72,10 @@ class GazeEvents:
                 del self._seen_s[person]
                 found.append(Change(f"person {person} has left", "person_left", person))
         return found
+
+
+def _identity(target: Target) -> tuple[str, int, str | None]:
+    return target.kind, target.id, target.part
 
 
 def _change(text: str, kind: EventKind, target: Target) -> Change:

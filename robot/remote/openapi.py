@@ -14,6 +14,10 @@ from gazerig.robot.model.outcome import Outcome
 from gazerig.robot.remote.socket_io import VERSION
 
 Schema = dict[str, Any]
+MOST_RATE_HZ = 60
+"""Highest rate of states."""
+WAIT_S, MOST_WAIT_S = 10, 15
+"""Wait of an HTTP request for an outcome: the usual one and the longest."""
 _PLAIN = {bool: "boolean", int: "integer", float: "number", str: "string", type(None): "null"}
 _REQUESTS = QUESTIONS | CHANGES
 
@@ -140,14 +144,14 @@ def api_description(base: str) -> dict[str, Any]:
         "do": (
             "post",
             "Send one message; the answer to an order has its outcome",
-            [_query("wait_s", {"type": "number", "minimum": 0, "maximum": 15, "default": 10})],
+            [_query("wait_s", {"type": "number", "minimum": 0, "maximum": MOST_WAIT_S, "default": WAIT_S})],
             {"200": _answer("Done", of_answer), **refusals},
         ),
         "socket": (
             "get",
             "Websocket: messages as of do, answers and outcomes; states at rate_hz; events",
             [
-                _query("rate_hz", {"type": "number", "minimum": 1, "maximum": 60}),
+                _query("rate_hz", {"type": "number", "minimum": 1, "maximum": MOST_RATE_HZ}),
                 _query("events", {"type": "boolean", "default": False}),
             ],
             {"101": {"description": "Open"}, **bad},

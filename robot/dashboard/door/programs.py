@@ -35,15 +35,12 @@ from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED
 from gazerig.robot.model.outcome import outcome_of
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.remote.openapi import api_description
+from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
 
 BASE = f"{API}v{VERSION}"
-MOST_RATE_HZ = 60.0
 MOST_PROGRAMS = 32
 """Largest number of websockets of programs, as of tabs of the page."""
-MOST_WAIT_S = 15.0
-"""Longest wait of an HTTP request for an outcome."""
 _EVENTS_HZ = 20.0
 """Rate at which the head is read for events and outcomes."""
 _PER_S, _BURST = 50.0, 100.0
@@ -232,7 +229,7 @@ class Programs:
 
     @_refusing
     async def _post(self, request: web.Request) -> web.StreamResponse:
-        wait_s = rate_of(request.query.get("wait_s", "10"), "wait_s", 0.0, MOST_WAIT_S)
+        wait_s = rate_of(request.query.get("wait_s", f"{WAIT_S}"), "wait_s", 0.0, MOST_WAIT_S)
         data = b""
         async with asyncio.timeout(_READ_S):
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
@@ -455,18 +452,14 @@ def description_page(description: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     info = description["info"]
     return (
-        f"<!doctype html><meta charset=utf-8><title>{_escaped(info['title'])}</title>"
+        f"<!doctype html><meta charset=utf-8><title>{html.escape(info['title'])}</title>"
         "<style>body{font:16px sans-serif;margin:2em;max-width:60em}td{padding:.2em 1em .2em 0;"
         "vertical-align:top}</style>"
-        f"<h1>{_escaped(info['title'])}</h1><p>{_escaped(info['description'])} "
+        f"<h1>{html.escape(info['title'])}</h1><p>{html.escape(info['description'])} "
         "<a href=openapi.json>openapi.json</a></p>"
         f"<table>{_rows(rows)}</table><h2>Messages</h2><table>{_rows(messages)}</table>"
     )
 
 
 def _rows(rows: Iterable[Iterable[str]]) -> str:
-    return "".join(f"<tr>{''.join(f'<td>{_escaped(cell)}' for cell in row)}" for row in rows)
-
-
-def _escaped(text: str) -> str:
-    return html.escape(text)
+    return "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}' for cell in row)}" for row in rows)
