@@ -27,11 +27,11 @@ OWNERS = {
     "zstandard": ("robot.recording.",),
     "msgspec": (
         "robot.control.tick_stream",
+        "robot.recording.",
         "features.study.participation",
         "features.study.journal",
         "features.study.pages.participant_page",
     ),
-    "orjson": ("robot.recording.",),
     "matplotlib": ("features.lab.report.plotting",),
     "pyarrow": ("features.lab.sweep.outcome",),
     "jinja2": (

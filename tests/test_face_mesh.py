@@ -6,8 +6,8 @@ from importlib.util import find_spec
 from math import asin, atan2, degrees, pi, radians, sin
 from pathlib import Path
 
+import msgspec
 import numpy as np
-import orjson
 import pytest
 from present import present
 from seeing.material import portrait
@@ -202,11 +202,11 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
 def test_recordings_hold_signs_and_those_of_before_are_read() -> None:
     (face,) = percept_of(1.0, face_with_signs()).faces
     data = percept_as_json(decode_plain(encode(_percept_row(7, percept_of(1.0, face)))))
-    _, back = percept_from_json(orjson.loads(orjson.dumps(data)))
+    _, back = percept_from_json(msgspec.json.decode(msgspec.json.encode(data)))
     assert back.faces == (face,)
     for name in ("eye_opening", "mouth_opening_m", "speaks"):
         del data["faces"][0][name]
-    old: Percept = percept_from_json(orjson.loads(orjson.dumps(data)))[1]
+    old: Percept = percept_from_json(msgspec.json.decode(msgspec.json.encode(data)))[1]
     assert (old.faces[0].eye_opening, old.faces[0].speaks) == (None, None)
 
 

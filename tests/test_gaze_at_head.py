@@ -3,8 +3,8 @@
 from dataclasses import replace
 from math import atan2, degrees, hypot, pi, radians
 
+import msgspec
 import numpy as np
-import orjson
 import pytest
 from attention_scene import attention, looking
 from fakes.scenes import EmptyScene
@@ -155,7 +155,7 @@ def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
 def test_a_gaze_of_the_eyes_is_kept_by_camera_recordings_and_checked() -> None:
     for gaze in (None, (0.0, 0.6, -0.8)):
         (face,) = detection(gaze).faces
-        (back,) = decode_faces(orjson.dumps({"faces": [_face(face)]}))
+        (back,) = decode_faces(msgspec.json.encode({"faces": [_face(face)]}))
         assert back.gaze_camera == gaze
         assert face_fault(face) == ""
     for wrong in ((0.0, 1.0), (0.0, float("nan"), 1.0), (0.0, 0.0, 0.0)):
@@ -178,12 +178,12 @@ def percept_of(t_s: float, *rows: Face) -> Percept:
 def test_recordings_hold_it_and_those_of_before_are_read() -> None:
     handed = percept_of(1.0, face_at(3, (1.0, 0.0, 0.2), True))
     data = percept_as_json(decode_plain(encode(_percept_row(7, handed))))
-    number, back = percept_from_json(orjson.loads(orjson.dumps(data)))
+    number, back = percept_from_json(msgspec.json.decode(msgspec.json.encode(data)))
     assert number == 7 and back.faces == handed.faces
     for face in data["faces"]:
         for name in ("off_head_rad", "looks_at_head", "gaze_world"):
             del face[name]
-    (old,) = percept_from_json(orjson.loads(orjson.dumps(data)))[1].faces
+    (old,) = percept_from_json(msgspec.json.decode(msgspec.json.encode(data)))[1].faces
     assert (old.off_head_rad, old.looks_at_head, old.gaze_world) == (None, None, None)
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
-import orjson
 import pytest
 from desk import GAZE_JOINTS
 from mcap.reader import make_reader
@@ -384,7 +384,7 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
         target=tick.target._replace(salience=odd),
         percept=None,
     )
-    values = orjson.loads(orjson.dumps(moments.as_json(handed_over(tick, odd)[1])))
+    values = msgspec.json.decode(msgspec.json.encode(moments.as_json(handed_over(tick, odd)[1])))
     back = moments.from_json(values, {})
     assert exact(back.tick) == exact(tick)
     assert repr(back.dt_s) == repr(odd)
@@ -394,7 +394,7 @@ def test_leads_and_gestures_come_back(recorded: Recorded) -> None:
     gesture = GestureState(2, "nod", "", "somebody", 3.5)
     lead = ControlState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
     tick = recorded.ticks[-1]._replace(lead=lead, gesture=gesture, percept=None)
-    data = orjson.loads(orjson.dumps(moments.as_json(handed_over(tick)[1])))
+    data = msgspec.json.decode(msgspec.json.encode(moments.as_json(handed_over(tick)[1])))
     back = moments.from_json(data, {}).tick
     assert (back.lead, back.gesture) == (lead, gesture)
 
@@ -406,7 +406,7 @@ def test_any_percept_comes_back(recorded: Recorded, odd: float) -> None:
                     np.full((2, 6, 6), odd))  # fmt: skip
     for percept in (Percept(odd, bodies, (face,)), Percept(1.0, scene=4)):
         (handed,), row = handed_over(recorded.ticks[-1]._replace(percept=percept))
-        data = orjson.loads(orjson.dumps(moments.percept_as_json(handed)))
+        data = msgspec.json.decode(msgspec.json.encode(moments.percept_as_json(handed)))
         number, back = moments.percept_from_json(data)
         assert number == row[2] == 1 and repr(back) == repr(percept)
         assert back.bodies.p_world_m.shape == percept.bodies.p_world_m.shape

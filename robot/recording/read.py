@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-import orjson
+import msgspec
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -177,7 +177,7 @@ class RunRecording:
         before_s: float | None = None
         for topic, data in self._messages({fmt.TICK, fmt.PERCEPT}):
             with _damage_errors(self.path):
-                message = orjson.loads(data)
+                message = msgspec.json.decode(data)
                 if topic == fmt.PERCEPT:
                     number, percept = percept_from_json(message)
                     percepts[number] = percept
@@ -202,7 +202,7 @@ class RunRecording:
         """
         for _, data in self._messages({fmt.FRAME}):
             with _damage_errors(self.path):
-                message = orjson.loads(data)
+                message = msgspec.json.decode(data)
                 frame = float(message["captured_s"]), base64.b64decode(message["data"])
             yield frame
 
@@ -214,7 +214,7 @@ class RunRecording:
         """
         for _, data in self._messages({fmt.HEALTH}):
             with _damage_errors(self.path):
-                message: dict[str, Any] = orjson.loads(data)
+                message: dict[str, Any] = msgspec.json.decode(data)
             yield message
 
     def _messages(self, wanted: set[str]) -> Iterator[tuple[str, memoryview]]:

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-import orjson
+import msgspec
 from mcap.writer import CompressionType, Writer
 
 from gazerig.robot.recording import run_format as fmt
@@ -78,10 +78,12 @@ class RunWriter:
             channel = self._channels.get(topic)
             if channel is None:
                 name, schema = fmt.SCHEMAS[topic]
-                about = self._writer.register_schema(name, "jsonschema", orjson.dumps(schema))
+                about = self._writer.register_schema(
+                    name, "jsonschema", msgspec.json.encode(schema)
+                )
                 channel = int(self._writer.register_channel(topic, "json", about))
                 self._channels[topic] = channel
-            at_ns, data = self.time_ns(message.at_s), orjson.dumps(message.data)
+            at_ns, data = self.time_ns(message.at_s), msgspec.json.encode(message.data)
             self._writer.add_message(channel, at_ns, data, at_ns, self._counts[topic])
 
     def world(self, about: Mapping[str, str]) -> None:

@@ -99,7 +99,7 @@ def volume(path: Path, seconds: float) -> None:
     stop = recording.wrap_stop(lambda s: "seconds" if s >= seconds else None)
     count = run(robot, assembly.clock, assembly.loop, stop, recording.record)
     shut_down(assembly, count, lambda line: None)
-    print(recording.close("seconds", assembly.sent_digest()))
+    print(recording.close("seconds", assembly.sent_bytes_digest()))
     print(f"recorded in {time.monotonic() - start_s:.1f} s")
     size = path.stat().st_size
     print(f"{size / count.ticks:.0f} bytes a tick, {size / seconds * 60 / 1e6:.2f} MB a minute")
