@@ -22,12 +22,13 @@ from gazerig.config.schema import RULES
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.model.types import in_order
+from gazerig.robot.model.types import order_joints
 
 NEXT_TICK = "next tick"
 NEXT_START = "next start"
 
 _AT_OPENING = "the camera is opened with it"
+_MASSES = "the model of the head's weight is made with it"
 _CHOOSER = "what chooses whom to look at is made with it"
 _AT_START: dict[str, str] = {
     "name": "it only names the rig",
@@ -41,6 +42,11 @@ _AT_START: dict[str, str] = {
     "joints.*.servo_speed_deg_s": "the servos' places are estimated from it after the first goal",
     "gesture_files": "gestures are read and checked when the rig is read",
     "couplings.*": "the servos' places are turned into angles with it from the first reading on",
+    "mass.*": _MASSES,
+    "joints.*.friction_nm": _MASSES,
+    "joints.*.play_deg": _MASSES,
+    "joints.*.spring_nm_deg": _MASSES,
+    "joints.*.spring_rest_deg": _MASSES,
     "meshes.*": "meshes are read when the rig is drawn for the first time",
     "buses.*": "the servo buses are opened with it",
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
@@ -205,7 +211,7 @@ _Unlisted = Mapping[str, tuple[str, ...]]
 
 
 def _unlisted(rig: Rig) -> _Unlisted:
-    return {"park_deg": in_order(rig.joints), "face_parts_mm": PARTS}
+    return {"park_deg": order_joints(rig.joints), "face_parts_mm": PARTS}
 
 
 def _leaves(

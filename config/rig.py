@@ -38,8 +38,9 @@ from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.model.types import in_order
+from gazerig.robot.model.types import order_joints
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,7 @@ class Rig:
         "pairs of joints that two servos move together, each under any name"] = field(default_factory=dict, kw_only=True)
     meshes: Annotated[Mapping[str, MeshParams],
         "mesh files shown instead of what the program makes, by the name of the link"] = field(default_factory=dict, kw_only=True)
+    mass: Annotated[MassParams, "masses and their balance"] = field(default_factory=MassParams, kw_only=True)
     park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
         "pose to which the joints move before torque is switched off; joints left out go to 0"] = field(default_factory=dict)
     camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)
@@ -190,7 +192,7 @@ class Rig:
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names of the joints, in the order of every sequence of them."""
-        return in_order(self.joints)
+        return order_joints(self.joints)
 
     def bus_named(self, name: str) -> BusConfig:
         """Return a bus by its name, "" for the one without.

@@ -21,10 +21,11 @@ from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PARTS
-from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable
-from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, motions
+from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable_text
+from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, gesture_motions
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
+from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 
@@ -188,7 +189,7 @@ def _servo_setup(name: str, rig: Rig) -> ServoConfig:
             rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
         )
         pair = CoupledPair(one.first, one.second, one.made())
-        if known and name in pair[:2] and not unreachable(pair, rig.joints):
+        if known and name in pair[:2] and not unreachable_text(pair, rig.joints):
             return pair_setups(pair, rig.joints, {})[name]
     return rig.joints[name].setup(name)
 
@@ -243,6 +244,23 @@ def _park_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
             )
 
 
+def _masses(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find masses that no such head can have."""
+    if rig.mass == MassParams() or any(True for rule in (_joint_names, _models) for _ in rule(rig)):
+        return
+    from gazerig.robot.description.build import RigShape, rig_mass_faults  # few rigs need it
+
+    lids = {
+        name: (radians(shut), radians(wide))
+        for name in LIDS
+        for shut, wide in [rig.lid_joints.ends_deg(name)]
+        if name in rig.joints and shut is not None and wide is not None
+    }
+    yield from rig_mass_faults(
+        RigShape(rig.name, rig.geometry, rig.joints, lids, rig.couplings, rig.camera, rig.mass)
+    )
+
+
 def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
     """Find couplings whose servos cannot do the whole range of their joints."""
     owner: dict[str, str] = {}
@@ -264,7 +282,7 @@ def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
         )
         if known:
             pair = CoupledPair(coupling.first, coupling.second, coupling.made())
-            if fault := unreachable(pair, rig.joints):
+            if fault := unreachable_text(pair, rig.joints):
                 yield f"couplings.{name}", fault
 
 
@@ -385,7 +403,12 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
                 if name in rig.joints and shut is not None and wide is not None:
                     spans[name] = radians(wide - shut)
             GestureFit(rig.names, spans).fit(
-                "", motions(gesture, rig.names), 1.0, middle, limits, rig.gaze.gestures.limit_share
+                "",
+                gesture_motions(gesture, rig.names),
+                1.0,
+                middle,
+                limits,
+                rig.gaze.gestures.limit_share,
             )
         except ConfigError as error:
             for fault in error.faults:
@@ -411,6 +434,7 @@ RULES = (
     _park_ranges,
     _part_names,
     _collisions,
+    _masses,
     _couplings,
     expressions,
     levels,

@@ -27,20 +27,14 @@ from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
 from gazerig.robot.description.gltf import gltf
 from gazerig.robot.description.head_shape import JAW_HALF
-from gazerig.robot.description.links import Description
-from gazerig.robot.description.mass import (
-    HEAD_LOAD_KG_M2,
-    SHELL_M,
-    about,
-    in_parent_frame,
-    join_inertias,
-    sheet,
-    skull,
-)
+from gazerig.robot.description.links import Description, Inertia
+from gazerig.robot.description.mass import SHELL_M, join_inertias, sheet, skull
 from gazerig.robot.description.mesh import merged
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
+from gazerig.robot.description.weights import carried_links
 from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
 
 VALIDATOR = os.environ.get("GLTF_VALIDATOR", "")
 """Folder in which ``npm install gltf-validator`` was run."""
@@ -299,23 +293,40 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
     assert data.ncon == 0
 
 
-def test_the_head_is_balanced_and_weighs_what_its_emulated_servos_carry() -> None:
-    description = description_of(shipped("desk"))
-    poses = description.poses(description.angles((), ()))
-    carried = [
-        in_parent_frame(link.inertia, *poses[link.name])
-        for link in description.links
-        if link.inertia is not None and link.name not in ("base_link", "neck_yaw_link")
-        and link.name != "neck_pitch_link" and link.name != "neck_roll_link"
-    ]  # fmt: skip
-    whole = join_inertias(carried)
-    pivot = poses["neck_roll_link"][1]
+def whole_head(rig: Rig) -> Inertia:
+    """The head with all it carries, about its own centre, placed from the pitch axis."""
+    description = description_of(rig, looks=False)
+    links = list(description.links)
+    own = description.link("head")
+    after = links[links.index(own) + 1 :]
+    carried = carried_links([link for link in after if link.parent != "base_link"])
+    whole = join_inertias([*carried, own.inertia] if own.inertia is not None else carried)
+    geometry = rig.geometry
+    pivot = (-geometry.eyes_ahead_mm / 1e3, 0.0, -geometry.eyes_above_mm / 1e3)
+    x, y, z = np.subtract(whole.com_m, pivot).tolist()
+    return whole._replace(com_m=(x, y, z))
+
+
+def test_a_head_weighs_what_its_shapes_give() -> None:
+    whole = whole_head(shipped("desk"))
     assert whole.mass_kg == pytest.approx(0.6)
-    assert np.linalg.norm(np.subtract(whole.com_m, pivot)) < 0.002
-    x, y, z = np.diag(np.array(about(whole, pivot))).tolist()
-    measured = {"neck_roll": x, "neck_pitch": y, "neck_yaw": z}
-    for name, expected in HEAD_LOAD_KG_M2.items():
-        assert measured[name] == pytest.approx(expected, rel=0.15), measured
+    # Shell and servos are above and a little behind the axes of the neck.
+    assert np.allclose(np.multiply(whole.com_m, 1e3), (-11.6, 0.0, 61.2), atol=0.5)
+
+
+def test_a_head_weighs_what_its_file_says() -> None:
+    desk = shipped("desk")
+    moments = (2500.0, 3400.0, 3000.0, 0.0, 500.0, 0.0)
+    given = LinkMassParams(0.9, (40.0, 2.0, 30.0), moments)
+    whole = whole_head(replace(desk, mass=MassParams(head=given)))
+    assert whole.mass_kg == pytest.approx(0.9)
+    assert np.allclose(whole.com_m, (0.040, 0.002, 0.030), atol=1e-9)
+    xx, yy, zz, xy, xz, yz = (moment * 1e-6 for moment in moments)
+    assert np.allclose(whole.tensor_kg_m2, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), atol=1e-9)
+    weight = {"back": CounterweightParams(0.3, (-80.0, 0.0, 30.0))}
+    balanced = whole_head(replace(desk, mass=MassParams(head=given, counterweights=weight)))
+    assert balanced.mass_kg == pytest.approx(1.2)
+    assert np.allclose(balanced.com_m, (0.010, 0.0015, 0.030), atol=1e-9)
 
 
 def test_a_skull_weighs_as_its_mesh_does() -> None:

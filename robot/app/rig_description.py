@@ -10,6 +10,7 @@ from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
+from gazerig.robot.description.statics import Statics
 from gazerig.robot.model.guard_params import CollisionParams
 
 
@@ -44,6 +45,7 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
         lid_ends(rig),
         rig.couplings,
         rig.camera,
+        rig.mass,
         (rig.webcam.width_px, rig.webcam.height_px),
     )
     if not rig.meshes:
@@ -60,6 +62,11 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
             if name not in lost
         )
     )
+
+
+def statics_of(rig: Rig) -> Statics:
+    """Return the model of the torques that a rig's servos hold at rest."""
+    return Statics(description_of(rig, looks=False), rig.joints, rig.couplings)
 
 
 def collision_hints(rig: Rig) -> list[str]:

@@ -5,7 +5,7 @@ The emulated servos of a rig are built into its joints by its YAML.
 
 import hashlib
 from collections.abc import Callable, Mapping
-from math import pi, radians
+from math import degrees, pi, radians
 from typing import NamedTuple
 
 from gazerig.config.rig import BusConfig, Rig
@@ -23,7 +23,8 @@ from gazerig.robot.app.bus_wiring import (
     servo_configs,
 )
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.description.mass import HEAD_LOAD_KG_M2
+from gazerig.robot.app.rig_description import statics_of
+from gazerig.robot.description.statics import Weight
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import coupled_pairs, pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
@@ -94,13 +95,55 @@ def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
     )
 
 
-def emulated_servo(rig: Rig, name: str) -> ServoSpec:
+class _ServoWeight(NamedTuple):
+    """Torque of a weight at a servo after its linkage: nm * sin(turns * (angle - upright)) + load.
+
+    turns: of the weight for one turn of the servo's part of the linkage
+    """
+
+    nm: float
+    upright_rad: float
+    turns: float = 1.0
+    load_nm: float = 0.0
+
+
+def _servo_weight(rig: Rig, name: str, weights: Mapping[str, Weight]) -> _ServoWeight:
+    """Return the weight at a servo: with all other joints at 0, of a pair with the second at 0."""
+    for first, second, coupling in coupled_pairs(rig.couplings):
+        if name in (first, second):
+            (a, b), (c, d) = coupling.rates((0.0, 0.0))
+            det = a * d - b * c
+            own, shares = (a, (d, -c)) if name == first else (c, (-b, a))
+            pitch, roll = weights[first], weights[second]
+            level = coupling.servo_rad((0.0, 0.0))[name == second]
+            return _ServoWeight(
+                shares[0] / det * pitch.nm,
+                level + own * pitch.upright_rad,
+                1.0 / own,
+                shares[1] / det * roll.torque_nm(0.0),
+            )
+    return _ServoWeight(weights[name].nm, weights[name].upright_rad)
+
+
+def _emulated_servo(rig: Rig, name: str, weights: Mapping[str, Weight]) -> ServoSpec:
     """Return the smart servo of one joint."""
-    joint = rig.joints[name]
+    joint, weight = rig.joints[name], _servo_weight(rig, name, weights)
     start, (low, high) = _start_step(rig, name), _mechanical_stops(rig, name)
-    steps_per_rad = joint.facts.steps_per_turn / (2.0 * pi)
-    load = HEAD_LOAD_KG_M2.get(name, 0.0) * (steps_per_rad / joint.made().steepest) ** 2
-    physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
+    linkage = joint.made()
+    turns = linkage.steepest * 2.0 * pi / joint.facts.steps_per_turn
+    physics = Physics(
+        load_kg_m2=weights[name].inertia_kg_m2 / turns**2,
+        load_nm=(1.0 if linkage.rising else -1.0) * weight.load_nm / turns,
+        gravity_nm=weight.nm / turns,
+        upright_steps=joint.steps(weight.upright_rad),
+        gravity_turns=weight.turns / turns,
+        spring_nm_rad=degrees(joint.spring_nm_deg) / turns**2,
+        spring_rest_steps=joint.steps(radians(joint.spring_rest_deg)),
+        friction_nm=joint.friction_nm / turns,
+        stop_low_steps=low,
+        stop_high_steps=high,
+        play_deg=joint.play_deg * turns,
+    )
     return ServoSpec(joint.id, joint.model, start, physics=physics)
 
 
@@ -114,7 +157,8 @@ def servo_index(rig: Rig, joint: str) -> int:
 def _emulated_line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind in CHAINS:
-        specs = tuple(emulated_servo(rig, joint) for joint in joints)
+        weights = statics_of(rig).weights()
+        specs = tuple(_emulated_servo(rig, joint, weights) for joint in joints)
         return CHAINS[config.kind](specs, config.baud)
     if config.kind in BOARDS:
         return BOARDS[config.kind](config, tuple(_hobby_spec(rig, one) for one in joints))

@@ -6,7 +6,7 @@ both eyes' centres, and whatever other joints the rig has. Angles are those of t
 with their signs (robot/model/kinematics.py).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from math import copysign, pi, radians
 from typing import NamedTuple
@@ -19,16 +19,23 @@ from gazerig.robot.description.links import (
     CameraFrame,
     Description,
     Follows,
-    Inertia,
     Link,
     LinkJoint,
 )
 from gazerig.robot.description.own_meshes import OwnMesh, with_own_meshes
+from gazerig.robot.description.weights import (
+    HEAD,
+    carried_links,
+    head_inertia,
+    mass_faults,
+    weighed,
+)
 from gazerig.robot.model.coupling_params import CouplingParams, coupled_pairs
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
-from gazerig.robot.model.types import further
+from gazerig.robot.model.mass_params import MassParams
+from gazerig.robot.model.types import further_joints
 
 
 def joint_torques_nm(
@@ -52,7 +59,7 @@ def joint_torques_nm(
     return found
 
 
-BASE, HEAD = "base_link", "head"
+BASE = "base_link"
 CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
 SIDES = ("left", "right")
 
@@ -76,6 +83,7 @@ class RigShape(NamedTuple):
     lids: Mapping[str, LidEnds]
     couplings: Mapping[str, CouplingParams]
     camera: CameraParams
+    mass: MassParams = MassParams()
     image_px: tuple[int, int] = (640, 480)
     meshes: tuple[OwnMesh, ...] = ()
 
@@ -92,15 +100,24 @@ def describe(rig: RigShape, *, looks: bool = True) -> Description:
     return with_own_meshes(_Builder(rig, looks=True).description(), rig.meshes)
 
 
+def rig_mass_faults(rig: RigShape) -> Iterator[tuple[str, str]]:
+    """Find masses that no such head can have: key in the rig's file, and the fault."""
+    built = describe(rig._replace(mass=MassParams()), looks=False)
+    yield from mass_faults(rig.mass, _measures(rig.geometry), built)
+
+
+def _measures(geometry: GeometryParams) -> HeadMeasures:
+    pivot_m = (-geometry.eyes_ahead_mm / 1e3, 0.0, -geometry.eyes_above_mm / 1e3)
+    return HeadMeasures(geometry.interocular_mm / 1e3, pivot_m)
+
+
 class _Builder:
     def __init__(self, rig: RigShape, *, looks: bool) -> None:
         self._rig, self._looks = rig, looks
         self._torques = joint_torques_nm(rig.joints, rig.couplings)
         geometry = rig.geometry
         self._eyes_m: Vec3 = (geometry.eyes_ahead_mm / 1e3, 0.0, geometry.eyes_above_mm / 1e3)
-        self._measures = HeadMeasures(
-            geometry.interocular_mm / 1e3, (-self._eyes_m[0], 0.0, -self._eyes_m[2])
-        )
+        self._measures = _measures(geometry)
         self._links: list[Link] = []
 
     def description(self) -> Description:
@@ -112,13 +129,14 @@ class _Builder:
         for name in LIDS:
             if name in rig.joints and name in rig.lids:
                 self._add_lid(name)
-        for name in further(rig.joints):
+        for name in further_joints(rig.joints):
             if name not in LOWER_NECK:
                 place, axis = parts.facial_joint_axis(name, self._measures)
                 joint = self._joint(name, axis)
                 self._links.append(
                     parts.further(link_name(name), HEAD, place, joint, self._measures)
                 )
+        self._links = [weighed(link, rig.mass, i >= first) for i, link in enumerate(self._links)]
         self._links.insert(first, self._build_head(neck, self._links[first:]))
         camera = rig.camera
         x, y, z = camera.position_mm
@@ -181,17 +199,9 @@ class _Builder:
         return parent
 
     def _build_head(self, neck: str, carried: list[Link]) -> Link:
-        """Return the head, balanced with all it carries about the axes of the neck."""
+        """Return the head without what it carries."""
         x, y, z = self._pivot_m
         ahead, _, above = self._eyes_m
-        rest = mass.join_inertias(_inertias_in_head(carried))
-        whole = max(mass.head_mass_kg(self._measures.interocular_m), 2.0 * rest.mass_kg)
-        # With this centre of its own mass the whole is centred on the pivot.
-        share = rest.mass_kg / (whole - rest.mass_kg)
-        cx, cy, cz = (
-            place + share * (place - off)
-            for place, off in zip(self._measures.pivot_m, rest.com_m, strict=True)
-        )
         still = [
             (side, self._lid_meeting_rad(side))
             for side in SIDES
@@ -202,8 +212,8 @@ class _Builder:
             neck,
             (x + ahead, y, z + above),
             self._measures,
-            (whole - rest.mass_kg, (cx, cy, cz)),
-            further(self._rig.joints),
+            head_inertia(self._rig.mass, self._measures, carried_links(carried)),
+            further_joints(self._rig.joints),
             still,
             self._looks,
         )
@@ -264,18 +274,3 @@ def link_name(joint: str) -> str:
     name = f"{joint}_link"
     # A joint may be called base or camera.
     return f"{name}_" if name in (BASE, CAMERA) else name
-
-
-def _inertias_in_head(links: list[Link]) -> list[Inertia]:
-    """Return the inertias of links that the head carries, in its frame, all joints at 0."""
-    at: dict[str, Vec3] = {HEAD: (0.0, 0.0, 0.0)}
-    found = []
-    for link in links:
-        x, y, z = at[link.parent or HEAD]
-        px, py, pz = link.p_m
-        at[link.name] = x + px, y + py, z + pz
-        if link.inertia is not None:
-            cx, cy, cz = link.inertia.com_m
-            com = (x + px + cx, y + py + cy, z + pz + cz)
-            found.append(link.inertia._replace(com_m=com))
-    return found

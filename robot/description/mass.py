@@ -9,6 +9,7 @@ import numpy as np
 
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import Inertia
+from gazerig.robot.model.mass_params import MassParams
 
 _PRINTED_KG_M3 = 1050.0
 """Density of printed PLA or PETG with the usual share of air."""
@@ -22,20 +23,24 @@ _SERVO_HALF_M: Vec3 = (0.010, 0.013, 0.017)
 
 _CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
 """Half axes of what fills a head (servos, frame, counterweight), in distances between the eyes."""
-_CONTENT_REACH = 2.2
-"""How far its centre may be from the head's middle to balance it, in distances between the eyes."""
-
 _SKULL = (47.15, (-0.831, 0.0, 0.110), ((65.81, 0.0, 8.78), (0.0, 72.79, 0.0), (8.78, 0.0, 54.48)))
 """Mass, centre and tensor of a head's shell with eyes 1 m apart, of the thickness above."""
 
-HEAD_LOAD_KG_M2 = {"neck_yaw": 2.0e-3, "neck_pitch": 3.0e-3, "neck_roll": 3.0e-3}
-"""Inertia of a balanced head of 0.6 kg about the axes of its neck, rounded."""
+
+def density_share(params: MassParams) -> float:
+    """Return the density of a rig's printed parts over the usual one."""
+    return params.density_kg_m3 / _PRINTED_KG_M3
 
 
-def head_mass_kg(interocular_m: float) -> float:
-    """Return the mass of a head: its shell grows with its surface, its mechanism does not."""
+def head_mass_kg(interocular_m: float, printed: float) -> float:
+    """Return the mass of a head: its shell grows with its surface, its mechanism does not.
+
+    Args:
+        interocular_m: distance between the eyes.
+        printed: density of its shell over the usual one.
+    """
     share = interocular_m / _REFERENCE_M
-    return HEAD_KG * (0.5 + 0.5 * share * share)
+    return HEAD_KG * (0.5 + 0.5 * printed * share * share)
 
 
 def servo(times: float = 1.0) -> Inertia:
@@ -45,12 +50,19 @@ def servo(times: float = 1.0) -> Inertia:
     return Inertia(mass, (0.0, 0.0, 0.0), diagonal(mass * (y + z), mass * (x + z), mass * (x + y)))
 
 
-def skull(interocular_m: float) -> Inertia:
-    """Return the shell of a head, whose thickness stays the same, from between the eyes."""
+def skull(interocular_m: float, printed: float = 1.0) -> Inertia:
+    """Return the shell of a head, whose thickness stays the same, from between the eyes.
+
+    Args:
+        interocular_m: distance between the eyes.
+        printed: density over the usual one.
+    """
     mass, com, tensor = _SKULL
     unit = interocular_m
     return Inertia(
-        mass * unit**2, _vector(np.array(com) * unit), _matrix(np.array(tensor) * unit**4)
+        printed * mass * unit**2,
+        _vector(np.array(com) * unit),
+        matrix(printed * np.array(tensor) * unit**4),
     )
 
 
@@ -80,36 +92,38 @@ def sheet(vertices: Floats, faces: np.ndarray, thickness_m: float = _LID_M) -> I
     com = masses @ points / mass
     off = points - com
     second = (off * masses[:, None]).T @ off
-    return Inertia(mass, _vector(com), _matrix(np.trace(second) * np.eye(3) - second))
+    return Inertia(mass, _vector(com), matrix(np.trace(second) * np.eye(3) - second))
 
 
-def balanced(shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, at_m: Vec3) -> Inertia:
-    """Return a shell with what fills it: an even ellipsoid that brings the whole into balance.
+def filled(
+    shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, com_m: Vec3 | None = None
+) -> Inertia:
+    """Return a shell with what fills it: an even ellipsoid of servos, frame and ballast.
 
     Args:
         shell: the skull.
         mass_kg: of both together.
         unit_m: distance between the eyes, which scales the content.
-        middle_m: of the head; the content's centre stays near it, balanced or not.
-        at_m: the wanted centre of the whole, on the axes of the neck.
+        middle_m: of the content.
+        com_m: centre of mass of both together, to which the content is moved; None: it stays.
     """
     rest = mass_kg - shell.mass_kg
-    if rest <= 0.0:  # a very large head has a thinner shell
-        return scale_mass(shell, mass_kg)
-    middle = np.array(middle_m)
-    wanted = (mass_kg * np.array(at_m) - shell.mass_kg * np.array(shell.com_m)) / rest
-    off = wanted - middle
-    farthest = _CONTENT_REACH * unit_m
-    off *= min(1.0, farthest / max(float(np.linalg.norm(off)), 1e-9))
+    if rest <= 0.05 * mass_kg:  # a very large head has a thinner shell
+        thinner = scale_mass(shell, mass_kg)
+        return thinner if com_m is None else thinner._replace(com_m=com_m)
+    middle = middle_m
+    if com_m is not None:
+        moment = mass_kg * np.array(com_m) - shell.mass_kg * np.array(shell.com_m)
+        middle = _vector(moment / rest)
     x, y, z = ((half * unit_m) ** 2 / 5.0 for half in _CONTENT_HALF)
     tensor = diagonal(rest * (y + z), rest * (x + z), rest * (x + y))
-    return join_inertias((shell, Inertia(rest, _vector(middle + off), tensor)))
+    return join_inertias((shell, Inertia(rest, middle, tensor)))
 
 
 def scale_mass(one: Inertia, mass_kg: float) -> Inertia:
     """Return the same shape of another mass."""
     share = mass_kg / one.mass_kg
-    return Inertia(mass_kg, one.com_m, _matrix(np.array(one.tensor_kg_m2) * share))
+    return Inertia(mass_kg, one.com_m, matrix(np.array(one.tensor_kg_m2) * share))
 
 
 def join_inertias(parts: Iterable[Inertia]) -> Inertia:
@@ -120,20 +134,14 @@ def join_inertias(parts: Iterable[Inertia]) -> Inertia:
     tensor = np.zeros((3, 3))
     for body in bodies:
         tensor += np.array(body.tensor_kg_m2) + _steiner(np.array(body.com_m) - com, body.mass_kg)
-    return Inertia(mass, _vector(com), _matrix(tensor))
+    return Inertia(mass, _vector(com), matrix(tensor))
 
 
 def in_parent_frame(one: Inertia, R: Mat3, p_m: Vec3) -> Inertia:
     """Return a body as seen from a frame in which its own has this pose."""
     turn = np.array(R)
     com = turn @ np.array(one.com_m) + p_m
-    return Inertia(one.mass_kg, _vector(com), _matrix(turn @ np.array(one.tensor_kg_m2) @ turn.T))
-
-
-def about(one: Inertia, point_m: Vec3) -> Mat3:
-    """Return the tensor of a body about a point."""
-    off = np.array(one.com_m) - point_m
-    return _matrix(np.array(one.tensor_kg_m2) + _steiner(off, one.mass_kg))
+    return Inertia(one.mass_kg, _vector(com), matrix(turn @ np.array(one.tensor_kg_m2) @ turn.T))
 
 
 def diagonal(x: float, y: float, z: float) -> Mat3:
@@ -150,6 +158,7 @@ def _vector(values: Floats) -> Vec3:
     return x, y, z
 
 
-def _matrix(values: Floats) -> Mat3:
+def matrix(values: Floats) -> Mat3:
+    """Return a matrix of numpy as rows."""
     a, b, c = np.asarray(values, float)
     return _vector(a), _vector(b), _vector(c)

@@ -178,7 +178,7 @@ def head(
     parent: str,
     p_m: Vec3,
     measures: HeadMeasures,
-    balance: tuple[float, Vec3],
+    inertia: Inertia,
     moved_parts: Sequence[str],
     still_lids: Sequence[tuple[str, float]],
     looks: bool,
@@ -190,15 +190,12 @@ def head(
         parent: of the link.
         p_m: in its parent.
         measures: of the head.
-        balance: mass, and where its centre should be.
+        inertia: of the head without its moved parts.
         moved_parts: joints that move parts of it: jaw, brows, ears.
         still_lids: side and elevation of lower lids that no joint moves.
         looks: with what can be seen of it, which takes a while to make.
     """
-    unit = measures.interocular_m
     bodies = _BODIES + (() if "jaw" in moved_parts else _JAW_BODIES)
-    kg, at_m = balance
-    inertia = mass.balanced(mass.skull(unit), kg, unit, measures.scaled(_MIDDLE), at_m)
     shapes = tuple(_body(measures, *body) for body in bodies)
     visuals = _head_looks(measures, moved_parts, still_lids) if looks else ()
     return Link(name, parent, p_m, inertia=inertia, visuals=visuals, collisions=shapes)

@@ -41,7 +41,7 @@ class JointLimit(NamedTuple):
         )
 
 
-class Line(NamedTuple):
+class LinearLinkage(NamedTuple):
     """A linear linkage: steps = zero + slope * angle and angle = (steps - zero) * rate."""
 
     zero: float
@@ -60,7 +60,7 @@ class Linkage(Protocol):
 
     steepest: float
     rising: bool
-    line: "Line | None"
+    line: "LinearLinkage | None"
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""
@@ -75,7 +75,7 @@ class Linkage(Protocol):
         ...
 
 
-class Straight:
+class ConstantRatio:
     """A gear with a constant ratio; implements Linkage.
 
     Args:
@@ -84,7 +84,7 @@ class Straight:
     """
 
     def __init__(self, zero: float, slope: float) -> None:
-        self.line: Line | None = Line(zero, slope, 1.0 / slope)
+        self.line: LinearLinkage | None = LinearLinkage(zero, slope, 1.0 / slope)
         self._zero, self._slope, self._rate = self.line
         self.steepest = abs(slope)
         self.rising = slope > 0.0
@@ -102,7 +102,7 @@ class Straight:
         return self._rate
 
 
-class Curve:
+class MeasuredLinkage:
     """A linear interpolation of measured points; implements Linkage.
 
     The outermost lines extrapolate beyond the points.
@@ -128,7 +128,7 @@ class Curve:
                     f"place {i + 1} goes back: measure it again"
                 )
         self.rising = up
-        self.line: Line | None = None
+        self.line: LinearLinkage | None = None
         self._angles, self._steps = tuple(angles_rad), tuple(float(s) for s in steps)
         # Keys rise for both directions of the rod.
         self._order = 1.0 if up else -1.0
@@ -183,6 +183,10 @@ class JointParams:
     gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
+    friction_nm: Annotated[float, Bounds(0, 20), "dry friction of the joint's own bearings and linkage, besides the servo's"] = 0.0
+    play_deg: Annotated[float, Bounds(0, 10), "play (backlash) between servo and joint, from stop to stop"] = 0.25
+    spring_nm_deg: Annotated[float, Bounds(0, 5), "stiffness of a spring on the joint; 0: none"] = 0.0
+    spring_rest_deg: Annotated[float, Bounds(-720, 720), "angle at which that spring has no torque; beyond the range if it is preloaded"] = 0.0
     firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware version that is accepted"] = 0
     # fmt: on
 
@@ -241,9 +245,11 @@ class JointParams:
         facts = self.facts
         if self.transmission_points:
             angles, places = zip(*self.transmission_points, strict=True)
-            return Curve([radians(a) for a in angles], [facts.unit_steps * p for p in places])
+            return MeasuredLinkage(
+                [radians(a) for a in angles], [facts.unit_steps * p for p in places]
+            )
         slope = self.sign * self.ratio * facts.steps_per_turn / (2.0 * pi)
-        return Straight(facts.unit_steps * self.zero, slope)
+        return ConstantRatio(facts.unit_steps * self.zero, slope)
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""

@@ -4,7 +4,7 @@ A step is implicit: P and D act on position and speed at its end, because the re
 faster than 1 kHz, acts during the step. So no gain of the registers makes the numbers diverge.
 Five steps are one linear map while no sign changes. Its weights are those of the steps themselves,
 computed once for each controller and voltage with sums and products only: the same on every
-machine.
+machine. Weight and spring count as constant during a span.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from functools import lru_cache
 from math import inf, sin
 from typing import NamedTuple
 
-from gazerig.sim_mock.smart_servo.physics import STEPS_PER_RAD, Loop, Mechanics
+from gazerig.sim_mock.smart_servo.physics import Loop, Mechanics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 SPAN_MS = 5
@@ -115,7 +115,8 @@ class ShaftMotion:
     """
 
     __slots__ = (
-        "_built", "_high", "_integral", "_linear", "_load", "_loop", "_low", "_rv", "_since_ms",
+        "_built", "_constant", "_heavy", "_high", "_integral", "_linear", "_load", "_loop", "_low",
+        "_rv", "_since_ms",
         "_span_start", "_weights",
         "effort", "joint", "profile", "quiet", "supply", "u", "v", "volts", "x",
     )  # fmt: skip
@@ -134,6 +135,8 @@ class ShaftMotion:
     _linear: bool
     _low: float
     _high: float
+    _constant: float
+    _heavy: bool
     _load: float
     _integral: float
     _rv: float
@@ -170,6 +173,10 @@ class ShaftMotion:
     def _advance(self, ticks: int) -> None:
         """Advance by some milliseconds, in one map if possible, else one by one."""
         loop, profile, v = self._loop, self.profile, self.v
+        if self._heavy:
+            built, x = self._built, self.x
+            pull = built.gravity * sin((x - built.upright) * built.turn)
+            self._load = self._constant + pull - built.spring * (x - built.relaxed)
         # Without a speed to follow, D only brakes.
         kr = 0.0 if profile.is_jump else loop.d + loop.f1
         led = profile.running
@@ -225,7 +232,7 @@ class ShaftMotion:
         before: its position at the start
         """
         loop = self._loop
-        accel, drag, _, dry, rate, _, _, play, sag = self._built
+        accel, drag, _, dry, rate, _, _, _, _, _, play, sag = self._built
         kp, kd, u_max = loop.p, loop.d, loop.u_max
         v, rv, volts, error = self.v, self._rv, self.volts, before - self.x
         level = round(volts * VOLTAGE_LEVELS)
@@ -277,7 +284,7 @@ class ShaftMotion:
         This happens every tick while the shaft starts, stops or reverses.
         """
         kp, u_max, slew = self._loop.p, self._loop.u_max, self._loop.slew
-        accel, drag, _, dry, rate, _, _, play, sag = self._built
+        accel, drag, _, dry, rate, _, _, _, _, _, play, sag = self._built
         x, v, u, joint, rv = self.x, self.v, self.u, self.joint, self._rv
         low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
         u_least, slew_down, play_low, t = -u_max, -slew, -play, self.effort
@@ -315,13 +322,12 @@ class ShaftMotion:
     def _follow(self, path: Sequence[float], before: float, kr: float) -> None:
         """Follow a path of one position per millisecond, with a gain on its speed."""
         kp, ki, kd, vi, _, kf2, bias, u_max, torque_max, slew = self._loop
-        accel, drag, free, dry, rate, gravity, upright, play, sag = self._built
+        accel, drag, free, dry, rate, _, _, _, _, _, play, sag = self._built
         x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
         low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
         rv, u_least, t_least, slew_down, play_low = self._rv, -u_max, -torque_max, -slew, -play
         integrating = ki != 0.0 or vi != 0.0
         k = kp + kd
-        special = kf2 != 0.0 or gravity != 0.0
         for r in path:
             last = rv
             rv += (r - before - rv) * SMOOTHING
@@ -329,9 +335,8 @@ class ShaftMotion:
                 rv = 0.0
             before = r
             c = kp * (r - x) + kr * rv + i + bias
-            if special:
+            if kf2:
                 c += kf2 * (rv - last)
-                load = self._load + gravity * sin((x - upright) / STEPS_PER_RAD)
             pull = v + load
             push = accel * volts
             w = pull + push * c

@@ -25,7 +25,8 @@ class Shaft(ShaftMotion):
 
     def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
         self._built = mechanics_of(model, physics)
-        self._load = self._built.accel * physics.load_nm / model.stall_torque_nm
+        self._constant = self._load = self._built.accel * physics.load_nm / model.stall_torque_nm
+        self._heavy = self._built.gravity != 0.0 or self._built.spring != 0.0
         self._low_high = physics.stop_low_steps, physics.stop_high_steps
         self._low, self._high = self._low_high
         self.supply = self.volts = (physics.supply_v or model.rated_v) / model.rated_v
@@ -68,7 +69,7 @@ class Shaft(ShaftMotion):
 
     def set_load(self, share: float) -> None:
         """Set the constant torque on the joint as a share of the stall torque."""
-        self._load = self._built.accel * share
+        self._constant = self._load = self._built.accel * share
         self.resume()
 
     def feed(self, supply: float) -> None:
@@ -82,7 +83,7 @@ class Shaft(ShaftMotion):
         """Apply controller settings."""
         if loop != self._loop:
             self._loop = loop
-            self._linear = is_linear(loop, self._built)
+            self._linear = is_linear(loop)
             self._weights = {}
             self._integral = max(-loop.u_max, min(loop.u_max, self._integral))
             self.resume()

@@ -26,6 +26,9 @@ class Physics(NamedTuple):
     gravity_nm: Nm; weight times lever: the torque is gravity_nm * sin(x - upright_steps), so
         it drives the joint away from ``upright_steps`` if positive, towards it if negative.
     upright_steps: steps of the encoder at which gravity has no lever.
+    gravity_turns: turns of the weight for one turn of the shaft.
+    spring_nm_rad, spring_rest_steps: Nm/rad and steps of the encoder; a spring at the shaft.
+    friction_nm: Nm; dry friction of the joint, in addition to the servo's.
     stop_low_steps, stop_high_steps: steps of the encoder; hard stops of the joint, no bounce.
     play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
         the X430. The encoder of X servos is at the output, so the registers show no play;
@@ -49,6 +52,10 @@ class Physics(NamedTuple):
     load_nm: float = 0.0
     gravity_nm: float = 0.0
     upright_steps: float = 2048.0
+    gravity_turns: float = 1.0
+    spring_nm_rad: float = 0.0
+    spring_rest_steps: float = 2048.0
+    friction_nm: float = 0.0
     stop_low_steps: float = -inf
     stop_high_steps: float = inf
     play_deg: float = 0.25
@@ -116,6 +123,10 @@ _RANGES: dict[str, tuple[float, float]] = {
     "load_nm": (-100.0, 100.0),
     "gravity_nm": (-100.0, 100.0),
     "upright_steps": (-1e7, 1e7),
+    "gravity_turns": (-100.0, 100.0),
+    "spring_nm_rad": (0.0, 1e4),
+    "spring_rest_steps": (-1e7, 1e7),
+    "friction_nm": (0.0, 100.0),
     "stop_low_steps": (-inf, inf),
     "stop_high_steps": (-inf, inf),
     "play_deg": (0.0, 10.0),
@@ -192,7 +203,9 @@ class Mechanics(NamedTuple):
     drag, free: divisor of a speed per 1 ms, with the motor's own braking and without
     dry: speed that dry friction removes in 1 ms
     rate: share of the rated voltage that the motor induces per step/ms
-    gravity: speed that the weight adds in 1 ms at its full lever; upright: position without lever
+    gravity: speed that the weight adds in 1 ms at its full lever; upright: position without lever;
+        turn: rad of the weight per step
+    spring: speed that the spring adds in 1 ms per step; relaxed: position without its torque
     play: half the dead travel; sag: share of the voltage that the supply loses at stall
     """
 
@@ -203,6 +216,9 @@ class Mechanics(NamedTuple):
     rate: float
     gravity: float
     upright: float
+    turn: float
+    spring: float
+    relaxed: float
     play: float
     sag: float
 
@@ -222,10 +238,13 @@ def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
         accel,
         drag=1.0 + accel * (rate + viscous),
         free=1.0 + accel * viscous,
-        dry=accel * physics.coulomb_share,
+        dry=accel * (physics.coulomb_share + physics.friction_nm / stall_nm),
         rate=rate,
         gravity=accel * physics.gravity_nm / stall_nm,
         upright=physics.upright_steps,
+        turn=physics.gravity_turns / STEPS_PER_RAD,
+        spring=accel * physics.spring_nm_rad / STEPS_PER_RAD / stall_nm,
+        relaxed=physics.spring_rest_steps,
         play=physics.play_deg * STEPS_PER_TURN / 720.0,
         sag=min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v),
     )
@@ -234,8 +253,6 @@ def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
 DISABLED = Loop(u_max=0.0, torque_max=0.0)
 
 
-def is_linear(loop: Loop, built: Mechanics) -> bool:
-    """Return whether five steps can be one: no integral terms, no dependence on the position."""
-    return (
-        loop.i == loop.vi == loop.f2 == loop.bias == built.gravity == 0.0 and loop.torque_max == inf
-    )
+def is_linear(loop: Loop) -> bool:
+    """Return whether five steps can be one: no integral terms, no torque limit."""
+    return loop.i == loop.vi == loop.f2 == loop.bias == 0.0 and loop.torque_max == inf

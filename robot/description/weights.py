@@ -1,0 +1,191 @@
+"""Masses of a rig's links: those of its file, else from the shapes of the parts.
+
+The one place that combines them. Lengths in metres, tensors about the centre of mass. A centre of
+mass in the file is relative to the link's axis, that of the head to the pitch axis of the neck.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.description import mass
+from gazerig.robot.description.head_shape import HeadMeasures, field
+from gazerig.robot.description.links import ORIGIN, Description, Inertia, Link
+from gazerig.robot.description.own_meshes import unknown_links
+from gazerig.robot.model.mass_params import MassParams, Moments
+
+HEAD = "head"
+_MIDDLE: Vec3 = (-0.85, 0.0, 0.10)
+"""Of the head's solid, in distances between the eyes: servos and frame are about it."""
+_OUTSIDE = 0.05
+"""A centre of mass may be so far outside the head's surface, in distances between the eyes."""
+_SIZE = 3.6
+"""No two points of a head are farther apart, in distances between the eyes."""
+
+
+def weighed(link: Link, params: MassParams, printed: bool) -> Link:
+    """Return a link other than the head with the mass of the rig's file.
+
+    Args:
+        link: with the mass of its shape.
+        params: of the rig.
+        printed: its shape is that of a printed part, whose density the file gives.
+    """
+    inertia, wanted = link.inertia, params.links.get(link.name)
+    if inertia is not None and printed:
+        inertia = mass.scale_mass(inertia, inertia.mass_kg * mass.density_share(params))
+    if wanted is not None:
+        shape = inertia or mass.servo()
+        kg = shape.mass_kg if wanted.mass_kg is None else wanted.mass_kg
+        shape = mass.scale_mass(shape, kg)
+        com = shape.com_m if wanted.com_mm is None else _metres(wanted.com_mm)
+        inertia = Inertia(kg, com, _tensor(wanted.inertia_kg_mm2) or shape.tensor_kg_m2)
+    return link._replace(inertia=_with_counterweights(inertia, link.name, params, ORIGIN))
+
+
+def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[Inertia]) -> Inertia:
+    """Return the inertia of the head without what it carries, in the head's frame.
+
+    Args:
+        params: of the rig; its head is weighed with all that it carries.
+        measures: of the head.
+        carried: eyes, lids and all else, in the head's frame, without counterweights.
+    """
+    rest = mass.join_inertias(carried)
+    kg = _whole_kg(params, measures, rest.mass_kg) - rest.mass_kg
+    own = mass.skull(measures.interocular_m, mass.density_share(params))
+    middle = measures.scaled(_MIDDLE)
+    wanted = params.head
+    if wanted.com_mm is None:
+        own = mass.filled(own, kg, measures.interocular_m, middle)
+    else:
+        com = _head_com_m(wanted.com_mm, measures)
+        share = rest.mass_kg / kg
+        x, y, z = (c + share * (c - off) for c, off in zip(com, rest.com_m, strict=True))
+        own = mass.filled(own, kg, measures.interocular_m, middle, (x, y, z))
+    if (tensor := _tensor(wanted.inertia_kg_mm2)) is not None:
+        whole = mass.join_inertias((own, rest))
+        excess = np.array(whole.tensor_kg_m2) - np.array(tensor)
+        own = own._replace(tensor_kg_m2=mass.matrix(np.array(own.tensor_kg_m2) - excess))
+    with_weights = _with_counterweights(own, HEAD, params, measures.pivot_m)
+    assert with_weights is not None
+    return with_weights
+
+
+def mass_faults(
+    params: MassParams, measures: HeadMeasures, built: Description
+) -> Iterator[tuple[str, str]]:
+    """Find masses that no such head can have: key in its file, and the fault.
+
+    Args:
+        params: of the rig.
+        measures: of the head.
+        built: description of the same rig with the masses of its shapes.
+    """
+    yield from _unknown(params, built)
+    bodies = [
+        weighed(link, params, True).inertia for link in built.links if _is_carried(link, built)
+    ]
+    rest = mass.join_inertias(body for body in bodies if body is not None)
+    wanted, kg = params.head, _whole_kg(params, measures, rest.mass_kg)
+    if kg <= rest.mass_kg * 1.01:
+        yield (
+            "mass.head.mass_kg",
+            f"the head weighs {kg:g} kg with all it carries, and eyes, lids and other parts of it "
+            f"weigh {rest.mass_kg:.3g} kg already",
+        )
+        return
+    if wanted.com_mm is not None:
+        at = np.array([_head_com_m(wanted.com_mm, measures)]) / measures.interocular_m
+        if float(field(at)[0]) > _OUTSIDE:
+            yield (
+                "mass.head.com_mm",
+                "this centre of mass is outside the head: give it ahead, left and above of the "
+                "neck's pitch axis, in mm",
+            )
+            return
+    own = np.array(head_inertia(params, measures, [rest]).tensor_kg_m2)
+    least, middle, most = np.linalg.eigvalsh(own).tolist()
+    size_m = _SIZE * measures.interocular_m
+    if wanted.inertia_kg_mm2 is None:
+        return
+    if least <= 0.0 or least + middle < most * (1.0 - 1e-9):
+        yield (
+            "mass.head.inertia_kg_mm2",
+            "less than eyes, lids and other parts of the head have about its centre of mass",
+        )
+    elif max(wanted.inertia_kg_mm2[:3]) > kg * size_m**2 * 1e6:
+        yield (
+            "mass.head.inertia_kg_mm2",
+            f"a head of {kg:g} kg and this size has at most {kg * size_m**2 * 1e6:.0f} kg mm2",
+        )
+
+
+def _unknown(params: MassParams, built: Description) -> Iterator[tuple[str, str]]:
+    for name, fault in unknown_links(built, params.links).items():
+        yield f"mass.links.{name}", fault
+    if HEAD in params.links:
+        yield f"mass.links.{HEAD}", "the head's mass is under mass.head"
+    named = {key: one.link for key, one in params.counterweights.items()}
+    faults = unknown_links(built, named.values())
+    for key, link in named.items():
+        if link in faults:
+            yield f"mass.counterweights.{key}.link", faults[link]
+
+
+def _is_carried(link: Link, built: Description) -> bool:
+    while link.parent is not None and link.parent != HEAD:
+        link = built.link(link.parent)
+    return link.parent == HEAD
+
+
+def _whole_kg(params: MassParams, measures: HeadMeasures, rest_kg: float) -> float:
+    if params.head.mass_kg is not None:
+        return params.head.mass_kg
+    made = mass.head_mass_kg(measures.interocular_m, mass.density_share(params))
+    return max(made, 2.0 * rest_kg)
+
+
+def _with_counterweights(
+    inertia: Inertia | None, link: str, params: MassParams, origin_m: Vec3
+) -> Inertia | None:
+    parts = [] if inertia is None else [inertia]
+    none: Mat3 = mass.diagonal(0.0, 0.0, 0.0)
+    for one in params.counterweights.values():
+        if one.link == link and one.mass_kg > 0.0:
+            x, y, z = (a / 1e3 + b for a, b in zip(one.position_mm, origin_m, strict=True))
+            parts.append(Inertia(one.mass_kg, (x, y, z), none))
+    return mass.join_inertias(parts) if len(parts) > 1 else inertia
+
+
+def _head_com_m(com_mm: Vec3, measures: HeadMeasures) -> Vec3:
+    x, y, z = (a / 1e3 + b for a, b in zip(com_mm, measures.pivot_m, strict=True))
+    return x, y, z
+
+
+def _metres(at_mm: Vec3) -> Vec3:
+    x, y, z = at_mm
+    return x / 1e3, y / 1e3, z / 1e3
+
+
+def _tensor(moments: Moments | None) -> Mat3 | None:
+    if moments is None:
+        return None
+    xx, yy, zz, xy, xz, yz = (moment * 1e-6 for moment in moments)
+    return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+
+
+def carried_links(links: Iterable[Link]) -> list[Inertia]:
+    """Return the inertias of links that the head carries, in its frame, all joints at 0."""
+    at: dict[str, Vec3] = {HEAD: ORIGIN}
+    found = []
+    for link in links:
+        x, y, z = at[link.parent or HEAD]
+        px, py, pz = link.p_m
+        at[link.name] = x + px, y + py, z + pz
+        if link.inertia is not None:
+            cx, cy, cz = link.inertia.com_m
+            com = (x + px + cx, y + py + cy, z + pz + cz)
+            found.append(link.inertia._replace(com_m=com))
+    return found

@@ -1,0 +1,72 @@
+"""Parameters of masses: what a head weighs, and where."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from gazerig.params import Bounds, Unit
+
+Moments = tuple[float, float, float, float, float, float]
+"""Moments and products of inertia: xx, yy, zz, xy, xz, yz."""
+
+
+@dataclass(frozen=True)
+class LinkMassParams:
+    """Mass of one link; what is null follows from shapes and density."""
+
+    # fmt: off
+    mass_kg: Annotated[float | None, Bounds(1e-5, 50), "mass as weighed; null: from its shape and the density"] = None
+    com_mm: Annotated[tuple[float, float, float] | None, Bounds(-1000, 1000),
+        "centre of mass ahead, left and above of the link's axis, of the head of the neck's pitch axis, "
+        "with all joints at 0; null: from its shape"] = None
+    inertia_kg_mm2: Annotated[Moments | None, Bounds(-1e6, 1e6), Unit("kg mm2"),
+        "moments and products of inertia about the centre of mass [xx, yy, zz, xy, xz, yz]; null: from its shape"] = None
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check that a body can have this inertia.
+
+        Raises:
+            ValueError: It cannot; the message gives the rule.
+        """
+        if self.inertia_kg_mm2 is None:
+            return
+        xx, yy, zz, xy, xz, yz = self.inertia_kg_mm2
+        least, middle, most = np.linalg.eigvalsh(
+            ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        ).tolist()
+        if least <= 0.0 or least + middle < most * (1.0 - 1e-9):
+            raise ValueError(
+                f"no body has the principal moments of inertia {least:.4g}, {middle:.4g} and "
+                f"{most:.4g} kg mm2: all must be above 0, and no one larger than the other two together"
+            )
+
+
+@dataclass(frozen=True)
+class CounterweightParams:
+    """A weight added to a link, as a point."""
+
+    # fmt: off
+    mass_kg: Annotated[float, Bounds(0, 20), "mass of the weight"]
+    position_mm: Annotated[tuple[float, float, float], Bounds(-1000, 1000),
+        "where it is, ahead, left and above of the link's axis, of the head of the neck's pitch axis"]
+    link: Annotated[str, "link that carries it: head, or a name of gazerig describe"] = "head"
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class MassParams:
+    """Masses of the links."""
+
+    # fmt: off
+    density_kg_m3: Annotated[float, Bounds(50, 20_000),
+        "density of printed parts with their usual share of air, for masses that are not given"] = 1050.0
+    head: Annotated[LinkMassParams,
+        "the whole head with eyes, lids and servos in it, without counterweights"] = field(default_factory=LinkMassParams)
+    links: Annotated[Mapping[str, LinkMassParams],
+        "other links by their names in gazerig describe, such as left_eye or neck_yaw_link"] = field(default_factory=dict)
+    counterweights: Annotated[Mapping[str, CounterweightParams],
+        "weights added to links, each under any name"] = field(default_factory=dict)
+    # fmt: on
