@@ -1,5 +1,6 @@
 """Errors of the drivers, grouped by what the caller can do about them."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from gazerig.errors import Error
@@ -55,6 +56,16 @@ def extra_hint(package: str, extra: str, error: ImportError) -> str:
     absent = isinstance(error, ModuleNotFoundError) and error.name == package.replace("-", "_")
     reason = "is not installed" if absent else f"cannot be loaded ({' '.join(str(error).split())})"
     return f"{package} {reason}: {install_command(extra)}"
+
+
+def require_package(package: str, extra: str) -> None:
+    """Check that a package of an extra is installed.
+
+    Raises:
+        SetupError: it is not; the message has the command that installs it.
+    """
+    if find_spec(package) is None:
+        raise SetupError(extra_hint(package, extra, ModuleNotFoundError(name=package)))
 
 
 def install_command(extra: str) -> str:

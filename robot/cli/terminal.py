@@ -30,10 +30,12 @@ import typer
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped_files import shipped_names
-from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError, extra_hint
 from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.robot.control.interrupts import ENDING, Interrupts
 
+_OF_REPORTS = ("jinja2", "scipy")
+"""Packages of the extra ``report`` that commands import as soon as they start."""
 _MOST = 500
 """So many lines wait; more are dropped."""
 _RETRY_S = 0.2
@@ -246,6 +248,12 @@ def _report_errors() -> Iterator[None]:
         _show_origin()
         say(suggest_doctor(str(error)) if isinstance(error, ServoFault) else str(error))
         raise typer.Exit(FAULT) from None
+    except ModuleNotFoundError as error:
+        if error.name not in _OF_REPORTS:
+            raise
+        _show_origin()
+        say(extra_hint(error.name, "report", error))
+        raise typer.Exit(BAD_INPUT) from None
     except BrokenPipeError:
         raise  # for run_app: standard output was closed
     except OSError as error:

@@ -321,12 +321,14 @@ def smoothed(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
         Times in steps of ``GRID_S`` from 0, and values by a local cubic (Savitzky and Golay
         1964), which keeps peaks that a mean would flatten.
     """
-    from scipy.signal import savgol_filter  # nearly a second of processor
-
     even = np.arange(0.0, times_s[-1] - times_s[0] + 1e-9, GRID_S)
     found = np.interp(even, times_s - times_s[0], values)
     window = min(2 * round(_SMOOTHED_OVER_S / GRID_S / 2.0) + 1, len(found) - (len(found) + 1) % 2)
-    return even, savgol_filter(found, window, 3, mode="nearest") if window > 3 else found
+    if window <= 3:
+        return even, found
+    half = window // 2
+    weights = np.linalg.pinv(np.vander(np.arange(-half, half + 1.0), 4))[-1]  # symmetric
+    return even, np.convolve(np.pad(found, half, mode="edge"), weights, mode="valid")
 
 
 def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats, Floats]:

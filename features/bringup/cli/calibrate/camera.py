@@ -20,7 +20,7 @@ from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import SetupError, require_package
 from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.bringup.calibration.camera_calibration import (
@@ -146,6 +146,8 @@ def calibrate_camera(
     """Measure the lens and the place of the camera, with the printed board, or a face."""
     with clear_errors(rig, port, mock), signals() as stopped:
         _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
+        if what is not CalibrationTarget.lens and face_at is None:
+            require_package("scipy", "calibration")
         loaded = load_rig(rig)
         if face_at is not None:
             changes = _measure_field(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
