@@ -5,7 +5,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Protocol, Self
 
-from gazerig.robot.model.outcome import Outcome, Progress, outcome_of
+from gazerig.robot.model.outcome import Outcome, Progress, command_outcome
 from gazerig.robot.model.reply import CommandReply
 
 
@@ -126,7 +126,7 @@ class Order:
     def _update_outcome(self, now: Progress) -> bool:
         """Update from the newest owner and gesture; return whether the order has ended."""
         reply = self._accepted_reply()
-        if reply is not None and self._outcome is None and (end := outcome_of(reply, now)):
+        if reply is not None and self._outcome is None and (end := command_outcome(reply, now)):
             outcome, self._why = end
             self._outcome = outcome
         return self._outcome is not None

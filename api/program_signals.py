@@ -6,10 +6,10 @@ import threading
 from types import FrameType
 from typing import Protocol
 
-from gazerig.robot.control.interrupts import SAME_REQUEST_S, signals_of
+from gazerig.robot.control.interrupts import SAME_REQUEST_S, available_signals
 from gazerig.robot.model.clock import RealClock
 
-_ENDING = signals_of("SIGTERM", "SIGHUP")
+_ENDING = available_signals("SIGTERM", "SIGHUP")
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 
 

@@ -13,7 +13,7 @@ from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Value
 from gazerig.robot.model.outcome import Progress
-from gazerig.robot.remote.client import RequestRejected, RobotClient, running
+from gazerig.robot.remote.client import RequestRejected, RobotClient, connect_to_all
 
 _POLL_S = 0.02
 
@@ -120,7 +120,7 @@ def connect(
     """
     if rig is None:
         return RemoteHead(RobotClient.connect(pid if name is None else name, who))
-    found = [RemoteHead(client) for client in running(pid if name is None else name, who)]
+    found = [RemoteHead(client) for client in connect_to_all(pid if name is None else name, who)]
     fitting = [head for head in found if head.rig == rig]
     for head in found:
         if len(fitting) != 1 or head is not fitting[0]:

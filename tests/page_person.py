@@ -25,7 +25,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick
-from gazerig.robot.dashboard.view.viewpoints import BOTH, HALF_WIDTH, view
+from gazerig.robot.dashboard.view.viewpoints import BOTH, HALF_WIDTH, named_view
 from gazerig.robot.model.commands import Renew
 
 YAW = GAZE_JOINTS.index("neck_yaw")
@@ -229,7 +229,7 @@ def beside(words: str, kind: str) -> str:
 
 def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple[float, float]:
     """Where in the window a point of the view "both" is; canvas: left, top, width, height in px."""
-    seen = view(BOTH)
+    seen = named_view(BOTH)
     eye, look_at = np.array(seen.position_m), np.array(seen.look_at_m)
     ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
     right = np.cross(ahead, (0.0, 0.0, 1.0))

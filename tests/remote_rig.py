@@ -12,7 +12,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Robot, Tick
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
-from gazerig.robot.remote.request_handler import Pulse
+from gazerig.robot.remote.request_handler import LoopMonitor
 from gazerig.robot.remote.socket_server import RemoteServer
 
 RATE = "loop.rate_hz"
@@ -97,7 +97,7 @@ class Beat:
         made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.robot: Robot = made.robot
         self.clock = made.clock
-        self.pulse = Pulse(self.clock)
+        self.pulse = LoopMonitor(self.clock)
         self.ticks: list[Tick] = []
         self.hold = threading.Event()
         self._over = threading.Event()

@@ -7,7 +7,7 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.dashboard.feed.page_process import REPLAY, SNAPSHOT, unpack
+from gazerig.robot.dashboard.feed.page_process import REPLAY, SNAPSHOT, decode_snapshot
 from gazerig.robot.model.commands import Ask
 
 SECONDS = 6.0
@@ -51,7 +51,7 @@ class Screen:
         return [message[1:] for message in self.messages if message[:1] == kind]
 
     def times_s(self, start_s: float) -> list[float]:
-        return [unpack(m).t_s - start_s for m in self.messages if m[:1] == SNAPSHOT]
+        return [decode_snapshot(m).t_s - start_s for m in self.messages if m[:1] == SNAPSHOT]
 
     def states(self) -> list[dict]:
         return [json.loads(body) for body in self.of(REPLAY)]

@@ -18,11 +18,11 @@ from typer.testing import CliRunner
 from gazerig.config.parameters import parameters
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli.entry_point import main as quick_main
-from gazerig.robot.cli.steer import END, lead
+from gazerig.robot.cli.steer import END, run_steering
 from gazerig.robot.cli.tune import app, state_lines
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.remote.client import RobotClient, running
+from gazerig.robot.remote.client import RobotClient, connect_to_all
 from gazerig.robot.remote.steering import STOP, Steering, Stick
 
 GAZERIG = (
@@ -204,7 +204,7 @@ def test_stop_and_resume() -> None:
 
 def test_stop_stops_every_rig_that_runs() -> None:
     with a_rig_beside() as other:
-        both = {rig.pid: rig for rig in running()}
+        both = {rig.pid: rig for rig in connect_to_all()}
         assert len(both) == 2
         refused = gazerig("ctl", "get", RATE)
         assert refused.returncode == 2 and "--pid" in refused.stderr
@@ -393,7 +393,7 @@ class _Turns:
 def test_steer_leads_a_running_rig_and_lets_go() -> None:
     seen: list[str] = []
     with RobotClient.connect(who="gazerig ctl steer") as rig:
-        lead(rig, _Turns(rig, seen), Steering(), RealClock(), lambda line: None)
+        run_steering(rig, _Turns(rig, seen), Steering(), RealClock(), lambda line: None)
         assert rig.status()["stopped"]
     assert "steer" in seen[2] and "steer" in seen[4]
     assert "steer" not in seen[0] and "steer" not in seen[6]

@@ -20,7 +20,7 @@ from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.model.command_json import as_json, check, from_json
+from gazerig.robot.model.command_json import as_json, check_command, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -103,7 +103,7 @@ def test_rubbish_is_refused_and_nothing_else_happens(data: Any) -> None:
         order = from_json(data)
     except ValueError:
         return
-    check(order)
+    check_command(order)
 
 
 def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(

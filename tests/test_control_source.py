@@ -8,12 +8,12 @@ from commanded_robot import Running, running_desk
 from gazerig.robot.control.head_state import as_json, from_json, head_state
 from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import doing, leader
+from gazerig.robot.control.tick_text import head_activity, tick_control_source
 from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts, snapshot
-from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
-from gazerig.robot.dashboard.panels.servo_health import health
+from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
+from gazerig.robot.dashboard.panels.servo_health import health_table
 from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
-from gazerig.robot.model.control_source import ControlSource, sentence
+from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.types import Snapshot
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -31,7 +31,7 @@ def shown(tick: Tick) -> Snapshot:
 
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     tick = running.go(0.1)[-1]
-    assert leader(tick) == ControlSource() and not leader(tick).led
+    assert tick_control_source(tick) == ControlSource() and not tick_control_source(tick).led
     shot = shown(tick)
     assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
     assert shot.leads_words == "nobody leads: it chooses by itself what to look at"
@@ -44,7 +44,7 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     for _ in range(6):
         running.order(Jog((("neck_yaw", 0.3),), "ann"))
         tick = running.go(0.5)[-1]
-    leads = leader(tick)
+    leads = tick_control_source(tick)
     assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
     assert leads.joints == ("neck_yaw", "neck_pitch")
     shot = shown(tick)
@@ -52,7 +52,7 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     assert (shot.target_name, shot.phase) == ("neck_yaw and neck_pitch held", "held")
     assert shot.why == shot.leads_words == shot.headline
     assert (shot.target_part, shot.saliences) == (None, ())
-    for said in (health(shot), winner(shot), saliences(shot)):
+    for said in (health_table(shot), target_text(shot), salience_bars(shot)):
         assert "face 1" not in said and "person 1" not in said
 
 
@@ -61,8 +61,8 @@ def test_another_client_leads_from_when_it_took_over(running: Running) -> None:
     running.go(0.4)
     running.order(Jog((("neck_yaw", 0.2),), "ben"))
     took = running.go(0.2)[0]
-    assert leader(running.ticks[-1]).who == "ben"
-    assert leader(running.ticks[-1]).since_s == took.t_s
+    assert tick_control_source(running.ticks[-1]).who == "ben"
+    assert tick_control_source(running.ticks[-1]).since_s == took.t_s
 
 
 @pytest.mark.parametrize(
@@ -78,30 +78,36 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
     for _ in range(10):
         running.order(LookAt((1.0, 0.2, 0.3), "ann", pointer=pointer))
         tick = running.go(0.2)[-1]
-    assert leader(tick).kind == kind
-    assert doing(tick).headline == said
+    assert tick_control_source(tick).kind == kind
+    assert head_activity(tick).headline == said
 
 
 def test_what_was_looked_at_before_joints_were_held_leads_again(running: Running) -> None:
     running.order(LookAt((1.0, 0.2, 0.3), "ann", stay=True))
     running.go(0.2)
     running.order(Jog((("neck_yaw", 0.3),), "ann", stay=True))
-    assert leader(running.go(0.2)[-1]).kind == "joint"
+    assert tick_control_source(running.go(0.2)[-1]).kind == "joint"
     running.order(Jog((), "ann"))
     tick = running.go(0.2)[-1]
-    assert leader(tick).kind == "person" and leader(tick).what == "look at 1 0.2 0.3"
+    assert (
+        tick_control_source(tick).kind == "person"
+        and tick_control_source(tick).what == "look at 1 0.2 0.3"
+    )
 
 
 def test_a_person_who_was_chosen_and_a_gesture(running: Running) -> None:
     running.order(LookAtPerson(1, "ann"))
     tick = running.go(0.3)[-1]
-    assert leader(tick).kind == "person" and "look at person 1" in doing(tick).headline
+    assert (
+        tick_control_source(tick).kind == "person"
+        and "look at person 1" in head_activity(tick).headline
+    )
     running.order(LookAt(None, "ann"))
     running.order(Play("nod", who="ben"))
     tick = running.go(0.2)[-1]
-    assert leader(tick)[:3] == ("gesture", "ben", "nod")
-    assert doing(tick).headline.startswith("it plays nod for ben, and looks at person 1")
-    assert leader(running.go(4.0)[-1]) == ControlSource()
+    assert tick_control_source(tick)[:3] == ("gesture", "ben", "nod")
+    assert head_activity(tick).headline.startswith("it plays nod for ben, and looks at person 1")
+    assert tick_control_source(running.go(4.0)[-1]) == ControlSource()
 
 
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
@@ -113,7 +119,7 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
     running.order(Resume("ann"))
-    assert leader(running.go(0.1)[-1]) == ControlSource()
+    assert tick_control_source(running.go(0.1)[-1]) == ControlSource()
 
 
 def test_a_head_without_torque_looks_at_nobody(running: Running) -> None:
@@ -130,7 +136,10 @@ def test_programs_are_told_the_same(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), "ann"))
     tick = running.go(0.2)[-1]
     state = from_json(as_json(head_state(tick)))
-    assert state.leader == leader(tick) and state.headline == doing(tick).headline
+    assert (
+        state.tick_control_source == tick_control_source(tick)
+        and state.headline == head_activity(tick).headline
+    )
     assert (state.gaze.target, state.gaze.phase) == ("neck_yaw held", "held")
 
 
@@ -140,8 +149,8 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
     made = running.made
     ticks: list[Tick] = []
     assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
-    assert {leader(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
-    assert doing(ticks[-1]).headline == sentence(ControlSource("parking"), 0.0)
+    assert {tick_control_source(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
+    assert head_activity(ticks[-1]).headline == control_sentence(ControlSource("parking"), 0.0)
     yaw = [
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]

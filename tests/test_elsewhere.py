@@ -80,8 +80,8 @@ def listener(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[socket
 def test_who_can_read_the_file_may_call(listener: socket_io.Listener, tmp_path: Path) -> None:
     file = tmp_path / "7.sock"
     assert file.stat().st_mode & 0o077 == 0
-    assert socket_io.sockets(tmp_path) == {file: 7}
-    with socket_io.dial(file, 1.0) as caller, listener.accept() as end:
+    assert socket_io.find_sockets(tmp_path) == {file: 7}
+    with socket_io.connect_to_socket(file, 1.0) as caller, listener.accept() as end:
         assert listener.identify(end) is not None
         caller.sendall(b"hello")
         assert end.recv(5) == b"hello"
@@ -100,9 +100,9 @@ def test_who_cannot_show_the_token_is_not_admitted(
 
 
 def test_the_file_of_a_killed_rig_is_removed(listener: socket_io.Listener, tmp_path: Path) -> None:
-    assert socket_io.clear_dead(tmp_path) == ()
+    assert socket_io.remove_dead_sockets(tmp_path) == ()
     listener.close()
-    assert socket_io.clear_dead(tmp_path) == (7,)
+    assert socket_io.remove_dead_sockets(tmp_path) == (7,)
     assert not list(tmp_path.glob("*.sock"))
 
 

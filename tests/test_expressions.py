@@ -16,7 +16,13 @@ from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.rig_limits import pose_offset
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.command_json import as_json, as_recorded, check, from_json, from_recording
+from gazerig.robot.model.command_json import (
+    as_json,
+    as_recorded_json,
+    check_command,
+    from_json,
+    from_recorded_json,
+)
 from gazerig.robot.model.commands import Ask, Command, Express, SetLevel
 from gazerig.robot.model.reply import CommandReply
 
@@ -111,13 +117,13 @@ def test_what_no_table_holds_is_refused_with_what_there_is(made: Assembly) -> No
 def test_a_share_that_is_none_is_refused(value: float) -> None:
     for command in (Express("happy", value), SetLevel("mouth", value)):
         with pytest.raises(ValueError, match=r"number 0\.\.1"):
-            check(command)
+            check_command(command)
 
 
 @pytest.mark.parametrize("command", [Express("happy", 0.25), SetLevel("mouth", 0.5)])
 def test_the_commands_survive_json_and_recordings(command: Command) -> None:
     assert from_json(as_json(command)) == command
-    assert from_recording(as_recorded(command)) == command
+    assert from_recorded_json(as_recorded_json(command)) == command
 
 
 def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Assembly) -> None:

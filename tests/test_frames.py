@@ -72,7 +72,7 @@ def test_a_camera_is_mounted_where_its_pose_says(
 ) -> None:
     yaw, pitch, roll = angles
     true = CameraParams("base", place, yaw, pitch, 60.0, roll)
-    found = mounted_at(
+    found = camera_at_pose(
         CameraParams("base", horizontal_field_deg=60.0),
         *CameraMount(true).pose(
             ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0)

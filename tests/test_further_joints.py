@@ -6,7 +6,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import RULES, load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.model.types import further, in_order
+from gazerig.robot.model.types import further_joints, order_joints
 
 
 def with_joint(name: str) -> Rig:
@@ -22,10 +22,10 @@ def faults(rig: Rig) -> list[str]:
 
 def test_joints_of_gaze_come_first_and_others_follow_by_name() -> None:
     rig = with_joint("jaw")
-    names = in_order({*rig.joints, "brow"})
+    names = order_joints({*rig.joints, "brow"})
     assert names[-2:] == ("brow", "jaw") and set(names[:-2]) == set(load_rig("desk").joints)
-    assert further(names) == ("brow", "jaw")
-    assert in_order(reversed(names)) == names
+    assert further_joints(names) == ("brow", "jaw")
+    assert order_joints(reversed(names)) == names
 
 
 def test_a_jaw_is_a_joint_and_a_misspelt_neck_is_not() -> None:

@@ -15,7 +15,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, read_table, write_gesture
 from gazerig.robot.cli.gestures import app
-from gazerig.robot.model.gesture_fit import fit_keys, smoothed
+from gazerig.robot.model.gesture_fit import fit_keys, smooth
 
 DESK = load_rig("desk")
 
@@ -89,7 +89,7 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     random = np.random.default_rng(3)
     times = np.cumsum(random.uniform(0.015, 0.025, 200))
     truth = 12.0 * np.sin(2 * pi * 0.6 * times) * np.minimum(1.0, times)
-    even, smooth = smoothed(times, truth + random.normal(0.0, 0.15, 200))
+    even, smooth = smooth(times, truth + random.normal(0.0, 0.15, 200))
     found, values = fit_keys(even, smooth, TOLERANCE_DEG)
     assert 4 <= len(found) <= 30
     curve = MinimumJerkCurve(float(smooth[0]), found.tolist(), values.tolist())

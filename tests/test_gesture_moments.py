@@ -17,7 +17,7 @@ from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Play
 from gazerig.robot.model.kinematics import LIDS, NECK
-from gazerig.robot.model.types import further
+from gazerig.robot.model.types import further_joints
 
 DT_S = 0.01
 TARGET = (1.0, 0.0, 0.25)
@@ -56,7 +56,7 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
         "right_eye_pan": right[0] + yaw, "right_eye_tilt": right[1] + pitch,
         "eyes_pan": 0.5 * (left[0] + right[0]) + yaw, "eyes_tilt": left[1] + pitch,
         **dict(zip(NECK, head, strict=True)),
-        **dict(zip(further(rig.joints), joints, strict=True)),
+        **dict(zip(further_joints(rig.joints), joints, strict=True)),
         **{lid: ends[lid][0] + opening * (ends[lid][1] - ends[lid][0])
            for lid, opening in zip(LIDS, openings, strict=True) if lid in ends},
     }  # fmt: skip
@@ -68,7 +68,7 @@ def interrupted(
 ) -> Moments:
     """Play a gesture and, at random moments, another one, the same again, or nothing."""
     rig, random = load_rig(rig_name), np.random.default_rng(seed)
-    player = GesturePlayer(len(further(rig.joints)))
+    player = GesturePlayer(len(further_joints(rig.joints)))
     choices = GestureChoices(shipped_gestures(), player, GestureParams(), rig.names, lid_spans(rig))
     bounds, others = limits(rig.joints), (*choices.names, gesture, gesture, "")
     at_rest = tuple([0.0] * len(rig.names))

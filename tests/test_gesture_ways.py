@@ -15,7 +15,13 @@ from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.dashboard.panels.controls import AnimationPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.model.command_json import as_json, as_recorded, check, from_json, from_recording
+from gazerig.robot.model.command_json import (
+    as_json,
+    as_recorded_json,
+    check_command,
+    from_json,
+    from_recorded_json,
+)
 from gazerig.robot.model.commands import Ask, Jog, Play, Resume, Stop
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
@@ -77,7 +83,7 @@ def test_menus_offer_what_this_rig_can_do_and_what_is_under_way(rig: TickedRig) 
 def test_the_command_is_data() -> None:
     command = Play("nod", 1.5, 3, "me")
     assert from_json(as_json(command)) == command
-    assert from_recording(as_recorded(command)) == command
+    assert from_recorded_json(as_recorded_json(command)) == command
     assert from_json({"do": "play", "gesture": "nod"}) == Play("nod")
     for wrong in (
         *(Play("nod", speed) for speed in (0.0, -1.0, 9.0, float("nan"), float("inf"))),
@@ -86,7 +92,7 @@ def test_the_command_is_data() -> None:
         Play(3),  # type: ignore[arg-type]
     ):
         with pytest.raises(ValueError, match="gesture"):
-            check(wrong)
+            check_command(wrong)
 
 
 def test_buttons_and_speed_on_the_page() -> None:

@@ -16,7 +16,12 @@ from gazerig.gaze.gesture.gesture import POSE_TRACKS, Gesture, KeyFrame, track_k
 from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions
+from gazerig.robot.model.gesture_fit import (
+    FittedGesture,
+    GestureFit,
+    GestureRefused,
+    gesture_motions,
+)
 
 RIGS = {name: load_rig(name) for name in shipped_names("rigs") if name != "minimal"}
 """The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
@@ -27,7 +32,9 @@ def fitted(gesture: Gesture, rig: str = "desk", speed: float = 1.0, **at: float)
     joints = RIGS[rig].names
     base = np.array([radians(at.get(name, 0.0)) for name in joints])
     fit = GestureFit(joints, lid_spans(RIGS[rig]))
-    return fit.fit("x", motions(gesture, joints), speed, base, limits(RIGS[rig].joints), 0.8)
+    return fit.fit(
+        "x", gesture_motions(gesture, joints), speed, base, limits(RIGS[rig].joints), 0.8
+    )
 
 
 def test_there_are_the_gestures_promised() -> None:
@@ -169,10 +176,10 @@ def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_nam
     jaw = (KeyFrame(0.3, head_pitch_deg=5.0, joints_deg={"jaw": 10.0}),)
     with pytest.raises(GestureRefused, match="it moves jaw, which this rig lacks"):
         fitted(Gesture("a yawn", jaw))
-    made = motions(Gesture("a yawn", jaw, optional=("jaw",)), RIGS["desk"].names)
+    made = gesture_motions(Gesture("a yawn", jaw, optional=("jaw",)), RIGS["desk"].names)
     assert made.left_out == ("jaw",)
     with pytest.raises(GestureRefused, match="this rig has none of the joints"):
-        motions(Gesture("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)), RIGS["desk"].names)  # fmt: skip
+        gesture_motions(Gesture("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)), RIGS["desk"].names)  # fmt: skip
 
 
 def test_a_loop_repeats_and_all_ends_at_rest() -> None:
@@ -187,7 +194,7 @@ def test_a_loop_repeats_and_all_ends_at_rest() -> None:
 
 def test_in_joint_space_the_eyes_go_along_with_the_head() -> None:
     for space, follows in (("gaze", 0.0), ("joint", 1.0)):
-        motion = motions(nod(space=space), RIGS["desk"].names).motion
+        motion = gesture_motions(nod(space=space), RIGS["desk"].names).motion
         flat = [0.0] * len(POSE_TRACKS)
         motion.add_to(flat, 0.2, (1.0,) * len(flat))
         assert flat[1] == pytest.approx(radians(-8.0))

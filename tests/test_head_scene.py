@@ -17,10 +17,10 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
-from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glb, glow
+from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.head_view import head_dimensions, lid_edges, with_shown_lids
-from gazerig.robot.dashboard.view.scene_node import turned_up
-from gazerig.robot.dashboard.view.viewpoints import BOTH, FACE, SHOULDER, View, view
+from gazerig.robot.dashboard.view.scene_node import pitch_up
+from gazerig.robot.dashboard.view.viewpoints import BOTH, FACE, SHOULDER, View, named_view
 from gazerig.robot.description import head_mesh
 from gazerig.robot.description.head_shape import EYE_RADIUS, eye_rim, field, measures_of, surface
 from gazerig.robot.description.mesh import Mesh, Painted, grid, merged
@@ -78,14 +78,14 @@ def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect
     shot = at_rest(name)
     unit = head_dimensions(shot).interocular_m
     points = skin_and_cap() * unit + shot.p_world_head_m
-    on_canvas = drawn(view(FACE, shot), points, aspect)
+    on_canvas = drawn(named_view(FACE, shot), points, aspect)
     low, high = on_canvas.min(axis=0), on_canvas.max(axis=0)
     assert 0.60 <= 0.5 * (high[1] - low[1]) <= 0.8
     assert np.abs(on_canvas).max() < 1.0
 
 
 def test_the_face_is_seen_from_the_front_and_not_past_the_visitor() -> None:
-    seen = view(FACE, at_rest("desk"))
+    seen = named_view(FACE, at_rest("desk"))
     off = np.subtract(seen.position_m, seen.look_at_m)
     assert abs(np.degrees(np.arctan2(off[1], off[0]))) <= 5.0
     assert 0.0 <= np.degrees(np.arctan2(off[2], np.hypot(off[0], off[1]))) < 10.0
@@ -94,7 +94,7 @@ def test_the_face_is_seen_from_the_front_and_not_past_the_visitor() -> None:
 
 @pytest.mark.parametrize("name", [BOTH, SHOULDER])
 def test_other_views_show_as_much_from_side_to_side_in_any_window(name: str) -> None:
-    wide, tall = (np.tan(0.5 * view(name).field_rad(a)) * a for a in (1.6, 0.5))
+    wide, tall = (np.tan(0.5 * named_view(name).field_rad(a)) * a for a in (1.6, 0.5))
     assert wide == pytest.approx(tall)
 
 
@@ -129,7 +129,7 @@ def covered(opening: float, lower: float) -> Floats:
     ):
         painted = head_mesh.eyelid(upper)
         into_lid = (
-            transforms.SO3(np.array(turned_up(edge_rad))).inverse().apply(rays).astype(np.float64)
+            transforms.SO3(np.array(pitch_up(edge_rad))).inverse().apply(rays).astype(np.float64)
         )
         hidden |= met(painted.mesh, into_lid)
     return hidden
@@ -248,7 +248,7 @@ def test_the_head_is_drawn_of_few_triangles() -> None:
 
 
 def test_only_the_eyes_are_lit_by_the_browser() -> None:
-    tree = _tree(glb(head_mesh.eye(), EYE))
+    tree = _tree(painted_glb(head_mesh.eye(), EYE))
     (material,) = tree["materials"]
     assert "KHR_materials_unlit" not in material["extensions"]
     assert material["pbrMetallicRoughness"]["roughnessFactor"] < 0.3
@@ -257,11 +257,11 @@ def test_only_the_eyes_are_lit_by_the_browser() -> None:
         tree["meshes"][0]["primitives"][0]["attributes"]
     )
     assert "alphaMode" not in tree["materials"][0]
-    brow = _tree(glb(head_mesh.brow(), SKIN))
+    brow = _tree(painted_glb(head_mesh.brow(), SKIN))
     assert "KHR_materials_unlit" in brow["materials"][0]["extensions"]
     assert "NORMAL" not in brow["meshes"][0]["primitives"][0]["attributes"]
-    plain: Painted = glow((0, 0, 0, 90))
-    assert _tree(glb(plain, SKIN))["materials"][0]["alphaMode"] == "BLEND"
+    plain: Painted = glow_disc((0, 0, 0, 90))
+    assert _tree(painted_glb(plain, SKIN))["materials"][0]["alphaMode"] == "BLEND"
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_another_reader_finds_the_mesh_in_the_file(
     painted: Callable[[], Painted], finish: Finish
 ) -> None:
     mesh, colours, normals = painted()
-    data = glb(Painted(mesh, colours, normals), finish._replace(lit=False))
+    data = painted_glb(Painted(mesh, colours, normals), finish._replace(lit=False))
     scene = trimesh.load_scene(io.BytesIO(data), "glb")
     (found,) = scene.geometry.values()
     assert np.asarray(found.vertices) == pytest.approx(mesh.vertices, abs=1e-6)

@@ -14,7 +14,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, LensParams, PoseHistory
-from gazerig.robot.model.intrinsics import fits, intrinsics_of_lens, project, rays, undistorted
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays, undistort
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import Perception
@@ -53,7 +53,7 @@ def test_straight_lines_are_straight_again() -> None:
     line = np.stack((np.linspace(-0.5, 0.5, 9), np.full(9, 0.25), np.ones(9)), axis=1)
     seen = project(line, BENT)
     assert np.ptp(seen[:, 1]) > 3.0  # it was bent
-    assert np.ptp(undistorted(seen, BENT)[:, 1]) < 1e-4
+    assert np.ptp(undistort(seen, BENT)[:, 1]) < 1e-4
 
 
 def test_no_points_are_no_rays() -> None:
@@ -78,7 +78,7 @@ def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:
     assert intrinsics_of_lens(LENS, view, 1280, 800) == BENT.scaled(2.0, 2.0)
     assert intrinsics_of_lens(LENS, view, 640, 480) == intrinsics_of_view(view, 640, 480)
     assert intrinsics_of_lens(None, view, 640, 400) == intrinsics_of_view(view, 640, 400)
-    assert not fits(LENS, 0, 0)
+    assert not lens_fits(LENS, 0, 0)
 
 
 def test_a_face_is_placed_through_the_lens_as_measured() -> None:

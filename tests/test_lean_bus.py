@@ -11,7 +11,7 @@ import pytest
 from stand_in import StandIn
 
 from gazerig.drivers.bus.bus_plugins import DYNAMIXEL, FEETECH, MAESTRO, PCA9685
-from gazerig.robot.control.body import Body, setups
+from gazerig.robot.control.body import Body, servo_setups
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, Pca9685Line, build
@@ -45,7 +45,7 @@ def body_of(kind, now):
     device = build(line(servos=servos), lambda: now[0])
     port = InProcessPort(device, sleep_until=lambda t_s: now.__setitem__(0, max(now[0], t_s)))
     joints = joints_of(model)
-    return Body(plugin.make(port, setups(joints, {}), plugin.params()), joints)
+    return Body(plugin.make(port, servo_setups(joints, {}), plugin.params()), joints)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -12,7 +12,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Command
-from gazerig.robot.remote.client import running
+from gazerig.robot.remote.client import connect_to_all
 from gazerig.robot.remote.live_server import LiveServer
 
 
@@ -92,7 +92,7 @@ def rig(folder: Path) -> Iterator[Rig]:
 
 
 def test_it_listens_and_says_nothing_while_all_is_well(rig: Rig) -> None:
-    (found,) = running()
+    (found,) = connect_to_all()
     found.close()
     assert rig.said == []
 
@@ -149,6 +149,6 @@ def test_close_without_open_is_no_error(folder: Path) -> None:
 
 
 def test_a_refusal_of_the_robot_is_no_error_of_the_program(rig: Rig) -> None:
-    with running()[0] as remote, pytest.raises(SetupError, match="nothing moves here"):
+    with connect_to_all()[0] as remote, pytest.raises(SetupError, match="nothing moves here"):
         remote.stop()
     assert rig.said == []

@@ -21,7 +21,7 @@ from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.control.tick_text import perception_text
-from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
+from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
 from gazerig.robot.dashboard.feed.live_feed import (
     GAZE_KEPT_S,
     GazeHistory,
@@ -35,10 +35,10 @@ from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.dashboard.feed.status_line import StatusLine
-from gazerig.robot.dashboard.panels.servo_health import health
+from gazerig.robot.dashboard.panels.servo_health import health_table
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import Snapshot
-from gazerig.robot.remote.request_handler import Pulse
+from gazerig.robot.remote.request_handler import LoopMonitor
 from gazerig.sim_mock.scenes.scene import ScenePicture
 
 
@@ -89,7 +89,7 @@ class Page:
         wait_for(lambda: self.page.started > before, "the page")
 
     def shown(self) -> tuple[Snapshot, ...]:
-        return drain(self.feed, self.live).snapshots
+        return read_waiting(self.feed, self.live).snapshots
 
     def close(self) -> None:
         self.page.close()
@@ -169,19 +169,19 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     assert tick.detections is not None
     found = replace(tick.detections, image=image, depth_m=metres)
     page.stream.update(tick._replace(detections=found))
-    news = drain(page.feed, page.live)
+    news = read_waiting(page.feed, page.live)
     assert news.image is not None
     assert found.located is not None
     lens, poses = found.located.intrinsics, page.live._poses
     assert poses is not None
     R, p_m = ran.made.shown_rig().mount.pose(*poses.head_pose(found.captured_s))
     for gaze_px in (None, gaze_pixel(tick.gaze.gaze_point_world_m, R, p_m, lens)):
-        drawn = draw_detections(ground(found, depth), found, gaze_px, lens, faces=False)
+        drawn = draw_detections(background(found, depth), found, gaze_px, lens, faces=False)
         if np.array_equal(drawn, news.image):
             break
     else:
         raise AssertionError("another image is drawn")
-    assert drain(page.feed, page.live).image is None
+    assert read_waiting(page.feed, page.live).image is None
 
 
 def test_a_late_frame_is_drawn_with_the_gaze_of_its_capture() -> None:
@@ -202,7 +202,7 @@ def test_a_simulated_scene_is_drawn_as_its_camera_sees_it(ran: Run, page: Page) 
     page.picture = ScenePicture(ran.made.scene)
     page.state = page.state._replace(scene_start_s=start_s)
     page.stream.update(ran.ticks[-1])
-    image = drain(page.feed, page.live).image
+    image = read_waiting(page.feed, page.live).image
     assert image is not None and image.shape == (400, 640, 3)
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 500  # a picture, and no dark ground
     # Who is found is where somebody is drawn: hair and skin differ from the wall behind.
@@ -226,7 +226,7 @@ def test_without_anyone_who_looks_no_image_is_drawn_until_somebody_does(
     page.comes_up()
     page.live.watched = False
     page.stream.update(ran.ticks[-1])
-    assert drain(page.feed, page.live).image is None
+    assert read_waiting(page.feed, page.live).image is None
     page.live.watched = True
     assert page.live.image() is not None
 
@@ -236,10 +236,10 @@ def test_a_camera_without_images_and_depth_says_so(ran: Run, page: Page) -> None
     page.live.choices.gaze = False
     page.publisher.depth = True
     page.stream.update(ran.ticks[-1]._replace(detections=Detections(0.0, 1, 640, 400)))
-    with_words = drain(page.feed, page.live).image
+    with_words = read_waiting(page.feed, page.live).image
     page.publisher.depth = False
     page.stream.update(ran.ticks[-1]._replace(t_s=99.0, detections=Detections(0.0, 2, 640, 400)))
-    without = drain(page.feed, page.live).image
+    without = read_waiting(page.feed, page.live).image
     assert with_words is not None and without is not None
     white = [bool((image.min(axis=2) > 200).any()) for image in (with_words, without)]
     assert white == [True, False]
@@ -264,7 +264,7 @@ def test_a_world_goes_with_the_time_since_it_began(ran: Run, page: Page) -> None
     for tick in ran.ticks[:60]:
         page.stream.update(tick)
     page.stream.flush()
-    news = drain(page.feed, page.live)
+    news = read_waiting(page.feed, page.live)
     assert news.world is not None and news.world.shapes == SmallWorld()
     assert news.world.world_s == pytest.approx(1.5 + ran.ticks[59].t_s - ran.ticks[0].t_s)
 
@@ -274,7 +274,7 @@ def test_before_a_world_has_begun_there_is_none(ran: Run, page: Page) -> None:
     page.comes_up()
     page.stream.update(ran.ticks[0])
     page.stream.flush()
-    news = drain(page.feed, page.live)
+    news = read_waiting(page.feed, page.live)
     assert news.snapshots and news.world is None
 
 
@@ -284,7 +284,7 @@ def test_the_page_names_the_detector_and_what_it_lacks(ran: Run, page: Page) -> 
     page.stream.update(ran.ticks[0])
     page.stream.flush()
     (shot,) = page.shown()
-    assert shot.perception.endswith(f" | {page.detector}") and page.detector in health(shot)
+    assert shot.perception.endswith(f" | {page.detector}") and page.detector in health_table(shot)
 
 
 def test_why_the_camera_sees_badly_is_shown_everywhere(ran: Run, page: Page) -> None:
@@ -297,11 +297,11 @@ def test_why_the_camera_sees_badly_is_shown_everywhere(ran: Run, page: Page) -> 
         page.stream.update(one)
     page.stream.flush()
     shot = page.shown()[-1]
-    assert why in shot.perception and why in health(shot)
+    assert why in shot.perception and why in health_table(shot)
     lines: list[str] = []
     StatusLine(lines.append, lambda: BusHealth(0, 0, {}), lambda: None).update(dark)
     assert "camera: the picture is too dark" in lines[0] and "switch on" not in lines[0]
-    pulse = Pulse(ran.made.clock)
+    pulse = LoopMonitor(ran.made.clock)
     pulse.update(dark)
     now = {**pulse.as_json(), "unsaved": 0}
     assert f"camera: {why}" in state_lines(now)

@@ -14,8 +14,8 @@ from branch import Branch, gazerig
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.client import NoRobotError, RequestRejected, RobotClient, running
-from gazerig.robot.remote.socket_io import folder, sockets
+from gazerig.robot.remote.client import NoRobotError, RequestRejected, RobotClient, connect_to_all
+from gazerig.robot.remote.socket_io import find_sockets, socket_folder
 
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
@@ -124,16 +124,19 @@ def test_ctrl_c_parks_and_removes_the_socket(run: Run) -> None:
         with pytest.raises(DriverError, match="ended or hung up"):
             rig.get()
     assert "parked, torque off" in run.words() and "Traceback" not in run.words()
-    assert not sockets(folder(os.environ, os.getuid()))
+    assert not find_sockets(socket_folder(os.environ, os.getuid()))
 
 
 def test_a_killed_rig_is_no_rig_and_the_next_clears_up(place: Path) -> None:
     killed = Run(place)
     killed.connected().close()
     killed.end(signal.SIGKILL)
-    socket_folder = folder(os.environ, os.getuid())
-    assert list(sockets(socket_folder).values()) == [killed.process.pid] and running() == []
+    socket_folder = socket_folder(os.environ, os.getuid())
+    assert (
+        list(find_sockets(socket_folder).values()) == [killed.process.pid]
+        and connect_to_all() == []
+    )
     second = Run(place)
     second.connected().close()
-    assert list(sockets(socket_folder).values()) == [second.process.pid]
+    assert list(find_sockets(socket_folder).values()) == [second.process.pid]
     second.end(signal.SIGTERM)

@@ -15,7 +15,7 @@ from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
 from gazerig.robot.app.session import run as run_session
 from gazerig.robot.model.client_control import ARRIVED_RAD
-from gazerig.robot.model.command_json import as_json, check, from_json
+from gazerig.robot.model.command_json import as_json, check_command, from_json
 from gazerig.robot.model.commands import (
     Command,
     Jog,
@@ -209,4 +209,4 @@ def test_looks_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> 
 
 
 def test_checks_take_what_the_recording_holds() -> None:
-    check(LookAtDirection((pi, pi / 2)))
+    check_command(LookAtDirection((pi, pi / 2)))

@@ -6,7 +6,7 @@ from outside_package import install, on_path
 from test_page_parts import looking
 
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
-from gazerig.robot.dashboard.panels.package_panels import PagePanels, own_panels
+from gazerig.robot.dashboard.panels.package_panels import PagePanels, core_panels
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 
 CODE = """
@@ -46,7 +46,7 @@ def test_panels_of_packages_are_drawn_and_failures_named(tmp_path: Path) -> None
 
 
 def test_panels_of_this_folder_are_found_and_drawn_when_they_are_due() -> None:
-    assert list(own_panels()) == [Timeline]
+    assert list(core_panels()) == [Timeline]
     widgets = Widgets()
     panels = PagePanels(widgets.panel("watch"))
     panels.begin()

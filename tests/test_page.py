@@ -27,7 +27,7 @@ from six_joints import of_six
 
 from gazerig.gaze.types import PART_NAMES, PARTS
 from gazerig.robot.dashboard.feed.camera_overlay import encode
-from gazerig.robot.dashboard.feed.page_process import PageProcess, pack, unpack
+from gazerig.robot.dashboard.feed.page_process import PageProcess, decode_snapshot, encode_snapshot
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")
@@ -147,9 +147,9 @@ def feeding(page: PageProcess, source: Callable[[float], Snapshot]) -> Iterator[
 
 def test_snapshot_survives_the_way() -> None:
     snapshot = looking(1.5, bodies=(SeenBody(7, "hand", (0.6, 0.3, 0.1), 0.04),))
-    assert unpack(pack(snapshot)) == snapshot
+    assert decode_snapshot(encode_snapshot(snapshot)) == snapshot
     numpys = replace(snapshot, rate_hz=np.float64(99.5), lids=tuple(np.array((0.25, 0.5))))
-    assert unpack(pack(numpys)) == numpys
+    assert decode_snapshot(encode_snapshot(numpys)) == numpys
 
 
 def irises(browser: Browser) -> np.ndarray:

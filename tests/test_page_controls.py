@@ -21,8 +21,8 @@ from stand_in import StandIn
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
-from gazerig.robot.control.command_handler import plain
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, News, drain
+from gazerig.robot.control.command_handler import to_plain
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, News, read_waiting
 from gazerig.robot.dashboard.feed.page_process import (
     ALL_USERS,
     CHOICES,
@@ -43,14 +43,14 @@ from gazerig.robot.dashboard.panels.param_panel import (
     ALL,
     FIRST,
     ParamControl,
-    ParamState,
+    ParamPanels,
     fits_slider,
     format_value,
-    found,
-    group_of,
-    hint,
-    label,
-    read,
+    param_group,
+    param_label,
+    param_tooltip,
+    parse_value,
+    search_params,
     slider_step,
 )
 from gazerig.robot.dashboard.requests.inbox import (
@@ -180,8 +180,8 @@ def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
         "7:tuning",
         b'{"a":"b c"}',
     )
-    assert urgent(request_message("7", b'{"do":"stop","why":""}'))
-    assert not urgent(request_message("7", b'{"do":"revert"}'))
+    assert is_urgent(request_message("7", b'{"do":"stop","why":""}'))
+    assert not is_urgent(request_message("7", b'{"do":"revert"}'))
 
 
 def test_answers_wait_until_the_page_has_room() -> None:
@@ -210,7 +210,7 @@ def test_words_menus_and_their_way() -> None:
     with linked() as (page, theirs):
         page.offer({"behaviour": ("wait", "guard")})
         page.say("the disk is full")
-        news = drain(theirs, LiveFeed())
+        news = read_waiting(theirs, LiveFeed())
     assert news.others == (
         (CHOICES, {"behaviour": ["wait", "guard"]}),
         (MESSAGE, [ALL_USERS, "the disk is full"]),
@@ -532,10 +532,10 @@ def test_a_parameter_is_read_as_the_rig_writes_it() -> None:
 
 
 def test_a_hint_says_all_there_is_to_know() -> None:
-    words = hint(PARAM._replace(choices=("a", "b")))
+    words = param_tooltip(PARAM._replace(choices=("a", "b")))
     for part in ("a.b", "how far", "0 to 10 deg", "a, b", "default 1.0 deg", "next tick"):
         assert part in words
-    assert label(PARAM, True) == "● a.b (deg)" and label(PARAM, False) == "a.b (deg)"
+    assert param_label(PARAM, True) == "● a.b (deg)" and param_label(PARAM, False) == "a.b (deg)"
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-35.0, 35.0), (0.3, 0.7), (10.0, 1e5)])
@@ -561,13 +561,13 @@ def test_what_a_slider_cannot_set_finely_is_typed() -> None:
 )
 def test_what_is_written_is_read_again(kind: str, value: JsonValue) -> None:
     param = PARAM._replace(kind=kind, default=value)
-    assert read(param, format_value(param, value)) == value
+    assert parse_value(param, format_value(param, value)) == value
 
 
 def test_what_cannot_be_read_is_refused_with_an_example() -> None:
     with pytest.raises(ValueError, match=r"a\.b: '1,5' is no number; write it like 1\.0"):
-        read(PARAM, "1,5")
-    assert read(PARAM._replace(optional=True), "null") is None
+        parse_value(PARAM, "1,5")
+    assert parse_value(PARAM._replace(optional=True), "null") is None
 
 
 def test_a_slider_makes_room_where_null_comes_into_force(place: Container) -> None:
@@ -585,19 +585,19 @@ def test_every_parameter_of_every_rig_becomes_a_control(place: Container, name: 
     rig = load_rig(name)
     now, texts = values(rig), {}
     sent = json.loads(
-        json.dumps([plain(param._asdict()) for param in parameters(rig, load_rig("desk"))])
+        json.dumps([to_plain(param._asdict()) for param in parameters(rig, load_rig("desk"))])
     )
     places = [Parameter.from_json(data) for data in sent]
     assert {param.key for param in places} == set(now)
     refused: list[str] = []
     for param in places:
-        value = json.loads(json.dumps(plain(now[param.key])))
+        value = json.loads(json.dumps(to_plain(now[param.key])))
         control = ParamControl(place, param, value, False, ignore, refused.append, 0.0)
         control.show(value, True)
-        assert hint(param).startswith(param.key)
+        assert param_tooltip(param).startswith(param.key)
         if isinstance(control.field, TextField):
             texts[param.key] = control.field.value
-            assert read(param, texts[param.key]) == value
+            assert parse_value(param, texts[param.key]) == value
         elif isinstance(control.field, Slider):
             assert control.field.checked(control.field.value) == value
         control.remove()
@@ -606,7 +606,7 @@ def test_every_parameter_of_every_rig_becomes_a_control(place: Container, name: 
         linkage = next(
             param for param in places if param.key == "joints.eyes_pan.transmission_points"
         )
-        assert "next start" in hint(linkage) and "default" not in hint(linkage)
+        assert "next start" in param_tooltip(linkage) and "default" not in param_tooltip(linkage)
     assert refused == []
 
 
@@ -621,10 +621,13 @@ def ignore(key: str, value: object) -> None:
 
 def test_search_takes_every_word() -> None:
     parameters = (PARAM, PARAM._replace(key="guard.speed", group="guard", description="how fast"))
-    assert found("how FAR", parameters) == ["a.b"]
-    assert found("how", parameters) == ["a.b", "guard.speed"] and found("how not", parameters) == []
-    assert group_of(PARAM._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
-    assert group_of(PARAM._replace(group="")) == "rig"
+    assert search_params("how FAR", parameters) == ["a.b"]
+    assert (
+        search_params("how", parameters) == ["a.b", "guard.speed"]
+        and search_params("how not", parameters) == []
+    )
+    assert param_group(PARAM._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
+    assert param_group(PARAM._replace(group="")) == "rig"
 
 
 def test_orders_survive_the_way_of_the_page() -> None:
@@ -638,7 +641,7 @@ def test_orders_survive_the_way_of_the_page() -> None:
 
 def test_who_searches_before_the_parameters_have_come_finds_them_then() -> None:
     widgets, mouth = Widgets(), Mouth()
-    state = ParamState(widgets, widgets.panel("tune"), mouth)  # type: ignore[arg-type]
+    state = ParamPanels(widgets, widgets.panel("tune"), mouth)  # type: ignore[arg-type]
     client = widgets.join("browser 1", lambda: None).name
     find = next(one for one in widgets._widgets.values() if one.props.get("label") == "find")
     find.arrived("how far", client)
@@ -659,7 +662,7 @@ def test_tune_opens_with_eight_controls_and_a_fold_with_all() -> None:
     widgets, mouth = Widgets(), Mouth()
     tune, freed = widgets.panel("tune"), []
     menus = FirstMenus(tune, mouth, lambda choice, who: freed.append((choice, who)))  # type: ignore[arg-type]
-    state = ParamState(widgets, tune, mouth)  # type: ignore[arg-type]
+    state = ParamPanels(widgets, tune, mouth)  # type: ignore[arg-type]
     client = widgets.join("browser 1", lambda: None).name
     for name in ("lids", "conversation", "behaviour", "character"):
         menus.offer(name, ["wait", "guard"])

@@ -26,7 +26,7 @@ from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
 from gazerig.robot.dashboard.door.browsers import TabLimits
 from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES, browser_of
-from gazerig.robot.dashboard.requests.outbox import TokenBucket, from_browser
+from gazerig.robot.dashboard.requests.outbox import TokenBucket, add_client
 
 BROWSER = Path(page_files.__file__).parents[1] / "browser"
 
@@ -508,9 +508,9 @@ def test_a_rate_lets_a_burst_pass_and_then_so_many_a_second() -> None:
 
 
 def test_only_small_objects_are_asked_for() -> None:
-    assert from_browser(b'{"a": [1, 2]}', "me") == {"a": [1, 2]}
-    assert from_browser(b"[]", "me") is None and from_browser(b"{", "me") is None
-    assert from_browser('{"do": "stop", "why": "x", "who": "you"}', "me") == {
+    assert add_client(b'{"a": [1, 2]}', "me") == {"a": [1, 2]}
+    assert add_client(b"[]", "me") is None and add_client(b"{", "me") is None
+    assert add_client('{"do": "stop", "why": "x", "who": "you"}', "me") == {
         "do": "stop", "why": "x", "who": "me",
     }  # fmt: skip
 

@@ -16,7 +16,7 @@ from shown_page import SNAPSHOT, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.page_process import REPLAY, PageProcess
-from gazerig.robot.model.control_source import ControlSource, sentence
+from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.types import Snapshot
 
 pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
@@ -55,7 +55,7 @@ CHANGES: dict[str, dict[str, Any]] = {
 
 def snapshot(state: str) -> Snapshot:
     leader = LEADS[state]
-    words = sentence(leader, 12.0)
+    words = control_sentence(leader, 12.0)
     headline = words if leader.led else "looks at person 3 (left eye)"
     changes = {"headline": headline, **CHANGES.get(state, {})}
     return replace(SNAPSHOT, t_s=12.0, leader=leader, leads_words=words, **changes)

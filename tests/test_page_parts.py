@@ -35,9 +35,14 @@ from gazerig.robot.dashboard.feed.camera_overlay import (
     ground,
 )
 from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices
-from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, REPLAY, pack, unpack
+from gazerig.robot.dashboard.feed.page_process import (
+    MESSAGE_BYTES,
+    REPLAY,
+    decode_snapshot,
+    encode_snapshot,
+)
 from gazerig.robot.dashboard.page_view import PageView
-from gazerig.robot.dashboard.panels.attention_panel import reason, saliences, winner
+from gazerig.robot.dashboard.panels.attention_panel import reason_text, salience_bars, target_text
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
 from gazerig.robot.dashboard.panels.joint_charts import (
@@ -46,7 +51,7 @@ from gazerig.robot.dashboard.panels.joint_charts import (
     ChartGroup,
     JointCharts,
     JointSeries,
-    groups_of,
+    chart_groups,
     mean_deg,
 )
 from gazerig.robot.dashboard.panels.panel import PanelView
@@ -64,8 +69,8 @@ from gazerig.robot.dashboard.panels.servo_health import (
     NO_FEEDBACK,
     alarms,
     group_reasons,
-    guard,
-    health,
+    guard_text,
+    health_table,
     other_heads,
     servo_table,
     silence,
@@ -78,7 +83,7 @@ from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.head_view import lid_edges
 from gazerig.robot.dashboard.view.overlays import OverlayPanel, field_edge
 from gazerig.robot.dashboard.view.people import fixated_part
-from gazerig.robot.dashboard.view.scene_node import along, turned_up
+from gazerig.robot.dashboard.view.scene_node import pitch_up, rotation_to
 from gazerig.robot.dashboard.widgets.widget import Html, Widget
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lathe, lid, ring
@@ -142,10 +147,10 @@ def camera_picture() -> tuple[np.ndarray, Detections]:
 def test_target_reason_and_guard_are_told_and_run_no_markup() -> None:
     shot = snapshot(reasons=tuple(f"joint {n}: too <fast>" for n in range(6)))
     for word in ("face &lt;3&gt;", "pursue", "the rule &#x27;person&#x27; pulls"):
-        assert word in winner(shot)
+        assert word in target_text(shot)
     for word in ("guard: limited", "3 lost", "too &lt;fast&gt; (joint 0, +5)"):
-        assert word in health(shot)
-    assert "too" not in health(snapshot()) and alarms(snapshot()) == ""
+        assert word in health_table(shot)
+    assert "too" not in health_table(snapshot()) and alarms(snapshot()) == ""
 
 
 def test_what_the_other_heads_do_is_told_and_that_one_is_let_go_is_an_alarm() -> None:
@@ -156,7 +161,7 @@ def test_what_the_other_heads_do_is_told_and_that_one_is_let_go_is_an_alarm() ->
     shot = replace(snapshot(), others=(well, limp))
     assert "anna: looks at &lt;1&gt;" in other_heads(shot) and other_heads(snapshot()) == ""
     assert "bert: the torque is off: hot" in alarms(shot) and "anna" not in alarms(shot)
-    assert unpack(pack(shot)).others == shot.others
+    assert decode_snapshot(encode_snapshot(shot)).others == shot.others
 
 
 @pytest.mark.parametrize(
@@ -178,9 +183,9 @@ def test_what_the_other_heads_do_is_told_and_that_one_is_let_go_is_an_alarm() ->
 def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None:
     first = Salience(3, "face", *terms, 1.0, sum(terms))
     shot = replace(snapshot(), saliences=(first,), behaviour="wait")
-    assert reason(shot) == said and escape(said) in winner(shot)
+    assert reason_text(shot) == said and escape(said) in target_text(shot)
     led = replace(shot, leader=ControlSource("person", "ann", "look at 1 0 0"))
-    assert reason(led) == shot.why
+    assert reason_text(led) == shot.why
 
 
 def test_why_a_planner_chose_is_said_with_it() -> None:
@@ -189,9 +194,10 @@ def test_why_a_planner_chose_is_said_with_it() -> None:
         snapshot(), saliences=(first,), behaviour="planned", plan="guard: hand 3 arrives in 0.20 s"
     )
     assert (
-        reason(shot) == "because the behaviour guard asks for it (0.80): hand 3 arrives in 0.20 s"
+        reason_text(shot)
+        == "because the behaviour guard asks for it (0.80): hand 3 arrives in 0.20 s"
     )
-    assert "behaviour: planned" in winner(shot) and "plan: guard" in winner(shot)
+    assert "behaviour: planned" in target_text(shot) and "plan: guard" in target_text(shot)
 
 
 def test_equal_reasons_are_said_once() -> None:
@@ -201,7 +207,7 @@ def test_equal_reasons_are_said_once() -> None:
 
 def test_a_short_limit_moves_nothing_on_the_page() -> None:
     limited = snapshot(reasons=tuple(f"joint {n}: too fast" for n in range(9)))
-    assert guard(limited).count("<div") == guard(snapshot()).count("<div")
+    assert guard_text(limited).count("<div") == guard_text(snapshot()).count("<div")
     assert alarms(limited) == ""
 
 
@@ -209,14 +215,14 @@ def test_what_holds_says_why_joint_by_joint() -> None:
     shot = replace(snapshot(reasons=tuple(f"joint {n}: hot" for n in range(6))), level="hold")
     held = alarms(shot)
     assert "joint 3: hot" in held and "joint 4" not in held and "and 2 more" in held
-    assert "joint 5: hot" in health(shot)
+    assert "joint 5: hot" in health_table(shot)
 
 
 def test_what_stands_still_shouts() -> None:
     stopped = replace(snapshot(), stopped="somebody pressed <STOP>", level="torque_off")
-    assert "somebody pressed &lt;STOP&gt;" in health(stopped) and "guard: stopped" in health(
+    assert "somebody pressed &lt;STOP&gt;" in health_table(
         stopped
-    )
+    ) and "guard: stopped" in health_table(stopped)
     assert alarms(stopped) == ""  # it is said beside the stop button, once
     held = alarms(replace(snapshot(reasons=("neck_yaw: hot",)), level="hold"))
     assert "class='banner hold'><b>guard: hold" in held and "neck_yaw: hot" in held
@@ -251,7 +257,7 @@ def test_a_group_is_the_mean_of_its_joints() -> None:
     angles_deg = np.zeros((2, 3, len(GAZE_JOINTS)))
     angles_deg[:, 2, GAZE_JOINTS.index("left_eye_pan")] = 4.0
     angles_deg[:, 2, GAZE_JOINTS.index("right_eye_pan")] = 2.0
-    eyes = groups_of(GAZE_JOINTS)["yaw"][0]
+    eyes = chart_groups(GAZE_JOINTS)["yaw"][0]
     assert mean_deg(angles_deg, eyes, GAZE_JOINTS).tolist() == [[0.0, 0.0, 3.0]] * 2
     named = {name for groups in GROUPS.values() for group in groups for name in group.joints}
     assert named == set(EVERY_JOINT)
@@ -260,13 +266,13 @@ def test_a_group_is_the_mean_of_its_joints() -> None:
 def test_traces_are_of_the_joints_that_are_there() -> None:
     desk = {
         name: [len(group.joints) for group in groups]
-        for name, groups in groups_of(GAZE_JOINTS).items()
+        for name, groups in chart_groups(GAZE_JOINTS).items()
     }
     assert desk == {
         "yaw": [2, 1, 2], "pitch": [2, 1, 2], "left eye": [1, 1, 1], "right eye": [1, 1, 1],
         "neck": [1, 1, 1],
     }  # fmt: skip
-    six = groups_of(SIX)
+    six = chart_groups(SIX)
     assert tuple(six) == ("yaw", "pitch", "left eye", "right eye")
     assert [group.joints for group in six["yaw"]] == [
         ("eyes_pan",),
@@ -275,8 +281,8 @@ def test_traces_are_of_the_joints_that_are_there() -> None:
     ]
     assert six["left eye"][0] == ChartGroup("both eyes, yaw, + left", ("eyes_pan",))
     assert six["right eye"][-1].joints == ("right_lower_lid",)
-    assert groups_of(()) == {}
-    mixed = groups_of(("left_eye_pan", "right_eye_pan", "eyes_tilt"))
+    assert chart_groups(()) == {}
+    mixed = chart_groups(("left_eye_pan", "right_eye_pan", "eyes_tilt"))
     assert [group.joints for group in mixed["right eye"]] == [("right_eye_pan",), ("eyes_tilt",)]
 
 
@@ -292,16 +298,16 @@ def test_traces_take_the_joints_of_the_rig_that_is_shown() -> None:
 
 
 def test_health_says_how_many_joints_nobody_measures() -> None:
-    assert without_feedback(snapshot()) == ""
+    assert no_feedback_note(snapshot()) == ""
     said = "6 of 6 joints without feedback: shown where they should be"
-    assert said in without_feedback(of_six(snapshot())) and said in health(of_six(snapshot()))
-    assert "2 of 6 joints" in without_feedback(of_six(snapshot(), SIX[:2]))
-    assert "anywhere" not in without_feedback(of_six(snapshot()))
+    assert said in no_feedback_note(of_six(snapshot())) and said in health_table(of_six(snapshot()))
+    assert "2 of 6 joints" in no_feedback_note(of_six(snapshot(), SIX[:2]))
+    assert "anywhere" not in no_feedback_note(of_six(snapshot()))
     limp = of_six(snapshot())
     limp = replace(limp, servos=limp.servos._replace(torque=(True,) + (False,) * 5))
-    assert "5 without torque: may be anywhere" in without_feedback(limp)
+    assert "5 without torque: may be anywhere" in no_feedback_note(limp)
     limp = replace(limp, servos=limp.servos._replace(torque=(False,) * 6))
-    assert "all without torque: may be anywhere" in without_feedback(limp)
+    assert "all without torque: may be anywhere" in no_feedback_note(limp)
 
 
 def turn(q: tuple[float, float, float, float], v: tuple[float, float, float]) -> np.ndarray:
@@ -319,12 +325,12 @@ def test_turns_lay_axes_where_they_should() -> None:
     dice = np.random.default_rng(3)
     for _ in range(50):
         x, y, z = (v := dice.normal(size=3)) / np.linalg.norm(v)
-        assert np.allclose(turn(along((x, y, z)), (1.0, 0.0, 0.0)), (x, y, z))
-        assert turn(along((x, y, z)), (0.0, 1.0, 0.0))[2] == pytest.approx(0.0, abs=1e-12)
+        assert np.allclose(turn(rotation_to((x, y, z)), (1.0, 0.0, 0.0)), (x, y, z))
+        assert turn(rotation_to((x, y, z)), (0.0, 1.0, 0.0))[2] == pytest.approx(0.0, abs=1e-12)
         R = rotation(tuple(dice.uniform(-3.0, 3.0, 3)))
         for axis in AHEAD:
             assert np.allclose(turn(quaternion(R), axis), np.array(R) @ axis, atol=1e-7)
-    assert np.allclose(turn(turned_up(0.3), (1.0, 0.0, 0.0)), (math.cos(0.3), 0.0, math.sin(0.3)))
+    assert np.allclose(turn(pitch_up(0.3), (1.0, 0.0, 0.0)), (math.cos(0.3), 0.0, math.sin(0.3)))
 
 
 def test_the_part_on_the_target_is_the_fixated_one() -> None:
@@ -402,13 +408,13 @@ def test_depth_is_shown_in_colours_near_red_far_blue_unknown_dark() -> None:
 
 def test_depth_is_drawn_on_only_where_it_is_wanted_and_there() -> None:
     picture, found = camera_picture()
-    assert ground(found, depth=False) is picture
-    reported = ground(found, depth=True)
+    assert background(found, depth=False) is picture
+    reported = background(found, depth=True)
     assert reported is not None and reported.shape == (480, IMAGE_WIDTH_PX, 3)
     assert (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[450:].any()  # words at the foot
     assert not (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[:430].any()
     deep = replace(found, depth_m=np.full((480, 640), 1.0, np.float32))
-    shown = ground(deep, depth=True)
+    shown = background(deep, depth=True)
     assert shown is not None and len(np.unique(shown[:430].reshape(-1, 3), axis=0)) == 1
 
 
@@ -750,13 +756,13 @@ def test_only_the_joints_nobody_measures_are_without_figures() -> None:
 
 
 def test_loop_figures_are_told_and_coloured_when_late() -> None:
-    said = health(healthy())
+    said = health_table(healthy())
     for words in ("200.0 Hz", "0.04 ms", "0.21 ms", "0.90 ms", "3 slots overrun", "60 ms</b> old"):
         assert words in said
     assert strained(said) == 0
     late = replace(healthy(), timing=LoopFigures(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
-    assert strained(health(late)) == 2
-    assert "no frame yet" in health(replace(healthy(), frame_age_s=None))
+    assert strained(health_table(late)) == 2
+    assert "no frame yet" in health_table(replace(healthy(), frame_age_s=None))
 
 
 def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
@@ -765,16 +771,16 @@ def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
         Salience(1, "<b>", 0.02, 0.0, 0.0, 0.0, 0.5, 0.6, 0.3),
     )
     shot = replace(healthy(), saliences=tugs, character="shy", conversation="listen")
-    said = saliences(shot)
+    said = salience_bars(shot)
     assert said.index("thing 4") < said.index("&lt;b&gt; 1")
     assert "translation 0.41" in said and "translation 0.02 rule 0.50" in said
     assert "looming 0.00</div>" not in said
     assert "0.60 &times;&ensp;0.30" in said
-    named = winner(shot)
+    named = target_text(shot)
     for words in ("thing &lt;4&gt;", "because it moves", "behaviour: wait", "character: shy",
                   "conversation: listen"):  # fmt: skip
         assert words in named
-    assert "wanders" in saliences(healthy()) and "slide &lt;0.4&gt;" in winner(healthy())
+    assert "wanders" in salience_bars(healthy()) and "slide &lt;0.4&gt;" in target_text(healthy())
 
 
 def as_it_is(shot: Snapshot) -> Snapshot:
@@ -829,7 +835,7 @@ def test_panel_takes_snapshots_and_fills_its_tabs(
         panel.show()
     again = words_of(widgets)
     assert "51 saccades" not in again and "1 saccade<" in again
-    panel.silence.content = silence()
+    panel.silence.content = no_data_text()
     assert "the rig has sent nothing" in panel.silence.content
     panel.update((made(healthy(0.1)),))
     assert panel.silence.content == ""
@@ -879,7 +885,7 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(server: viser.ViserServe
         view.show(News((healthy(1.1 + 0.1 * k),), None, ended=False))
     last = replace(of_six(healthy(4.0)), target_name="the last", stopped="a test")
     view.show(News((last,), None, ended=False))
-    known = {"stopped": "a test", "silent": False, "without_feedback": 6}
+    known = {"stopped": "a test", "silent": False, "no_feedback_note": 6}
     assert button.reported.items() >= known.items()
     panel = view._panel
     widgets.join("a browser", lambda: None)
@@ -958,8 +964,8 @@ def test_a_recording_that_stands_still_is_no_silent_rig(server: viser.ViserServe
 
 def test_the_age_of_the_frame_is_said_once() -> None:
     shot = replace(SNAPSHOT, frame_age_s=0.073, perception="frame 73 ms old | face 1 at 0.94 m")
-    said = health(shot)
+    said = health_table(shot)
     assert said.count("73 ms") == 1 and "<div>face 1 at 0.94 m</div>" in said
-    assert "<div>no face</div>" in health(replace(shot, perception="no face"))
-    blind = health(replace(shot, frame_age_s=None, perception="no frame yet"))
+    assert "<div>no face</div>" in health_table(replace(shot, perception="no face"))
+    blind = health_table(replace(shot, frame_age_s=None, perception="no frame yet"))
     assert blind.count("no frame yet") == 1

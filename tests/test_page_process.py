@@ -20,12 +20,12 @@ import shown_page
 from page_visitor import LOOKING, PATIENCE_S, Visitor, unpacked
 from shown_page import AHEAD, free_port, running_page, wait_for
 
-from gazerig.robot.dashboard.feed.page_process import URL, PageProcess, pack
+from gazerig.robot.dashboard.feed.page_process import URL, PageProcess, encode_snapshot
 from gazerig.robot.dashboard.page_main import free_port as first_free_port
-from gazerig.robot.dashboard.page_main import watch
+from gazerig.robot.dashboard.page_main import show_until_closed
 from gazerig.robot.dashboard.requests.inbox import BEAT
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.view.viewpoints import BOTH, NAMES, view
+from gazerig.robot.dashboard.view.viewpoints import BOTH, NAMES, named_view
 from gazerig.robot.dashboard.widgets.widgets import PANELS
 from gazerig.robot.model.types import SeenFace
 
@@ -138,7 +138,7 @@ def test_a_view_chosen_before_the_scene_has_loaded_is_taken(
     shared: tuple[PageProcess, str, int],
 ) -> None:
     visitor = Visitor(shared[1])
-    position_m, look_at_m, *_ = view(BOTH)
+    position_m, look_at_m, *_ = named_view(BOTH)
     with visitor.open("/rig/panels") as panels:
         panels.send(json.dumps({"seen": list(PANELS)}))
         told: list[tuple[int, dict[str, object]]] = []
@@ -274,8 +274,10 @@ def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
     # A door whose thread is stuck takes what is to be done and never does it.
     door = SimpleNamespace(is_open=lambda: True, soon=lambda do: None if stuck == "door" else do())
     served = SimpleNamespace(door=door, pointer=SimpleNamespace(), outbox=Outbox(cast(Any, theirs)))
-    run = threading.Thread(target=watch, args=(theirs, view, os.getppid(), served), daemon=True)
-    ours.send(pack(SNAPSHOT))
+    run = threading.Thread(
+        target=show_until_closed, args=(theirs, view, os.getppid(), served), daemon=True
+    )
+    ours.send(encode_snapshot(SNAPSHOT))
     run.start()
     try:
         assert drawn.wait(PATIENCE_S)
@@ -288,7 +290,7 @@ def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
             except BlockingIOError:
                 if stuck == "drawing":
                     break
-                ours.send(pack(SNAPSHOT))
+                ours.send(encode_snapshot(SNAPSHOT))
                 let_go.wait(0.02)
         assert heard == {"drawing": 1, "door": 0, "": 2}[stuck]
     finally:

@@ -25,7 +25,7 @@ from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.egomotion_residual import (
     EgomotionResidual,
     TrackedPoint,
-    turning_rad_s,
+    rotation_rate_rad_s,
 )
 from gazerig.robot.perception.frame_locator import Box, Reading
 from gazerig.robot.perception.perception import Perception
@@ -222,7 +222,7 @@ def turning_head(late_s: float, moves: bool = False, bound_by: float = 1.0) -> E
 
     for k in range(150):
         t = k / 30
-        turn = turning_rad_s(
+        turn = rotation_rate_rad_s(
             rotation((yaw(t - 0.015), 0, 0)), rotation((yaw(t + 0.015), 0, 0)), 0.03
         )
         # Placed by the pose at t though it was taken earlier.

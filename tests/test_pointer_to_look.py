@@ -13,9 +13,9 @@ from gazerig.robot.dashboard.requests.pointer_to_look import (
     Pointer,
     PointerToLook,
     ViewCamera,
-    opponent_at,
-    pointed_at,
-    pointer_of,
+    gaze_target,
+    opponent_target,
+    parse_pointer,
 )
 from gazerig.robot.model.clock import SimulatedClock
 
@@ -53,7 +53,7 @@ def seen_at(point: Vec3, camera: ViewCamera, aspect: float) -> tuple[float, floa
 def test_the_point_is_drawn_under_the_pointer(
     camera: ViewCamera, aspect: float, at: tuple[float, float]
 ) -> None:
-    point = present(pointed_at(Pointer(*at, aspect), camera, EYES))
+    point = present(gaze_target(Pointer(*at, aspect), camera, EYES))
     assert seen_at(point, camera, aspect) == pytest.approx(at)
     # All lie on one plane, across the way from the viewer to the head.
     to_head = sub(EYES, camera.p_world_m)
@@ -63,14 +63,14 @@ def test_the_point_is_drawn_under_the_pointer(
 
 def test_a_pointer_on_the_eyes_makes_them_look_at_the_viewer() -> None:
     x, y = seen_at(EYES, turned_camera(), 1.4)
-    point = present(pointed_at(Pointer(x, y, 1.4), turned_camera(), EYES))
+    point = present(gaze_target(Pointer(x, y, 1.4), turned_camera(), EYES))
     to_viewer = sub(turned_camera().p_world_m, EYES)
     assert point == pytest.approx(add(EYES, scale(to_viewer, 1.0 - TOWARDS_HEAD)))
 
 
 def test_a_pointer_to_the_viewers_left_is_to_the_heads_right() -> None:
-    left = present(pointed_at(Pointer(0.2, 0.5, 1.6), AHEAD_OF_IT, EYES))
-    up = present(pointed_at(Pointer(0.5, 0.2, 1.6), AHEAD_OF_IT, EYES))
+    left = present(gaze_target(Pointer(0.2, 0.5, 1.6), AHEAD_OF_IT, EYES))
+    up = present(gaze_target(Pointer(0.5, 0.2, 1.6), AHEAD_OF_IT, EYES))
     assert atan2(left[1] - EYES[1], left[0] - EYES[0]) < -0.2  # y is the head's left
     assert up[2] > EYES[2] + 0.05 and abs(up[1]) < 1e-9
 
@@ -78,9 +78,9 @@ def test_a_pointer_to_the_viewers_left_is_to_the_heads_right() -> None:
 def test_who_is_inside_the_head_or_looks_away_from_it_leads_nowhere() -> None:
     inside = AHEAD_OF_IT._replace(p_world_m=(0.04, 0.0, 0.14))
     away = AHEAD_OF_IT._replace(p_world_m=(-0.8, 0.0, 0.14))
-    assert pointed_at(Pointer(0.5, 0.5, 1.0), inside, EYES) is None
-    assert pointed_at(Pointer(0.5, 0.5, 1.0), away, EYES) is None
-    assert pointed_at(Pointer(0.5, 0.5, 1.0), AHEAD_OF_IT._replace(fov_rad=nan), EYES) is None
+    assert gaze_target(Pointer(0.5, 0.5, 1.0), inside, EYES) is None
+    assert gaze_target(Pointer(0.5, 0.5, 1.0), away, EYES) is None
+    assert gaze_target(Pointer(0.5, 0.5, 1.0), AHEAD_OF_IT._replace(fov_rad=nan), EYES) is None
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_a_pointer_is_handed_on_with_who_points_and_no_faster_than_a_burst() -> 
     known = {"ana": AHEAD_OF_IT}
     to_look = PointerToLook(known.get, lambda *look: looks.append(look), SimulatedClock())
     asked = {"x": 0.5, "y": 0.5, "aspect": 1, "more": "is passed over"}
-    assert pointer_of(asked) == Pointer(0.5, 0.5, 1.0)
+    assert parse_pointer(asked) == Pointer(0.5, 0.5, 1.0)
     assert not to_look.take(asked, "ana")  # it is not known where the head is
     to_look.p_world_eyes_m = EYES
     assert not to_look.take(asked, "bob")  # who does not see the view
@@ -122,15 +122,15 @@ LOOKS_AT_THE_OPPONENT = ViewCamera(
 
 
 def test_the_fist_of_the_opponent_is_under_the_pointer_and_within_its_box() -> None:
-    point = present(opponent_at(Pointer(0.6, 0.4, 1.5), LOOKS_AT_THE_OPPONENT))
+    point = present(opponent_target(Pointer(0.6, 0.4, 1.5), LOOKS_AT_THE_OPPONENT))
     assert seen_at(point, LOOKS_AT_THE_OPPONENT, 1.5) == pytest.approx((0.6, 0.4))
     assert point[0] == pytest.approx(0.7)
     # A pointer outside of the box moves the fist to its edge; nothing behind the viewer is moved.
-    assert opponent_at(Pointer(1.0, 1.0, 1.5), LOOKS_AT_THE_OPPONENT) == pytest.approx(
+    assert opponent_target(Pointer(1.0, 1.0, 1.5), LOOKS_AT_THE_OPPONENT) == pytest.approx(
         (0.7, -0.6, -0.4)
     )
     near = AHEAD_OF_IT._replace(p_world_m=(0.6, 0.0, 0.14))
-    assert opponent_at(Pointer(0.5, 0.5, 1.5), near) is None
+    assert opponent_target(Pointer(0.5, 0.5, 1.5), near) is None
 
 
 def test_a_pointer_moves_either_gaze_or_opponent() -> None:

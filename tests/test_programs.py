@@ -440,7 +440,7 @@ def test_a_program_too_many_takes_the_place_of_the_oldest(rig: Rig) -> None:
 
 def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> None:
     async def fill() -> None:
-        program = programs.Program(60.0, True)
+        program = programs.ProgramSocket(60.0, True)
         for number in range(1000):
             program.say({"number": number})
         sent = []
@@ -448,7 +448,7 @@ def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> No
             sent.append(json.loads(text)["number"])
         assert sent == list(range(1000 - 256, 1000))
         for rate_hz in (0.0, 10.0, 30.0, 60.0):
-            reader, count = programs.Program(rate_hz, False), 0
+            reader, count = programs.ProgramSocket(rate_hz, False), 0
             for k in range(600):  # ten seconds of news at 60 Hz, not quite regular
                 reader.take(
                     programs.HeadNews(f"{k}", (), Progress()), 5.0 + k / 60.0 + k % 2 * 3e-3
@@ -545,7 +545,7 @@ def test_the_lines_for_node_work(rig: Rig, tmp_path: Path) -> None:
     words = [node, str(network), f"{rig.url}/?token={rig.token}"]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "arrived"
-    path = remote_socket.folder(os.environ, os.getuid()) / f"{rig.client.pid}.sock"
+    path = remote_socket.socket_folder(os.environ, os.getuid()) / f"{rig.client.pid}.sock"
     process = subprocess.Popen([node, str(local), str(path)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None

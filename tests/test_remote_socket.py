@@ -32,11 +32,11 @@ from gazerig.robot.remote.client import (
     NoRobotError,
     RequestRejected,
     RobotClient,
-    running,
+    connect_to_all,
 )
-from gazerig.robot.remote.request_handler import Pulse, RequestHandler
+from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.remote.socket_io import REQUEST_BYTES
-from gazerig.robot.remote.socket_server import Budget, RemoteServer, RequestRate
+from gazerig.robot.remote.socket_server import ProcessorBudget, RemoteServer, RequestRate
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -87,17 +87,17 @@ def test_the_socket_is_the_owners_alone(rig: RobotClient, folder: Path) -> None:
 
 
 def open_server() -> RemoteServer:
-    beat_less = RequestHandler(None, None, Pulse(RealClock()), {"rig": "other"})  # type: ignore[arg-type]
+    beat_less = RequestHandler(None, None, LoopMonitor(RealClock()), {"rig": "other"})  # type: ignore[arg-type]
     return RemoteServer(beat_less, lambda _: None)
 
 
 def test_close_removes_it_and_hangs_up(folder: Path) -> None:
     server = open_server()
     path = server.open()
-    with remote_socket.dial(path, 1.0) as end:
+    with remote_socket.connect_to_socket(path, 1.0) as end:
         server.close()
         assert hung_up(end)
-    assert not path.exists() and running() == []
+    assert not path.exists() and connect_to_all() == []
     server.close()  # twice is no error
     names = [thread.name for thread in threading.enumerate()]
     assert "remote control" not in names
@@ -109,7 +109,7 @@ def test_a_folder_open_to_others_is_refused_by_both_sides(folder: Path) -> None:
     with pytest.raises(SetupError, match="not a folder of yours alone"):
         open_server().open()
     remote_socket.listen(folder / "1.sock").close()
-    assert running() == []
+    assert connect_to_all() == []
 
 
 def test_a_link_in_place_of_the_folder_is_refused(folder: Path, tmp_path: Path) -> None:
@@ -165,16 +165,16 @@ def test_a_path_too_long_for_a_socket_is_refused_in_words(
 
 
 def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -> None:
-    assert remote_socket.folder({"XDG_RUNTIME_DIR": str(tmp_path)}, os.getuid()) == (
+    assert remote_socket.socket_folder({"XDG_RUNTIME_DIR": str(tmp_path)}, os.getuid()) == (
         tmp_path / "gazerig"
     )
     for environ in ({}, {"XDG_RUNTIME_DIR": "/nonexistent"}, {"XDG_RUNTIME_DIR": str(tmp_path)}):
-        assert remote_socket.folder(environ, 4_000_000) == Path("/tmp/gazerig-4000000")
+        assert remote_socket.socket_folder(environ, 4_000_000) == Path("/tmp/gazerig-4000000")
 
 
 def listens() -> None:
     """Have a socket until standard input ends."""
-    pulse = Pulse(RealClock())
+    pulse = LoopMonitor(RealClock())
     server = RemoteServer(RequestHandler(None, None, pulse, {"rig": "other"}), print)  # type: ignore[arg-type]
     server.open()
     print("open", flush=True)
@@ -200,7 +200,7 @@ def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
     with listening() as killed:
         pass
     dead = folder / f"{killed.pid}.sock"
-    assert dead.exists() and running() == []
+    assert dead.exists() and connect_to_all() == []
     with pytest.raises(NoRobotError, match="no rig is running: start one with gazerig run"):
         RobotClient.connect()
     server = open_server()
@@ -213,9 +213,9 @@ def test_a_living_neighbour_keeps_its_socket(folder: Path) -> None:
     with listening() as neighbour:
         server = open_server()
         server.open()
-        assert set(remote_socket.sockets(folder).values()) == {neighbour.pid, os.getpid()}
+        assert set(remote_socket.find_sockets(folder).values()) == {neighbour.pid, os.getpid()}
         server.close()
-        assert set(remote_socket.sockets(folder).values()) == {neighbour.pid}
+        assert set(remote_socket.find_sockets(folder).values()) == {neighbour.pid}
 
 
 def test_a_new_rig_takes_over_the_socket_of_a_dead_one_with_its_number(folder: Path) -> None:
@@ -223,7 +223,7 @@ def test_a_new_rig_takes_over_the_socket_of_a_dead_one_with_its_number(folder: P
     remote_socket.listen(folder / f"{os.getpid()}.sock").close()  # dead
     server = open_server()
     server.open()
-    (found,) = running()
+    (found,) = connect_to_all()
     found.close()
     server.close()
 
@@ -424,7 +424,7 @@ def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
 
 
 def raw(folder: Path) -> socket.socket:
-    return remote_socket.dial(folder / f"{os.getpid()}.sock", 5.0)
+    return remote_socket.connect_to_socket(folder / f"{os.getpid()}.sock", 5.0)
 
 
 def line_of(end: socket.socket) -> dict[str, Any]:
@@ -618,14 +618,14 @@ def test_programs_of_other_users_are_hung_up_on(
     stranger = remote_socket.Peer(1, os.getuid() + 1)
     rig.get(RATE)  # let in
     with monkeypatch.context() as patch:
-        patch.setattr(remote_socket, "peer", lambda end: stranger)
+        patch.setattr(remote_socket, "identify_peer", lambda end: stranger)
         with raw(folder) as end:
             assert hung_up(end)
     assert rig.get(RATE) == {RATE: 200.0}
 
 
 def test_processor_time_is_shared_out() -> None:
-    budget = Budget(RequestRate(0.1, 0.5), 100.0)
+    budget = ProcessorBudget(RequestRate(0.1, 0.5), 100.0)
     budget.spend(0.5, 100.0)
     assert budget.wait_s(100.0) == 0.0
     budget.spend(0.2, 100.0)

@@ -11,8 +11,8 @@ from replayed_run import RATE_HZ, SECONDS, Screen, ticks_of
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.page_process import FRAME, REPLAY, SNAPSHOT, unpack
-from gazerig.robot.dashboard.panels.replay import ReplayView, clock, event_list, strip
+from gazerig.robot.dashboard.feed.page_process import FRAME, REPLAY, SNAPSHOT, decode_snapshot
+from gazerig.robot.dashboard.panels.replay import ReplayView, event_list, event_strip, format_time
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
@@ -61,7 +61,7 @@ def test_the_snapshot_of_a_time_is_the_last_one_before(
     assert frames.duration_s == pytest.approx(ticks[-1].t_s - start_s)
     assert len(frames) == pytest.approx(50 * SECONDS, abs=2)
     for at_s in (0.0, 1.234, 3.0, frames.duration_s, 99.0):
-        shown_s = unpack(frames.message(frames.at(at_s))).t_s - start_s
+        shown_s = decode_snapshot(frames.message(frames.at(at_s))).t_s - start_s
         assert -1e-9 <= min(at_s, frames.duration_s) - shown_s < 0.0201
     assert frames.at(-1.0) == 0
 
@@ -69,7 +69,7 @@ def test_the_snapshot_of_a_time_is_the_last_one_before(
 def test_a_snapshot_is_what_the_live_page_would_have_shown(
     frames: SnapshotIndex, ticks: list[Tick]
 ) -> None:
-    snapshot = unpack(frames.message(frames.at(4.0)))
+    snapshot = decode_snapshot(frames.message(frames.at(4.0)))
     tick = next(t for t in ticks if t.t_s == snapshot.t_s)
     assert snapshot.measured_rad == tick.joints.position_rad
     assert (
@@ -113,7 +113,9 @@ def test_the_conversation_is_shown_from_when_it_was_asked_for(ticks: list[Tick])
     asked = list(ticks[:400])
     asked[200] = asked[200]._replace(commands=(Ask("conversation", "talk"),))
     made = SnapshotIndex(asked, (), RATE_HZ)
-    found = [unpack(made.message(made.at(at_s))).conversation for at_s in (0.5, 0.95, 1.05, 1.5)]
+    found = [
+        decode_snapshot(made.message(made.at(at_s))).conversation for at_s in (0.5, 0.95, 1.05, 1.5)
+    ]
     assert found == ["", "", "talk", "talk"]
     made.close()
 
@@ -186,7 +188,7 @@ def test_a_round_that_comes_late_sends_some_on_the_way(
 
 
 def events_of(screen: Screen) -> list[object]:
-    return [e for m in screen.messages if m[:1] == SNAPSHOT for e in unpack(m).events]
+    return [e for m in screen.messages if m[:1] == SNAPSHOT for e in decode_snapshot(m).events]
 
 
 def test_every_eye_movement_is_told_once_as_it_plays(frames: SnapshotIndex) -> None:
@@ -196,7 +198,9 @@ def test_every_eye_movement_is_told_once_as_it_plays(frames: SnapshotIndex) -> N
     shown(replay, screen, time_, SECONDS + 3.0)
     reported = events_of(screen)
     assert len(reported) > 20 and len(reported) == len(set(reported))
-    assert reported == [e for n in range(len(frames)) for e in unpack(frames.message(n)).events]
+    assert reported == [
+        e for n in range(len(frames)) for e in decode_snapshot(frames.message(n)).events
+    ]
 
 
 def test_after_a_leap_the_page_is_told_what_led_there(
@@ -213,11 +217,13 @@ def test_after_a_leap_the_page_is_told_what_led_there(
         reported = events_of(screen)
         since_s = before if place_s > before else -1.0  # backwards the page starts again
         wanted = [
-            e for n in range(len(frames)) for e in unpack(frames.message(n)).events
+            e for n in range(len(frames)) for e in decode_snapshot(frames.message(n)).events
             if frames.at(since_s) * (since_s > 0.0) < n <= frames.at(place_s)
         ]  # fmt: skip
         assert reported == wanted and len(reported) > 3
-        (trail,) = [t for m in screen.messages if m[:1] == SNAPSHOT if (t := unpack(m).trail)]
+        (trail,) = [
+            t for m in screen.messages if m[:1] == SNAPSHOT if (t := decode_snapshot(m).trail)
+        ]
         at_s = [row.t_s - ticks[0].t_s for row in trail]
         assert at_s == sorted(at_s) and at_s[-1] == pytest.approx(place_s, abs=0.021)
         assert at_s[0] == pytest.approx(max(since_s, 0.0), abs=0.1)
@@ -231,7 +237,7 @@ def test_nothing_is_recalled_while_the_slider_is_in_the_hand(frames: SnapshotInd
         replay.ask({"seek_s": place_s})
         shown(replay, screen, time_, 0.04)
     assert events_of(screen) == []
-    assert all(not unpack(m).trail for m in screen.messages if m[:1] == SNAPSHOT)
+    assert all(not decode_snapshot(m).trail for m in screen.messages if m[:1] == SNAPSHOT)
 
 
 def test_after_two_leaps_in_a_row_the_page_is_told_what_both_passed_over(
@@ -245,7 +251,9 @@ def test_after_two_leaps_in_a_row_the_page_is_told_what_both_passed_over(
         replay.ask({"seek_s": place_s})
         shown(replay, screen, time_, 0.04)
     shown(replay, screen, time_, 2.0)
-    wanted = [e for n in range(1, frames.at(5.0) + 1) for e in unpack(frames.message(n)).events]
+    wanted = [
+        e for n in range(1, frames.at(5.0) + 1) for e in decode_snapshot(frames.message(n)).events
+    ]
     assert events_of(screen) == wanted and len(wanted) > 10
 
 
@@ -256,7 +264,7 @@ def test_what_is_recalled_fits_into_a_message(frames: SnapshotIndex, ticks: list
     ]  # fmt: skip
     whole = SnapshotIndex(long, (), RATE_HZ)
     assert len(whole.message_with_history(0, len(whole) - 1)) < MESSAGE_BYTES
-    rows = unpack(whole.message_with_history(0, len(whole) - 1)).trail
+    rows = decode_snapshot(whole.message_with_history(0, len(whole) - 1)).trail
     assert rows[-1].t_s - rows[0].t_s == pytest.approx(10.0, abs=0.1)
     whole.close()
 
@@ -330,7 +338,7 @@ def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
 
 
 def test_poses_survive_the_packing(frames: SnapshotIndex, ticks: list[Tick]) -> None:
-    first = unpack(frames.message(0))
+    first = decode_snapshot(frames.message(0))
     assert first.R_world_head == ticks[0].pose.R_world_head
     assert abs(first.measured_rad[6] - radians(-12.0)) < radians(0.2)
 
@@ -424,9 +432,9 @@ def test_the_events_about_a_time_are_listed() -> None:
 
 
 def test_marks_are_drawn_where_they_are() -> None:
-    drawn = strip({"saccade": [0, 2, 0, 1], "blink": [0, 0, 0, 0]})
+    drawn = event_strip({"saccade": [0, 2, 0, 1], "blink": [0, 0, 0, 0]})
     assert drawn.count("<rect") == 2 and "x='85.0'" in drawn and "x='255.0'" in drawn
 
 
 def test_times_are_written_as_minutes_and_seconds() -> None:
-    assert [clock(s) for s in (0.0, 62.3456, 59.9996)] == ["0:00.000", "1:02.346", "1:00.000"]
+    assert [format_time(s) for s in (0.0, 62.3456, 59.9996)] == ["0:00.000", "1:02.346", "1:00.000"]

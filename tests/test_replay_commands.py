@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli import replay as cli_replay
-from gazerig.robot.dashboard.feed.page_process import unpack
+from gazerig.robot.dashboard.feed.page_process import decode_snapshot
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.replay import SnapshotIndex
@@ -47,12 +47,12 @@ def test_a_recording_exports_what_the_run_itself_would(recorded: Path) -> None:
 def test_a_replay_knows_how_the_recorded_rig_was_built(
     recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    built = cli_replay._built(RunRecording(recorded).info.config_yaml)
+    built = cli_replay._recorded_rig(RunRecording(recorded).info.config_yaml)
     recording = RunRecording(recorded)
     frames = SnapshotIndex(recording.ticks(), recording.frames(), RATE_HZ, "shy", built)
-    shown = unpack(frames.message(frames.at(1.5)))
+    shown = decode_snapshot(frames.message(frames.at(1.5)))
     assert shown.commanded_pose is not None and shown.character == "shy" and shown.trail
-    assert cli_replay._built("name: desk\n") is None
+    assert cli_replay._recorded_rig("name: desk\n") is None
     assert "no longer valid (recorded.yaml" in capsys.readouterr().err
 
 
@@ -76,7 +76,7 @@ def test_a_rerun_with_another_character_shows_both(recorded: Path) -> None:
 def test_figures_of_two_runs_stand_side_by_side() -> None:
     was = {"saccades": 3, "gaze_error_deg": {"median": 0.123456}, "events": [1, 2]}
     now = {"saccades": 4, "gaze_error_deg": {"median": None}, "blinks": 1}
-    assert list(cli_replay.beside(was, now)) == [
+    assert list(cli_replay.compare_figures(was, now)) == [
         ("saccades", "3", "4"), ("gaze error deg median", "0.1235", "-"),
         ("events", "2 of them", "-"), ("blinks", "-", "1"),
     ]  # fmt: skip

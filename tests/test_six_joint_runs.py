@@ -20,7 +20,7 @@ from gazerig.robot.analysis.blink_finder import UPPER, lid_openings
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.page_process import unpack
+from gazerig.robot.dashboard.feed.page_process import decode_snapshot
 from gazerig.robot.recording.export_bids import DatasetDescription as Subject
 from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
@@ -28,7 +28,7 @@ from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_interv
 from gazerig.robot.recording.replay import SnapshotIndex
 from gazerig.robot.recording.run_format import HEALTH
 from gazerig.robot.recording.tick_record import as_json, from_json
-from gazerig.robot.remote.request_handler import Pulse
+from gazerig.robot.remote.request_handler import LoopMonitor
 
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 
@@ -102,7 +102,7 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
 
 def test_figures_and_status_say_what_is_estimated(maker: Run, desk: Run) -> None:
     for ticks, estimated in ((maker.ticks, list(SIX)), (desk.ticks, [])):
-        summary, pulse = Summary(), Pulse(_Still())
+        summary, pulse = Summary(), LoopMonitor(_Still())
         summary.update(ticks[0])
         pulse.update(ticks[0])
         figures = summary.figures()
@@ -190,6 +190,6 @@ def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
 
 def test_the_page_shows_a_recording_of_them(maker: Run) -> None:
     frames = SnapshotIndex(iter(maker.ticks[:100]), (), 200.0)
-    shot = unpack(frames.message(len(frames) - 1))
+    shot = decode_snapshot(frames.message(len(frames) - 1))
     assert shot.joints == shot.estimated == SIX and shot.lower_lids is not None
     frames.close()

@@ -17,7 +17,11 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, pack, unpack
+from gazerig.robot.dashboard.feed.page_process import (
+    MESSAGE_BYTES,
+    decode_snapshot,
+    encode_snapshot,
+)
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
@@ -184,9 +188,9 @@ def test_without_a_rig_a_single_tick_is_shown_as_far_as_it_goes() -> None:
 
 def test_snapshots_survive_the_way_and_are_short() -> None:
     for shot in taken():
-        message = pack(shot)
+        message = encode_snapshot(shot)
         assert len(message) < MESSAGE_BYTES / 20
-        assert unpack(message) == shot
+        assert decode_snapshot(message) == shot
 
 
 @cache
@@ -232,7 +236,7 @@ def test_lower_lids_are_shown_where_there_are_any() -> None:
 
 def test_a_snapshot_of_six_joints_survives_the_way() -> None:
     _, shot = maker_shown()
-    assert unpack(pack(shot)) == shot
+    assert decode_snapshot(encode_snapshot(shot)) == shot
 
 
 def test_joints_whose_names_nobody_knows_are_numbered() -> None:

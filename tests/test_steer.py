@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.cli.steer import END, KeyControls, lead
+from gazerig.robot.cli.steer import END, KeyControls, run_steering
 from gazerig.robot.model.commands import LookAtDirection
 from gazerig.robot.remote.client import RequestRejected
 from gazerig.robot.remote.gamepad import Gamepad, GamepadLost, open_gamepad
@@ -199,7 +199,7 @@ class Clock:
 
 def led(rig: Rig, *turns: Stick | str) -> list[str]:
     shown: list[str] = []
-    lead(rig, Moves(*turns), Steering(), Clock(), shown.append)  # type: ignore[arg-type]
+    run_steering(rig, Moves(*turns), Steering(), Clock(), shown.append)  # type: ignore[arg-type]
     return shown
 
 
@@ -219,7 +219,7 @@ def test_a_lead_that_was_taken_is_taken_back_while_the_stick_is_held() -> None:
             rig.leads = False  # somebody clicked on the page
             return super().update(steering, now_s)
 
-    lead(rig, Taken(held, held), Steering(), Clock(), str)  # type: ignore[arg-type]
+    run_steering(rig, Taken(held, held), Steering(), Clock(), str)  # type: ignore[arg-type]
     assert rig.told == [(50, 0), (50, 0)]
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.main import app
-from gazerig.robot.cli.terminal import _writer, completed, suggest_for_rig
+from gazerig.robot.cli.terminal import _writer, complete_suggestions, suggest_for_rig
 from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
@@ -33,9 +33,11 @@ GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
     ],
 )  # fmt: skip
 def test_a_suggestion_names_rig_and_port(said: str, wanted: str) -> None:
-    assert completed(said, GIVEN) == wanted
-    assert completed(completed(said, GIVEN), GIVEN).count("--port") == wanted.count("--port")
-    assert completed(said, {}) == said
+    assert complete_suggestions(said, GIVEN) == wanted
+    assert complete_suggestions(complete_suggestions(said, GIVEN), GIVEN).count(
+        "--port"
+    ) == wanted.count("--port")
+    assert complete_suggestions(said, {}) == said
 
 
 @pytest.mark.parametrize(
@@ -69,8 +71,8 @@ def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path
 def test_other_threads_suggest_the_same_and_inner_blocks_too() -> None:
     heard = []
     with suggest_for_rig("my.yaml", "/dev/ttyACM3", False), suggest_for_rig(None, None, False):
-        thread = Thread(target=lambda: heard.append(completed("gazerig home")))
+        thread = Thread(target=lambda: heard.append(complete_suggestions("gazerig home")))
         thread.start()
         thread.join()
     assert heard == ["gazerig home my.yaml --port /dev/ttyACM3"]
-    assert completed("gazerig home") == "gazerig home"
+    assert complete_suggestions("gazerig home") == "gazerig home"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.view.glb import glow
+from gazerig.robot.dashboard.view.glb import glow_disc
 from gazerig.robot.description import head_mesh, person_shape
 from gazerig.robot.description.mesh import (
     Mesh,
@@ -32,7 +32,7 @@ SHAPES: dict[str, Callable[[], Painted]] = {
     "jaw": lambda: head_mesh.skin().jaw,
     "person": lambda: person_shape.head(1, 0.6),
     "torso": lambda: person_shape.torso(2, 0.4),
-    "glow": lambda: glow((20, 24, 34, 140), 10),
+    "glow": lambda: glow_disc((20, 24, 34, 140), 10),
 }
 
 

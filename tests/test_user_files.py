@@ -20,7 +20,7 @@ from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_
 from gazerig.drivers.files.file_output import output_file, output_text, refuse_existing, write_file
 from gazerig.robot.analysis.heatmap import align_face
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.remote.live_server import look
+from gazerig.robot.remote.live_server import read_file_state
 
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 
@@ -137,7 +137,7 @@ def test_names_can_be_shown_and_recorded(tmp_path: Path, name: str, said: str) -
 
 
 def test_a_watched_file_that_becomes_a_pipe_is_not_waited_for(pipe: Path) -> None:
-    assert look(pipe) is None and look(Path("/dev/zero")) is None
+    assert read_file_state(pipe) is None and read_file_state(Path("/dev/zero")) is None
 
 
 def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:

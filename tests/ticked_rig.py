@@ -13,14 +13,14 @@ from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.remote.client import RobotClient
-from gazerig.robot.remote.request_handler import Pulse, RequestHandler
+from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
 
 
 class TickedRig:
     """A rig that ticks once whenever a command comes, and its connection in one object."""
 
     def __init__(self, made: Assembly) -> None:
-        self.made, self.pulse = made, Pulse(made.clock)
+        self.made, self.pulse = made, LoopMonitor(made.clock)
         self.commands: list[Command] = []
         self.handler = RequestHandler(self, None, self.pulse, {})
         self.answer: object = None
@@ -58,7 +58,7 @@ def connected(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     """Yield a rig that every client connects to."""
     made = started()
     rig = TickedRig(made)
-    monkeypatch.setattr(Pulse, "taken_up", lambda *_, **__: True)
+    monkeypatch.setattr(LoopMonitor, "taken_up", lambda *_, **__: True)
     monkeypatch.setattr(
         RobotClient, "connect", lambda pid=None, who="": RobotClient(rig, 1)  # type: ignore[arg-type]
     )  # fmt: skip

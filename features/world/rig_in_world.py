@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.robot.model.coupling import Coupling, Unreachable
-from gazerig.robot.model.joint import Line, Linkage
+from gazerig.robot.model.joint import LinearLinkage, Linkage
 
 RELINEARISE_RAD = 0.003
 """A coupling is linearised again after a joint has turned this far. The error of the servo's
@@ -37,7 +37,7 @@ class PairTransmission:
 
     def __init__(self, coupling: Coupling, index: int, linkage: Linkage) -> None:
         self._coupling, self._index, self._linkage = coupling, index, linkage
-        self.line: Line | None = None
+        self.line: LinearLinkage | None = None
         self._at_rad: tuple[float, float] | None = None
         self._steps = 0.0
         self._slopes = (0.0, 0.0)

@@ -38,7 +38,7 @@ class Animation:
         """Begin at rest.
 
         Args:
-            joints: the joints that gaze does not move (``gazerig.robot.model.types.further``).
+            joints: the joints that gaze does not move (``gazerig.robot.model.types.further_joints``).
             tables: expressions and levels.
         """
         self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))

@@ -107,8 +107,8 @@ def _measure_blink(trace: list[tuple[float, float]], usual: float) -> BlinkEvent
     up = max(range(lowest - 1, len(speed)), key=speed.__getitem__)
     if speed[down] >= 0.0 or speed[up] <= 0.0:
         return None
-    close_from, close_to = _phase(t[1:-1], [-v for v in speed], down)
-    open_from, open_to = _phase(t[1:-1], speed, up)
+    close_from, close_to = _phase_times_s(t[1:-1], [-v for v in speed], down)
+    open_from, open_to = _phase_times_s(t[1:-1], speed, up)
     return BlinkEvent(
         close_from,
         close_to - close_from,
@@ -120,7 +120,7 @@ def _measure_blink(trace: list[tuple[float, float]], usual: float) -> BlinkEvent
     )
 
 
-def _phase(t: list[float], speed: list[float], peak: int) -> tuple[float, float]:
+def _phase_times_s(t: list[float], speed: list[float], peak: int) -> tuple[float, float]:
     """Return when the speed rises above its foot before its peak, and falls below it after."""
     foot = _FOOT_SHARE * speed[peak]
     first = last = peak

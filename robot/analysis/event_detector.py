@@ -200,7 +200,10 @@ class SaccadeFinder:
             if speeds[first].relative_deg_s < foot and speeds[first].t_s < self._began_s:
                 break
         part = [speeds[i] for i in range(first, end)]
-        onset_s, end_s = _crossing(part[0], part[1], foot), _crossing(part[-1], part[-2], foot)
+        onset_s, end_s = (
+            _crossing_time_s(part[0], part[1], foot),
+            _crossing_time_s(part[-1], part[-2], foot),
+        )
         inner = part[1:-1] or part
         peak = max(speed.unsmoothed_deg_s for speed in inner)
         top = [speed.t_s for speed in inner if speed.unsmoothed_deg_s >= _TOP_SHARE * peak]
@@ -216,7 +219,7 @@ class SaccadeFinder:
         )
 
 
-def _crossing(below: _SpeedSample, above: _SpeedSample, level: float) -> float:
+def _crossing_time_s(below: _SpeedSample, above: _SpeedSample, level: float) -> float:
     """Return when the speed passed a level between two samples."""
     span = above.relative_deg_s - below.relative_deg_s
     share = (level - below.relative_deg_s) / span if span > 0.0 else 0.0

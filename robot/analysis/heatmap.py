@@ -176,7 +176,7 @@ _LEGEND_PAPER, _LEGEND_INK, _SOFT, _BAR = (
 _SCALE_TOP, _SCALE_HIGH, _ROWS_TOP, _ROW_PX = 96, 260, 448, 38
 
 
-def with_legend(
+def add_legend(
     image: Image, most_s_cm2: float, total_s: float, shares: Mapping[str, float]
 ) -> Image:
     """Return the image with a panel to its right.
@@ -275,7 +275,7 @@ def write_heatmap(
     cover = _COVER * np.clip((share - _FAINT) / (_PLAIN - _FAINT), 0.0, 1.0) ** 0.7
     mixed = canvas * (1.0 - cover[..., None]) + colours * cover[..., None]
     painted = np.asarray(np.rint(mixed), dtype=np.uint8)
-    whole = with_legend(painted, top / 1e4, float(times.sum()), shares)
+    whole = add_legend(painted, top / 1e4, float(times.sum()), shares)
     ok, data = cv2.imencode(".png", whole)
     if not ok:
         raise SetupError(f"{out}: the image cannot be written as PNG")

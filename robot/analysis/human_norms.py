@@ -342,6 +342,6 @@ BANDS: tuple[NormBand, ...] = (
 BY_KEY = {band.key: band for band in BANDS}
 
 
-def applies(band: NormBand, mode: str) -> bool:
+def band_applies(band: NormBand, mode: str) -> bool:
     """Return whether a band applies in a mode of conversation."""
     return not band.mode or mode in band.mode.split()

@@ -25,7 +25,7 @@ HALF_WIDE_M, HALF_HIGH_M = 0.085, 0.125
 Mask = NDArray[np.bool_]
 
 
-class HeadPlace(NamedTuple):
+class HeadPlacement(NamedTuple):
     """Pose of one of the heads in their common world.
 
     Attributes:
@@ -37,7 +37,7 @@ class HeadPlace(NamedTuple):
     p_m: Vec3
 
     @classmethod
-    def from_numbers(cls, numbers: Sequence[float]) -> "HeadPlace":
+    def from_numbers(cls, numbers: Sequence[float]) -> "HeadPlacement":
         """Return the place that ``as_numbers`` gave."""
         a, b, c, d, e, f, g, h, i, j, k, m = numbers
         return cls(((d, e, f), (g, h, i), (j, k, m)), (a, b, c))
@@ -74,7 +74,7 @@ class MutualGazeTrace:
         second: pose of the other one.
     """
 
-    def __init__(self, first: HeadPlace, second: HeadPlace) -> None:
+    def __init__(self, first: HeadPlacement, second: HeadPlacement) -> None:
         self._places = first, second
         self._newest: list[_LookingHead | None] = [None, None]
         self._rows: list[tuple[float, bool, bool]] = []

@@ -21,7 +21,12 @@ from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
-from gazerig.robot.app.camera_factory import camera_poses, make_lendable, placed_camera, run_camera
+from gazerig.robot.app.camera_factory import (
+    camera_placement,
+    camera_poses,
+    make_borrowed_camera,
+    run_camera,
+)
 from gazerig.robot.app.gaze_models import motion_models, oculomotor, rig_kinematics, target_chooser
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
@@ -42,8 +47,8 @@ from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.moved_opponent import BoxingScene, MovedOpponent
-from gazerig.robot.model.types import JointAngles, further
+from gazerig.robot.model.moved_opponent import BoxingScene, TickClockOpponent
+from gazerig.robot.model.types import JointAngles, further_joints
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -155,7 +160,7 @@ def assemble(
     seeds = np.random.SeedSequence(options.seed).spawn(len(_Generators._fields))
     random = _Generators(*map(np.random.default_rng, seeds))
     kinematics = rig_kinematics(rig)
-    camera, notes = placed_camera(rig, options, kinematics)
+    camera, notes = camera_placement(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
     clock: Clock = SimulatedClock() if options.fast else RealClock()
     if room is None and options.world is not None:
@@ -178,7 +183,7 @@ def assemble(
                 rig, options, scene, sight, opened, random.camera, camera, clock, program,
             )  # fmt: skip
         if options.mock and not options.fast:
-            seen = make_lendable(
+            seen = make_borrowed_camera(
                 seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
             )
         gentle_deg_s = rig.guard.soft_start_speed_deg_s
@@ -191,12 +196,12 @@ def assemble(
             GyroFusion(messages.append) if options.replay is None else None,
         )  # fmt: skip
         placement = CameraPlacement(
-            lambda rig: placed_camera(rig, options, kinematics, seen)[0], camera.mount
+            lambda rig: camera_placement(rig, options, kinematics, seen)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
         robot = _build_robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
         if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
-            robot.let_move(MovedOpponent(scene.opponent, room.start_s))
+            robot.let_move(TickClockOpponent(scene.opponent, room.start_s))
     except BaseException:
         opened.close()
         raise
@@ -249,7 +254,7 @@ def _build_components(
     moves = motion_models(rig, random.head, random.sway)
     field_of_view, bottom_up = FieldOfView(rig.gaze.field_of_view), BottomUp(rig.gaze.bottom_up)
     top_down, idle = TopDown(rig.gaze.top_down), Idle(rig.gaze.idle, random.idle)
-    animation = Animation(further(rig.joints), animation_tables(rig))
+    animation = Animation(further_joints(rig.joints), animation_tables(rig))
     return Components(
         body=body,
         guard=Guard(rig.guard, limits(rig.joints), body.names, body.reach, 1.0 / rig.loop.rate_hz),

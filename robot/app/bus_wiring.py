@@ -11,9 +11,9 @@ from gazerig.drivers.plugins import BUS, BusPlugin, describe_error, find, is_our
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
-from gazerig.robot.control.body import setups
+from gazerig.robot.control.body import servo_setups
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
-from gazerig.robot.guardian.release_plan import ReleasePlan, pickled
+from gazerig.robot.guardian.release_plan import ReleasePlan, pickle_params
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling_params import coupled_pairs
 
@@ -53,7 +53,7 @@ def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:
 def servo_configs(rig: Rig) -> tuple[ServoConfig, ...]:
     """Return the configuration of a rig's servos for the buses, in the order of its joints."""
     gentle_deg_s = rig.guard.soft_start_speed_deg_s
-    return setups(rig.joints, park_rad(rig), gentle_deg_s, coupled_pairs(rig.couplings))
+    return servo_setups(rig.joints, park_rad(rig), gentle_deg_s, coupled_pairs(rig.couplings))
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
@@ -127,7 +127,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
         board.channels,
         config.pca9685.addresses,
         SERVOS[rig.joints[joints_on(rig, name)[0]].model].family,
-        "" if ours else pickled(config.section),
+        "" if ours else pickle_params(config.section),
     )
 
 

@@ -35,7 +35,7 @@ from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, HeadPose, scene_pixels
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, label_of, require
+from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, part_label, require_method
 from gazerig.robot.app.run_bus import CameraPoses, RunBus, TrueSteps
 from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
@@ -206,7 +206,7 @@ def scene_start_s(camera: Camera) -> float | None:
     return camera.start_s if isinstance(camera, SceneCamera | RoomCamera) else None
 
 
-def placed_camera(
+def camera_placement(
     rig: Rig, options: RunOptions, kinematics: Kinematics, seen: Camera | None = None
 ) -> tuple[CameraParams, tuple[str, ...]]:
     """Return the rig's camera, with mount base if its frames cannot turn with the head.
@@ -224,7 +224,9 @@ def placed_camera(
     return fixed_mount(rig.camera, kinematics), (note,)
 
 
-def make_lendable(own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]) -> BorrowedCamera:
+def make_borrowed_camera(
+    own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]
+) -> BorrowedCamera:
     """Return an emulated rig's camera, which a browser's may replace."""
     field_rad = radians(FIELD_DEG)
     detector = partial(face_detector, rig.detector)
@@ -273,7 +275,7 @@ def real_camera(
     if name is None or is_ours(CAMERA, name):
         parts = CameraParts(_source_factory(rig, options), detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)
-    params, label = _camera_section(rig, name), find(CAMERA, name).label
+    params, label = _package_camera_params(rig, name), find(CAMERA, name).label
     camera = create_camera_part(name, params)
     if is_source(camera):
         source = upright(partial(create_plugin_source, name, params), frame_orientation(placed))
@@ -297,9 +299,9 @@ def program_camera(
         SetupError: it is no camera, or gives frames in simulated time.
     """
     camera = parts.camera
-    label = label_of("camera", camera)
+    label = part_label("camera", camera)
     if not is_source(camera):
-        require(camera, "camera", "latest")
+        require_method(camera, "camera", "latest")
         return GuardedCamera(cast(Camera, camera), label, None if fast else LONGEST_CAMERA_S)
     if fast:
         raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
@@ -331,7 +333,7 @@ def frame_orientation(camera: CameraParams) -> FrameOrientation:
     return FrameOrientation(camera.rotation, camera.mirrored)
 
 
-def _camera_section(rig: Rig, name: str) -> object:
+def _package_camera_params(rig: Rig, name: str) -> object:
     """Return the parameters of a package's camera: the rig's section of its name, or defaults."""
     section = getattr(rig, name, None)
     if section is not None:
@@ -380,7 +382,7 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
             case SceneCamera():  # it computes ideal detections
                 done = locate is None or camera.retune(locate)
             case _:
-                done = _retune_detecting(camera, after, detector, motion, locate)
+                done = _retune_simulated_camera(camera, after, detector, motion, locate)
     except SetupError as error:
         return f"the detector is unchanged: {error}"
     return (
@@ -388,7 +390,7 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     )
 
 
-def _retune_detecting(
+def _retune_simulated_camera(
     camera: Camera,
     after: Rig,
     detector: Callable[[], FaceDetector] | None,

@@ -28,8 +28,8 @@ from gazerig.robot.model.gesture_fit import (
     GestureFit,
     GestureRefused,
     fit_keys,
-    motions,
-    smoothed,
+    gesture_motions,
+    smooth,
 )
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
@@ -117,7 +117,7 @@ def fit_to_rig(rig: Rig, gesture: Gesture) -> FittedGesture:
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
     fit = GestureFit(rig.names, lid_spans(rig))
     share = rig.gaze.gestures.limit_share
-    return fit.fit("", motions(gesture, rig.names), 1.0, middle, bounds, share)
+    return fit.fit("", gesture_motions(gesture, rig.names), 1.0, middle, bounds, share)
 
 
 def _track_of_joint(joint: str) -> str:
@@ -138,7 +138,7 @@ def _joint_keys(
     if np.abs(values).max() <= _STILL_DEG:
         return []
     if dense:
-        times, values = fit_keys(*smoothed(times_s, values), TOLERANCE_DEG)
+        times, values = fit_keys(*smooth(times_s, values), TOLERANCE_DEG)
         times = times + float(times_s[0]) - start_s
     else:
         times = times_s - start_s

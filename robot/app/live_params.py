@@ -43,7 +43,7 @@ from gazerig.robot.app.rig_limits import (
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Tune, Value
-from gazerig.robot.model.coupling_params import coupled_pairs, partners
+from gazerig.robot.model.coupling_params import coupled_pairs, joint_partners
 from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics
@@ -119,7 +119,7 @@ class LiveParams:
         self.parts = parts
         self._placed = placed
         self._started = rig
-        self._coupled = partners(coupled_pairs(rig.couplings))
+        self._coupled = joint_partners(coupled_pairs(rig.couplings))
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _PreparedChange] = {}
 
@@ -242,7 +242,7 @@ class LiveParams:
     def _keep_servos(self, rig: Rig) -> dict[str, JointParams]:
         """Return the joints with the servos that the bus was opened with."""
         return {
-            name: _with_servo_of(rig.joints[name], first, name in self._coupled)
+            name: _keep_servo_of(rig.joints[name], first, name in self._coupled)
             for name, first in self._started.joints.items()
         }
 
@@ -255,7 +255,7 @@ _OF_A_PAIR = ("sign", "ratio", "zero_step")
 """Further fields that stay if two servos move two joints together."""
 
 
-def _with_servo_of(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
+def _keep_servo_of(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
     """Return a joint with the servo of another; the same object if it has that already."""
     keys = (*_OF_THE_SERVO, *_OF_A_PAIR) if coupled else _OF_THE_SERVO
     kept = {key: getattr(first, key) for key in keys}

@@ -27,8 +27,8 @@ class ProgramParts(NamedTuple):
         """Return the detector: the program's, with ours as a fallback, or the rig's."""
         if self.detector is None:
             return face_detector(params)
-        require(self.detector, "detector", "find")
-        label = label_of("detector", self.detector)
+        require_method(self.detector, "detector", "find")
+        label = part_label("detector", self.detector)
         return CheckedDetector(self.detector, label, lambda: mtcnn(params))
 
     def choose(
@@ -37,26 +37,26 @@ class ProgramParts(NamedTuple):
         """Return the chooser of the target: the program's rule before the rig's own."""
         if self.chooser is None:
             return own
-        require(self.chooser, "attention", "choose")
+        require_method(self.chooser, "attention", "choose")
         longest_s = None if simulated else LONGEST_S
         return GuardedChooser(
-            self.chooser, own, label_of("attention", self.chooser), say, longest_s
+            self.chooser, own, part_label("attention", self.chooser), say, longest_s
         )
 
 
 NO_PARTS = ProgramParts()
 
 
-def require(part: object, what: str, method: str) -> None:
+def require_method(part: object, what: str, method: str) -> None:
     """Refuse a part of a program that lacks a method.
 
     Raises:
         SetupError: it has no such method.
     """
     if not callable(getattr(part, method, None)):
-        raise SetupError(f"{label_of(what, part)} has no method {method}")
+        raise SetupError(f"{part_label(what, part)} has no method {method}")
 
 
-def label_of(what: str, part: object) -> str:
+def part_label(what: str, part: object) -> str:
     """Return the name of a program's part for messages."""
     return f"{what} {type(part).__name__} of the program"

@@ -10,20 +10,20 @@ from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
-from gazerig.robot.model.types import JointAngles, further, in_order
+from gazerig.robot.model.types import JointAngles, further_joints, order_joints
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
 """Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
 
 
 def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
-    """Return the joints' limits, in the order of ``in_order``."""
-    return tuple(joints[name].limit() for name in in_order(joints))
+    """Return the joints' limits, in the order of ``order_joints``."""
+    return tuple(joints[name].limit() for name in order_joints(joints))
 
 
 def park_pose(rig: Rig) -> JointAngles:
     """Return the pose for parking, before torque is switched off."""
-    return tuple(radians(rig.park_deg.get(name, 0.0)) for name in in_order(rig.joints))
+    return tuple(radians(rig.park_deg.get(name, 0.0)) for name in order_joints(rig.joints))
 
 
 def face_parts_m(rig: Rig) -> dict[str, Vec3]:
@@ -71,11 +71,11 @@ def neck_span(rig: Rig, name: str) -> Angles2:
 
 
 def _eye_ranges(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
-    yaw = _joint_range(rig, _turning_joint(rig, side, "pan"), rig.ranges.eye_yaw_deg)
-    return yaw, _joint_range(rig, _turning_joint(rig, side, "tilt"), rig.ranges.eye_pitch_deg)
+    yaw = _joint_range(rig, _eye_joint(rig, side, "pan"), rig.ranges.eye_yaw_deg)
+    return yaw, _joint_range(rig, _eye_joint(rig, side, "tilt"), rig.ranges.eye_pitch_deg)
 
 
-def _turning_joint(rig: Rig, side: str, axis: str) -> str:
+def _eye_joint(rig: Rig, side: str, axis: str) -> str:
     """Name the joint that turns an eye: its own, or that of both."""
     own = f"{side}_eye_{axis}"
     return own if own in rig.joints else f"eyes_{axis}"
@@ -115,7 +115,7 @@ def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
     spans = lid_spans(rig)
     yaw, pitch, roll = (offsets.get(name, 0.0) for name in NECK)
     a, b, c, d = (1.0 + offsets.get(name, 0.0) / spans.get(name, 1.0) for name in LIDS)
-    joints = tuple(offsets.get(name, 0.0) for name in further(rig.joints))
+    joints = tuple(offsets.get(name, 0.0) for name in further_joints(rig.joints))
     return NO_OFFSET._replace(head_rad=(yaw, pitch, roll), lids=(a, b, c, d), joints_rad=joints)
 
 

@@ -144,7 +144,7 @@ class RunObservers:
     def _make_page(self, address: tuple[str, int]) -> PageProcess:
         command, steer = self._commanded.command, self._steer
         page_requests = PageRequestHandler(
-            command if steer is None else stop_only_taker(command),
+            command if steer is None else stop_only_handler(command),
             params=self._tuning,
             point=self._picking.point,
             steer=steer.press if steer is not None else None,
@@ -323,7 +323,7 @@ class RunObservers:
             self._publisher.resend_geometry()
 
 
-def stop_only_taker(command: CommandTaker) -> CommandTaker:
+def stop_only_handler(command: CommandTaker) -> CommandTaker:
     """Return a taker of stop and resume only; other commands raise ValueError."""
 
     def take(asked: Command) -> Ticket | None:

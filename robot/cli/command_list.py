@@ -122,7 +122,7 @@ def package_commands() -> Mapping[str, CommandEntry]:
     return _load_entries([one for one in registrations(COMMAND) if not one.is_ours])
 
 
-def in_order(commands: Mapping[str, CommandEntry]) -> list[str]:
+def sort_by_panel(commands: Mapping[str, CommandEntry]) -> list[str]:
     """Return names of commands panel by panel, as the help shows them."""
     panels = [*PANELS, *(entry.panel for entry in commands.values())]
     return sorted(commands, key=lambda name: panels.index(commands[name].panel))

@@ -79,7 +79,7 @@ def emulate(
             raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
         buses = [
             BusSettings(
-                _at(device, baud, any_baud),
+                _set_baud(device, baud, any_baud),
                 name if several else None,
                 wire_time,
                 turnaround_us,
@@ -113,7 +113,7 @@ def _rig_devices(name: str, firmware: int | None) -> dict[str, Emulated]:
     return lines if len(lines) > 1 else dict(zip(("",), lines.values(), strict=True))
 
 
-def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
+def _set_baud(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
     """Return a device at another baud rate, None for its own."""
     if isinstance(device, PluginLine):
         return device

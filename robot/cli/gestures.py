@@ -35,10 +35,10 @@ def import_gesture(
 
         loaded = load_rig(rig)
         text = gesture_text(loaded, read_table(table, fps), f"from {table.name}")
-        say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
+        print_gesture_fit(loaded.name, *write_gesture(loaded, name, text, folder, force))
 
 
-def say_written(rig_name: str, path: Path, fitted: "FittedGesture") -> None:
+def print_gesture_fit(rig_name: str, path: Path, fitted: "FittedGesture") -> None:
     """Print how a rig performs a gesture that was written, and how to use it."""
     slower = (
         f", slower by {fitted.slowed_by:.2f} for {fitted.slow_joint}" if fitted.slow_joint else ""

@@ -19,7 +19,7 @@ from gazerig.robot.model.commands import (
     LookAtPerson,
     LookAtPixel,
 )
-from gazerig.robot.remote.client import RobotClient, running
+from gazerig.robot.remote.client import RobotClient, connect_to_all
 
 app = typer.Typer()
 _LEADS_EVERY_S = 0.2
@@ -96,7 +96,7 @@ def stop(
 ) -> None:
     """Switch the torque of every running rig off at once; nothing parks, the programs continue."""
     with clear_errors():
-        rigs = running(pid, "gazerig stop")
+        rigs = connect_to_all(pid, "gazerig stop")
         if not rigs:
             RobotClient.connect(pid)  # raises the reason
         failed = False

@@ -74,7 +74,7 @@ class CommandGroup(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, in the order of the help."""
         self._every.add_packages()
-        return in_order(self._every.entries)
+        return sort_by_panel(self._every.entries)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command as far as a list of all needs it, None if there is none of this name."""
@@ -121,9 +121,9 @@ def begin(
     if context.invoked_subcommand is None:
         from gazerig.drivers.serial.list_ports import serial_ports
         from gazerig.robot.cli.main import next_steps
-        from gazerig.robot.remote.client import running
+        from gazerig.robot.remote.client import connect_to_all
 
-        print(next_steps(serial_ports(), rig_files(), bool(running())))
+        print(next_steps(serial_ports(), rig_files(), bool(connect_to_all())))
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ import typer
 
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.cli.terminal import clear_errors, say, signals, status
+from gazerig.robot.cli.terminal import clear_errors, record_signals, say, status
 from gazerig.robot.model.clock import RealClock
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def record_camera(
     """Record the frames of a camera, for gazerig run --camera-recording FILE."""
     with clear_errors():
         source, name = _source(oak, camera, video, (width, height, rate))
-        with signals() as stopped:
+        with record_signals() as stopped:
             _record(source, name, file, seconds, jpeg, force, stopped)
 
 

@@ -17,7 +17,14 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.robot.app.options import parse_host_port
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say, signals
+from gazerig.robot.cli.terminal import (
+    FAULT,
+    ForceOption,
+    clear_errors,
+    complete_rig,
+    record_signals,
+    say,
+)
 
 if TYPE_CHECKING:
     from gazerig.robot.app.resimulate import Resimulation
@@ -66,7 +73,7 @@ def replay(
                 "another RIG, --character and --joints need --rerun: a replay shows what was"
             )
         else:
-            with signals() as stopped:
+            with record_signals() as stopped:
                 well = _show(file, parse_host_port(page), play, seconds, stopped)
     if not well:
         raise typer.Exit(FAULT)
@@ -161,13 +168,13 @@ def _show(
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
-    built, rate_hz = _built(recording.info.config_yaml), recording.info.rate_hz
+    built, rate_hz = _recorded_rig(recording.info.config_yaml), recording.info.rate_hz
     with report_bad_contents(file), _progress("reading", recording.duration_s) as read:
         frames = SnapshotIndex(
             recording.ticks(), recording.frames(), rate_hz, recording.info.character or "", built,
             read,
         )  # fmt: skip
-    world = _world(recording)
+    world = _recorded_world(recording)
     start_s = recording.world.start_s if recording.world is not None else None
     replaying = Replay(frames, clock)
     page = PageProcess(*address, replaying.handle_request)
@@ -200,7 +207,7 @@ def _show(
         frames.close()
 
 
-def _world(recording: "RunRecording") -> "WorldShapes | None":
+def _recorded_world(recording: "RunRecording") -> "WorldShapes | None":
     """Return the recorded run's world; None without one, or if it is lost, with a message."""
     if recording.world is None:
         return None
@@ -214,7 +221,7 @@ def _world(recording: "RunRecording") -> "WorldShapes | None":
         return None
 
 
-def _built(config_yaml: str) -> "ShownRig | None":
+def _recorded_rig(config_yaml: str) -> "ShownRig | None":
     """Return the recorded rig's build; None, with the reason, if it is unknown."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.rig import Rig
@@ -267,16 +274,16 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
         result = rerun(recording, rig=rig, character=character, joints=joints, on_tick=on_tick)
     for line in result.notes:
         say(line)
-    say(agreement(result))
+    say(agreement_text(result))
     table = Table("", "recorded", "run again", title=f"{file.name} run again")
-    for name, was, now in beside(result.recorded_figures, result.rerun_figures):
+    for name, was, now in compare_figures(result.recorded_figures, result.rerun_figures):
         table.add_row(name, was, now, style=None if was == now else "bold")
     Console().print(table)
     changed = rig is not None or character is not None
     return result.is_same or result.joints != "recorded" or changed
 
 
-def agreement(result: "Resimulation") -> str:
+def agreement_text(result: "Resimulation") -> str:
     """Return a text: how far a rerun agrees with the recorded run."""
     text = f"{result.agreeing_ticks} of {result.ticks} ticks are the same to the bit"
     if result.first_difference_s is not None:
@@ -286,7 +293,7 @@ def agreement(result: "Resimulation") -> str:
     return f"joints {result.joints}: {text}"
 
 
-def beside(
+def compare_figures(
     was: Mapping[str, object], now: Mapping[str, object], within: str = ""
 ) -> Iterator[tuple[str, str, str]]:
     """Return the figures of two runs side by side: name and both in words."""
@@ -294,7 +301,7 @@ def beside(
         one, other = was.get(name), now.get(name)
         if isinstance(one, Mapping) or isinstance(other, Mapping):
             inner = [value if isinstance(value, Mapping) else {} for value in (one, other)]
-            yield from beside(inner[0], inner[1], f"{within}{name} ".replace("_", " "))
+            yield from compare_figures(inner[0], inner[1], f"{within}{name} ".replace("_", " "))
         else:
             yield f"{within}{name}".replace("_", " "), _value_text(one), _value_text(other)
 

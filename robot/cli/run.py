@@ -89,7 +89,7 @@ def run(
         from gazerig.robot.app import session
 
         browse = open_page if not no_browser and is_desktop_here() else None
-        opening = Opening("" if fast else start_text(asked))
+        opening = StartLine("" if fast else start_text(asked))
         with exit_on_signals():
             group = None
             if asked.world is not None:
@@ -101,7 +101,7 @@ def run(
             else:
                 told = summary is not None
                 carry_out = partial(session.run, session.compose(asked), summarised=told)
-        with signals() as stopped:
+        with record_signals() as stopped:
             figures = carry_out(stopped, opening.say, shows, opening.saw, browse)
         if summary is not None:
             text = json.dumps(figures, indent=2) + "\n"
@@ -113,7 +113,7 @@ def run(
         raise typer.Exit(FAULT)
 
 
-class Opening:
+class StartLine:
     """Says in its first line what runs: before any other, and not for a run that is refused.
 
     Args:

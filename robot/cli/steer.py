@@ -61,13 +61,13 @@ def steer(
             rig = stack.enter_context(RobotClient.connect(pid, "gazerig ctl steer"))
             say(HELP["gamepad" if with_pad else "keyboard"])
             with contextlib.suppress(KeyboardInterrupt):
-                lead(rig, controls, Steering(behind), RealClock(), status)
+                run_steering(rig, controls, Steering(behind), RealClock(), status)
             if rig.leads:
                 rig.look_freely()
             say("it looks freely")
 
 
-def lead(
+def run_steering(
     rig: RobotClient,
     controls: SteeringInput,
     steering: Steering,

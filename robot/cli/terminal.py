@@ -158,7 +158,7 @@ def suggest_doctor(text: str) -> str:
     return f"{text}; gazerig doctor finds the cause" if reaches and "gazerig " not in text else text
 
 
-def completed(text: str, given: Mapping[str, object] | None = None) -> str:
+def complete_suggestions(text: str, given: Mapping[str, object] | None = None) -> str:
     """Return a message in which every suggested command reaches what this command reached.
 
     Args:
@@ -327,7 +327,7 @@ def _report_thread_error(args: threading.ExceptHookArgs) -> None:
     say(f"{name} failed ({args.exc_type.__name__}: {what}); the rest runs on without")
 
 
-def signals() -> Interrupts:
+def record_signals() -> Interrupts:
     """Return a block in which Ctrl-C and other requests to end are only noted, by name."""
     return Interrupts(also=_writer.unread)
 
@@ -352,7 +352,7 @@ def exit_on_signals() -> Iterator[None]:
 
 def say(line: str) -> None:
     """Write a line for people; the status line before it is wiped. Never waits, never raises."""
-    _write(f"{completed(line)}\n", wiped=True)
+    _write(f"{complete_suggestions(line)}\n", wiped=True)
 
 
 def status(line: str) -> None:

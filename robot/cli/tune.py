@@ -19,7 +19,7 @@ from gazerig.robot.cli import steer as cli_steer
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.parameter import JsonValue, Parameter
-from gazerig.robot.remote.client import RobotClient, running
+from gazerig.robot.remote.client import RobotClient, connect_to_all
 
 ctl = typer.Typer(
     name="ctl",
@@ -29,7 +29,7 @@ ctl = typer.Typer(
 
 
 @ctl.callback()
-def choose(context: typer.Context, rig: PidOption = None) -> None:
+def select_rig(context: typer.Context, rig: PidOption = None) -> None:
     """Control a rig that runs in another terminal: parameters, gaze target, behaviour."""
     if rig is not None and isinstance(context.command, TyperGroup):
         context.default_map = {name: {"pid": rig} for name in context.command.commands}
@@ -111,7 +111,7 @@ def rigs(
     """List the rigs that run here: name, rig, process, address of the page with its token."""
     with clear_errors():
         found = []
-        for rig in running():
+        for rig in connect_to_all():
             with rig:
                 now = rig.status()
                 row = {key: now.get(key) for key in ("name", "rig", "pid", "page")}

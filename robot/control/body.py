@@ -9,11 +9,11 @@ from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
-from gazerig.robot.model.joint import JointLimit, JointParams, Line
-from gazerig.robot.model.types import JointAngles, JointState, in_order
+from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
+from gazerig.robot.model.types import JointAngles, JointState, order_joints
 
 
-def setups(
+def servo_setups(
     joints: Mapping[str, JointParams],
     park_rad: Mapping[str, float],
     gentle_deg_s: float = ENTRY_DEG_S,
@@ -32,7 +32,7 @@ def setups(
         coupled |= pair_setups(pair, joints, park_rad, gentle_deg_s)
     return tuple(
         coupled.get(name) or joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s)
-        for name in in_order(joints)
+        for name in order_joints(joints)
     )
 
 
@@ -43,11 +43,11 @@ class Body:
         names: Names of the joints, in the order of every sequence of joints.
 
     Args:
-        bus: Bus with the configuration from ``setups``.
+        bus: Bus with the configuration from ``servo_setups``.
         joints: The joints by name.
-        park_rad: As in ``setups``.
-        gentle_deg_s: As in ``setups``.
-        pairs: As in ``setups``.
+        park_rad: As in ``servo_setups``.
+        gentle_deg_s: As in ``servo_setups``.
+        pairs: As in ``servo_setups``.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Body:
         pairs: Sequence[CoupledPair] = (),
     ) -> None:
         self.bus = bus
-        self.names = in_order(joints)
+        self.names = order_joints(joints)
         self._pairs = tuple(pairs)
         self._coupled = CoupledServos(pairs, self.names) if pairs else None
         self._park_rad = dict(park_rad or {})
@@ -81,7 +81,7 @@ class Body:
         self._joints = joints
         linkages = [joint.made() for joint in joints]
         # All joints are computed as if every linkage were straight; then the others are corrected.
-        lines = [linkage.line or Line(0.0, 0.0, 0.0) for linkage in linkages]
+        lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
         self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
         self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
 
@@ -96,7 +96,7 @@ class Body:
         """
         before, self._gentle_deg_s = self._joints, gentle_deg_s
         self._set_joints(tuple(joints[name] for name in self.names))
-        self.bus.retune(setups(joints, self._park_rad, self._gentle_deg_s, self._pairs))
+        self.bus.retune(servo_setups(joints, self._park_rad, self._gentle_deg_s, self._pairs))
         return {
             i: (
                 now.angle_rad(old.steps(1.0)) - now.angle_rad(old.steps(0.0)),

@@ -184,7 +184,7 @@ def to_target(answer: Any, t_s: float) -> Target | None:
     if answer is None:
         return None
     if not isinstance(answer, Target):
-        point = _vec(answer, "a target or a point x, y, z")
+        point = _vector(answer, "a target or a point x, y, z")
         return Target(
             point, (0.0, 0.0, 0.0), t_s, "point", -1, 1.0, True, None, 0, "a rule's point"
         )
@@ -195,14 +195,16 @@ def to_target(answer: Any, t_s: float) -> Target | None:
             raise ValueError(f"a target with {name} {number!r}")
     centre = answer.centre_world_m
     return answer._replace(
-        p_world_m=_vec(answer.p_world_m, "three numbers as p_world_m"),
-        v_world_m_s=_vec(answer.v_world_m_s, "three numbers as v_world_m_s"),
-        centre_world_m=None if centre is None else _vec(centre, "three numbers as centre_world_m"),
+        p_world_m=_vector(answer.p_world_m, "three numbers as p_world_m"),
+        v_world_m_s=_vector(answer.v_world_m_s, "three numbers as v_world_m_s"),
+        centre_world_m=None
+        if centre is None
+        else _vector(centre, "three numbers as centre_world_m"),
         saliences=(),
     )
 
 
-def _vec(value: Any, wanted: str) -> Vec3:
+def _vector(value: Any, wanted: str) -> Vec3:
     """Return three finite numbers.
 
     Raises:

@@ -38,13 +38,13 @@ class Menus:
     def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
         menus = {
-            "behaviour": _first(top_down.chosen_behaviour, top_down.behaviours),
-            "conversation": _first(self._aversion.mode, MODES),
+            "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
+            "conversation": _put_first(self._aversion.mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }
         if names := self._expressions.names:
-            menus["expression"] = _first(self._expressions.name, names)
-        menus["gesture"] = _first(
+            menus["expression"] = _put_first(self._expressions.name, names)
+        menus["gesture"] = _put_first(
             self._gestures.playing or NO_GESTURE, (NO_GESTURE, *self._gestures.names)
         )
         return menus
@@ -137,6 +137,6 @@ def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[Jo
         raise ValueError("; ".join(outside))
 
 
-def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
+def _put_first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names with the present choice first."""
     return (present, *(name for name in names if name != present))

@@ -31,7 +31,7 @@ from gazerig.robot.model.commands import (
     Tune,
 )
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.moved_opponent import MovedOpponent
+from gazerig.robot.model.moved_opponent import TickClockOpponent
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.guard import Guard
@@ -83,7 +83,7 @@ class CommandExecutor:
         self._taken_over = False
         self._trigger = GestureTrigger()
         self.commanded_rad: JointAngles = ()
-        self.opponent: MovedOpponent | None = None
+        self.opponent: TickClockOpponent | None = None
 
     def reset(self) -> None:
         """Forget the gestures that rules have played."""

@@ -122,7 +122,7 @@ class PathGuard(Protocol):
         ...
 
 
-class Commandable(Protocol):
+class CommandTarget(Protocol):
     """A robot that takes commands, such as ``gazerig.robot.control.loop.Robot``."""
 
     def command(self, command: Command) -> Ticket | None:
@@ -185,7 +185,7 @@ class CommandHandler:
 
     def __init__(
         self,
-        robot: Commandable,
+        robot: CommandTarget,
         params: ParamAccess | None,
         status: Callable[[], object] = dict,
         refusals: tuple[type[Exception], ...] = (),
@@ -226,7 +226,7 @@ class CommandHandler:
                     {menu: list(them) for menu, them in self._robot.menus().items()}
                 )
             case {"do": "gestures", **rest} if not rest:
-                return QuestionAnswer([plain(one._asdict()) for one in self._robot.gestures()])
+                return QuestionAnswer([to_plain(one._asdict()) for one in self._robot.gestures()])
             case {"do": "fault", "text": str(text), **rest} if not rest:
                 if self._fault is None:
                     raise ValueError(REAL)
@@ -251,7 +251,7 @@ class CommandHandler:
                 found = [text for key, text in self._describe_params() if key.startswith(prefix)]
                 return QuestionAnswer(found)
             case {"do": "get", "prefix": str(prefix), **rest} if not rest:
-                return QuestionAnswer(plain(self._params.get(prefix)) if self._params else {})
+                return QuestionAnswer(to_plain(self._params.get(prefix)) if self._params else {})
             case {"do": "unsaved", **rest} if not rest:
                 return QuestionAnswer(as_changes(self._params.unsaved()) if self._params else [])
             case {"do": "characters", **rest} if not rest:
@@ -286,7 +286,7 @@ class CommandHandler:
             return []
         found = self._params.parameters()
         if found is not self._described[0]:
-            self._described = found, [(one.key, plain(one._asdict())) for one in found]
+            self._described = found, [(one.key, to_plain(one._asdict())) for one in found]
         return self._described[1]
 
     def _save(self, path: str | None) -> RequestResult:
@@ -302,12 +302,12 @@ class CommandHandler:
         return ParamsSaved(saved)
 
 
-def plain(value: object) -> object:
+def to_plain(value: object) -> object:
     """Convert tuples and mappings to lists and dicts, as in JSON."""
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
+        return [to_plain(item) for item in value]
     return value
 
 

@@ -71,7 +71,7 @@ class CommandQueue:
             if tunes > 1:
                 break
             taken.append(self._commands.popleft())
-        return _without_superseded(taken)
+        return _drop_superseded(taken)
 
     def _refuse_motions(self) -> None:
         """Refuse commands before a stop that would move the head; keep the others."""
@@ -83,7 +83,7 @@ class CommandQueue:
                 self._commands.append(waiting)
 
 
-def _without_superseded(taken: list[QueuedCommand]) -> list[QueuedCommand]:
+def _drop_superseded(taken: list[QueuedCommand]) -> list[QueuedCommand]:
     """Return the commands without levels that a later command of this tick sets again."""
     kept: list[QueuedCommand] = []
     seen: set[str] = set()

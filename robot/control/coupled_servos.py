@@ -89,26 +89,26 @@ class CoupledServos:
         fault = now.fault[i] or now.fault[j]
         shared = f"{fault} (of its coupled servo)" if fault else ""
         now = now._replace(
-            at_s=_with(now.at_s, i, oldest, j, oldest),
-            load=_with(now.load, i, load, j, load),
-            torque=_with(now.torque, i, powered, j, powered),
-            rearmed=_with(now.rearmed, i, anew, j, anew),
-            fault=_with(now.fault, i, now.fault[i] or shared, j, now.fault[j] or shared),
+            at_s=_replace_pair(now.at_s, i, oldest, j, oldest),
+            load=_replace_pair(now.load, i, load, j, load),
+            torque=_replace_pair(now.torque, i, powered, j, powered),
+            rearmed=_replace_pair(now.rearmed, i, anew, j, anew),
+            fault=_replace_pair(now.fault, i, now.fault[i] or shared, j, now.fault[j] or shared),
         )
         if not absent:
             return now
         steps, speeds = last.position_steps, last.velocity_steps_s
         return now._replace(
             missing=tuple(sorted({*now.missing, i, j})),
-            position_steps=_with(now.position_steps, i, steps[i], j, steps[j]),
-            velocity_steps_s=_with(now.velocity_steps_s, i, speeds[i], j, speeds[j]),
+            position_steps=_replace_pair(now.position_steps, i, steps[i], j, steps[j]),
+            velocity_steps_s=_replace_pair(now.velocity_steps_s, i, speeds[i], j, speeds[j]),
         )
 
 
 T = TypeVar("T")
 
 
-def _with(values: tuple[T, ...], i: int, at_i: T, j: int, at_j: T) -> tuple[T, ...]:
+def _replace_pair(values: tuple[T, ...], i: int, at_i: T, j: int, at_j: T) -> tuple[T, ...]:
     """Return values with two of them replaced; the same tuple if nothing changes."""
     if values[i] == at_i and values[j] == at_j:
         return values

@@ -20,7 +20,7 @@ def group_events(events: Iterable[str]) -> list[str]:
     for what, names in whose.items():
         ids = [int(found[1]) for name in names if (found := _SERVO.search(name))]
         several = len(names) > 1 and len(ids) == len(names)
-        who = f"servos {runs(ids)}" if several else ", ".join(filter(None, names))
+        who = f"servos {format_ranges(ids)}" if several else ", ".join(filter(None, names))
         lines.append(f"{who}: {what}" if who else what)
     return lines
 
@@ -30,7 +30,7 @@ def is_register_change(event: str) -> bool:
     return _REGISTER.search(event) is not None
 
 
-def runs(numbers: Sequence[int]) -> str:
+def format_ranges(numbers: Sequence[int]) -> str:
     """Format numbers with runs joined: 1-3, 7."""
     runs: list[list[int]] = []
     for number in sorted(numbers):

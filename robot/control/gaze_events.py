@@ -15,7 +15,7 @@ EventKind = Literal[
 EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
 
 
-class Change(NamedTuple):
+class GazeChange(NamedTuple):
     """An event of a tick.
 
     Attributes:
@@ -36,41 +36,41 @@ class GazeEvents:
         self._last: Tick | None = None
         self._seen_s: dict[int, float] = {}
 
-    def update(self, tick: Tick) -> list[Change]:
+    def update(self, tick: Tick) -> list[GazeChange]:
         """Return the events of a tick; those of parking are not events."""
         last, self._last = self._last, tick
         if last is None or tick.parking:
             return self._people(tick)
-        found: list[Change] = []
+        found: list[GazeChange] = []
         gaze, target = tick.gaze, tick.target
         ballistic = last.gaze.phase == "saccade", gaze.phase == "saccade"
         other = gaze.saccades != last.gaze.saccades
         if ballistic[0] and (other or not ballistic[1]):
-            found.append(_change("the eyes land at", "saccade_landing", last.target))
+            found.append(_target_change("the eyes land at", "saccade_landing", last.target))
         if target is not last.target and _identity(target) != _identity(last.target):
-            found.append(_change("the target is", "target", target))
+            found.append(_target_change("the target is", "target", target))
         if ballistic[1] and (other or not ballistic[0]):
-            found.append(_change("saccade to", "saccade_start", target))
+            found.append(_target_change("saccade to", "saccade_start", target))
         if gaze.blink and not last.gaze.blink:
-            found.append(Change("blink", "blink", ""))
+            found.append(GazeChange("blink", "blink", ""))
         was, now = last.gesture, tick.gesture
         if was.name and (was.number, was.name) != (now.number, now.name):
             ended = now.ended if now.number == was.number else "another gesture"
             text = f"{was.name} has finished" if not ended else f"{was.name} ended: {ended}"
-            found.append(Change(text, "gesture_finished", was.name))
+            found.append(GazeChange(text, "gesture_finished", was.name))
         return found + self._people(tick)
 
-    def _people(self, tick: Tick) -> list[Change]:
+    def _people(self, tick: Tick) -> list[GazeChange]:
         """Return arrivals, and departures of people who have not been seen for some time."""
-        found: list[Change] = []
+        found: list[GazeChange] = []
         for face in tick.percept.faces if tick.percept is not None else ():
             if face.id not in self._seen_s:
-                found.append(Change(f"person {face.id} has arrived", "person_arrived", face.id))
+                found.append(GazeChange(f"person {face.id} has arrived", "person_arrived", face.id))
             self._seen_s[face.id] = tick.t_s
         for person, seen_s in tuple(self._seen_s.items()):
             if tick.t_s - seen_s > GONE_S:
                 del self._seen_s[person]
-                found.append(Change(f"person {person} has left", "person_left", person))
+                found.append(GazeChange(f"person {person} has left", "person_left", person))
         return found
 
 
@@ -78,7 +78,7 @@ def _identity(target: Target) -> tuple[str, int, str | None]:
     return target.kind, target.id, target.part
 
 
-def _change(text: str, kind: EventKind, target: Target) -> Change:
+def _target_change(text: str, kind: EventKind, target: Target) -> GazeChange:
     name = target_name(target)
     shown = "the chosen point" if target.kind == ORDERED else name
-    return Change(f"{text} {shown}", kind, name)
+    return GazeChange(f"{text} {shown}", kind, name)

@@ -14,7 +14,7 @@ from gazerig.robot.model.gesture_fit import (
     GestureFit,
     GestureMotions,
     GestureRefused,
-    motions,
+    gesture_motions,
 )
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, GestureReply
@@ -200,7 +200,7 @@ class GestureChoices:
             if len(self._cache) >= len(self._gestures) + _MOST_KEPT:
                 self._cache = {kept: made for kept, made in self._cache.items() if kept[1] == 0}
             try:
-                self._cache[key] = motions(self._gestures[name], self._joints, count)
+                self._cache[key] = gesture_motions(self._gestures[name], self._joints, count)
             except GestureRefused as refused:
                 self._cache[key] = refused
         return self._cache[key]

@@ -14,7 +14,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
 from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import doing, leader, target_name
+from gazerig.robot.control.tick_text import head_activity, target_name, tick_control_source
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
     NO_GESTURE,
@@ -213,8 +213,8 @@ def head_state(tick: Tick) -> HeadState:
         tick.lead,
         tick.gesture,
         percept.captured_s if percept is not None else None,
-        leader(tick),
-        doing(tick).headline,
+        tick_control_source(tick),
+        head_activity(tick).headline,
     )
 
 
@@ -286,7 +286,7 @@ def _values_or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
 
 
 def _gaze(tick: Tick) -> GazeReading:
-    pose, gaze, does = tick.pose, tick.gaze, doing(tick)
+    pose, gaze, does = tick.pose, tick.gaze, head_activity(tick)
     # A client's target is a gaze target; held joints have none.
     target = target_name(tick.target) if tick.lead.by != "joint" and tick.led else does.target
     sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))

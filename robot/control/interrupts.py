@@ -9,15 +9,15 @@ from typing import Any, Self
 from gazerig.robot.model.clock import RealClock
 
 
-def signals_of(*names: str) -> tuple[signal.Signals, ...]:
+def available_signals(*names: str) -> tuple[signal.Signals, ...]:
     """Return the signals of these names that the operating system has."""
     return tuple(one for name in names if (one := getattr(signal, name, None)) is not None)
 
 
-ENDING = signals_of("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
+ENDING = available_signals("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
 """Ctrl-C, a request to end, a terminal that was closed, Ctrl-backslash, and Windows' Ctrl-Break."""
-_HANG_UP = signals_of("SIGHUP")
-_BACKGROUND = signals_of("SIGTTIN", "SIGTTOU")
+_HANG_UP = available_signals("SIGHUP")
+_BACKGROUND = available_signals("SIGTTIN", "SIGTTOU")
 """They would stop a background program that accesses its terminal, with the torque on."""
 
 _NEVER = 1 << 30

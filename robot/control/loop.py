@@ -30,12 +30,12 @@ from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import stopped_result
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.command_json import check
+from gazerig.robot.model.command_json import check_command
 from gazerig.robot.model.commands import Ask, Command, Jog, MoveOpponent, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.moved_opponent import MovedOpponent
+from gazerig.robot.model.moved_opponent import TickClockOpponent
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
@@ -137,7 +137,7 @@ class Robot:
             ValueError: The command is invalid, or the queue is full; the message lists the
                 available choices.
         """
-        check(command)
+        check_command(command)
         if isinstance(command, Jog):
             refuse_out_of_range(command, self.body.names, self._guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
@@ -150,11 +150,11 @@ class Robot:
         Raises:
             ValueError: As ``command``.
         """
-        check(command)
+        check_command(command)
         refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
         return self._commands.add(command)
 
-    def let_move(self, opponent: MovedOpponent) -> None:
+    def let_move(self, opponent: TickClockOpponent) -> None:
         """Let commands move a boxer of the emulated world."""
         self._executor.opponent = opponent
 

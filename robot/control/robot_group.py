@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.loop import Robot
-from gazerig.robot.control.tick_text import doing
+from gazerig.robot.control.tick_text import head_activity
 from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.types import OtherHead
@@ -23,7 +23,7 @@ class NamedRobot(NamedTuple):
         newest = self.robot.newest
         if newest is None:
             return OtherHead(self.name, "has not begun")
-        return OtherHead(self.name, doing(newest).headline, newest.guard_result.level)
+        return OtherHead(self.name, head_activity(newest).headline, newest.guard_result.level)
 
 
 class RobotGroup:
@@ -52,7 +52,7 @@ class RobotGroup:
         for name, robot in self._others:
             with contextlib.suppress(ValueError):  # nothing may prevent the others from stopping
                 tickets.append((name, robot.command(command)))
-        return _TicketOfAll(self._first.command(command), tickets)
+        return _GroupTicket(self._first.command(command), tickets)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return the first head's menus."""
@@ -63,7 +63,7 @@ class RobotGroup:
         return self._first.gestures()
 
 
-class _TicketOfAll(Ticket):
+class _GroupTicket(Ticket):
     """The ticket of the first head's reply, or of another head's refusal."""
 
     def __init__(self, first: Ticket, others: Sequence[tuple[str, Ticket]]) -> None:

@@ -59,7 +59,7 @@ class TickFeed:
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
         """Return the stored events with numbers above ``after``, the oldest first."""
         newest = self.number  # an event that comes meanwhile must not hide an earlier one
-        found = [*_later(self._messages, after), *_later(self._others, after)]
+        found = [*_events_after(self._messages, after), *_events_after(self._others, after)]
         found = [event for event in found if event.number <= newest]
         return tuple(sorted(found, key=lambda event: event.number))
 
@@ -68,6 +68,6 @@ class TickFeed:
         return tuple(self._messages)
 
 
-def _later(events: deque[HeadEvent], after: int) -> list[HeadEvent]:
+def _events_after(events: deque[HeadEvent], after: int) -> list[HeadEvent]:
     newest_first = reversed(list(events))  # a copy: the loop appends meanwhile
     return list(takewhile(lambda event: event.number > after, newest_first))

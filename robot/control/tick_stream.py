@@ -17,7 +17,7 @@ import numpy as np
 from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Percept, Target, Vec3
 from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.command_json import as_recorded
+from gazerig.robot.model.command_json import as_recorded_json
 from gazerig.robot.model.control_source import ControlState, GestureState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
@@ -56,7 +56,7 @@ class TickRow(NamedTuple):
         dt_s: Time since the previous tick.
         percept: Number of the percept, None without one.
         as_desired: Whether ``guard_result.desired_rad`` equals ``desired_rad``.
-        commands: JSON from ``command_json.as_recorded``.
+        commands: JSON from ``command_json.as_recorded_json``.
         before: Further inputs of the run, for a recording.
     """
 
@@ -168,7 +168,7 @@ class TickStream:
                 tick.t_s, dt_s, None if percept is None else self._number, tick.joints, tick.pose,
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
-                [as_recorded(command) for command in tick.commands], tick.stopped, tick.led,
+                [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.led,
                 tick.lead, tick.gesture, tick.parking, before,
             ))  # fmt: skip
         return encode((percepts, rows))

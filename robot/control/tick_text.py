@@ -8,7 +8,12 @@ from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import ORDERED, PART_NAMES, Target, body_name
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.control_source import ControlSource, control_source, sentence, title
+from gazerig.robot.model.control_source import (
+    ControlSource,
+    control_sentence,
+    control_source,
+    control_title,
+)
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
@@ -51,7 +56,7 @@ def target_name(target: Target) -> str:
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 
-class Doing(NamedTuple):
+class Activity(NamedTuple):
     """The head's present activity in words.
 
     Attributes:
@@ -67,27 +72,27 @@ class Doing(NamedTuple):
     phase: str
 
 
-def leader(tick: Tick) -> ControlSource:
+def tick_control_source(tick: Tick) -> ControlSource:
     """Return the source of control of the head."""
     return control_source(tick.stopped, tick.parking, tick.lead, tick.gesture)
 
 
-def doing(tick: Tick) -> Doing:
+def head_activity(tick: Tick) -> Activity:
     """Return the head's activity; while a client is in control, only that."""
-    leads = leader(tick)
+    leads = tick_control_source(tick)
     phase: str = "blink" if tick.gaze.blink else tick.gaze.phase
-    said = sentence(leads, tick.t_s)
+    said = control_sentence(leads, tick.t_s)
     found = tick.guard_result
     if found.level == "torque_off" and leads.kind not in ("stopped", "parking"):
         limp = f"the torque is off: {' and '.join(found.critical_reasons[:1]) or 'guard'}"
-        return Doing(limp, target_name(tick.target), limp, phase)
+        return Activity(limp, target_name(tick.target), limp, phase)
     if leads.led:
         phase = {"joint": "held", "stopped": "stopped", "parking": "parking"}.get(leads.kind, phase)
         distance = _distance_text(tick) if leads.kind in ("person", "pointer") else ""
-        return Doing(said + distance, title(leads), said + distance, phase)
+        return Activity(said + distance, control_title(leads), said + distance, phase)
     looks = _gaze_text(tick.target)
     headline = f"{said}, and {looks}" if leads.kind == "gesture" else looks
-    return Doing(headline, target_name(tick.target), tick.target.why, phase)
+    return Activity(headline, target_name(tick.target), tick.target.why, phase)
 
 
 def _gaze_text(target: Target) -> str:

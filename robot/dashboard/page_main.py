@@ -32,7 +32,7 @@ from gazerig.robot.dashboard.door.admission import page_url
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.door.browsers import Browsers
 from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, drain
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, read_waiting
 from gazerig.robot.dashboard.feed.page_process import (
     CANNOT_OPEN,
     COMMANDS_VARIABLE,
@@ -81,7 +81,7 @@ def free_port(host: str, port: int) -> int:
     raise OSError(errno.EADDRINUSE, f"no port from {port} on is free")
 
 
-class Served(NamedTuple):
+class ServedPage(NamedTuple):
     """Open page: the server behind the door, the door and the address.
 
     outbox: of requests to the rig; pointer: receives pointers of browsers
@@ -99,7 +99,7 @@ class Served(NamedTuple):
 def serve(
     host: str, port: int, token: str, folder: Path, feed: MessageLink, stop: StopSender,
     rig: Path | None = None,
-) -> Served:  # fmt: skip
+) -> ServedPage:  # fmt: skip
     """Open the page's server, and its door on the first free port.
 
     Raises:
@@ -135,10 +135,10 @@ def serve(
     if port not in (0, open_port):  # 0 asks for any port
         text.append(f"port {port} is busy, using {open_port}")
     url = f"{page_url(host, open_port)}/?token={token}"
-    return Served(server, door, outbox, pointer, url, "; ".join(text) or None)
+    return ServedPage(server, door, outbox, pointer, url, "; ".join(text) or None)
 
 
-def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> None:
+def show_until_closed(feed: MessageLink, view: PageView, parent: int, served: ServedPage) -> None:
     """Draw incoming snapshots until the other side has closed.
 
     Raises:
@@ -158,7 +158,7 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
         if readable:
             live.watched = view.watched()
-            news = drain(feed, live)
+            news = read_waiting(feed, live)
             if news.ended:
                 return
             view.emulated, view.choice = live.emulated, live.choice
@@ -205,7 +205,7 @@ def main(arguments: list[str]) -> int:
             feed.send(NOTICE + served.words.encode())
         view = PageView(served.server, served.door.widgets, served.outbox, served.door.tell)
         feed.send(URL + served.url.encode())
-        watch(feed, view, int(parent), served)
+        show_until_closed(feed, view, int(parent), served)
         served.door.close()
         served.server.stop()
         return 0

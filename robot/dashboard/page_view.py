@@ -6,8 +6,8 @@ import viser
 
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.door.viser_server import browser_of
-from gazerig.robot.dashboard.feed.camera_overlay import encode, without_pictures
-from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices, WorldNow
+from gazerig.robot.dashboard.feed.camera_overlay import encode, no_pictures_image
+from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices, ShownWorld
 from gazerig.robot.dashboard.feed.page_process import (
     ALL_USERS,
     CHOICES,
@@ -19,16 +19,16 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.panels.controls import Controls, refused_moves
 from gazerig.robot.dashboard.panels.panel import PanelView
 from gazerig.robot.dashboard.panels.replay import ReplayView
-from gazerig.robot.dashboard.panels.servo_health import silence
+from gazerig.robot.dashboard.panels.servo_health import no_data_text
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.view.glb import furnish
+from gazerig.robot.dashboard.view.glb import add_lights
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.overlays import OverlayPanel
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.dashboard.view.viewpoints import NAMES, Viewpoints
 from gazerig.robot.dashboard.view.world_view import WorldView
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.model.control_source import ControlSource, sentence
+from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.moved_opponent import has_opponent
 from gazerig.robot.model.types import Snapshot
 
@@ -57,7 +57,7 @@ class PageView:
         self._outbox = outbox
         self._tell = tell
         self._viewpoints = Viewpoints(server, lambda number: browser_of(server, number))
-        furnish(server.scene)
+        add_lights(server.scene)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
@@ -74,7 +74,7 @@ class PageView:
         widgets.on_join(self._greet)
         self._jpeg: bytes | None = None
         self._image: ImageArray | None = None
-        self._world_now: WorldNow | None = None
+        self._world_now: ShownWorld | None = None
         self._drawn = self._watched = False
         buttons = self._panel.view.buttons("look from", NAMES, order=-1)
         buttons.on_press(
@@ -104,9 +104,7 @@ class PageView:
             self._newest = news.snapshots[-1]
             shot = self._newest
             if self._replay is not None:  # it can neither be stopped nor resumed
-                self._tell(
-                    {"recording": True, **control_state_json(ControlSource("recording"), shot)}
-                )
+                self._tell({"recording": True, **headline_json(ControlSource("recording"), shot)})
             else:
                 self._tell({
                     "stopped": shot.stopped,
@@ -116,7 +114,7 @@ class PageView:
                     "emulated": self.emulated,
                     "opponent": self._world_now is not None and has_opponent(self._world_now.shapes),
                     "refused": refused_moves(self._menus, shot.joints),
-                    **control_state_json(shot.leader, shot),
+                    **headline_json(shot.leader, shot),
                 })  # fmt: skip
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
@@ -164,7 +162,7 @@ class PageView:
                         float(duration_s),
                     )
                 if data.get("pictures") is False:
-                    self._image = without_pictures()
+                    self._image = no_pictures_image()
                 self._replay.show(data)
 
     def _draw(self) -> None:
@@ -193,15 +191,15 @@ class PageView:
         """Show that no data arrives any more, with the last data."""
         self.show(News((), None, ended=False))
         if self._drawn and self._replay is None:  # a recording may be paused
-            self._panel.silence.content = silence()
+            self._panel.silence.content = no_data_text()
             self._tell({"stopped": "", "silent": True})
 
 
-def control_state_json(leader: ControlSource, shot: Snapshot) -> dict[str, object]:
+def headline_json(leader: ControlSource, shot: Snapshot) -> dict[str, object]:
     """Return the source of control and the activity of the head, for the page's headline."""
     return {
         "leads": leader.kind,
-        "leads_words": sentence(leader, shot.t_s),
+        "leads_words": control_sentence(leader, shot.t_s),
         "headline": shot.headline,
         "busy": shot.busy,
     }

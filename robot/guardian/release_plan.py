@@ -18,7 +18,7 @@ class ReleasePlan(NamedTuple):
     protocol, device, crc, channels: of a Maestro, as in gazerig.drivers.maestro.params
     addresses: of PCA9685 boards
     family: of smart servos, by its name
-    settings: of a package's bus, its parameters as ``pickled`` wrote them
+    settings: of a package's bus, its parameters as ``pickle_params`` wrote them
     """
 
     kind: BusKind
@@ -34,7 +34,7 @@ class ReleasePlan(NamedTuple):
     settings: str = ""
 
 
-def pickled(params: object) -> str:
+def pickle_params(params: object) -> str:
     """Return the parameters of a package's bus as text."""
     return base64.b85encode(pickle.dumps(params)).decode()
 

@@ -45,7 +45,7 @@ MAX_PIXEL = 20000.0
 _MAX_TIME_S = 1e12
 
 
-def check(command: Command) -> None:
+def check_command(command: Command) -> None:
     """Check that a command's values are valid.
 
     Raises:
@@ -63,7 +63,9 @@ def check(command: Command) -> None:
                 raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
             for pair in angles:
                 if not (
-                    isinstance(pair, tuple) and len(pair) == 2 and _within(pair[1], MAX_ANGLE_RAD)
+                    isinstance(pair, tuple)
+                    and len(pair) == 2
+                    and _is_within(pair[1], MAX_ANGLE_RAD)
                 ):
                     raise ValueError(
                         "angles are pairs of a joint and a finite angle in radians within +-360 deg"
@@ -78,13 +80,13 @@ def check(command: Command) -> None:
         case Play(gesture, speed, times, who):
             if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
                 raise ValueError("a gesture is given by its name")
-            if not _within(speed, MAX_SPEED) or speed < MIN_SPEED:
+            if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:
                 raise ValueError(f"the speed of a gesture is a number {MIN_SPEED:g}..{MAX_SPEED:g}")
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
                 raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
             _check_who(who)
         case MoveOpponent(p):
-            if not _numbers(p, 3, MAX_COORDINATE_M) or any(
+            if not _are_numbers(p, 3, MAX_COORDINATE_M) or any(
                 not least <= one <= most
                 for one, (least, most) in zip(p, OPPONENT_BOX_M, strict=True)
             ):
@@ -116,7 +118,7 @@ def _check_look(command: Look) -> None:
         case LookAt(p) | LookAtInHead(p):
             _check_point(p)
         case LookAtDirection(direction, frame, distance):
-            if not (_numbers(direction, 2, pi) and -pi / 2 <= direction[1] <= pi / 2):
+            if not (_are_numbers(direction, 2, pi) and -pi / 2 <= direction[1] <= pi / 2):
                 raise ValueError(
                     "a direction is a finite yaw within +-180 deg (left above 0) and a pitch "
                     "within +-90 deg (up above 0)"
@@ -130,18 +132,18 @@ def _check_look(command: Look) -> None:
                     f"a person is named by a whole number from 0 on, not {person!r:.40}"
                 )
         case LookAtPixel(pixel, distance, captured_s, p):
-            if not _numbers(pixel, 2, MAX_PIXEL):
+            if not _are_numbers(pixel, 2, MAX_PIXEL):
                 raise ValueError("a pixel is two finite numbers, x right and y down")
             if distance is not None:
                 _check_distance(distance)
-            if captured_s is not None and not _within(captured_s, _MAX_TIME_S):
+            if captured_s is not None and not _is_within(captured_s, _MAX_TIME_S):
                 raise ValueError("captured_s is the time of a frame in seconds")
             if p is not None:
                 _check_point(p)
 
 
 def _check_point(p: object) -> None:
-    if not _numbers(p, 3, MAX_COORDINATE_M):
+    if not _are_numbers(p, 3, MAX_COORDINATE_M):
         raise ValueError(
             "a point is three finite numbers in metres, x ahead, y left, z up, none "
             f"beyond +-{MAX_COORDINATE_M:g} m"
@@ -149,14 +151,14 @@ def _check_point(p: object) -> None:
 
 
 def _check_distance(distance: object) -> None:
-    if not (_within(distance, MAX_COORDINATE_M) and distance > 0.0):  # type: ignore[operator]
+    if not (_is_within(distance, MAX_COORDINATE_M) and distance > 0.0):  # type: ignore[operator]
         raise ValueError(f"a distance is above 0 and at most {MAX_COORDINATE_M:g} m")
 
 
 def _check_control(command: ControlCommand) -> None:
     _check_who(command.who, command.stay)
     for_s = command.for_s
-    if for_s is not None and not (_within(for_s, MAX_CONTROL_S) and for_s > 0.0):
+    if for_s is not None and not (_is_within(for_s, MAX_CONTROL_S) and for_s > 0.0):
         raise ValueError(f"for_s is above 0 and at most {MAX_CONTROL_S:g} s")
 
 
@@ -170,17 +172,17 @@ def _check_who(who: object, flag: object = False) -> None:
 def _check_share(what: str, key: str, name: object, value: object) -> None:
     if not isinstance(name, str) or len(name) > MAX_WORDS:
         raise ValueError(f"{what} is given by its name")
-    if not _within(value, 1.0) or value < 0.0:  # type: ignore[operator]
+    if not _is_within(value, 1.0) or value < 0.0:  # type: ignore[operator]
         raise ValueError(f"the {key} of {what} is a number 0..1")
 
 
-def _numbers(values: object, count: int, most: float) -> bool:
+def _are_numbers(values: object, count: int, most: float) -> bool:
     """Return whether this is a tuple of ``count`` finite numbers within +-most."""
     of_them = isinstance(values, tuple) and len(values) == count
-    return of_them and all(_within(value, most) for value in values)  # type: ignore[attr-defined]
+    return of_them and all(_is_within(value, most) for value in values)  # type: ignore[attr-defined]
 
 
-def _within(value: object, most: float) -> bool:
+def _is_within(value: object, most: float) -> bool:
     # A comparison is false for NaN, and accepts integers too large for a float.
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return number and -most <= value <= most  # type: ignore[operator]
@@ -194,13 +196,13 @@ def as_json(command: Command) -> dict[str, object]:
     return {"do": _NAMES[type(command)], **command._asdict()}
 
 
-def as_recorded(command: Command) -> dict[str, object]:
+def as_recorded_json(command: Command) -> dict[str, object]:
     """Return a command as JSON for recordings: its name under "order", and its fields."""
     return {"order": _NAMES[type(command)], **command._asdict()}
 
 
 def from_json(data: object) -> Command:
-    """Read the result of ``as_json`` or ``as_recorded``; fields with defaults may be left out.
+    """Read the result of ``as_json`` or ``as_recorded_json``; fields with defaults may be left out.
 
     Raises:
         ValueError: It is not a command; the message lists the commands or fields.
@@ -215,11 +217,11 @@ def from_json(data: object) -> Command:
     if not needed <= set(fields) <= set(kind._fields):
         raise ValueError(f"{name} takes {', '.join(kind._fields)}; given {', '.join(fields)}")
     command = kind(**fields)  # type: ignore[arg-type]
-    check(command)
+    check_command(command)
     return command
 
 
-def from_recording(data: dict[str, object]) -> Command:
+def from_recorded_json(data: dict[str, object]) -> Command:
     """Read a command of a recorded run.
 
     Old recordings lack the fields ``stay`` and ``confirmed``: in their runs a control never
@@ -233,7 +235,7 @@ def from_recording(data: dict[str, object]) -> Command:
     return from_json({**old.get(name if isinstance(name, str) else "", {}), **data})
 
 
-def signed(command: Command, who: str) -> Command:
+def set_client(command: Command, who: str) -> Command:
     """Return a command with its client's name; commands without that field stay unchanged."""
     if isinstance(command, ControlCommand | Play | Renew | Stop | Resume):
         return command._replace(who=who[:MAX_WORDS])

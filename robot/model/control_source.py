@@ -113,7 +113,7 @@ def control_source(
     return ControlSource()
 
 
-def title(leader: ControlSource) -> str:
+def control_title(leader: ControlSource) -> str:
     """Return the source of control in two or three words, e.g. "neck_yaw held", "stopped"."""
     match leader.kind:
         case "gaze":
@@ -130,7 +130,7 @@ def title(leader: ControlSource) -> str:
             return leader.kind
 
 
-def sentence(leader: ControlSource, t_s: float) -> str:
+def control_sentence(leader: ControlSource, t_s: float) -> str:
     """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg, for 3 s".
 
     Args:

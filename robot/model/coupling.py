@@ -132,14 +132,14 @@ class PushRods:
         """Return the speed of one horn per joint speed."""
         tip = self._tip(horn_rad, side)
         _, first, second = self._rod_error(joints, side, tip)
-        x, _, z = _tilt(self._anchor, joints, side)
+        x, _, z = _pitch_and_roll(self._anchor, joints, side)
         across = (x - tip[0]) * self._horn * sin(horn_rad)
         turn = 2.0 * (across - (z - tip[2]) * abs(self._horn) * cos(horn_rad))
         return -first / turn, -second / turn
 
     def _horn_rad(self, joints: Pair, side: float) -> float:
         """Return the angle of one horn, on the branch of the level head."""
-        at_x, at_y, at_z = _tilt(self._anchor, joints, side)
+        at_x, at_y, at_z = _pitch_and_roll(self._anchor, joints, side)
         x, y, z = at_x - self._servo[0], at_y - side * self._servo[1], at_z - self._servo[2]
         gap2 = x * x + y * y + z * z
         along, up = self._horn * x, abs(self._horn) * z
@@ -350,7 +350,7 @@ def _clip(angle: float) -> float:
     return min(max(angle, -0.5 * pi), 0.5 * pi) if isfinite(angle) else 0.0
 
 
-def _tilt(p: Vec3, joints: Pair, side: float) -> Vec3:
+def _pitch_and_roll(p: Vec3, joints: Pair, side: float) -> Vec3:
     """Return a point, mirrored for the right side, pitched and rolled.
 
     The rotation is that of ``gazerig.gaze.angles.rotation`` without yaw.

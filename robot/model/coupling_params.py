@@ -101,19 +101,19 @@ def coupled_pairs(couplings: Mapping[str, CouplingParams]) -> tuple[CoupledPair,
     return tuple(CoupledPair(one.first, one.second, one.made()) for one in couplings.values())
 
 
-def partners(pairs: Iterable[CoupledPair]) -> dict[str, str]:
+def joint_partners(pairs: Iterable[CoupledPair]) -> dict[str, str]:
     """Return the partner of each coupled joint."""
     return {a: b for first, second, _ in pairs for a, b in ((first, second), (second, first))}
 
 
-def unreachable(pair: CoupledPair, joints: Mapping[str, JointParams]) -> str | None:
+def unreachable_text(pair: CoupledPair, joints: Mapping[str, JointParams]) -> str | None:
     """Return a text about joint angles that the servos cannot reach, None if they reach all.
 
     Args:
         pair: The coupled pair.
         joints: Joints of the rig, with known servo models.
     """
-    for at in _range(pair, joints):
+    for at in _joint_grid(pair, joints):
         where = f"{pair.first} {degrees(at[0]):g}, {pair.second} {degrees(at[1]):g} deg"
         if isinstance(pair.coupling, MeasuredGrid) and not pair.coupling.holds(at):
             return f"cannot reach {where}: its points do not go so far"
@@ -149,7 +149,7 @@ def pair_setups(
         gentle_deg_s: Highest speed at which servos outside their ranges move inside.
     """
     names = pair.first, pair.second
-    grid = tuple(_range(pair, joints))
+    grid = tuple(_joint_grid(pair, joints))
     servos = [pair.coupling.servo_rad(at) for at in grid]
     rates = [pair.coupling.rates(at) for at in grid]
     rest = pair.coupling.servo_rad((park_rad.get(names[0], 0.0), park_rad.get(names[1], 0.0)))
@@ -159,8 +159,8 @@ def pair_setups(
     for k, name in enumerate(names):
         joint, linkage = joints[name], joints[name].made()
         slopes = [rate[k] for rate in rates]
-        fastest = max(_reach(slope, speeds) for slope in slopes)
-        quickest = max(_reach(slope, accels) for slope in slopes)
+        fastest = max(_combined_limit(slope, speeds) for slope in slopes)
+        quickest = max(_combined_limit(slope, accels) for slope in slopes)
         steps = [linkage.steps(angles[k]) for angles in servos]
         steepest = max(abs(slope) for pair_slopes in slopes for slope in pair_slopes)
         gentle = radians(min(ENTRY_DEG_S, gentle_deg_s)) * steepest
@@ -176,7 +176,7 @@ def pair_setups(
     return found
 
 
-def _range(pair: CoupledPair, joints: Mapping[str, JointParams]) -> Iterator[Pair]:
+def _joint_grid(pair: CoupledPair, joints: Mapping[str, JointParams]) -> Iterator[Pair]:
     """Return a grid of joint angles over the whole range, its corners first."""
     one, other = joints[pair.first].limit(), joints[pair.second].limit()
     ends = [(one.low_rad, one.high_rad), (other.low_rad, other.high_rad)]
@@ -187,7 +187,7 @@ def _range(pair: CoupledPair, joints: Mapping[str, JointParams]) -> Iterator[Pai
     yield from ((first, second) for first in first_axis for second in second_axis)
 
 
-def _reach(slope: Pair, most: list[float]) -> float:
+def _combined_limit(slope: Pair, most: list[float]) -> float:
     return abs(slope[0]) * most[0] + abs(slope[1]) * most[1]
 
 

@@ -191,7 +191,7 @@ class CameraMount:
         return compose(R_world_head, self._R), add(p_world_head_m, rotate(R_world_head, self._p))
 
 
-def mounted_at(
+def camera_at_pose(
     params: CameraParams, R_parent_camera: Mat3, p_parent_camera_m: Vec3
 ) -> CameraParams:
     """Return the parameters of a camera at another pose: the inverse of ``CameraMount``.

@@ -25,7 +25,7 @@ from gazerig.gaze.gesture.gesture_player import OffsetState, PlayedGesture
 from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import further
+from gazerig.robot.model.types import further_joints
 
 _SMALLEST = 0.2
 """A gesture of which a range leaves less than this share is not played, as it is hardly visible."""
@@ -62,7 +62,7 @@ class GestureMotions(NamedTuple):
     left_out: tuple[str, ...]
 
 
-def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureMotions:
+def gesture_motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureMotions:
     """Return a gesture as curves of a rig's joints.
 
     Args:
@@ -80,7 +80,7 @@ def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureM
     kept = {name: keys for name, keys in tracks.items() if name in there}
     if not kept:
         raise GestureRefused(f"this rig has none of the joints that it moves: {', '.join(tracks)}")
-    motion = GestureMotion(kept, further(joints), gesture.space == "joint")
+    motion = GestureMotion(kept, further_joints(joints), gesture.space == "joint")
     return GestureMotions(gesture, motion, left_out)
 
 
@@ -130,7 +130,7 @@ class GestureFit:
 
     def __init__(self, joints: tuple[str, ...], lid_spans_rad: Mapping[str, float]) -> None:
         self.joints = joints
-        channels = (*POSE_TRACKS, *further(joints))
+        channels = (*POSE_TRACKS, *further_joints(joints))
         self._matrix = np.zeros((len(channels), len(joints)))
         for j, name in enumerate(joints):
             if name in channels:
@@ -248,7 +248,7 @@ class GestureFit:
             for at, now in zip((2, 3), begins, strict=True)
         ]
         for factor in _LONGER:
-            if self._keeps_limits(_fade(state, factor * least_s), most):
+            if self._keeps_limits(_fade_samples(state, factor * least_s), most):
                 return factor * least_s
         return _LONGER[-1] * least_s
 
@@ -263,7 +263,7 @@ class GestureFit:
         """Return the time for which a gesture must wait for the present one to fade."""
         if not any(map(np.any, state)):
             return 0.0
-        fade = _fade(state, fade_s)
+        fade = _fade_samples(state, fade_s)
         begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
         most = [
             np.maximum(share * np.array([limit[at] for limit in limits]), np.abs(now)) + _ROUNDING
@@ -287,7 +287,7 @@ class GestureFit:
         )
 
 
-def _fade(state: OffsetState, time_s: float) -> MotionSamples:
+def _fade_samples(state: OffsetState, time_s: float) -> MotionSamples:
     """Return samples of the fifth-order polynomials from a state to rest in a time."""
     s = np.linspace(0.0, 1.0, 101)[:, None]
     p, v, a = state.value, state.speed * time_s, state.acceleration * time_s**2
@@ -310,7 +310,7 @@ _SMOOTHED_OVER_S = 0.15
 _MOST_KEYS = 60
 
 
-def smoothed(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+def smooth(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return samples at even times without the jitter of a hand and of encoders.
 
     Args:
@@ -344,7 +344,7 @@ def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats,
     """
     if np.abs(values - values[0]).max() <= tolerance:
         return np.zeros(0), np.zeros(0)
-    chosen = _turns(values, tolerance)
+    chosen = _reversals(values, tolerance)
     while len(chosen) < _MOST_KEYS:
         curve = MinimumJerkCurve(
             float(values[0]), times_s[chosen].tolist(), values[chosen].tolist()
@@ -357,7 +357,7 @@ def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats,
     return times_s[chosen], values[chosen]
 
 
-def _turns(values: Floats, tolerance: float) -> list[int]:
+def _reversals(values: Floats, tolerance: float) -> list[int]:
     """Return the indices at which the samples reverse by more than the tolerance, and the last."""
     turns: list[int] = []
     high = low = 0

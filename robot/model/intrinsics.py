@@ -45,7 +45,7 @@ def intrinsics_of_lens(
         height_px: Height of the images.
         own: Intrinsics reported by the camera, used if no measured lens fits.
     """
-    if lens is None or not fits(lens, width_px, height_px):
+    if lens is None or not lens_fits(lens, width_px, height_px):
         if own is not None:
             return own
         return intrinsics_of_view(view_rad, width_px, height_px)
@@ -53,7 +53,7 @@ def intrinsics_of_lens(
     return measured.scaled(width_px / lens.width_px, height_px / lens.height_px)
 
 
-def fits(lens: LensParams, width_px: int, height_px: int) -> bool:
+def lens_fits(lens: LensParams, width_px: int, height_px: int) -> bool:
     """Return whether images of a size show the field for which the lens was measured."""
     return not lens_fault(lens, width_px, height_px)
 
@@ -99,7 +99,7 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     return found
 
 
-def undistorted(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
+def undistort(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     """Return the pixels (n, 2) without the lens's distortion."""
     i = intrinsics
     points: Floats = rays(points_px, i)[:, :2] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)

@@ -28,7 +28,7 @@ from gazerig.gaze.angles import (
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
-from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
+from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, order_joints
 
 
 class Capsule(NamedTuple):
@@ -100,7 +100,7 @@ class Kinematics:
     def __init__(
         self, params: GeometryParams, joints: Iterable[str], lids: Mapping[str, LidEnds]
     ) -> None:
-        self.names = in_order(joints)
+        self.names = order_joints(joints)
         self.one_pan, self.one_tilt = "eyes_pan" in self.names, "eyes_tilt" in self.names
         place = {name: i for i, name in enumerate(self.names)}
         # A missing joint is looked up behind the rig's joints, at an appended 0.

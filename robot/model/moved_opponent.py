@@ -44,7 +44,7 @@ def has_opponent(scene: object) -> bool:
     return isinstance(scene, BoxingScene) and scene.opponent is not None
 
 
-class MovedOpponent:
+class TickClockOpponent:
     """A boxer, on the clock of the ticks.
 
     Args:

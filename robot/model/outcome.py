@@ -38,7 +38,7 @@ class Progress(NamedTuple):
     led: str = ""
 
 
-def outcome_of(reply: CommandReply, now: Progress) -> tuple[Outcome, str] | None:
+def command_outcome(reply: CommandReply, now: Progress) -> tuple[Outcome, str] | None:
     """Return the outcome of a command and the reason for it, None while it is in progress."""
     played = reply.gesture.number if reply.gesture is not None else 0
     if reply.refused:

@@ -1,6 +1,6 @@
 """Values of the machine: desired, commanded and measured joints, and the page's snapshot.
 
-Units are rad, m and s. Joints are in the order of ``in_order``.
+Units are rad, m and s. Joints are in the order of ``order_joints``.
 """
 
 import re
@@ -37,10 +37,10 @@ JOINT_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 """Pattern of joint names."""
 
 JointAngles = tuple[float, ...]
-"""One angle per joint, in the order of the rig's joints (``in_order``)."""
+"""One angle per joint, in the order of the rig's joints (``order_joints``)."""
 
 
-def in_order(names: Iterable[str]) -> tuple[str, ...]:
+def order_joints(names: Iterable[str]) -> tuple[str, ...]:
     """Return a rig's joints in the order of all sequences of joints.
 
     Joints that gaze moves come first, in the order of ``GAZE_JOINTS``, then all others by name.
@@ -50,9 +50,9 @@ def in_order(names: Iterable[str]) -> tuple[str, ...]:
     return (*(name for name in GAZE_JOINTS if name in there), *others)
 
 
-def further(names: Iterable[str]) -> tuple[str, ...]:
-    """Return a rig's joints that gaze does not move, in the order of ``in_order``."""
-    return tuple(name for name in in_order(names) if name not in GAZE_JOINTS)
+def further_joints(names: Iterable[str]) -> tuple[str, ...]:
+    """Return a rig's joints that gaze does not move, in the order of ``order_joints``."""
+    return tuple(name for name in order_joints(names) if name not in GAZE_JOINTS)
 
 
 Level = Literal["ok", "limited", "hold", "torque_off"]

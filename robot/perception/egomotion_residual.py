@@ -156,7 +156,7 @@ class EgomotionResidual:
         }
 
 
-def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
+def rotation_rate_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
     """Return the angular velocity that turns one orientation into another, for small turns."""
     R = compose(R_after, transpose(R_before))
     half = 0.5 / dt_s

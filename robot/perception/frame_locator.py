@@ -207,7 +207,7 @@ class FrameLocator:
         depth = self._depth_about(found, at_px, person.trunk_px * _FACE_RADIUS_M / _TRUNK_M)
         if depth is not None:
             z, sd = depth[0] + _FACE_RADIUS_M, hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        p_m = _on_ray(at_px, z, lens)
+        p_m = _point_at_depth(at_px, z, lens)
         return DetectionInCamera(
             "face", p_m, None, _FACE_RADIUS_M, 0.0, person.confidence, 1.0, depth is not None,
             _HEAD_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None, clothing=person.clothing,
@@ -219,7 +219,7 @@ class FrameLocator:
         depth = self._depth_about(found, palm.centre_px, 0.25 * palm.size_px)
         if depth is not None:
             z, sd = depth[0], hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        p_m = _on_ray(palm.centre_px, z, lens)
+        p_m = _point_at_depth(palm.centre_px, z, lens)
         return DetectionInCamera(
             "hand", p_m, None, _HAND_RADIUS_M, 0.0, palm.confidence, 1.0, depth is not None,
             _PALM_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None,
@@ -264,7 +264,7 @@ class FrameLocator:
         return share, hypot(_LEAST_SD, 0.5 * spread / z)
 
 
-def _on_ray(at_px: tuple[float, float], z_m: float, lens: Intrinsics) -> Vec3:
+def _point_at_depth(at_px: tuple[float, float], z_m: float, lens: Intrinsics) -> Vec3:
     """Return the position of a pixel at a depth along the optical axis."""
     x, y, z = rays(np.array([at_px]), lens)[0].tolist()
     return scale((x, y, z), z_m)

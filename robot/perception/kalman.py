@@ -103,7 +103,7 @@ class TrackFilter:
         self._camera = p_camera_m
         self.p_m: Vec3 = p_m
         self.v_m_s: Vec3 = (0.0, 0.0, 0.0)
-        self.view, self.range_m = sight(p_m, p_camera_m)
+        self.view, self.range_m = view_and_range(p_m, p_camera_m)
         var = speed_sd_m_s * speed_sd_m_s
         self.across = Variances(sds_m[0] * sds_m[0], 0.0, var)
         self.along = Variances(sds_m[1] * sds_m[1], 0.0, var)
@@ -157,7 +157,7 @@ class TrackFilter:
 
     def offset(self, p_m: Vec3) -> Offset:
         """Return the offset of a position from the expected one."""
-        view, range_m = sight(p_m, self._camera)
+        view, range_m = view_and_range(p_m, self._camera)
         ahead = dot(view, self.view)
         aside = sub(view, scale(self.view, ahead))
         away = norm(aside)
@@ -219,7 +219,7 @@ class TrackFilter:
         A camera measures an angle and a relative growth per second: at another range than the
         measured one they are another speed.
         """
-        view, range_m = sight(p_m, self._camera)
+        view, range_m = view_and_range(p_m, self._camera)
         at = self.range_m / range_m
         along = dot(v_m_s, view)
         v, here = scale(sub(v_m_s, scale(view, along)), at), self.view
@@ -247,7 +247,7 @@ class TrackFilter:
         if ahead < NEAREST_M and norm(sub(way, scale(self.view, ahead))) < NEAREST_M:
             p_m = add(self._camera, scale(self.view, NEAREST_M))  # not behind the camera
         self.p_m = p_m
-        self.view, self.range_m = sight(p_m, self._camera)
+        self.view, self.range_m = view_and_range(p_m, self._camera)
 
     def _move(self, across_m: Vec3, along_m: float) -> None:
         """Move it on the sphere about the camera and along its view; its velocity turns with it.
@@ -276,7 +276,7 @@ class TrackFilter:
         self.p_m = add(self._camera, scale(here, range_m))
 
 
-def sight(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
+def view_and_range(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
     """Return the direction of a position and its distance, at least NEAREST_M."""
     x, y, z = p_m[0] - p_camera_m[0], p_m[1] - p_camera_m[1], p_m[2] - p_camera_m[2]
     far = sqrt(x * x + y * y + z * z)

@@ -199,7 +199,7 @@ class Perception:
 
         def turn() -> Vec3:
             (R_before, _), (R_after, _) = poses.pose_at(before), poses.pose_at(after)
-            return turning_rad_s(R_before, R_after, 2.0 * _HALF_TURN_S)
+            return rotation_rate_rad_s(R_before, R_after, 2.0 * _HALF_TURN_S)
 
         seen = [
             TrackedPoint(track.id, track.detection.p_world_m, track.v_world_m_s)

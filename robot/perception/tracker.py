@@ -25,7 +25,7 @@ from gazerig.robot.perception.data_association import (
     clothing_costs,
     pair_costs,
 )
-from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, sight
+from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, view_and_range
 from gazerig.robot.perception.returning_people import SeenPerson, find_returned
 from gazerig.robot.perception.track import FACE, UNNAMED, KnownClothes, LocalisedDetection, Track
 
@@ -468,7 +468,7 @@ def _mark(found: LocalisedDetection) -> int:
 
 
 def _sight(p_m: Vec3, p_camera: Vec3) -> tuple[float, float, float, float]:
-    (x, y, z), range_m = sight(p_m, p_camera)
+    (x, y, z), range_m = view_and_range(p_m, p_camera)
     return x, y, z, range_m
 
 

@@ -300,7 +300,7 @@ def label_samples(trace: GazeAngles) -> Labels:
     out, time_s = trace.movement[source], trace.time_s
     # Short pursuits become fixations, and short fixations within a pursuit become pursuit.
     for wanted, other in ((_PURSUIT, _FIXATION), (_FIXATION, _PURSUIT)):
-        for first, last in _runs(out):
+        for first, last in _value_runs(out):
             if out[first] != wanted or time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
                 continue
             before = out[first - 1] if first else 0
@@ -308,7 +308,7 @@ def label_samples(trace: GazeAngles) -> Labels:
             if wanted == _PURSUIT or (before == other and after == other):
                 out[first : last + 1] = other
     carried = (out == _FIXATION) & _is_carried(trace, source)
-    for first, last in _runs(carried.astype(np.int64)):
+    for first, last in _value_runs(carried.astype(np.int64)):
         if carried[first] and time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
             out[first : last + 1] = 0
     return Labels(lag_s, out, trace.blink[source], trace.looked_at[source])
@@ -371,18 +371,18 @@ def find_intervals(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval,
     speed = speed_deg_s(trace.time_s, trace.cyclopean_deg)
     found = [
         _interval(trace, labels, speed, first, last, MOVEMENTS[labels.movement[first]])
-        for first, last in _runs(key)
+        for first, last in _value_runs(key)
         if labels.movement[first]
     ]
     found += [
         _interval(trace, labels, speed, first, last, "blink")
-        for first, last in _runs(labels.blink.astype(np.int64))
+        for first, last in _value_runs(labels.blink.astype(np.int64))
         if labels.blink[first]
     ]
     return tuple(sorted(found, key=lambda s: (s.onset_s, s.event)))
 
 
-def _runs(key: Ints) -> list[tuple[int, int]]:
+def _value_runs(key: Ints) -> list[tuple[int, int]]:
     """Return first and last index of every run of equal values."""
     breaks = np.flatnonzero(np.diff(key)) + 1
     firsts = [0, *breaks.tolist()]

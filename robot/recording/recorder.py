@@ -30,7 +30,7 @@ from gazerig.robot.control.tick_stream import (
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, WorldInfo, as_text, started_ns
-from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, body_record_to_plain
+from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, body_record_as_plain
 from gazerig.robot.recording.writer_client import WriterClient
 
 _HEALTH_S = 1.0
@@ -187,7 +187,7 @@ class Recorder:
             records.clear()
             return _NOTHING
         before = [
-            body_record_to_plain(one)
+            body_record_as_plain(one)
             for one in records
             if not (type(one) is MeasuredJoints and one.joints is tick.joints)
         ]

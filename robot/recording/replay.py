@@ -25,8 +25,8 @@ from gazerig.robot.dashboard.feed.page_process import (
     MARK_KINDS,
     REPLAY,
     SPEEDS,
-    pack,
-    unpack,
+    decode_snapshot,
+    encode_snapshot,
 )
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.clock import Clock
@@ -226,7 +226,7 @@ class SnapshotIndex:
                 self._events += shown.events
                 self._events_at.extend([len(self._packed)] * len(shown.events))
                 self._times.append(at_s)
-                self._packed.append(zlib.compress(pack(shown), 1))
+                self._packed.append(zlib.compress(encode_snapshot(shown), 1))
             if len(self._packed) % _PROGRESS_EVERY == 0:
                 progress(at_s)
         if not self._packed:
@@ -257,7 +257,7 @@ class SnapshotIndex:
 
     def message_without_history(self, number: int) -> bytes:
         """Return a snapshot's message without its trail and events, which are shown only once."""
-        return pack(replace(unpack(self.message(number)), trail=(), events=()))
+        return encode_snapshot(replace(decode_snapshot(self.message(number)), trail=(), events=()))
 
     def message_with_history(self, first: int, number: int) -> bytes:
         """Return a snapshot's message with the joints and events since snapshot ``first``."""
@@ -266,13 +266,15 @@ class SnapshotIndex:
         trail: list[Trail] = []
         for past in range(max(first, self.at(from_s)), number + 1):
             if past >= closely:
-                trail += unpack(self.message(past)).trail
+                trail += decode_snapshot(self.message(past)).trail
             elif past % _THINNED == 0:
-                trail += unpack(self.message(past)).trail[-1:]
+                trail += decode_snapshot(self.message(past)).trail[-1:]
         since, until = (bisect_left(self._events_at, n) for n in (first, number + 1))
         events = self._events[max(since, until - _MOST_KEPT_EVENTS) : until]
-        shown = replace(unpack(self.message(number)), trail=tuple(trail), events=tuple(events))
-        return pack(shown)
+        shown = replace(
+            decode_snapshot(self.message(number)), trail=tuple(trail), events=tuple(events)
+        )
+        return encode_snapshot(shown)
 
     @property
     def has_pictures(self) -> bool:
@@ -462,7 +464,7 @@ def introduction(frames: SnapshotIndex) -> dict[str, object]:
     events = [m for m in frames.marks if m.kind == "event"]
     return {
         "marks": {
-            kind: counts([m for m in frames.marks if m.kind == kind], frames.duration_s)
+            kind: count_marks([m for m in frames.marks if m.kind == kind], frames.duration_s)
             for kind in MARK_KINDS
         },
         "events": [(round(m.at_s, 3), m.words[:_MOST_WORDS]) for m in events[:_MOST_EVENTS]],
@@ -470,7 +472,7 @@ def introduction(frames: SnapshotIndex) -> dict[str, object]:
     }
 
 
-def counts(marks: Sequence[Mark], duration_s: float) -> list[int]:
+def count_marks(marks: Sequence[Mark], duration_s: float) -> list[int]:
     """Count the marks in equal parts of the recording."""
     found = [0] * _MARKS
     for mark in marks:

@@ -88,7 +88,7 @@ _DESCRIPTIONS = {
 """Descriptions of fields by name."""
 
 
-def schema_of(kind: Any) -> Schema:
+def type_schema(kind: Any) -> Schema:
     """Return the JSON schema of a value of a type: classes with fields are objects.
 
     Args:
@@ -96,24 +96,24 @@ def schema_of(kind: Any) -> Schema:
     """
     if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
         fields = {
-            name: _describe(schema_of(of), text)
+            name: _describe(type_schema(of), text)
             if (text := _DESCRIPTIONS.get(name))
-            else schema_of(of)
+            else type_schema(of)
             for name, of in get_type_hints(kind).items()
         }
         return _object(**fields)
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, UnionType):  # of a type and None
-        schema = schema_of(inner[0])
+        schema = type_schema(inner[0])
         return {**schema, "type": [schema["type"], "null"]}
     if origin is np.ndarray:
         return {"type": "array"}
     if origin in (tuple, list):
-        return _list(schema_of(inner[0]))
+        return _list(type_schema(inner[0]))
     return {"type": _JSON_TYPES.get(kind, "string" if origin is Literal else "object")}
 
 
-_TICK = schema_of(TickRow)
+_TICK = type_schema(TickRow)
 _TICK["description"] = (
     "one tick of the control loop; frames: world at the neck base, x forward, y left, z up"
 )
@@ -122,7 +122,7 @@ _TICK["properties"]["commands"]["items"] = _ORDER
 for _unwritten in ("as_desired", "parking"):
     del _TICK["properties"][_unwritten]
 _PERCEPT = {
-    **_object(number=_WHOLE, **schema_of(Percept)["properties"]),
+    **_object(number=_WHOLE, **type_schema(Percept)["properties"]),
     "description": "content of one frame in world coordinates, by the head's pose at its capture",
 }
 _HEALTH = _describe(

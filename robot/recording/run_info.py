@@ -122,7 +122,7 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
     Raises:
         ValueError: A field is missing, is not JSON or has an impossible value.
     """
-    found = _read(text, {f.name for f in fields(RunInfo)})
+    found = _read_fields(text, {f.name for f in fields(RunInfo)})
     if isinstance(found.get("placement"), list):
         found["placement"] = tuple(found["placement"])
     try:
@@ -133,7 +133,7 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
     optional = [key for key in ("character", "scene") if getattr(info, key) is not None]
     if not all(isinstance(getattr(info, key), str) for key in (*texts, *optional)):
         raise ValueError("a name of the run is not text")
-    if not (_within(info.rate_hz, 1.0, 10_000.0) and _within(info.pictures_hz, 0.0, 1000.0)):
+    if not (_is_within(info.rate_hz, 1.0, 10_000.0) and _is_within(info.pictures_hz, 0.0, 1000.0)):
         raise ValueError(f"a control rate of {info.rate_hz} Hz")
     if type(info.seed) is not int or info.seed < 0:
         raise ValueError(f"the seed {info.seed}")
@@ -144,13 +144,13 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
     pose = info.placement
     if not isinstance(pose, tuple) or len(pose) not in (0, 12):
         raise ValueError("an invalid pose of the neck base")
-    if not all(_within(number, -1000.0, 1000.0) for number in pose):
+    if not all(_is_within(number, -1000.0, 1000.0) for number in pose):
         raise ValueError("an invalid pose of the neck base")
     started_ns(info)
     return info
 
 
-def _within(value: object, low: float, high: float) -> bool:
+def _is_within(value: object, low: float, high: float) -> bool:
     return type(value) in (int, float) and low <= value <= high  # type: ignore[operator]
 
 
@@ -160,10 +160,10 @@ def read_run_end(text: Mapping[str, str]) -> RunEnd:
     Raises:
         ValueError: A field is not JSON or has an impossible value.
     """
-    end = RunEnd(**_read(text, {f.name for f in fields(RunEnd)}))
+    end = RunEnd(**_read_fields(text, {f.name for f in fields(RunEnd)}))
     if not isinstance(end.stopped_by, str) or not isinstance(end.tx_sha256, str):
         raise ValueError("a field of the end is not text")
-    if type(end.lost) is not int or not (end.ran_s is None or _within(end.ran_s, 0.0, 1e9)):
+    if type(end.lost) is not int or not (end.ran_s is None or _is_within(end.ran_s, 0.0, 1e9)):
         raise ValueError("a field of the end is not a number")
     return end
 
@@ -186,7 +186,7 @@ def read_world_info(text: Mapping[str, str]) -> WorldInfo:
     return WorldInfo(name, script_yaml, seed, float(start_s))
 
 
-def _read(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:
+def _read_fields(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:
     """Read the fields that this version knows."""
     known = {key: value for key, value in text.items() if key in names}
     return {k: v if k.endswith("_yaml") else json.loads(v) for k, v in known.items()}

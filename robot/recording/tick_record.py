@@ -23,7 +23,7 @@ from gazerig.gaze.types import (
 )
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickRow
-from gazerig.robot.model.command_json import from_recording as command_from_json
+from gazerig.robot.model.command_json import from_recorded_json as command_from_json
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
     NO_GESTURE,
@@ -216,7 +216,7 @@ def _body_record(data: Json) -> BodyRecord:
     return made
 
 
-def body_record_to_plain(one: BodyRecord) -> tuple[str, Sequence[Any]]:
+def body_record_as_plain(one: BodyRecord) -> tuple[str, Sequence[Any]]:
     """Return a report of the machine: its name and plain values."""
     name = _BODY_RECORD_NAMES[type(one)]
     if isinstance(one, MeasuredJoints):

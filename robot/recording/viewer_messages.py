@@ -27,16 +27,16 @@ _SIGHT = {"r": 0.2, "g": 0.6, "b": 1.0, "a": 1.0}
 _AIM = {"r": 1.0, "g": 0.3, "b": 0.2, "a": 1.0}
 
 
-def stamp(ns: int) -> dict[str, int]:
+def time_stamp(ns: int) -> dict[str, int]:
     """Return a time in nanoseconds as a viewer's time stamp."""
     sec, nsec = divmod(ns, 1_000_000_000)
     return {"sec": sec, "nsec": nsec}
 
 
-def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
+def image_message(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
     """Return a JPEG as foxglove.CompressedImage, with its exposure in the rig's own time."""
     return {
-        "timestamp": stamp(at_ns),
+        "timestamp": time_stamp(at_ns),
         "frame_id": "camera",
         "format": "jpeg",
         "data": base64.b64encode(jpeg).decode("ascii"),
@@ -44,10 +44,10 @@ def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
     }
 
 
-def line(text: str, at_ns: int) -> Json:
+def log_message(text: str, at_ns: int) -> Json:
     """Return a text as foxglove.Log."""
     return {
-        "timestamp": stamp(at_ns), "level": _INFO, "message": text, "name": "gazerig", "file": "",
+        "timestamp": time_stamp(at_ns), "level": _INFO, "message": text, "name": "gazerig", "file": "",
         "line": 0,
     }  # fmt: skip
 
@@ -56,7 +56,7 @@ def joint_states(names: Sequence[str], joints: JointState, at_ns: int) -> Json:
     """Return measured joints as foxglove.JointStates in rad and rad/s."""
     rows = zip(names, joints.position_rad, joints.velocity_rad_s, strict=True)
     return {
-        "timestamp": stamp(at_ns),
+        "timestamp": time_stamp(at_ns),
         "joints": [{"name": n, "position": q, "velocity": v} for n, q, v in rows],
     }
 
@@ -75,7 +75,7 @@ def transforms(pose: GazeState, at_ns: int) -> Json:
     return {"transforms": [head, *turned]}
 
 
-def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json:
+def scene_message(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json:
     """Return faces, lines of sight and the gaze point as foxglove.SceneUpdate."""
     sights: list[Vec3] = []
     for p, angles in (
@@ -86,7 +86,7 @@ def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json
         sights += [p, add(p, rotate(R, (norm(sub(point_m, p)), 0.0, 0.0)))]
     entity: Json = {
         **{kind: [] for kind in UNUSED},
-        "timestamp": stamp(at_ns), "frame_id": "world", "id": "gaze", "lifetime": _FOREVER,
+        "timestamp": time_stamp(at_ns), "frame_id": "world", "id": "gaze", "lifetime": _FOREVER,
         "frame_locked": False,
         "spheres": [
             *(_sphere(face, 2.0 * _FACE_M, _SKIN) for face in faces), _sphere(point_m, 0.02, _AIM),
@@ -107,7 +107,7 @@ def orientation(R: Mat3) -> dict[str, float]:
 
 def _transform(parent: str, child: str, p: Vec3, R: Mat3, at_ns: int) -> Json:
     return {
-        "timestamp": stamp(at_ns), "parent_frame_id": parent, "child_frame_id": child,
+        "timestamp": time_stamp(at_ns), "parent_frame_id": parent, "child_frame_id": child,
         "translation": _xyz(p), "rotation": orientation(R),
     }  # fmt: skip
 

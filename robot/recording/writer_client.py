@@ -27,7 +27,7 @@ _TRIES = 8  # most messages per call, so that a writer that recovers delays no t
 _TIMEOUT_S = 15.0
 
 
-class _Piece(NamedTuple):
+class _QueuedMessage(NamedTuple):
     """A queued message: its bytes, and an image's file descriptor and size, or -1 and 0."""
 
     data: bytes
@@ -52,7 +52,7 @@ class WriterClient:
         self._patient = patient
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._queue: deque[_Piece] = deque()
+        self._queue: deque[_QueuedMessage] = deque()
         self._queued = self._images = 0
         self.failed = ""
         self.done: WrittenFile | None = None
@@ -88,7 +88,7 @@ class WriterClient:
         for at in range(0, len(data), writer.PIECE_BYTES):
             last = at + writer.PIECE_BYTES >= len(data)
             piece = data[at : at + writer.PIECE_BYTES]
-            self._enqueue(_Piece((writer.LAST if last else writer.MORE) + piece))
+            self._enqueue(_QueuedMessage((writer.LAST if last else writer.MORE) + piece))
         self._send_waiting()
         return True
 
@@ -100,11 +100,11 @@ class WriterClient:
         if self._socket is None or self._images > IMAGE_BYTES:
             os.close(fd)
             return False
-        self._enqueue(_Piece(writer.LAST + writer.FRAME + body, fd, image_bytes))
+        self._enqueue(_QueuedMessage(writer.LAST + writer.FRAME + body, fd, image_bytes))
         self._send_waiting()
         return True
 
-    def _enqueue(self, piece: _Piece) -> None:
+    def _enqueue(self, piece: _QueuedMessage) -> None:
         self._queue.append(piece)
         self._queued += len(piece.data)
         self._images += piece.image_bytes
@@ -173,7 +173,7 @@ class WriterClient:
             self._forget(self._queue.popleft())
             most -= 1
 
-    def _forget(self, piece: _Piece) -> None:
+    def _forget(self, piece: _QueuedMessage) -> None:
         """Free the resources of a queued message."""
         self._queued -= len(piece.data)
         self._images -= piece.image_bytes

@@ -70,7 +70,7 @@ class RecordRouter:
         self._at_s = data["t_s"] - self._first_s
         self._add(fmt.TICK, data)
         for event in data["events"]:
-            self._add(fmt.LOG, viewers.line(event, self._now_ns))
+            self._add(fmt.LOG, viewers.log_message(event, self._now_ns))
         for order in data["commands"]:
             self._add(fmt.ORDER, order)
         self._newest = row
@@ -81,7 +81,9 @@ class RecordRouter:
             pose, gaze = GazeState(*viewed.pose), GazeCommand(*viewed.gaze)
             self._add(fmt.JOINT_STATES, viewers.joint_states(names, joints, now_ns))
             self._add(fmt.TRANSFORMS, viewers.transforms(pose, now_ns))
-            self._add(fmt.SCENE, viewers.scene(pose, gaze.gaze_point_world_m, self._faces, now_ns))
+            self._add(
+                fmt.SCENE, viewers.scene_message(pose, gaze.gaze_point_world_m, self._faces, now_ns)
+            )
 
     def frame(self, captured_s: float, image: ImageArray) -> None:
         """Write a camera image as JPEG."""
@@ -89,7 +91,7 @@ class RecordRouter:
 
         first_s = self._first_s if self._first_s is not None else captured_s
         exposed_ns = self._writer.time_ns(captured_s - first_s)
-        self._add(fmt.FRAME, viewers.image(encode(image), captured_s, exposed_ns))
+        self._add(fmt.FRAME, viewers.image_message(encode(image), captured_s, exposed_ns))
 
     def health(self, bus: BusHealth, lost: int) -> None:
         """Write the bus counts and the servos' readings of the newest tick."""

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.errors import HeadEnded, NotFound, Refused
-from gazerig.robot.model.command_json import as_json, check
+from gazerig.robot.model.command_json import as_json, check_command
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     Ask,
@@ -42,7 +42,7 @@ from gazerig.robot.remote.socket_io import (
     VERSION,
     MalformedMessage,
     Wire,
-    dial,
+    connect_to_socket,
     folder,
     is_private,
     sockets,
@@ -228,13 +228,13 @@ class RobotClient:
         Raises:
             NoRobotError: no rig runs, or not exactly one fits; the message lists those that run.
         """
-        found = running(which, who)
+        found = connect_to_all(which, who)
         if len(found) == 1:
             return found[0]
         for other in found:
             other.close()
-        asked = "" if which is None else f" {_choice(which)}"
-        there = _names(running())
+        asked = "" if which is None else f" {_choice_text(which)}"
+        there = _names(connect_to_all())
         if not found:
             raise NoRobotError(
                 f"no rig{asked} is running: {there or 'start one with gazerig run ...'}"
@@ -500,7 +500,7 @@ class RobotClient:
 
     def _command(self, command: Command) -> CommandReply:
         try:
-            check(command)
+            check_command(command)
         except ValueError as error:
             raise RequestRejected(str(error)) from None
         fields = as_json(command)
@@ -514,7 +514,7 @@ class RobotClient:
         return tuple(cast(dict[str, list[str]], said)["notes"])
 
 
-def running(which: int | str | None = None, who: str = "") -> list[RobotClient]:
+def connect_to_all(which: int | str | None = None, who: str = "") -> list[RobotClient]:
     """Connect to every rig of this user that runs, or to those of one process or name.
 
     Args:
@@ -522,25 +522,27 @@ def running(which: int | str | None = None, who: str = "") -> list[RobotClient]:
         who: As in ``RobotClient.connect``.
     """
     if isinstance(which, str) and not which.isdecimal():
-        return _named(running(who=who), which)
+        return _select_by_name(connect_to_all(who=who), which)
     pid = None if which is None else int(which)
     uid = user_id()
-    place = folder(os.environ, uid)
+    place = socket_folder(os.environ, uid)
     if not is_private(place, uid):  # who put a socket there is not known
         return []
     found: list[RobotClient] = []
-    for path, number in sockets(place).items():
+    for path, number in find_sockets(place).items():
         if pid is None or number == pid:
             try:
-                found.append(RobotClient(_wire(path), number, who, partial(_wire, path)))
+                found.append(
+                    RobotClient(_connect_wire(path), number, who, partial(_connect_wire, path))
+                )
             except OSError:  # killed: the next rig that starts removes it
                 continue
     return found
 
 
-def _wire(path: Path) -> Wire:
+def _connect_wire(path: Path) -> Wire:
     """Connect to a rig's socket."""
-    return Wire(dial(path, CONNECT_S), ANSWER_BYTES)
+    return Wire(connect_to_socket(path, CONNECT_S), ANSWER_BYTES)
 
 
 def rig_name(rig: str) -> str:
@@ -548,12 +550,12 @@ def rig_name(rig: str) -> str:
     return Path(rig).stem
 
 
-def _choice(which: int | str) -> str:
+def _choice_text(which: int | str) -> str:
     """Return a chosen process or name as text."""
     return f"of process {which}" if str(which).isdecimal() else f"named {which}"
 
 
-def _named(rigs: list[RobotClient], name: str) -> list[RobotClient]:
+def _select_by_name(rigs: list[RobotClient], name: str) -> list[RobotClient]:
     """Return the rigs of a name, and close the other connections."""
     found = []
     for rig in rigs:

@@ -16,14 +16,14 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.robot.control.command_handler import Commandable, ParamAccess, PathGuard
+from gazerig.robot.control.command_handler import CommandTarget, ParamAccess, PathGuard
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.model.types import LoopFigures
-from gazerig.robot.remote.request_handler import Pulse, RequestHandler
+from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
 
 EVERY_S = 0.5
@@ -52,7 +52,7 @@ class FileState(NamedTuple):
     whole: bool
 
 
-def look(path: Path) -> FileState | None:
+def read_file_state(path: Path) -> FileState | None:
     """Return the state of a file; None if it cannot be read: absent, empty or not permitted."""
     try:
         stat, data = path.stat(), read_limited(path, _LARGEST)
@@ -141,18 +141,22 @@ class FileWatch:
         with self._lock:
             known = [one for one in self._watched if one.resolve() == same]
             for watched in known:
-                self._watched[watched].known(look(watched))
+                self._watched[watched].known(read_file_state(watched))
             if not known:
-                self._watched[path] = Debouncer(look(path))
+                self._watched[path] = Debouncer(read_file_state(path))
 
     def look(self) -> None:
         """Check all files once and report those that are new or stay missing."""
         with self._lock:
             files = dict.fromkeys(self._files())
             self._watched = {
-                path: self._watched.get(path) or Debouncer(look(path)) for path in files
+                path: self._watched.get(path) or Debouncer(read_file_state(path)) for path in files
             }
-            new = [path for path, settling in self._watched.items() if settling.update(look(path))]
+            new = [
+                path
+                for path, settling in self._watched.items()
+                if settling.update(read_file_state(path))
+            ]
         # Not under the lock: the receiver may wait for a thread that saves.
         for path in new:
             self._changed(path)
@@ -192,7 +196,7 @@ class LiveServer:
 
     def __init__(
         self,
-        robot: Commandable,
+        robot: CommandTarget,
         tuning: FileTuning,
         refusals: tuple[type[Exception], ...],
         clock: Clock,
@@ -206,7 +210,7 @@ class LiveServer:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
         self._say = say
-        self._pulse = Pulse(clock, timing)
+        self._pulse = LoopMonitor(clock, timing)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
         requests = RequestHandler(
@@ -287,7 +291,7 @@ class StopOnlyServer:
         say: Callable[[str], None],
     ) -> None:
         self._say = say
-        self._pulse = Pulse(clock)
+        self._pulse = LoopMonitor(clock)
         only = _StopOnlyRobot(command)
         requests = RequestHandler(only, None, self._pulse, about, fixed=_FIXED)
         self._server = RemoteServer(requests, say)

@@ -78,7 +78,7 @@ class Schemas:
         return found, [name for name in names if name not in optional]
 
 
-def _message(name: str, description: str, properties: Schema, needed: list[str]) -> Schema:
+def _message_schema(name: str, description: str, properties: Schema, needed: list[str]) -> Schema:
     tag = {"type": ["string", "integer"], "description": "comes back with the answer"}
     return {
         "title": name,
@@ -90,14 +90,14 @@ def _message(name: str, description: str, properties: Schema, needed: list[str])
     }
 
 
-def messages(schemas: Schemas) -> dict[str, Schema]:
+def message_schemas(schemas: Schemas) -> dict[str, Schema]:
     """Return the schema of each message of a program, by its verb."""
     found = {}
     for name, (text, kinds) in _REQUESTS.items():
         properties = {field: schemas.of(kind) for field, kind in kinds.items()}
-        found[name] = _message(name, text, properties, list(properties))
+        found[name] = _message_schema(name, text, properties, list(properties))
     for name, kind in ORDERS.items():
-        found[name] = _message(name, inspect.getdoc(kind) or "", *schemas.fields(kind))
+        found[name] = _message_schema(name, inspect.getdoc(kind) or "", *schemas.fields(kind))
     return found
 
 
@@ -106,7 +106,7 @@ def api_description(base: str) -> dict[str, Any]:
     """Return the OpenAPI description; ``base`` is the beginning of the paths."""
     schemas = Schemas()
     state, event, outcome = schemas.of(HeadState), schemas.of(HeadEvent), schemas.of(Outcome)
-    requests = messages(schemas)
+    requests = message_schemas(schemas)
     text = {"type": "string"}
     answer: Schema = {
         "type": "object",
@@ -118,7 +118,7 @@ def api_description(base: str) -> dict[str, Any]:
     named = {**schemas.named, **requests, "Answer": answer}
     of_answer = {"$ref": "#/components/schemas/Answer"}
     refusals = {
-        code: _answer(what, of_answer)
+        code: _response(what, of_answer)
         for code, what in {
             "400": "Not a message", "403": "Wrong token or another site", "409": "Refused",
             "413": "Too long", "429": "Too many requests", "503": "No head takes requests",
@@ -138,33 +138,33 @@ def api_description(base: str) -> dict[str, Any]:
         "state": (
             "get",
             "Newest state of the head; events numbered above after",
-            [_query("after", {"type": "integer", "minimum": 0})],
-            {"200": _answer("State", {"type": "object", "properties": {"ok": now}}), **bad},
+            [_query_parameter("after", {"type": "integer", "minimum": 0})],
+            {"200": _response("State", {"type": "object", "properties": {"ok": now}}), **bad},
         ),
         "do": (
             "post",
             "Send one message; the answer to an order has its outcome",
-            [_query("wait_s", {"type": "number", "minimum": 0, "maximum": MOST_WAIT_S, "default": WAIT_S})],
-            {"200": _answer("Done", of_answer), **refusals},
+            [_query_parameter("wait_s", {"type": "number", "minimum": 0, "maximum": MOST_WAIT_S, "default": WAIT_S})],
+            {"200": _response("Done", of_answer), **refusals},
         ),
         "socket": (
             "get",
             "Websocket: messages as of do, answers and outcomes; states at rate_hz; events",
             [
-                _query("rate_hz", {"type": "number", "minimum": 1, "maximum": MOST_RATE_HZ}),
-                _query("events", {"type": "boolean", "default": False}),
+                _query_parameter("rate_hz", {"type": "number", "minimum": 1, "maximum": MOST_RATE_HZ}),
+                _query_parameter("events", {"type": "boolean", "default": False}),
             ],
             {"101": {"description": "Open"}, **bad},
         ),
         "openapi.json": (
-            "get", "This description", [], {"200": _answer("OpenAPI 3.1", {"type": "object"})},
+            "get", "This description", [], {"200": _response("OpenAPI 3.1", {"type": "object"})},
         ),
     }  # fmt: skip
     paths: dict[str, Schema] = {
         f"{base}/{name}": {method: {"summary": text, "parameters": queries, "responses": answers}}
         for name, (method, text, queries, answers) in operations.items()
     }
-    paths[f"{base}/do"]["post"]["requestBody"] = {"required": True, **_json(body)}
+    paths[f"{base}/do"]["post"]["requestBody"] = {"required": True, **_json_content(body)}
     return {
         "openapi": "3.1.0",
         "info": {
@@ -185,13 +185,13 @@ def api_description(base: str) -> dict[str, Any]:
     }
 
 
-def _json(schema: Schema) -> Schema:
+def _json_content(schema: Schema) -> Schema:
     return {"content": {"application/json": {"schema": schema}}}
 
 
-def _answer(description: str, schema: Schema) -> Schema:
-    return {"description": description, **_json(schema)}
+def _response(description: str, schema: Schema) -> Schema:
+    return {"description": description, **_json_content(schema)}
 
 
-def _query(name: str, schema: Schema) -> Schema:
+def _query_parameter(name: str, schema: Schema) -> Schema:
     return {"name": name, "in": "query", "required": False, "schema": schema}

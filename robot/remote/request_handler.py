@@ -30,11 +30,16 @@ from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
-from gazerig.robot.control.tick_text import camera_conditions, control_text, doing, leader
+from gazerig.robot.control.tick_text import (
+    camera_conditions,
+    control_text,
+    head_activity,
+    tick_control_source,
+)
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.command_json import signed
+from gazerig.robot.model.command_json import set_client
 from gazerig.robot.model.commands import REPEATED, Command
-from gazerig.robot.model.control_source import sentence
+from gazerig.robot.model.control_source import control_sentence
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.socket_io import VERSION
@@ -50,7 +55,7 @@ _HANGS = (
 )
 
 
-class Pulse:
+class LoopMonitor:
     """Newest tick, and whether the loop is running.
 
     Args:
@@ -97,7 +102,7 @@ class Pulse:
         tick = self._feed.newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
-        does, leads = doing(tick), leader(tick)
+        does, leads = head_activity(tick), tick_control_source(tick)
         measured = zip(tick.guard_result.joints, tick.joints.position_rad, strict=True)
         return {
             "ticks": self._feed.ticks,
@@ -107,7 +112,7 @@ class Pulse:
             "led": tick.led,
             "lead": control_text(tick),
             "leads": leads.kind,
-            "leads_words": sentence(leads, tick.t_s),
+            "leads_words": control_sentence(leads, tick.t_s),
             "headline": does.headline,
             "busy": busy_text(self._timing()),
             "limited": [
@@ -158,9 +163,9 @@ class RequestHandler:
 
     def __init__(
         self,
-        robot: Commandable,
+        robot: CommandTarget,
         params: ParamAccess | None,
-        pulse: Pulse,
+        pulse: LoopMonitor,
         about: Mapping[str, object],
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
@@ -207,7 +212,7 @@ class RequestHandler:
             match request:
                 case {"do": "hello", "version": int(version), **rest} if not rest:
                     return {"ok": self._greeting(version), **tag}
-            done = handler.do(request, partial(_with_client, peer))
+            done = handler.do(request, partial(_set_client, peer))
             return {"ok": self._outcome_json(done), **tag}
         except _CommandRefused as error:
             return {"refused": str(error), "reply": error.reply.as_json(), **tag}
@@ -265,10 +270,10 @@ class RequestHandler:
         return {"notes": list(notes)}
 
 
-def _with_client(peer: str, command: Command) -> Command:
+def _set_client(peer: str, command: Command) -> Command:
     """Return a command with the client's process: it cannot pose as another, or as the page."""
     who = str(getattr(command, "who", ""))
-    return signed(command, f"{who} ({peer})" if who else peer) if peer else command
+    return set_client(command, f"{who} ({peer})" if who else peer) if peer else command
 
 
 def is_stop(request: object) -> bool:

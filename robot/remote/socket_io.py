@@ -68,7 +68,7 @@ class MalformedMessage(ValueError):
         self.over = over
 
 
-def folder(environ: Mapping[str, str], uid: int) -> Path:
+def socket_folder(environ: Mapping[str, str], uid: int) -> Path:
     """Return the folder of a user's sockets; it may not exist."""
     for runtime in (environ.get("XDG_RUNTIME_DIR"), f"/run/user/{uid}"):
         # unset, or left over from another user by sudo or su
@@ -108,7 +108,7 @@ def is_private(path: Path, uid: int) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == uid and not found.st_mode & 0o077
 
 
-def sockets(path: Path) -> dict[Path, int]:
+def find_sockets(path: Path) -> dict[Path, int]:
     """Return path -> process id of the sockets in a folder, including dead ones."""
     found = path.glob("*.sock") if path.is_dir() else ()
     pids = {place: place.stem.partition("-")[0] for place in sorted(found)}
@@ -124,14 +124,14 @@ def unused_path(path: Path, pid: int) -> Path:
     return name
 
 
-def dial(path: Path, within_s: float) -> socket.socket:
+def connect_to_socket(path: Path, within_s: float) -> socket.socket:
     """Connect to a rig's socket.
 
     Raises:
         OSError: there is no answer; ConnectionRefusedError if the process is dead.
     """
     if not HAS_SOCKET_FILES:
-        return _dial_port(path, within_s)
+        return _connect_to_port(path, within_s)
     caller = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         caller.settimeout(within_s)
@@ -142,7 +142,7 @@ def dial(path: Path, within_s: float) -> socket.socket:
     return caller
 
 
-def _dial_port(path: Path, within_s: float) -> socket.socket:
+def _connect_to_port(path: Path, within_s: float) -> socket.socket:
     """Connect to the port in a file, and send the token."""
     port, _, token = path.read_text(encoding="ascii").partition(" ")
     if not port.isdecimal():
@@ -195,7 +195,7 @@ class Listener:
             OSError: the caller is gone.
         """
         if not self._token:
-            found = peer(caller)
+            found = identify_peer(caller)
             # The folder is closed to others; this is a second check.
             return found if found.uid == user_id() else None
         caller.settimeout(_TOKEN_S)
@@ -261,7 +261,7 @@ def _listen_on_port(path: Path, early: Path) -> Listener:
     return Listener(listener, token)
 
 
-def peer(end: socket.socket) -> Peer:
+def identify_peer(end: socket.socket) -> Peer:
     """Return the peer of a Unix socket.
 
     Raises:
@@ -272,12 +272,12 @@ def peer(end: socket.socket) -> Peer:
     return Peer(pid, uid)
 
 
-def clear_dead(path: Path) -> tuple[int, ...]:
+def remove_dead_sockets(path: Path) -> tuple[int, ...]:
     """Remove the sockets of killed rigs; return their process ids."""
     dead: list[int] = []
-    for place, pid in sockets(path).items():
+    for place, pid in find_sockets(path).items():
         try:
-            dial(place, 0.2).close()
+            connect_to_socket(place, 0.2).close()
         except ConnectionRefusedError:
             place.unlink(missing_ok=True)
             dead.append(pid)

@@ -30,7 +30,7 @@ EACH = RequestRate(0.06, 0.2)
 ALL = RequestRate(0.1, 0.4)
 
 
-class Budget:
+class ProcessorBudget:
     """Token bucket of processor time.
 
     Args:
@@ -87,7 +87,7 @@ class RemoteServer:
         self._requests = requests
         self._say = say
         self._clock = RealClock()
-        self._budget = Budget(ALL, self._clock.now_s())
+        self._budget = ProcessorBudget(ALL, self._clock.now_s())
         self.path: Path | None = None
         self._listener: Listener | None = None
         self._lock = threading.Lock()
@@ -101,9 +101,9 @@ class RemoteServer:
             SetupError: no socket can be opened; the message names the reason.
         """
         uid = remote_socket.user_id()
-        folder = remote_socket.folder(os.environ, uid)
+        folder = remote_socket.socket_folder(os.environ, uid)
         remote_socket.make_private(folder, uid)
-        remote_socket.clear_dead(folder)
+        remote_socket.remove_dead_sockets(folder)
         with _NAMING:
             self.path = remote_socket.unused_path(folder, os.getpid())
             self._listener = remote_socket.listen(self.path)
@@ -171,7 +171,7 @@ class RemoteServer:
 
     def _serve(self, wire: Wire, peer: str) -> None:
         """Answer one program until it disconnects or its data cannot be parsed."""
-        own = Budget(EACH, self._clock.now_s())
+        own = ProcessorBudget(EACH, self._clock.now_s())
         try:
             while self._serve_request(wire, peer, own):
                 pass
@@ -180,7 +180,7 @@ class RemoteServer:
                 self._wires.pop(wire, None)
             wire.close()
 
-    def _serve_request(self, wire: Wire, peer: str, own: Budget) -> bool:
+    def _serve_request(self, wire: Wire, peer: str, own: ProcessorBudget) -> bool:
         """Answer one request; return whether another can follow."""
         try:
             request = wire.read(None, _REST_S)
@@ -206,7 +206,7 @@ class RemoteServer:
         self._budget.spend(used_s, now_s)
         return taken
 
-    def _delay(self, own: Budget) -> str:
+    def _delay(self, own: ProcessorBudget) -> str:
         """Delay a program that uses too much time; return the reason if it is refused."""
         now_s = self._clock.now_s()
         wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))

@@ -93,11 +93,11 @@ class Collisions:
     ) -> bool:
         """Put up the keeper's wall; return False if both joints are inside their ranges."""
         keeper = self._keeper[k]
-        if not _side(pair[keeper], motion):
+        if not _present_side(pair[keeper], motion):
             keeper = 1 - keeper
-            if not _side(pair[keeper], motion):
+            if not _present_side(pair[keeper], motion):
                 return False
-        elif _side(pair[1 - keeper], motion):
+        elif _present_side(pair[1 - keeper], motion):
             other = pair[1 - keeper]
             eager = _crosses(pair[keeper], motion, desired)
             if eager and not _crosses(other, motion, desired) and _is_outside(other, position):
@@ -132,7 +132,7 @@ class Collisions:
             self.exits[joint] = max(farther, key=lambda angle: abs(angle - now))
 
 
-def _side(span: ForbiddenRange, motion: MotionLimiter) -> int:
+def _present_side(span: ForbiddenRange, motion: MotionLimiter) -> int:
     """Return the side on which a joint is and can stay: -1 below, 1 above, 0 neither."""
     if motion.keeps_below(span.joint, span.below):
         return -1
@@ -142,7 +142,7 @@ def _side(span: ForbiddenRange, motion: MotionLimiter) -> int:
 def _put_wall(span: ForbiddenRange, motion: MotionLimiter) -> None:
     """Limit a joint to its present side."""
     i = span.joint
-    if _side(span, motion) < 0:
+    if _present_side(span, motion) < 0:
         motion.wall_above(i, span.below)
     else:
         motion.wall_below(i, span.above)

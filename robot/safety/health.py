@@ -84,9 +84,9 @@ class JointHealth:
         self.fine = min(self.share) == 1.0 and not any(self.held)
 
     def _judge(self, i: int, joints: JointState, dt_s: float) -> None:
-        heat = self._heat(i, _value(joints.temperature_c, i))
-        load = self._load(i, _value(joints.load, i), dt_s)
-        volts = self._volts(i, _value(joints.voltage_v, i), dt_s)
+        heat = self._heat(i, _joint_value(joints.temperature_c, i))
+        load = self._load(i, _joint_value(joints.load, i), dt_s)
+        volts = self._volts(i, _joint_value(joints.voltage_v, i), dt_s)
         share = min(heat, load, volts)
         slowest = self._params.slowest
         self.share[i] = slowest + (1.0 - slowest) * share
@@ -136,7 +136,7 @@ class JointHealth:
         return max(room / self._params.voltage_margin_v, 0.0) if room > 0.0 else 0.0
 
 
-def _value(column: Sequence[float | None], i: int) -> float | None:
+def _joint_value(column: Sequence[float | None], i: int) -> float | None:
     """Return one joint's value, None if it is unknown."""
     value = column[i] if column else None
     return value if value is not None and isfinite(value) else None

@@ -28,7 +28,7 @@ from gazerig.features.bringup.cli.calibration_keys import (
     key_and_count,
     keys_of,
 )
-from gazerig.robot.app.run_observers import stop_only_taker
+from gazerig.robot.app.run_observers import stop_only_handler
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.remote.client import RequestRejected, RobotClient
@@ -301,7 +301,7 @@ def test_what_is_on_the_buttons_is_what_keys_there_are() -> None:
 
 def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
     given: list[Command] = []
-    order = stop_only_taker(given.append)
+    order = stop_only_handler(given.append)
     order(Stop("a test"))
     order(Resume())
     for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),)), Ask("behaviour", "guard")):

@@ -35,7 +35,7 @@ from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
 from gazerig.robot.model.coupling import Differential
 from gazerig.robot.model.coupling_params import CoupledPair
-from gazerig.robot.model.gesture_fit import motions
+from gazerig.robot.model.gesture_fit import gesture_motions
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -316,7 +316,7 @@ def test_a_head_moved_by_hand_becomes_a_gesture_that_moves_it_so(tmp_path: Path)
     gesture = load_gesture(path)
     assert gesture.space == "joint" and len(gesture.frames) < 40
     assert fitted.slowed_by == 1.0
-    motion = motions(gesture, DESK.names).motion
+    motion = gesture_motions(gesture, DESK.names).motion
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at).value)
     wanted = np.array([how(t)["neck_pitch"] for t in at])

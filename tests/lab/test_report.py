@@ -194,7 +194,7 @@ def test_every_measure_has_its_band_and_every_band_its_source(walking: GazeTrace
     keys = [measure.key for measure in measure_run(walking)]
     assert len(set(keys)) == len(keys) and set(keys) <= set(bands.BY_KEY)
     for mode in ("talk", "listen", "think", "none"):
-        assert any(bands.applies(band, mode) for band in bands.BANDS if band.mode)
+        assert any(bands.band_applies(band, mode) for band in bands.BANDS if band.mode)
     for band in bands.BANDS:
         assert band.low < band.high and band.min_events >= 1 and band.group in bands.GROUPS
         assert re.search(r"\d{4}|Nakamoto|Mitake|the same|healthy|log-normal|stare|fixations",

@@ -21,7 +21,7 @@ from gazerig.features.world.run.head_group import (
     overload_message,
 )
 from gazerig.features.world.run.shared_world import Lockstep
-from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
+from gazerig.robot.analysis.mutual_gaze import HeadPlacement, mutual_gaze
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.description.links import IDENTITY
@@ -168,8 +168,8 @@ def test_two_recordings_report_the_figures_of_the_run(tmp_path: Path) -> None:
 
 def test_the_report_refuses_a_head_that_was_alone_and_one_head_twice() -> None:
     report = pytest.importorskip("gazerig.features.lab.report.heads").mutual_gaze_report
-    here, there = HeadPlace(IDENTITY, (0.0, 0.0, 0.0)), HeadPlace(IDENTITY, (1.0, 0.0, 0.0))
-    assert HeadPlace.from_numbers(there.as_numbers) == there
+    here, there = HeadPlacement(IDENTITY, (0.0, 0.0, 0.0)), HeadPlacement(IDENTITY, (1.0, 0.0, 0.0))
+    assert HeadPlacement.from_numbers(there.as_numbers) == there
     with pytest.raises(SetupError, match="^b is from a run with one head"):
         report(((), ()), (here.as_numbers, ()), ("a", "b"))
     with pytest.raises(SetupError, match="are from the same head"):

@@ -32,7 +32,7 @@ from gazerig.features.bringup.calibration.charuco_views import board_poses
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import DetectedBoard
-from gazerig.robot.model.frames import CameraParams, mounted_at
+from gazerig.robot.model.frames import CameraParams, camera_at_pose
 from gazerig.robot.model.intrinsics import project
 
 Floats = NDArray[np.float64]
@@ -369,7 +369,7 @@ class HandEye:
 
     def camera_params(self, params: CameraParams) -> CameraParams:
         """Return the camera at the place found, rounded to 0.1 mm and 0.01 deg."""
-        found = mounted_at(params, self.R_head_camera, self.p_head_camera_m)
+        found = camera_at_pose(params, self.R_head_camera, self.p_head_camera_m)
         x, y, z = (round(mm, 1) for mm in found.position_mm)
         return replace(
             found,

@@ -41,7 +41,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, completed
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
 from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
@@ -89,7 +89,7 @@ def doctor(
         if as_json:
             rows = [finding_json(one, bus) for bus, some in findings.items() for one in some]
             rows += [finding_json(one, "") for one in eyes]
-            rows = [row | {"cure": completed(str(row["cure"]))} for row in rows]
+            rows = [row | {"cure": complete_suggestions(str(row["cure"]))} for row in rows]
             print(json.dumps(rows))
         whole = [*(one for some in findings.values() for one in some), *eyes]
         tell(summarize(whole, rig, fix))
@@ -136,13 +136,13 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[
 
 def _print_line(line: str) -> None:
     """Print a line of the doctor's; all lines go to one stream, so that their order stays."""
-    level, space, rest = completed(line).partition(" ")
+    level, space, rest = complete_suggestions(line).partition(" ")
     out = console()
     if level in STYLES:
         out.print(f"[{STYLES[level]}]{level:5}[/]", end=space)
         out.print(rest, markup=False)
     else:
-        out.print(completed(line), markup=False)
+        out.print(complete_suggestions(line), markup=False)
 
 
 def _apply_fixes(

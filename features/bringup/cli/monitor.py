@@ -34,7 +34,7 @@ from gazerig.features.bringup.telemetry import (
     as_json,
 )
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
+from gazerig.robot.cli.terminal import RigArgument, clear_errors, record_signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.joint import JointParams
@@ -65,7 +65,7 @@ def monitor(
 ) -> None:
     """Show the readings of all servos; nothing is written to them, the torque stays as it is."""
     leaving = contextlib.suppress(KeyboardInterrupt)
-    with clear_errors(rig, port, mock), signals() as stopped, leaving:
+    with clear_errors(rig, port, mock), record_signals() as stopped, leaving:
         stopped.tolerated = 0  # nothing to park: what waits for a stopped terminal ends at once
         found, clock = load_rig(rig), RealClock()
         refuse_packages(found, "monitor")

@@ -24,7 +24,7 @@ from gazerig.features.bringup.manual_control import (
 )
 from gazerig.robot.app.rig_limits import lid_ends, limits
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
 from gazerig.robot.control.event_text import group_events
 
 app = typer.Typer()
@@ -169,7 +169,11 @@ def _manual_control(
                 "Is no hand in the mechanism?",
                 yes,
             )
-    with clear_errors(name, port, mock), signals() as stopped, rig_ports(rig, mock, port) as wire:
+    with (
+        clear_errors(name, port, mock),
+        record_signals() as stopped,
+        rig_ports(rig, mock, port) as wire,
+    ):
         gentle = rig.guard.soft_start_speed_deg_s
         if speed > gentle:
             say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")

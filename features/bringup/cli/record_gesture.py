@@ -22,7 +22,7 @@ from gazerig.features.bringup.cli.ports import (
 from gazerig.features.bringup.hand_recording import LONGEST_S, record, switch_off
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
-from gazerig.robot.cli.gestures import FolderOption, say_written
+from gazerig.robot.cli.gestures import FolderOption, print_gesture_fit
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
@@ -72,7 +72,11 @@ def record_gesture(
             yes,
         )
         clock, there = RealClock(), {one: loaded.joints[one] for one in measured}
-        with signals() as stopped, rig_ports(loaded, mock, port) as wire, ExitStack() as ports:
+        with (
+            record_signals() as stopped,
+            rig_ports(loaded, mock, port) as wire,
+            ExitStack() as ports,
+        ):
             readers = {}
             for bus in dict.fromkeys(joint.bus for joint in there.values()):
                 line = ports.enter_context(open_port(loaded, wire, bus))
@@ -91,4 +95,4 @@ def record_gesture(
         for one in recorded.left_out:
             say(f"{one}: answered too seldom and is left out")
         text = gesture_text(loaded, recorded.series, "recorded by hand")
-        say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
+        print_gesture_fit(loaded.name, *write_gesture(loaded, name, text, folder, force))

@@ -39,7 +39,7 @@ from gazerig.features.bringup.cli.ports import (
 from gazerig.features.bringup.doctor.run import name_ports
 from gazerig.features.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
-from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, completed, say
+from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
 
 app = typer.Typer()
 
@@ -261,7 +261,7 @@ def _show(
         ):
             out.print(f"{where}: {line}", markup=False)
     for line in remarks(rounds, where, requested):
-        out.print(completed(line), markup=False)
+        out.print(complete_suggestions(line), markup=False)
 
 
 def remarks(

@@ -39,7 +39,7 @@ from gazerig.features.bringup.channel_test import FINE_STEPS, ChannelPosition, g
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import clipping_text, instructions, settings_file
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.cli.terminal import say, signals
+from gazerig.robot.cli.terminal import record_signals, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
 
@@ -122,7 +122,7 @@ def _walk_channel(
         KeyboardInterrupt: the user requested the end.
     """
     clock = RealClock()
-    with signals() as stopped:
+    with record_signals() as stopped:
         stopped.never_raise()
 
         def sleep_until(t_s: float) -> None:

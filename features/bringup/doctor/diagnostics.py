@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from gazerig.robot.control.event_text import runs
+from gazerig.robot.control.event_text import format_ranges
 
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
@@ -91,7 +91,7 @@ def join_places(places: Sequence[str]) -> str:
     if len(places) == 1 or len(found) < len(places) or len(nouns) > 1:
         return ", ".join(places)
     names = ", ".join(match[1] for match in found)
-    return f"{names} ({nouns.pop()}s {runs([int(match[3]) for match in found])})"
+    return f"{names} ({nouns.pop()}s {format_ranges([int(match[3]) for match in found])})"
 
 
 def finding_json(finding: Diagnostic, bus: str) -> dict[str, object]:

@@ -12,7 +12,7 @@ from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.progress_bar import Steps, progress_bar
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
-from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
 
 if TYPE_CHECKING:
     from gazerig.config.rig import Rig
@@ -187,7 +187,7 @@ def _simulate_run(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeT
         start_s[:] = start_s or [tick.t_s]
         tell(text, min(1.0, (tick.t_s - start_s[0]) / seconds))
 
-    with signals() as stopped:
+    with record_signals() as stopped:
         run = simulate(rig, options, stopped, watch)
     layers = ("rig", options.rig), ("character", options.character), ("profile", options.profile)
     facts = (

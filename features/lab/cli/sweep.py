@@ -15,7 +15,14 @@ from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import FAULT, INTERRUPTED, RigArgument, clear_errors, say, signals
+from gazerig.robot.cli.terminal import (
+    FAULT,
+    INTERRUPTED,
+    RigArgument,
+    clear_errors,
+    record_signals,
+    say,
+)
 from gazerig.robot.cli.tune import read_value
 
 if TYPE_CHECKING:
@@ -240,7 +247,7 @@ def _running_sweep(
     try:
         with (
             progress_bar(remaining=True) as tell,
-            signals() as stopped,
+            record_signals() as stopped,
             open_sweep(spec, folder, jobs, stopped) as work,
         ):
 

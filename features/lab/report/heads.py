@@ -9,7 +9,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report.plotting import COLOURS, Figure, label, png_of
 from gazerig.features.lab.report.statistics import number
 from gazerig.robot.analysis.mutual_gaze import (
-    HeadPlace,
+    HeadPlacement,
     MutualGazeTrace,
     MutualLooks,
     bridge_gaps,
@@ -127,7 +127,7 @@ def mutual_gaze_report(
             f"{names[0]} and {names[1]} are from the same head: --with takes the other's"
         )
     trace = MutualGazeTrace(
-        HeadPlace.from_numbers(placements[0]), HeadPlace.from_numbers(placements[1])
+        HeadPlacement.from_numbers(placements[0]), HeadPlacement.from_numbers(placements[1])
     )
     both = merge(
         ((tick.t_s, 0, tick) for tick in ticks[0]),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from gazerig.robot.analysis.blink_finder import UPPER
 from gazerig.robot.analysis.human_norms import GROUPS, LIDS, PARALLEL
 from gazerig.robot.control.feedback_basis import Basis, basis_of
-from gazerig.robot.model.types import in_order
+from gazerig.robot.model.types import order_joints
 
 
 @dataclass(frozen=True)
@@ -106,4 +106,4 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
 
 def joints_of(names: Iterable[str], estimated: Iterable[str]) -> JointBasis:
     """Return the basis from the joints of ticks."""
-    return JointBasis(in_order(names), in_order(estimated))
+    return JointBasis(order_joints(names), order_joints(estimated))

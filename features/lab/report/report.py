@@ -25,7 +25,7 @@ from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.page import Figure, RunHeader, report_page, write_all
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, basis_text, png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
-from gazerig.robot.analysis.human_norms import BY_KEY, applies
+from gazerig.robot.analysis.human_norms import BY_KEY, band_applies
 from gazerig.robot.control.tick import Tick
 
 Progress = Callable[[str, float], None]
@@ -109,7 +109,7 @@ def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
         m
         for group in each
         for m in group
-        if applies(BY_KEY[m.key], run.mode) and not run.joints.left_out(m.key)
+        if band_applies(BY_KEY[m.key], run.mode) and not run.joints.left_out(m.key)
     )
 
 

@@ -13,7 +13,7 @@ from gazerig.robot.app.options import RunOptions, parse_camera, parse_host_port
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.progress_bar import progress_bar
-from gazerig.robot.cli.terminal import clear_errors, say, signals
+from gazerig.robot.cli.terminal import clear_errors, record_signals, say
 
 if TYPE_CHECKING:
     from gazerig.features.study.data_folder import StudyData
@@ -90,7 +90,7 @@ def run(
         films = {} if head is not None else _films(found, folder)
         plan = SessionPlan(found, folder, participant, parse_host_port(page), films, head)
         browse = open_page if not no_browser and is_desktop_here() else None
-        with signals() as stopped:
+        with record_signals() as stopped:
             print(run_session(plan, stopped, say, RealClock(), browse))
 
 

@@ -29,7 +29,7 @@ from gazerig.features.study.screens import (
 )
 from gazerig.features.study.study_run import StudyRun
 from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
-from gazerig.robot.dashboard.requests.outbox import ASKED_BYTES, from_browser
+from gazerig.robot.dashboard.requests.outbox import ASKED_BYTES, add_client
 
 HeadHealth = Literal["none", "alive", "late", "fault", "stopped"]
 """none: films are shown; late: it does not answer; stopped: its torque is off."""
@@ -177,14 +177,14 @@ class ExperimenterLine:
         async for message in line:
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
-            status, text = await self._run_request(from_browser(message.data, WHO))
+            status, text = await self._run_request(add_client(message.data, WHO))
             async with asyncio.timeout(TAKES_S):
                 await line.send_str(json.dumps({"answer": status, "words": text}))
 
     async def _handle_request(self, request: web.Request) -> web.Response:
         async with asyncio.timeout(_READ_S):
             body = await request.read()
-        status, text = await self._run_request(from_browser(body, WHO))
+        status, text = await self._run_request(add_client(body, WHO))
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=HEADERS)
 
     async def _run_request(self, asked: dict[str, object] | None) -> tuple[int, str]:

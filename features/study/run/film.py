@@ -27,7 +27,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.description.files import description_files
-from gazerig.robot.model.types import in_order
+from gazerig.robot.model.types import order_joints
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
 SIZE_PX, RATE_HZ = 720, 25.0
@@ -131,7 +131,7 @@ def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None
     """
     seconds = study.design.trials.seconds
     rig = study.rigs[key]
-    names = in_order(rig.joints)
+    names = order_joints(rig.joints)
     seen = assemble(rig, _options(study, 1.0))
     try:
         people = () if seen.scene is None else seen.scene.people(0.0)

@@ -17,7 +17,7 @@ from gazerig.features.world.run.shared_world import (
     SimulatedWorld,
 )
 from gazerig.features.world.world_scene import HeadsScene, RigFrame
-from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
+from gazerig.robot.analysis.mutual_gaze import HeadPlacement, MutualGazeTrace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
@@ -168,7 +168,7 @@ class HeadGroup:
         self._failures: list[BaseException] = []
         self._ending: set[int] = set()
         self._print_lock = threading.Lock()
-        places = [HeadPlace(member.frame.R, member.frame.p_m) for member in members]
+        places = [HeadPlacement(member.frame.R, member.frame.p_m) for member in members]
         self._traces = [MutualGazeTrace(places[0], other) for other in places[1:]]
 
     def run(

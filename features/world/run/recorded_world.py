@@ -12,7 +12,7 @@ from gazerig.features.world.run.run_world import mjcf_of, world_script
 from gazerig.features.world.shapes import ShapesFrom, script_shapes
 from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import RigFrame
-from gazerig.robot.analysis.mutual_gaze import HeadPlace
+from gazerig.robot.analysis.mutual_gaze import HeadPlacement
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.recording.run_info import WorldInfo
@@ -46,7 +46,11 @@ def recorded_shapes(info: WorldInfo, placement: tuple[float, ...]) -> WorldShape
         hint = extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))
         raise SetupError(f"the room is not shown: {hint}")
     shapes = script_shapes(Figures(_script(info), info.seed))
-    return ShapesFrom(shapes, RigFrame(*HeadPlace.from_numbers(placement))) if placement else shapes
+    return (
+        ShapesFrom(shapes, RigFrame(*HeadPlacement.from_numbers(placement)))
+        if placement
+        else shapes
+    )
 
 
 def _script(info: WorldInfo) -> SceneScript:

@@ -20,7 +20,7 @@ from gazerig.features.world.world_scene import HeadFace, RigFrame
 from gazerig.features.world.world_spec import state_file
 from gazerig.gaze.angles import add, rotate, rotation
 from gazerig.gaze.types import Vec3
-from gazerig.robot.analysis.mutual_gaze import HeadPlace
+from gazerig.robot.analysis.mutual_gaze import HeadPlacement
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
@@ -143,7 +143,7 @@ class SimulatedWorld:
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
         """Return the world from the view of one of the heads."""
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        placement = HeadPlace(*self.frames[number]).as_numbers
+        placement = HeadPlacement(*self.frames[number]).as_numbers
         return simulated_room(
             rig, options, self._lockstep.clock(number), world, self._world, placement
         )
@@ -192,7 +192,7 @@ class RealTimeWorld:
         # Other heads use the world until ``close`` ends it.
         served = ServedRig(self._buses, self._paths[number], lambda: None)
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        placement = HeadPlace(*self.frames[number]).as_numbers
+        placement = HeadPlacement(*self.frames[number]).as_numbers
         return served_room(rig, options, RealClock(), world, served, placement)
 
     def enter(self, number: int) -> None:

@@ -24,7 +24,7 @@ from aiohttp.typedefs import Handler, Middleware
 from gazerig.robot.dashboard.door.admission import API, Admission
 from gazerig.robot.dashboard.door.browsers import Browsers, Connections, TabLimits
 from gazerig.robot.dashboard.door.page_files import PageFiles
-from gazerig.robot.dashboard.door.programs import Programs
+from gazerig.robot.dashboard.door.programs import ProgramRoutes
 from gazerig.robot.dashboard.door.sockets import (
     TAKES_S,
     TakePicture,
@@ -33,13 +33,13 @@ from gazerig.robot.dashboard.door.sockets import (
     close_socket,
     until_one_ends,
 )
-from gazerig.robot.dashboard.door.viser_server import VIEW, ViewAddress, ViewProxy, client_of
+from gazerig.robot.dashboard.door.viser_server import VIEW, ViewAddress, ViewProxy, view_client
 from gazerig.robot.dashboard.requests.outbox import (
     ASKED_BYTES,
     TokenBucket,
-    compact,
-    from_browser,
-    leads,
+    add_client,
+    encode_request,
+    takes_control,
 )
 from gazerig.robot.dashboard.requests.rig_relay import RigRelay
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
@@ -129,7 +129,7 @@ class AuthProxy:
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
         self._relay = RigRelay(rig)
-        self._programs = Programs(self._relay, stop, self._over, _HEADERS)
+        self._programs = ProgramRoutes(self._relay, stop, self._over, _HEADERS)
         self._opened = threading.Event()
         self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
@@ -193,7 +193,7 @@ class AuthProxy:
         await runner.setup()
         assert runner.server is not None
         self._connections = Connections(runner.server)
-        async with client_of(self._inside) as client:
+        async with view_client(self._inside) as client:
             self._view = ViewProxy(client, self._connections, _HEADERS)
             try:
                 listener = await self._loop.create_server(
@@ -262,7 +262,7 @@ class AuthProxy:
         async with asyncio.timeout(_READ_S):
             body = await request.read()
         who = self._who(request)
-        status, text = await self._handle(from_browser(body, who), who)
+        status, text = await self._handle(add_client(body, who), who)
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=_HEADERS)
 
     async def _handle(self, asked: dict[str, object] | None, who: str) -> tuple[int, str]:
@@ -277,9 +277,13 @@ class AuthProxy:
             return (503, text) if text else (204, "")
         if not self._asked_rate.take(self._loop.time()):
             return 429, "too many requests; try again"
-        if leads(asked):
+        if takes_control(asked):
             self.browsers.led_by(who)
-        return (204, "") if self._ask(compact(asked)) else (503, "the rig accepts no requests now")
+        return (
+            (204, "")
+            if self._ask(encode_request(asked))
+            else (503, "the rig accepts no requests now")
+        )
 
     async def _handle_line(self, request: web.Request) -> web.StreamResponse:
         """Send the state whenever it changes, with heartbeats in between; receive stops.
@@ -320,10 +324,10 @@ class AuthProxy:
                 async with asyncio.timeout(TAKES_S):
                     await line.pong(message.data)
             elif message.type is aiohttp.WSMsgType.PONG and who == self.browsers.leading():
-                self._ask(compact({"do": "renew", "who": who}))
+                self._ask(encode_request({"do": "renew", "who": who}))
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
-            asked = from_browser(message.data, who)
+            asked = add_client(message.data, who)
             if asked is not None and "point" in asked:
                 self.browsers.led_by("")  # no control is renewed during pointer control
                 self._point(asked["point"], who)

@@ -21,7 +21,7 @@ from gazerig.robot.control.command_handler import ORDERS
 from gazerig.robot.dashboard.door.admission import API
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
 from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
-from gazerig.robot.dashboard.requests.outbox import TokenBucket, leads
+from gazerig.robot.dashboard.requests.outbox import TokenBucket, takes_control
 from gazerig.robot.dashboard.requests.rig_relay import (
     BUSY,
     BUSY_WORDS,
@@ -33,7 +33,7 @@ from gazerig.robot.dashboard.requests.rig_relay import (
 )
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED
-from gazerig.robot.model.outcome import outcome_of
+from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
@@ -69,7 +69,7 @@ class MessageRefused(ValueError):
         self.status = status
 
 
-def message_of(data: str | bytes) -> dict[str, Any]:
+def parse_message(data: str | bytes) -> dict[str, Any]:
     """Return a message that came as text.
 
     Raises:
@@ -91,7 +91,7 @@ def message_of(data: str | bytes) -> dict[str, Any]:
     return found
 
 
-def rate_of(text: str, name: str, least: float, most: float) -> float:
+def parse_rate(text: str, name: str, least: float, most: float) -> float:
     """Return a number of a query.
 
     Raises:
@@ -106,7 +106,7 @@ def rate_of(text: str, name: str, least: float, most: float) -> float:
     return value
 
 
-class Program:
+class ProgramSocket:
     """One program's websocket: what waits to be sent, and what it controls.
 
     States that it does not read in time are replaced by newer ones; of events and answers the
@@ -147,7 +147,7 @@ class Program:
             self.news.set()
         for _ in range(len(self._open)):
             tag, reply = self._open.popleft()
-            if (end := outcome_of(reply, news.progress)) is None:
+            if (end := command_outcome(reply, news.progress)) is None:
                 self._open.append((tag, reply))
             else:
                 self.say({"outcome": end[0], "why": end[1], "tag": tag})
@@ -169,13 +169,13 @@ class Program:
         return state
 
 
-_Handler = Callable[["Programs", web.Request], Awaitable[web.StreamResponse]]
+_Handler = Callable[["ProgramRoutes", web.Request], Awaitable[web.StreamResponse]]
 
 
-def _refusing(handler: _Handler) -> _Handler:
+def _answer_refusals(handler: _Handler) -> _Handler:
     """Return a handler that answers a bad message with its reason."""
 
-    async def answer(programs: "Programs", request: web.Request) -> web.StreamResponse:
+    async def answer(programs: "ProgramRoutes", request: web.Request) -> web.StreamResponse:
         try:
             return await handler(programs, request)
         except MessageRefused as error:
@@ -184,7 +184,7 @@ def _refusing(handler: _Handler) -> _Handler:
     return answer
 
 
-class Programs:
+class ProgramRoutes:
     """Routes for programs; used in the door's event loop.
 
     Args:
@@ -222,22 +222,22 @@ class Programs:
 
     # --- HTTP ---------------------------------------------------------------------------
 
-    @_refusing
+    @_answer_refusals
     async def _state(self, request: web.Request) -> web.StreamResponse:
-        after = int(rate_of(request.query.get("after", f"{NEWEST}"), "after", 0, NEWEST))
+        after = int(parse_rate(request.query.get("after", f"{NEWEST}"), "after", 0, NEWEST))
         return await self._asked({"do": "state", "after": after})
 
-    @_refusing
+    @_answer_refusals
     async def _post(self, request: web.Request) -> web.StreamResponse:
-        wait_s = rate_of(request.query.get("wait_s", f"{WAIT_S}"), "wait_s", 0.0, MOST_WAIT_S)
+        wait_s = parse_rate(request.query.get("wait_s", f"{WAIT_S}"), "wait_s", 0.0, MOST_WAIT_S)
         data = b""
         async with asyncio.timeout(_READ_S):
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
                 data += more
-        message = _signed(message_of(data), request)
+        message = _add_client(parse_message(data), request)
         if message.get("do") != "stop" and not self._takes():
             raise MessageRefused(BUSY, 429)
-        if leads(message) and message.get("for_s") is not None:
+        if takes_control(message) and message.get("for_s") is not None:
             message["stay"] = True  # it ends by its time; a request has no connection to lose
         return await self._asked(message, wait_s)
 
@@ -257,7 +257,7 @@ class Programs:
         found: asyncio.Future[tuple[str, str]] = loop.create_future()
 
         def take(news: HeadNews, now_s: float) -> None:
-            end = outcome_of(reply, news.progress)
+            end = command_outcome(reply, news.progress)
             if end is not None and not found.done():
                 found.set_result(end)
 
@@ -294,7 +294,7 @@ class Programs:
 
     # --- the websocket ------------------------------------------------------------------
 
-    @_refusing
+    @_answer_refusals
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" not in request.headers:
             raise MessageRefused("this is a websocket", 426)
@@ -303,8 +303,8 @@ class Programs:
             raise MessageRefused(f"events={events:.20}: true or false")
         rate_hz = 0.0
         if (text := request.query.get("rate_hz")) is not None:
-            rate_hz = rate_of(text, "rate_hz", 1.0, MOST_RATE_HZ)
-        program = Program(rate_hz, events == "true")
+            rate_hz = parse_rate(text, "rate_hz", 1.0, MOST_RATE_HZ)
+        program = ProgramSocket(rate_hz, events == "true")
         socket = web.WebSocketResponse(
             max_msg_size=4 * REQUEST_BYTES, compress=False, autoping=False
         )
@@ -328,7 +328,7 @@ class Programs:
         await close_socket(socket, request)
         return socket
 
-    async def _send(self, socket: web.WebSocketResponse, program: Program) -> None:
+    async def _send(self, socket: web.WebSocketResponse, program: ProgramSocket) -> None:
         while not socket.closed:
             await program.news.wait()
             program.news.clear()
@@ -339,7 +339,7 @@ class Programs:
     async def _receive(
         self,
         socket: web.WebSocketResponse,
-        program: Program,
+        program: ProgramSocket,
         orders: "asyncio.Queue[dict[str, Any]]",
         request: web.Request,
     ) -> None:
@@ -362,7 +362,7 @@ class Programs:
                 await asyncio.sleep(_FLOOD_PAUSE_S)
                 continue
             try:
-                message = _signed(message_of(frame.data), request)
+                message = _add_client(parse_message(frame.data), request)
                 if message.get("do") == "stop":
                     program.say(await self._do(message))
                 elif late or orders.full() or not self._takes():
@@ -372,7 +372,9 @@ class Programs:
             except MessageRefused as error:
                 program.say({"refused": str(error)})
 
-    async def _carry_out(self, program: Program, orders: "asyncio.Queue[dict[str, Any]]") -> None:
+    async def _carry_out(
+        self, program: ProgramSocket, orders: "asyncio.Queue[dict[str, Any]]"
+    ) -> None:
         """Send a program's messages to the rig, in their order."""
         while True:
             message = await orders.get()
@@ -381,14 +383,14 @@ class Programs:
             match answer:
                 case {"ok": {"reply": dict(reply)}}:
                     found = CommandReply.from_json(reply)
-                    if leads(message):
+                    if takes_control(message):
                         held = found.lead and not message.get("stay")
                         program.leading = message["who"] if held else ""
                     if "tag" in message and message["do"] not in _NO_OUTCOME:
                         program.follow(message["tag"], found)
                         self.feed.wake()
 
-    async def _renew(self, socket: web.WebSocketResponse, program: Program) -> None:
+    async def _renew(self, socket: web.WebSocketResponse, program: ProgramSocket) -> None:
         """Ping a program in control; each answer renews its control.
 
         One that hangs or does not read loses it within a second, as one that has gone.
@@ -424,7 +426,7 @@ class Programs:
         return answer | _tag(message)
 
 
-def _signed(message: dict[str, Any], request: web.Request) -> dict[str, Any]:
+def _add_client(message: dict[str, Any], request: web.Request) -> dict[str, Any]:
     """Return a message with the name of its program, which it may choose, and the address."""
     kind = ORDERS.get(str(message.get("do")))
     if kind is None or "who" not in kind._fields:

@@ -100,17 +100,17 @@ class WebcamSocket:
         self._newest = socket
         async for message in socket:
             if self._newest is not socket:
-                await _say(socket, "another browser's camera has taken over")
+                await _send_text(socket, "another browser's camera has taken over")
                 return
             if message.type is not aiohttp.WSMsgType.BINARY or not message.data.startswith(_JPEG):
-                await _say(socket, "only JPEG pictures are taken here")
+                await _send_text(socket, "only JPEG pictures are taken here")
                 return
             if self._rate.take(self._now_s()):
                 self._take(message.data)
-            await _say(socket, "next")
+            await _send_text(socket, "next")
 
 
-async def _say(socket: web.WebSocketResponse, text: str) -> None:
+async def _send_text(socket: web.WebSocketResponse, text: str) -> None:
     async with asyncio.timeout(TAKES_S):
         await socket.send_str(text)
 

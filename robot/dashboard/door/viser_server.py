@@ -147,7 +147,7 @@ _FRAMED = {
 }
 
 
-class _OnlyInside(AbstractResolver):
+class _ViewResolver(AbstractResolver):
     """Resolver that returns one address for every name."""
 
     def __init__(self, port: int) -> None:
@@ -172,13 +172,13 @@ class _OnlyInside(AbstractResolver):
         """Close nothing."""
 
 
-def client_of(inside: ViewAddress) -> aiohttp.ClientSession:
+def view_client(inside: ViewAddress) -> aiohttp.ClientSession:
     """Return a client of the server behind the door; called in the door's event loop."""
     connector: aiohttp.BaseConnector
     if inside.path is not None:
         connector = aiohttp.UnixConnector(str(inside.path), limit=0)
     else:
-        connector = aiohttp.TCPConnector(limit=0, resolver=_OnlyInside(inside.port))
+        connector = aiohttp.TCPConnector(limit=0, resolver=_ViewResolver(inside.port))
     return aiohttp.ClientSession(
         connector=connector, auto_decompress=True, headers={KEY_HEADER: inside.key}
     )

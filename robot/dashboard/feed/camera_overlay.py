@@ -45,7 +45,7 @@ def draw_detections(
     Returns an image of at most IMAGE_WIDTH_PX; the one given is left as it is.
     """
     scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
-    drawn = _small(image, detections, scale)
+    drawn = _shrink(image, detections, scale)
     if heat_px is not None:
         draw_heat(drawn, scale * heat_px)
     for person in detections.people if faces else ():
@@ -53,7 +53,7 @@ def draw_detections(
         corner = _pixel(x, y, scale)
         cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 1, cv2.LINE_AA)
         cv2.circle(drawn, _pixel(*person.head_px, scale), 4, _FACE, 1, cv2.LINE_AA)
-        _write(drawn, f"person {person.confidence:.2f}", corner, _FACE)
+        _draw_text(drawn, f"person {person.confidence:.2f}", corner, _FACE)
     for palm in (detections.palms or ()) if faces else ():
         radius = max(2, round(0.5 * palm.size_px * scale))
         cv2.circle(drawn, _pixel(*palm.centre_px, scale), radius, _BLOB, 1, cv2.LINE_AA)
@@ -61,7 +61,7 @@ def draw_detections(
         x, y, width, height = face.box_px
         corner = _pixel(x, y, scale)
         cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 2, cv2.LINE_AA)
-        _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
+        _draw_text(drawn, f"{face.confidence:.2f}", corner, _FACE)
         for landmark_x, landmark_y in face.landmarks_px:
             cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
     for blob in detections.blobs if faces else ():
@@ -72,7 +72,7 @@ def draw_detections(
         radius = max(2, _clip(lens.fx_px * blob.radius_m / z * scale))
         centre = _pixel(u, v, scale)
         cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
-        _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
+        _draw_text(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
     if gaze_px is not None:
         share = drawn.shape[1] / IMAGE_WIDTH_PX  # small images are shown in the same size
         ring, edge, line, dot = (max(2, round(share * px)) for px in (14, 5, 3, 3))
@@ -83,7 +83,7 @@ def draw_detections(
     return drawn
 
 
-def ground(detections: Detections, depth: bool) -> ImageArray | None:
+def background(detections: Detections, depth: bool) -> ImageArray | None:
     """Return the background of ``draw_detections``: the image, or the depth if selected.
 
     A camera without depth returns its image with a message.
@@ -93,12 +93,12 @@ def ground(detections: Detections, depth: bool) -> ImageArray | None:
     if detections.depth_m is not None:
         return depth_image(detections.depth_m)
     scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
-    drawn = _small(detections.image, detections, scale)
-    _write(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
+    drawn = _shrink(detections.image, detections, scale)
+    _draw_text(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
     return drawn
 
 
-def without_pictures() -> ImageArray:
+def no_pictures_image() -> ImageArray:
     """Return a dark image with a message that no images were recorded."""
     drawn = np.full((IMAGE_WIDTH_PX * 5 // 8, IMAGE_WIDTH_PX, 3), _DARK_GROUND, np.uint8)
     words, size = "no pictures were recorded", 1.0
@@ -143,7 +143,7 @@ def encode(image: ImageArray) -> bytes:
     return jpeg.tobytes()
 
 
-def _small(image: ImageArray | None, detections: Detections, scale: float) -> ImageArray:
+def _shrink(image: ImageArray | None, detections: Detections, scale: float) -> ImageArray:
     width = max(1, round(detections.width_px * scale))
     height = max(1, round(detections.height_px * scale))
     if image is None:
@@ -153,7 +153,7 @@ def _small(image: ImageArray | None, detections: Detections, scale: float) -> Im
     return cast(ImageArray, cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
 
 
-def _write(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]) -> None:
+def _draw_text(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]) -> None:
     above = (at[0], max(12, at[1] - 4))
     cv2.putText(drawn, text, above, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
 

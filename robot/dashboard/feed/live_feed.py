@@ -38,7 +38,7 @@ from gazerig.robot.dashboard.feed.page_process import (
     REPLAY,
     SNAPSHOT,
     VALUES,
-    unpack,
+    decode_snapshot,
 )
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
@@ -77,7 +77,7 @@ class LiveRig(NamedTuple):
     choice: str = ""
 
 
-class WorldNow(NamedTuple):
+class ShownWorld(NamedTuple):
     """Simulated world, and the time since its start, s."""
 
     shapes: WorldShapes
@@ -105,7 +105,7 @@ class RunState(NamedTuple):
     timing: Sequence[Any] | None = None
 
 
-class FrameHead(NamedTuple):
+class FrameHeader(NamedTuple):
     """Detections of a frame that are drawn, and properties of its image.
 
     faces: box, landmarks and confidence; blobs: id, kind, position and radius
@@ -145,9 +145,9 @@ def state_message(state: RunState) -> bytes:
 def frame_message(
     found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
 ) -> bytes:
-    """Return a message with what was found in a frame; see ``FrameHead``."""
+    """Return a message with what was found in a frame; see ``FrameHeader``."""
     lens = found.located.intrinsics if found.located is not None else found.lens
-    head = FrameHead(
+    head = FrameHeader(
         found.captured_s,
         found.number,
         found.width_px,
@@ -226,10 +226,10 @@ class LiveFeed:
             if pickle.dumps(rig.world) != pickle.dumps(self._world):
                 self._world = rig.world
         elif kind == DETECTED:
-            self._take_frame(FrameHead(*decode_plain(body)), fd)
+            self._take_frame(FrameHeader(*decode_plain(body)), fd)
         elif kind == PIXELS:
             end = 4 + int.from_bytes(body[:4], "little")
-            self._take_frame(FrameHead(*decode_plain(body[4:end])), -1, body[end:])
+            self._take_frame(FrameHeader(*decode_plain(body[4:end])), -1, body[end:])
         else:
             return False
         return True
@@ -261,12 +261,12 @@ class LiveFeed:
         rig = self._builder.rig if self._builder is not None else None
         return rig.shape if rig is not None else None
 
-    def world(self) -> WorldNow | None:
+    def world(self) -> ShownWorld | None:
         """Return the simulated world to be shown; None without one, or before its data."""
         start_s, t_s = self._state.scene_start_s, self.shown_s
         if self._world is None or start_s is None or t_s is None:
             return None
-        return WorldNow(self._world, t_s - start_s)
+        return ShownWorld(self._world, t_s - start_s)
 
     def image(self) -> ImageArray | None:
         """Return the newest frame with its detections; None without a new one."""
@@ -281,24 +281,24 @@ class LiveFeed:
         lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
         R, p_m = builder.rig.mount.pose(*poses.head_pose(found.captured_s))
         start_s = self._state.scene_start_s
-        if _blank(found) and self._picture is not None and start_s is not None:
+        if _has_no_image(found) and self._picture is not None and start_s is not None:
             size_px = found.width_px, found.height_px
             seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
             found = replace(found, image=self._picture.draw(seen_by).image)
         # The page's process draws; the control loop's imports this module too, without OpenCV.
-        from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
+        from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
 
         points_m = self._trail.points() if self.choices.heat else None
         return draw_detections(
-            ground(found, self._wants_depth),
+            background(found, self._wants_depth),
             found,
             gaze_pixel(self._gaze.at(found.captured_s), R, p_m, lens)
             if self.choices.gaze
             else None,
             lens,
             # Without an image only the detections can be drawn.
-            faces=self.choices.faces or _blank(found),
-            heat_px=None if points_m is None else pixels(points_m, R, p_m, lens),
+            faces=self.choices.faces or _has_no_image(found),
+            heat_px=None if points_m is None else project_points(points_m, R, p_m, lens),
         )
 
     def _take_ticks(self, data: bytes) -> None:
@@ -322,7 +322,7 @@ class LiveFeed:
             self._gaze.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 
-    def _take_frame(self, head: FrameHead, fd: int, pixels: bytes | None = None) -> None:
+    def _take_frame(self, head: FrameHeader, fd: int, pixels: bytes | None = None) -> None:
         lens = None
         if head.lens is not None:
             fx_px, fy_px, cx_px, cy_px, k1, k2, p1, p2, k3 = head.lens
@@ -347,18 +347,18 @@ class LiveFeed:
         self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
 
 
-def _blank(found: Detections) -> bool:
+def _has_no_image(found: Detections) -> bool:
     """Return whether there is neither an image nor a depth image."""
     return found.image is None and found.depth_m is None
 
 
 def gaze_pixel(point_m: Vec3, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:
     """Return where in the image of a camera at (R, p_m) a gaze point is, None when it is behind."""
-    found = pixels(np.array([point_m]), R, p_m, lens).tolist()
+    found = project_points(np.array([point_m]), R, p_m, lens).tolist()
     return (found[0][0], found[0][1]) if found else None
 
 
-def pixels(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floats:
+def project_points(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floats:
     """Return where points (n, 3) are in the image of a camera at (R, p_m); without those behind."""
     seen: Floats = (points_world_m - np.array(p_m)) @ np.array(R)
     return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
@@ -448,11 +448,11 @@ class News(NamedTuple):
     ended: bool
     others: tuple[tuple[bytes, object], ...] = ()
     image: ImageArray | None = None
-    world: WorldNow | None = None
+    world: ShownWorld | None = None
     shape: RigShape | None = None
 
 
-def drain(feed: MessageLink, live: LiveFeed) -> News:
+def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
     """Return everything that waits, without waiting for more.
 
     live: takes what a running rig sends
@@ -470,7 +470,7 @@ def drain(feed: MessageLink, live: LiveFeed) -> News:
         ended = not message
         kind, body = message[:1], message[1:]
         if kind == SNAPSHOT:
-            snapshots.append(unpack(message))
+            snapshots.append(decode_snapshot(message))
             live.shown_s = snapshots[-1].t_s
         elif kind == FRAME:
             jpeg = body

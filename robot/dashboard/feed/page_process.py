@@ -90,7 +90,7 @@ _face_values = attrgetter(*(field.name for field in fields(SeenFace)))
 _body_values = attrgetter(*(field.name for field in fields(SeenBody)))
 
 
-def pack(snapshot: Snapshot) -> bytes:
+def encode_snapshot(snapshot: Snapshot) -> bytes:
     """Write a snapshot as one message."""
     faces = [_face_values(face) for face in snapshot.faces]
     bodies = [_body_values(body) for body in snapshot.bodies]
@@ -98,8 +98,8 @@ def pack(snapshot: Snapshot) -> bytes:
     return SNAPSHOT + pickle.dumps(values, pickle.HIGHEST_PROTOCOL)
 
 
-def unpack(message: bytes) -> Snapshot:
-    """Read a message that ``pack`` wrote; only ever fed by the process that started the page."""
+def decode_snapshot(message: bytes) -> Snapshot:
+    """Read a message that ``encode_snapshot`` wrote; only ever fed by the process that started the page."""
     values, faces, bodies = pickle.loads(memoryview(message)[1:])
     return Snapshot(
         **dict(zip(_PLAIN, values, strict=True)),
@@ -221,7 +221,7 @@ class PageProcess:
             return
         self._shown_s = snapshot.t_s
         self._flush_replies()
-        if not self.send(pack(snapshot)):
+        if not self.send(encode_snapshot(snapshot)):
             self.dropped += 1
 
     def show_frame(self, jpeg: bytes) -> None:
@@ -322,7 +322,7 @@ class PageProcess:
         self._hang_up()
         text = "it gave no reason"
         if self._errors is not None:
-            lines = _end_of(self._errors).decode(errors="replace").strip().splitlines()
+            lines = _read_tail(self._errors).decode(errors="replace").strip().splitlines()
             text = lines[-1].strip() if lines else text
         code: int | None = CANNOT_OPEN
         if process is not None:
@@ -409,7 +409,7 @@ def _errors_file() -> BinaryIO:
     return tempfile.TemporaryFile(buffering=0)
 
 
-def _end_of(file: BinaryIO) -> bytes:
+def _read_tail(file: BinaryIO) -> bytes:
     """Return the last bytes of a file that another process may still write to."""
     start = max(0, os.fstat(file.fileno()).st_size - _LAST_LINES_BYTES)
     if hasattr(os, "pread"):  # keeps the position at which the other process writes

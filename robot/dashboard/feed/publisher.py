@@ -13,7 +13,7 @@ from math import inf
 
 from gazerig.drivers.process.passed_image import CAN_PASS, copy_image
 from gazerig.drivers.types import Detections
-from gazerig.robot.control.command_handler import ParamAccess, plain
+from gazerig.robot.control.command_handler import ParamAccess, to_plain
 from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.feed.live_feed import (
@@ -74,7 +74,7 @@ class ParamFeed:
         first = self._version is None
         self._version = self._tuning.version  # before reading: a change meanwhile is seen next
         if first:
-            params = [plain(param._asdict()) for param in self._tuning.parameters()]
+            params = [to_plain(param._asdict()) for param in self._tuning.parameters()]
             for start in range(0, len(params), _PIECE):
                 self._due.append(PARAMS + json.dumps(params[start : start + _PIECE]).encode())
         now = dict(self._tuning.values())
@@ -88,7 +88,7 @@ class ParamFeed:
             "characters": sorted(self._tuning.characters()),
         }
         for start in range(0, max(1, len(changed)), _PIECE):
-            piece = {key: plain(now[key]) for key in changed[start : start + _PIECE]}
+            piece = {key: to_plain(now[key]) for key in changed[start : start + _PIECE]}
             self._due.append(VALUES + json.dumps({**state, "values": piece}).encode())
 
 

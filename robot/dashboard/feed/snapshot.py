@@ -12,9 +12,9 @@ from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import control_text, doing, leader
+from gazerig.robot.control.tick_text import control_text, head_activity, tick_control_source
 from gazerig.robot.description.build import RigShape
-from gazerig.robot.model.control_source import sentence
+from gazerig.robot.model.control_source import control_sentence
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint import JointLimit
@@ -121,7 +121,7 @@ class SnapshotBuilder:
             self._timing.update(tick.t_s)
             if tick.joints.missing:
                 self._unanswered.update(tick.joints.missing)
-            events += map(_seen, self._events.update(tick))
+            events += map(_shown_event, self._events.update(tick))
             if tick.t_s - self._trail_s >= _TRAIL_S:
                 self._trail_s = tick.t_s
                 trail.append(_trail(tick))
@@ -172,7 +172,7 @@ def snapshot(
     rig: how it is built, for the commanded pose, the camera and the servos' limits
     """
     pose, percept, target = tick.pose, tick.percept, tick.target
-    does, leads = doing(tick), leader(tick)
+    does, leads = head_activity(tick), tick_control_source(tick)
     joints, measured = joint_names(tick, rig), tick.joints.measured
     field = rig.field if rig is not None else None
     pivot = None
@@ -208,7 +208,7 @@ def snapshot(
         stopped=tick.stopped,
         led=control_text(tick),
         leader=leads,
-        leads_words=sentence(leads, tick.t_s),
+        leads_words=control_sentence(leads, tick.t_s),
         headline=does.headline,
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
@@ -331,7 +331,7 @@ def _trail(tick: Tick) -> Trail:
     )
 
 
-def _seen(event: Event) -> SeenEvent:
+def _shown_event(event: Event) -> SeenEvent:
     match event:
         case SaccadeEvent():
             return SeenSaccade(

@@ -7,7 +7,12 @@ from gazerig.drivers.process.bounded_call import overdue_text
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import camera_conditions, doing, guard_text, health_text
+from gazerig.robot.control.tick_text import (
+    camera_conditions,
+    guard_text,
+    head_activity,
+    health_text,
+)
 from gazerig.robot.model.types import LoopFigures
 
 _LINE_S = 0.2
@@ -47,7 +52,7 @@ class StatusLine:
                 overdue_text(),
                 self._busy,
                 self._rate,
-                doing(tick).headline,
+                head_activity(tick).headline,
                 guard_text(tick.guard_result),
                 health_text(self._health()),
                 *[f"camera: {text.partition(':')[0]}" for text in camera_conditions(tick)],

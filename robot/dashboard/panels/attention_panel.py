@@ -20,7 +20,7 @@ _LEAST_FULL = 1.0
 """Salience of a bar over the whole panel; the highest salience if that is more."""
 
 
-def winner(snapshot: Snapshot) -> str:
+def target_text(snapshot: Snapshot) -> str:
     """Return the target, the reason, and the present behaviour and plan as HTML."""
     named = (
         ("behaviour", snapshot.behaviour),
@@ -31,13 +31,13 @@ def winner(snapshot: Snapshot) -> str:
     chips = " ".join(chip(f"{what}: {name}") for what, name in named if name)
     return (
         f"<div class='big'>{escape(snapshot.target_name)}</div>"
-        f"<div class='tall'>{escape(reason(snapshot))}</div>"
+        f"<div class='tall'>{escape(reason_text(snapshot))}</div>"
         f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))} "
         f"{chips}</div>"
     )
 
 
-def reason(snapshot: Snapshot) -> str:
+def reason_text(snapshot: Snapshot) -> str:
     """Return the reason for the target as text, e.g. "because it moves (translation 0.38)".
 
     During manual control, or without saliences, it is the rig's own reason.
@@ -62,7 +62,7 @@ def reason(snapshot: Snapshot) -> str:
     return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}{planned}"
 
 
-def saliences(snapshot: Snapshot) -> str:
+def salience_bars(snapshot: Snapshot) -> str:
     """Return the saliences by term as HTML, the highest first."""
     if snapshot.leader.led:
         return ""

@@ -7,13 +7,13 @@ from math import degrees, radians
 import viser
 
 from gazerig.gaze.gesture.expression import NEUTRAL
-from gazerig.robot.dashboard.panels.param_panel import ParamState
+from gazerig.robot.dashboard.panels.param_panel import ParamPanels
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.commands import NO_GESTURE, Ask, Express, Jog, LookAt, Play
-from gazerig.robot.model.types import Snapshot, in_order
+from gazerig.robot.model.types import Snapshot, order_joints
 
 STEER = "steer"
 """Menu of the steps of a calibration, not of requests to the robot."""
@@ -30,7 +30,7 @@ class Controls:
         self._steer, self._tune = widgets.panel("steer"), widgets.panel("tune")
         self._jog = JogPanel(self._steer.section("joints", order=40), outbox)
         self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.let_go)
-        self._tuning = ParamState(widgets, self._tune, outbox)
+        self._tuning = ParamPanels(widgets, self._tune, outbox)
         self._face = AnimationPanel(self._steer, outbox)
         self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
@@ -352,7 +352,7 @@ class JogPanel:
     def values(self, in_force: Mapping[str, object]) -> None:
         """Create the sliders, and set their ranges to the joints' limits."""
         keys = [key.split(".") for key in in_force if key.startswith("joints.")]
-        for joint in in_order(path[1] for path in keys if path[2:] == ["min_deg"]):
+        for joint in order_joints(path[1] for path in keys if path[2:] == ["min_deg"]):
             low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
             if not (isinstance(low, int | float) and isinstance(high, int | float)):
                 continue

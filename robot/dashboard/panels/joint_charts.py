@@ -77,7 +77,7 @@ GROUPS = {
 """Groups of joints of a head with all joints; one chart for each."""
 
 
-def groups_of(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
+def chart_groups(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
     """Return the groups of a rig, with its joints only, none empty."""
     there = frozenset(joints)
     menu: dict[str, tuple[ChartGroup, ...]] = {}
@@ -147,7 +147,7 @@ class JointCharts:
     def show(self, traces: JointSeries) -> None:
         """Draw the traces."""
         ago_s, angles_deg = traces.table(SPANS[self.span.value])
-        menu = groups_of(traces.joints)
+        menu = chart_groups(traces.joints)
         if not len(ago_s) or not menu:
             return
         if self.what.options != tuple(menu):

@@ -45,7 +45,7 @@ class PagePanel(ABC):
         """Return the section as HTML without scripts; called once in ``period`` frames."""
 
 
-def own_panels() -> Iterator[type[PagePanel]]:
+def core_panels() -> Iterator[type[PagePanel]]:
     """Return the panels of this folder."""
     package = __name__.rpartition(".")[0]
     for found in pkgutil.iter_modules([str(Path(__file__).parent)]):
@@ -65,7 +65,7 @@ class PagePanels:
     def __init__(self, place: Container) -> None:
         self._shown: list[tuple[type[PagePanel], Html]] = []
         self._panels: dict[Html, PagePanel] = {}
-        for part in own_panels():
+        for part in core_panels():
             self._add(part, part.title, place)
         for one in registrations(PAGE_PANEL):
             try:

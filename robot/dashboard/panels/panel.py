@@ -9,7 +9,7 @@ import numpy as np
 
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
-from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
+from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
 from gazerig.robot.dashboard.panels.gaze_map import GazeMap
 from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.panels.package_panels import PagePanels
@@ -19,7 +19,7 @@ from gazerig.robot.dashboard.panels.run_figures import (
     MainSequenceChart,
     RunFigures,
 )
-from gazerig.robot.dashboard.panels.servo_health import alarms, health, other_heads
+from gazerig.robot.dashboard.panels.servo_health import alarms, health_table, other_heads
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
@@ -114,11 +114,11 @@ class PanelView:
         if self._shown % _WORDS_EVERY == 0:
             self.alarms.content = alarms(snapshot)
             if "watch" in self._open:
-                self.winner.content = winner(snapshot) + other_heads(snapshot)
-                self.saliences.content = saliences(snapshot)
+                self.winner.content = target_text(snapshot) + other_heads(snapshot)
+                self.saliences.content = salience_bars(snapshot)
                 self.estimation_note.content = estimation_note(snapshot)
             if "health" in self._open:
-                self.health.content = health(snapshot)
+                self.health.content = health_table(snapshot)
         if "watch" in self._open and self._shown % _TRACES_EVERY == 0:
             self.traces.show(self._traces)
         if "watch" in self._open:

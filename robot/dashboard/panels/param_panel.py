@@ -25,7 +25,7 @@ _FAR = 20.0
 """Ratio of range to value from which a number is typed instead of set by a slider."""
 
 
-def hint(param: Parameter) -> str:
+def param_tooltip(param: Parameter) -> str:
     """Return the tooltip of a parameter: description, range and default."""
     parts = [f"{param.key}: {param.description}" if param.description else param.key]
     unit = f" {param.unit}" if param.unit else ""
@@ -39,7 +39,7 @@ def hint(param: Parameter) -> str:
     return "; ".join(parts)
 
 
-def label(param: Parameter, unsaved: bool, title: str = "") -> str:
+def param_label(param: Parameter, unsaved: bool, title: str = "") -> str:
     """Return a control's label: a mark if it is unsaved, its name and its unit.
 
     title: plain name, without a unit; "": the last parts of the key
@@ -78,7 +78,7 @@ def format_value(param: Parameter, value: object) -> str:
     return json.dumps(value)
 
 
-def read(param: Parameter, text: str) -> object:
+def parse_value(param: Parameter, text: str) -> object:
     """Parse text that a person typed.
 
     Raises:
@@ -114,13 +114,13 @@ class ParamControl:
     ) -> None:
         self.param, self.order, self.title = param, order, title
         self._put, self._refuse = put, refuse
-        self.field = self._add(place, label(param, unsaved, title), value, order)
+        self.field = self._add(place, param_label(param, unsaved, title), value, order)
         self.field.on_change(lambda shown, _: self._ask(shown))
 
     def _add(
         self, place: Container, text: str, value: object, order: float
     ) -> Checkbox | Choice | Slider | TextField:
-        param, tooltip = self.param, hint(self.param)
+        param, tooltip = self.param, param_tooltip(self.param)
         if param.kind == "bool" and not param.optional:
             return place.checkbox(text, bool(value), hint=tooltip, order=order)
         if param.choices and not param.optional and value in param.choices:
@@ -136,7 +136,13 @@ class ParamControl:
             if whole:
                 step = max(1, round(step)) if high - low > 500 else 1
             return place.slider(
-                text, (low, high), step, now, hint=hint(self.param), whole=whole, order=order
+                text,
+                (low, high),
+                step,
+                now,
+                hint=param_tooltip(self.param),
+                whole=whole,
+                order=order,
             )
         shown = format_value(param, value)
         return place.text(text, shown, hint=f"{tooltip}; Enter sets it", order=order)
@@ -146,7 +152,7 @@ class ParamControl:
         value = next((c for c in self.param.choices if str(c) == shown), shown)
         if isinstance(self.field, TextField):
             try:
-                value = read(self.param, str(shown))
+                value = parse_value(self.param, str(shown))
             except ValueError as error:
                 self._refuse(str(error))
                 return
@@ -154,7 +160,7 @@ class ParamControl:
 
     def show(self, value: object, unsaved: bool) -> None:
         """Show the present value."""
-        self.field.label = label(self.param, unsaved, self.title)
+        self.field.label = param_label(self.param, unsaved, self.title)
         if isinstance(self.field, TextField):
             self.field.value = format_value(self.param, value)
         elif isinstance(self.field, Choice):
@@ -191,7 +197,7 @@ _SAVE: dict[str, object] = {"do": "save", "path": None}
 _REVERT: dict[str, object] = {"do": "revert"}
 
 
-class ParamState:
+class ParamPanels:
     """Parameters, and one panel of controls for each browser."""
 
     def __init__(self, widgets: Widgets, place: Container, outbox: Outbox) -> None:
@@ -299,7 +305,7 @@ class ParamPanel:
     def offer(self, params: Mapping[str, Parameter]) -> None:
         """Set the available parameters."""
         self._params = params
-        groups = tuple(dict.fromkeys(group_of(param) for param in params.values()))
+        groups = tuple(dict.fromkeys(param_group(param) for param in params.values()))
         self._group.options = (NOTHING, UNSAVED, DIFFERENT, *groups)
 
     def take(self, values: Mapping[str, object], unsaved: frozenset[str], path: str) -> None:
@@ -361,13 +367,13 @@ class ParamPanel:
             known = [param for key, param in self._params.items() if key in self._values]
             group = self._group.value
             if self._find.value.strip():
-                wanted = found(self._find.value, known)
+                wanted = search_params(self._find.value, known)
             elif group == UNSAVED:
                 wanted = [param.key for param in known if param.key in self._unsaved]
             elif group == DIFFERENT:
                 wanted = [one.key for one in known if self._values[one.key] != one.default]
             else:
-                wanted = [param.key for param in known if group_of(param) == group]
+                wanted = [param.key for param in known if param_group(param) == group]
             for key in [key for key in self._controls if key not in wanted[:MOST_SHOWN]]:
                 self._controls.pop(key).remove()
             for order, key in enumerate(wanted[:MOST_SHOWN]):
@@ -389,12 +395,12 @@ class ParamPanel:
         )
 
 
-def group_of(param: Parameter) -> str:
+def param_group(param: Parameter) -> str:
     """Return the group of a parameter: its section of the file, at most two names deep."""
     return ".".join(param.group.split(".")[:2]) if param.group else "rig"
 
 
-def found(text: str, params: Iterable[Parameter]) -> list[str]:
+def search_params(text: str, params: Iterable[Parameter]) -> list[str]:
     """Return the keys that contain, with description and unit, every word of a text."""
     words = text.lower().split()
     return [

@@ -69,7 +69,7 @@ class ReplayView:
         Once there are also marks, counts along the recording by kind, and events, (at_s, words).
         """
         if (marks := state.get("marks")) is not None:
-            self.strip.content = strip(marks)
+            self.strip.content = event_strip(marks)
         if (events := state.get("events")) is not None:
             self._events = [(float(at_s), str(text)) for at_s, text in events]
         at_s, sought_s = float(state["at_s"]), state["sought_s"]
@@ -87,7 +87,7 @@ class ReplayView:
         self.events.content = event_list(self._events, at_s)
 
 
-def strip(marks: Mapping[str, Sequence[int]]) -> str:
+def event_strip(marks: Mapping[str, Sequence[int]]) -> str:
     """Return the density of saccades, blinks and events along the recording, as SVG.
 
     marks: counts of equal shares of the recording, by kind
@@ -116,10 +116,10 @@ def strip(marks: Mapping[str, Sequence[int]]) -> str:
 def position_text(at_s: float, duration_s: float, playing: bool) -> str:
     """Show the present position in the recording."""
     word = "playing" if playing else "standing still"
-    return f"<div class='ends'><span>{word}</span><span>{clock(at_s)} / {clock(duration_s)}</span></div>"
+    return f"<div class='ends'><span>{word}</span><span>{format_time(at_s)} / {format_time(duration_s)}</span></div>"
 
 
-def clock(seconds: float) -> str:
+def format_time(seconds: float) -> str:
     """Return seconds as minutes and seconds, e.g. "1:02.345"."""
     thousandths = round(seconds * 1e3)
     return f"{thousandths // 60000}:{thousandths % 60000 / 1e3:06.3f}"
@@ -129,14 +129,14 @@ def event_list(events: Sequence[tuple[float, str]], at_s: float) -> str:
     """Return the events around a time as HTML: the last two, and the next two paler."""
     past = [e for e in events if e[0] <= at_s + 1e-6][-_EVENTS_BEFORE:]
     coming = [e for e in events if e[0] > at_s + 1e-6][:_EVENTS_AFTER]
-    rows = [_event(*event, "past") for event in past]
-    rows += [_event(*event, "quiet") for event in coming]
+    rows = [_event_line(*event, "past") for event in past]
+    rows += [_event_line(*event, "quiet") for event in coming]
     return "".join(rows) or "no event"
 
 
-def _event(at_s: float, text: str, kind: str) -> str:
+def _event_line(at_s: float, text: str, kind: str) -> str:
     shown = text if len(text) <= _WORDS else f"{text[: _WORDS - 1]}…"
-    return f"<div class='{kind}'>{clock(at_s)} {escape(shown)}</div>"
+    return f"<div class='{kind}'>{format_time(at_s)} {escape(shown)}</div>"
 
 
 def _speed_name(speed: float) -> str:

@@ -62,11 +62,11 @@ class MainSequenceChart:
     def drawing(self) -> str:
         """Return both charts as HTML."""
         sizes = [s.amplitude_deg for s in self._seen]
-        widest = _room(_WIDEST_DEG, sizes)
+        widest = _axis_end(_WIDEST_DEG, sizes)
         speeds = [s.peak_deg_s for s in self._seen]
         lengths = [1e3 * s.duration_s for s in self._seen]
         speed, length = "peak speed, deg/s, against size, deg", "duration, ms, against size, deg"
-        fastest, longest = _room(_FASTEST_DEG_S, speeds), _room(_LONGEST_MS, lengths)
+        fastest, longest = _axis_end(_FASTEST_DEG_S, speeds), _axis_end(_LONGEST_MS, lengths)
         return (
             heading(speed, count_text(self.count, "saccade"))
             + _image(speed, sizes, speeds, widest, fastest, lowest_peak_deg_s, highest_peak_deg_s)
@@ -83,7 +83,7 @@ class MainSequenceChart:
         )
 
 
-def _room(choices: tuple[float, ...], values: list[float]) -> float:
+def _axis_end(choices: tuple[float, ...], values: list[float]) -> float:
     """Return the smallest end of an axis that includes all values, else the largest."""
     most = max(values, default=0.0)
     return next((choice for choice in choices if choice >= most), choices[-1])

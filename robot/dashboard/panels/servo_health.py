@@ -17,7 +17,7 @@ NO_FEEDBACK = "no feedback"
 """Text in the place of values that a servo does not report."""
 
 
-def health(snapshot: Snapshot) -> str:
+def health_table(snapshot: Snapshot) -> str:
     """Return the health of the rig as HTML."""
     # Without the frame's age, which has its own line.
     first, _, others = snapshot.perception.partition(" | ")
@@ -28,9 +28,9 @@ def health(snapshot: Snapshot) -> str:
         kind = " class='warn'" if age_s >= OLD_FRAME_S else ""
         frame = f"<div>frame <b{kind}>{1e3 * age_s:.0f} ms</b> old</div>"
     return (
-        guard(snapshot)
+        guard_text(snapshot)
         + heading("servos")
-        + without_feedback(snapshot)
+        + no_feedback_note(snapshot)
         + servo_table(snapshot.servos, snapshot.joints, snapshot.estimated)
         + f"<div>{escape(snapshot.health)}</div>"
         + heading("loop")
@@ -41,7 +41,7 @@ def health(snapshot: Snapshot) -> str:
     )
 
 
-def guard(snapshot: Snapshot) -> str:
+def guard_text(snapshot: Snapshot) -> str:
     """Return the guard's action and reasons as HTML of constant height."""
     level = "stopped" if snapshot.stopped else snapshot.level
     if snapshot.stopped:
@@ -84,8 +84,8 @@ def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
     late: Strain = "over" if servos.age_s[i] > _OLD_S else ""
     figures = f"<td colspan='3' class='nothing'>{NO_FEEDBACK}</td>"
     if not estimated:
-        warmth, load = _at(servos.temperature_c, i), _at(servos.load, i)
-        volts = _at(servos.voltage_v, i)
+        warmth, load = _value_at(servos.temperature_c, i), _value_at(servos.load, i)
+        volts = _value_at(servos.voltage_v, i)
         figures = (
             _cell("-" if warmth is None else f"{warmth:.0f}", strain_of_heat(servos, i))
             + _cell("-" if load is None else f"{100.0 * load:+.0f} %", strain_of_load(servos, i))
@@ -106,7 +106,7 @@ def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
 
 def strain_of_heat(servos: Servos, i: int) -> Strain:
     """Return the relation of a servo's temperature to the limits of the guard."""
-    warmth, limits = _at(servos.temperature_c, i), servos.limits
+    warmth, limits = _value_at(servos.temperature_c, i), servos.limits
     if warmth is None or limits is None:
         return ""
     return "over" if warmth >= limits.hot_c[i] else "near" if warmth >= limits.warm_c[i] else ""
@@ -114,7 +114,7 @@ def strain_of_heat(servos: Servos, i: int) -> Strain:
 
 def strain_of_load(servos: Servos, i: int) -> Strain:
     """Return the relation of a servo's load to its continuous limit."""
-    load, limits = _at(servos.load, i), servos.limits
+    load, limits = _value_at(servos.load, i), servos.limits
     if load is None or limits is None:
         return ""
     return "over" if abs(load) >= _HARD_LOAD else "near" if abs(load) > limits.heavy[i] else ""
@@ -122,7 +122,7 @@ def strain_of_load(servos: Servos, i: int) -> Strain:
 
 def strain_of_voltage(servos: Servos, i: int) -> Strain:
     """Return the relation of a servo's voltage to its limits."""
-    volts, limits = _at(servos.voltage_v, i), servos.limits
+    volts, limits = _value_at(servos.voltage_v, i), servos.limits
     if volts is None or limits is None:
         return ""
     return "" if limits.low_v[i] <= volts <= limits.high_v[i] else "near"
@@ -158,7 +158,7 @@ def _cell(text: str, strain: Strain) -> str:
     return f"<td class='{strain}'>{text}</td>" if strain else f"<td>{text}</td>"
 
 
-def _at(column: tuple[float | None, ...], i: int) -> float | None:
+def _value_at(column: tuple[float | None, ...], i: int) -> float | None:
     return column[i] if column else None
 
 
@@ -198,7 +198,7 @@ def other_heads(snapshot: Snapshot) -> str:
     return "".join(one_line(f"{other.name}: {other.headline}") for other in snapshot.others)
 
 
-def silence() -> str:
+def no_data_text() -> str:
     """Return a message that the rig sends no data."""
     return note("silent: the rig has sent nothing for a second; the page shows the last data")
 
@@ -224,7 +224,7 @@ def one_line(text: str) -> str:
     return f"<div class='line' title='{said}'>{said}</div>"
 
 
-def without_feedback(snapshot: Snapshot) -> str:
+def no_feedback_note(snapshot: Snapshot) -> str:
     """Return the number of joints without position feedback, "" if all are measured."""
     estimated = snapshot.estimated
     if not estimated:

@@ -59,7 +59,7 @@ def is_superseded(earlier: bytes, later: bytes) -> bool:
     return keys <= set(json.loads(second)["changes"])
 
 
-def urgent(message: bytes) -> bool:
+def is_urgent(message: bytes) -> bool:
     """Return whether a message cannot wait: a command, or a message of the page itself."""
     return message[:1] != REQUEST or parse_request(message)[1].startswith(_URGENT)
 
@@ -104,7 +104,7 @@ class Inbox:
                 message = b""
             if not message:
                 break
-            if urgent(message):
+            if is_urgent(message):
                 self._take(message)
             else:
                 try:

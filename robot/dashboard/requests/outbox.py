@@ -77,7 +77,7 @@ class Outbox:
         return True
 
 
-def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
+def add_client(body: bytes | str, who: str) -> dict[str, object] | None:
     """Return a request with the browser's name written in, None if it is not valid.
 
     Args:
@@ -97,12 +97,12 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
     return asked
 
 
-def leads(asked: Mapping[str, object]) -> bool:
+def takes_control(asked: Mapping[str, object]) -> bool:
     """Return whether a request gives its browser control of the head."""
     return "pick" in asked or asked.get("do") in _LEADING
 
 
-def compact(asked: Mapping[str, object]) -> bytes:
+def encode_request(asked: Mapping[str, object]) -> bytes:
     """Return a request as JSON without blanks, its "do" first."""
     return json.dumps(asked, separators=(",", ":")).encode()
 

@@ -45,7 +45,7 @@ class Pointer(NamedTuple):
     aspect: float
 
 
-def pointer_of(asked: object) -> Pointer | None:
+def parse_pointer(asked: object) -> Pointer | None:
     """Return the pointer that a browser sent, None if it is not valid."""
     match asked:
         case {"x": int() | float() as x, "y": int() | float() as y, "aspect": int() | float() as a}:
@@ -56,7 +56,7 @@ def pointer_of(asked: object) -> Pointer | None:
     return pointer if inside and _NARROWEST <= pointer.aspect <= _WIDEST else None
 
 
-def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Vec3 | None:
+def gaze_target(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Vec3 | None:
     """Return the point in the world, None if the viewer is inside the head.
 
     Args:
@@ -67,10 +67,10 @@ def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Ve
     to_head = sub(p_world_eyes_m, camera.p_world_m)
     if norm(to_head) < _NEAREST_M:
         return None
-    return _on_plane(pointer, camera, to_head, TOWARDS_HEAD * dot(to_head, to_head))
+    return _intersect_plane(pointer, camera, to_head, TOWARDS_HEAD * dot(to_head, to_head))
 
 
-def opponent_at(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
+def opponent_target(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
     """Return the point at a pointer for the opponent's fist, None if that is behind the viewer.
 
     It is in the plane parallel to the screen through the fist's guard, and within its box.
@@ -78,7 +78,7 @@ def opponent_at(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
     ahead = tuple(row[2] for row in camera.R_world_camera)
     normal = (ahead[0], ahead[1], ahead[2])
     away = dot(normal, sub(_GUARD_M, camera.p_world_m))
-    point = _on_plane(pointer, camera, normal, away) if away > _NEAREST_M else None
+    point = _intersect_plane(pointer, camera, normal, away) if away > _NEAREST_M else None
     if point is None:
         return None
     x, y, z = (
@@ -87,7 +87,9 @@ def opponent_at(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
     return x, y, z
 
 
-def _on_plane(pointer: Pointer, camera: ViewCamera, normal: Vec3, away: float) -> Vec3 | None:
+def _intersect_plane(
+    pointer: Pointer, camera: ViewCamera, normal: Vec3, away: float
+) -> Vec3 | None:
     """Return where the line of sight of a pointer meets a plane, None if it does not."""
     half = tan(0.5 * camera.fov_rad)
     right, down, ahead = zip(*camera.R_world_camera, strict=True)
@@ -123,17 +125,17 @@ class PointerToLook:
 
         A pointer with "opponent" moves the opponent of a boxing world instead of the gaze.
         """
-        pointer, eyes_m = pointer_of(asked), self.p_world_eyes_m
+        pointer, eyes_m = parse_pointer(asked), self.p_world_eyes_m
         if pointer is None or eyes_m is None or not self._rate.take(self._clock.now_s()):
             return False
         camera = self._camera(who)
         if camera is None:
             return False
         if isinstance(asked, dict) and asked.get("opponent") is True:
-            if (to := opponent_at(pointer, camera)) is not None:
+            if (to := opponent_target(pointer, camera)) is not None:
                 self._move_opponent(to)
             return to is not None
-        point = pointed_at(pointer, camera, eyes_m)
+        point = gaze_target(pointer, camera, eyes_m)
         if point is None:
             return False
         self._look(point, who)

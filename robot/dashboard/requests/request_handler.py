@@ -15,7 +15,7 @@ from gazerig.robot.control.command_handler import (
 )
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.command_json import signed
+from gazerig.robot.model.command_json import set_client
 from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
@@ -79,7 +79,7 @@ class PageRequestHandler:
     def _do(self, data: Mapping[str, object]) -> str | None:
         match data:
             case {"do": str(verb)}:
-                match self._handler.do(data, _signed):
+                match self._handler.do(data, _add_client):
                     case PendingCommand() as given:
                         return self._reply_text(given)
                     case ParamsSaved(saved):
@@ -155,6 +155,6 @@ class _CommandSink:
         return ()
 
 
-def _signed(command: Command) -> Command:
+def _add_client(command: Command) -> Command:
     """Return a command with its client: the browser's name, or the page."""
-    return command if getattr(command, "who", PAGE) else signed(command, PAGE)
+    return command if getattr(command, "who", PAGE) else set_client(command, PAGE)

@@ -17,7 +17,7 @@ from gazerig.robot.control.command_handler import CHANGES
 from gazerig.robot.model.control_source import ControlState, GestureState
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import CONNECT_S
-from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, dial
+from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, connect_to_socket
 
 _THREADS = 4
 _MOST_WAITING = 64
@@ -78,7 +78,7 @@ class RigRelay:
             with suppress(queue.Empty):
                 wire = self._wires.get_nowait() if first else None
             try:
-                wire = wire or Wire(dial(path, CONNECT_S), ANSWER_BYTES)
+                wire = wire or Wire(connect_to_socket(path, CONNECT_S), ANSWER_BYTES)
                 wire.write(request, CONNECT_S)
                 answer = wire.read(within_s, within_s)
             except (OSError, EOFError, ValueError) as error:

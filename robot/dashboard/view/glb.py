@@ -73,7 +73,7 @@ def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
 
     light = np.ones((len(shape.vertices), 3))
     if finish.lit:
-        light = lit(light, shape.normals, finish)
+        light = shade_colours(light, shape.normals, finish)
     gain = float(light.max())
     colours = np.ones((len(light), 4))
     colours[:, :3] = light / gain
@@ -103,7 +103,7 @@ def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
     return bytes(data)
 
 
-def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
+def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
     """Return a painted mesh as a binary glTF file.
 
     Args:
@@ -114,11 +114,13 @@ def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
     mesh, colours, normals = painted
     rgba = np.ones((len(mesh.vertices), 4))
     rgba[:, : colours.shape[1]] = np.clip(colours / 255.0, 0.0, 1.0)
-    rgba[:, :3] = _linear(rgba[:, :3])
+    rgba[:, :3] = _to_linear(rgba[:, :3])
     gain = 1.0
     by_browser = finish.roughness < 1.0
     if finish.lit and not by_browser and normals is not None:
-        rgba[:, :3] = lit(rgba[:, :3], normals if pose is None else normals @ pose.T, finish)
+        rgba[:, :3] = shade_colours(
+            rgba[:, :3], normals if pose is None else normals @ pose.T, finish
+        )
         gain = float(rgba[:, :3].max())
         rgba[:, :3] /= gain
     material: dict[str, Any] = {
@@ -139,7 +141,7 @@ def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
     return glb_file(mesh, np.rint(255.0 * rgba).astype(np.uint8), normals, material)
 
 
-def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
+def shade_colours(colours: Floats, normals: Floats, finish: Finish) -> Floats:
     """Return the colours of surfaces under the scene's lights.
 
     Args:
@@ -151,7 +153,7 @@ def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
         (n, 3); may exceed 1.
     """
     up = 0.5 + 0.5 * normals[:, 2:]
-    sky, ground = _linear(np.array((SKY, GROUND)) / 255.0)
+    sky, ground = _to_linear(np.array((SKY, GROUND)) / 255.0)
     around = up * sky + (1.0 - up) * ground
     found = colours * around * (SKY_INTENSITY / pi)
     for light in LIGHTS:
@@ -159,12 +161,12 @@ def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
         facing = np.clip(normals @ way, 0.0, None)[:, None]
         half = (way + _TO_EYE) / np.linalg.norm(way + _TO_EYE)
         gleam = finish.shine * np.clip(normals @ half, 0.0, 1.0)[:, None] ** finish.tight
-        colour = _linear(np.array(light.colour) / 255.0)
+        colour = _to_linear(np.array(light.colour) / 255.0)
         found = found + light.intensity * colour * (colours * facing / pi + gleam)
     return np.asarray(found)
 
 
-def _linear(share: Floats) -> Floats:
+def _to_linear(share: Floats) -> Floats:
     """Return colours in linear light, as glTF defines vertex colours."""
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
@@ -227,7 +229,7 @@ def glb_file(
     )  # fmt: skip
 
 
-def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
+def glow_disc(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
     """Return a flat disc of radius 1, facing up, that fades out from its middle."""
     radius = np.linspace(1.0, 0.0, rings)
     mesh = lathe([(r, 0.0) for r in radius.tolist()])
@@ -238,7 +240,7 @@ def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
     return Painted(mesh, colours, np.tile((0.0, 0.0, 1.0), (len(mesh.vertices), 1)))
 
 
-def furnish(scene: viser.SceneApi) -> None:
+def add_lights(scene: viser.SceneApi) -> None:
     """Add the lights; the scene has no background, so that of the page is visible."""
     scene.world_axes.visible = False
     scene.configure_environment_map(None)

@@ -9,8 +9,17 @@ import viser
 
 from gazerig.gaze.angles import compose, rotate_back, rotation, sub
 from gazerig.gaze.types import Mat3
-from gazerig.robot.dashboard.view.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, glb, glow
-from gazerig.robot.dashboard.view.scene_node import put
+from gazerig.robot.dashboard.view.glb import (
+    CLOTH,
+    EYE,
+    FLAT,
+    PLASTIC,
+    SKIN,
+    Finish,
+    glow_disc,
+    painted_glb,
+)
+from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description import links
 from gazerig.robot.description.build import SIDES, RigShape, describe
 from gazerig.robot.description.head_shape import HeadMeasures, measures_of
@@ -68,7 +77,7 @@ class HeadView:
         self._seen: tuple[tuple[str, ...], HeadMeasures] | None = None
         self._description: Description | None = None
         self._root = scene.add_frame("/rig", show_axes=False)
-        self._shade = self._add("/shade", glb(glow((20, 24, 34, 140), 10), FLAT))
+        self._shade = self._add("/shade", painted_glb(glow_disc((20, 24, 34, 140), 10), FLAT))
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
         self.lid_edges = LidEdges({}, {})
@@ -99,7 +108,7 @@ class HeadView:
         for link in description.links:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
-                put(self.links[link.name].frame, link.p_m, quaternion(R))
+                set_pose(self.links[link.name].frame, link.p_m, quaternion(R))
         for look in self.links[description.camera.link].looks:
             look.visible = camera
         self._shade.visible = not self.on_table
@@ -138,7 +147,7 @@ class HeadView:
         lit = description.poses(at_rest | lid_angles(shape, (_LIT_OPEN,) * 2, (_LIT_OPEN,) * 2))
         for link in description.links:
             node = self.links[link.name]
-            put(node.frame, link.p_m, quaternion(link.R))
+            set_pose(node.frame, link.p_m, quaternion(link.R))
             if before is not None and _look_alike(before.link(link.name), link):
                 continue
             while node.looks:
@@ -148,7 +157,7 @@ class HeadView:
                 moved = link.joint.name if link.joint is not None else ""
                 if look.name.endswith("still_lid") or "lower_lid" in moved:
                     R_lit = _LIT_LOWER_LID
-                data = glb(look.painted, _FINISHES[look.finish], np.array(R_lit))
+                data = painted_glb(look.painted, _FINISHES[look.finish], np.array(R_lit))
                 handle = self._add(f"{paths[link.name]}/look_{look.name}", data)
                 handle.position, handle.wxyz = look.p_m, quaternion(look.R)
                 node.looks.append(handle)
@@ -156,7 +165,7 @@ class HeadView:
         (base, *_) = description.links
         if base.visuals:
             x, y, _ = base.visuals[0].p_m
-            put(self._shade, (x, y, FLOOR_M + 0.001))
+            set_pose(self._shade, (x, y, FLOOR_M + 0.001))
 
 
 def _look_alike(one: Link, other: Link) -> bool:

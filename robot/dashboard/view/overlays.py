@@ -10,7 +10,7 @@ from gazerig.gaze.angles import rotate_back, sub
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.view.head_view import LidEdges
-from gazerig.robot.dashboard.view.scene_node import along, put, turned_up
+from gazerig.robot.dashboard.view.scene_node import pitch_up, rotation_to, set_pose
 from gazerig.robot.description.build import SIDES
 from gazerig.robot.description.head_shape import EYE_RADIUS, measures_of, surface
 from gazerig.robot.description.mesh import Colour, Mesh, grid, lid, ring
@@ -72,7 +72,7 @@ class CameraField:
                 receive_shadow=False,
             )
         self._frustum.visible = True
-        put(self._frustum, camera.p_world_camera_m, quaternion(camera.R_world_camera))
+        set_pose(self._frustum, camera.p_world_camera_m, quaternion(camera.R_world_camera))
 
 
 class EyeFields:
@@ -107,7 +107,7 @@ class EyeFields:
                 )
         sides = zip(self._frames, snapshot.p_world_eyes_m, snapshot.gaze_world, strict=True)
         for frame, p_world_m, gaze_world in sides:
-            put(frame, p_world_m, along(gaze_world))
+            set_pose(frame, p_world_m, rotation_to(gaze_world))
 
 
 def field_edge(field_deg: tuple[float, float, float, float], *, left: bool) -> Floats:
@@ -203,7 +203,7 @@ class CommandedPoseView:
 
     def _move(self, ghost: CommandedPose, edges: LidEdges) -> None:
         R, p_world_head_m = ghost.R_world_head, ghost.p_world_head_m
-        put(self._frame, p_world_head_m, quaternion(R))
+        set_pose(self._frame, p_world_head_m, quaternion(R))
         sides = zip(
             self._eyes,
             ghost.p_world_eyes_m,
@@ -220,10 +220,10 @@ class CommandedPoseView:
                 part.position = (x * unit, 0.0, 0.0)
         for eye, p_world_m, gaze_world, opening, lower in sides:
             p_head_m = rotate_back(R, sub(p_world_m, p_world_head_m))
-            put(eye.ball, p_head_m, along(rotate_back(R, gaze_world)))
+            set_pose(eye.ball, p_head_m, rotation_to(rotate_back(R, gaze_world)))
             for frame, which, so_far in (
                 (eye.upper, "upper", opening),
                 (eye.lower, "lower", lower),
             ):
                 edge_rad = edges.elevation_rad(f"{eye.side}_{which}_lid", so_far)
-                put(frame, p_head_m, turned_up(edge_rad))
+                set_pose(frame, p_head_m, pitch_up(edge_rad))

@@ -6,8 +6,8 @@ import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Floats, Vec3
-from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glb, glow
-from gazerig.robot.dashboard.view.scene_node import along, put, turn_to
+from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
+from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_rotation
 from gazerig.robot.description.mesh import Colour, Mesh, cap, ring
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.person_shape import LOOKS, hand, head, torso
@@ -33,23 +33,23 @@ _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 @lru_cache(maxsize=len(LOOKS))
 def _person_glb(look: int) -> tuple[bytes, bytes]:
     """Return head and chest of a person's look as files for browsers."""
-    return glb(head(look, _FINENESS), SKIN), glb(torso(look, _CHEST_M), CLOTH)
+    return painted_glb(head(look, _FINENESS), SKIN), painted_glb(torso(look, _CHEST_M), CLOTH)
 
 
-class _Shade:
+class _Shadow:
     """Dark spot on the floor below an object."""
 
     def __init__(self, scene: viser.SceneApi, name: str, radius_m: float) -> None:
         self._spot = scene.add_glb(
             name,
-            glb(glow((20, 24, 34, 96), 8), FLAT),
+            painted_glb(glow_disc((20, 24, 34, 96), 8), FLAT),
             scale=radius_m,
             cast_shadow=False,
             receive_shadow=False,
         )
 
     def below(self, p_world_m: Vec3) -> None:
-        put(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.002))
+        set_pose(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.002))
 
     def remove(self) -> None:
         self._spot.remove()
@@ -59,7 +59,7 @@ class _Person:
     """Person of a face: a head in the face's frame, and an upright chest."""
 
     def __init__(self, scene: viser.SceneApi, frame: str, face: SeenFace) -> None:
-        self._shade = _Shade(scene, f"/shades/{face.id}", 0.3)
+        self._shade = _Shadow(scene, f"/shades/{face.id}", 0.3)
         shown, chest = _person_glb((face.id - 1) % len(LOOKS))
         self._head = scene.add_glb(f"{frame}/head", shown, cast_shadow=False, receive_shadow=False)
         self._chest = scene.add_glb(
@@ -71,9 +71,9 @@ class _Person:
         (ahead, _, _), (aside, _, _), _ = face.R_world_face
         x, y, z = face.p_world_m
         self._shade.below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
-        put(self._head, nose_m.tolist())
-        put(self._chest, face.p_world_m)
-        turn_to(self._chest, along((ahead, aside, 0.0)))
+        set_pose(self._head, nose_m.tolist())
+        set_pose(self._chest, face.p_world_m)
+        set_rotation(self._chest, rotation_to((ahead, aside, 0.0)))
 
     def fit(self, size: float) -> None:
         """Scale the person by a factor on the usual size."""
@@ -95,7 +95,7 @@ class _Outline:
 
     def show(self, face: SeenFace, nose_m: Floats) -> None:
         """Move the line to the face, in the plane of the eyes."""
-        put(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
+        set_pose(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
 
     def fit(self, size: float) -> None:
         """Scale it to the measured size of the face."""
@@ -130,7 +130,7 @@ class _FaceView:
 
     def show(self, face: SeenFace, p_world_target_m: Vec3, parts: bool) -> None:
         """Move the person; ``parts``: with marks at the parts, a halo around the one looked at."""
-        put(self._frame, face.p_world_m, quaternion(face.R_world_face))
+        set_pose(self._frame, face.p_world_m, quaternion(face.R_world_face))
         self._label.text = face_label(face)
         from_centre_m = np.array(face.parts_world_m) - face.p_world_m
         parts_m: Floats = (from_centre_m @ np.array(face.R_world_face)).round(3)
@@ -149,10 +149,10 @@ class _FaceView:
                 self._add(f"{part}/mark", cap(0.0042, np.pi, 8), _TARGET)
         for handle, p_m in zip(self._parts, parts_m.tolist(), strict=False):
             handle.visible = parts
-            put(handle, p_m)
+            set_pose(handle, p_m)
         self._halo.visible = looked_at is not None
         if looked_at is not None:
-            put(self._halo, parts_m[looked_at] + (0.006, 0.0, 0.0))
+            set_pose(self._halo, parts_m[looked_at] + (0.006, 0.0, 0.0))
 
     def remove(self) -> None:
         self._shape.remove()
@@ -176,7 +176,7 @@ class _BodyView:
                 opacity=0.5, cast_shadow=False,
             )  # fmt: skip
         elif body.kind == "hand":
-            data = glb(hand(0), SKIN)
+            data = painted_glb(hand(0), SKIN)
             self._shape = scene.add_glb(
                 f"{name}/hand", data, cast_shadow=False, receive_shadow=False
             )
@@ -185,17 +185,17 @@ class _BodyView:
                 f"{name}/ball", radius=1.0, color=_BODY, opacity=0.85, cast_shadow=False
             )
         self._label = scene.add_label(f"{name}/label", body.kind, anchor="bottom-center")
-        self._shade = None if marks else _Shade(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
+        self._shade = None if marks else _Shadow(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
 
     def show(self, body: SeenBody) -> None:
         """Move it; a hand shows the rig its palm."""
         x, y, z = body.p_world_m
-        put(self._frame, body.p_world_m)
-        turn_to(self._frame, along((-x, -y, 0.0)))
+        set_pose(self._frame, body.p_world_m)
+        set_rotation(self._frame, rotation_to((-x, -y, 0.0)))
         if self._shade is not None:
             self._shade.below((x, y, z))
         self._shape.scale = round(body.radius_m, 3)
-        put(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
+        set_pose(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
         self._label.text = body.kind
 
     def remove(self) -> None:
@@ -247,7 +247,7 @@ class PeopleView:
                     shown.remove()
                 self._bodies[body.id] = _BodyView(self._scene, body, marks=self._as_marks)
             self._bodies[body.id].show(body)
-        put(self._target, snapshot.p_world_target_m)
+        set_pose(self._target, snapshot.p_world_target_m)
         self._label.text = snapshot.target_name
 
 

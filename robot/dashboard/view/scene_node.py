@@ -22,36 +22,36 @@ class Placeable(Protocol):
     wxyz: Floats
 
 
-def put(thing: Placeable, p_m: Sequence[float], turn: Quaternion | None = None) -> None:
+def set_pose(thing: Placeable, p_m: Sequence[float], turn: Quaternion | None = None) -> None:
     """Move a node, and rotate it if a rotation is given."""
-    if _off(thing.position.tolist(), p_m) > _STILL_M:
+    if _largest_difference(thing.position.tolist(), p_m) > _STILL_M:
         thing.position = p_m  # type: ignore[assignment]
     if turn is not None:
-        turn_to(thing, turn)
+        set_rotation(thing, turn)
 
 
-def turn_to(thing: Placeable, turn: Quaternion) -> None:
+def set_rotation(thing: Placeable, turn: Quaternion) -> None:
     """Rotate a node."""
-    if _off(thing.wxyz.tolist(), turn) > _STILL:
+    if _largest_difference(thing.wxyz.tolist(), turn) > _STILL:
         thing.wxyz = turn  # type: ignore[assignment]
 
 
-def along(direction: Vec3) -> Quaternion:
+def rotation_to(direction: Vec3) -> Quaternion:
     """Return the rotation of the x axis to a direction, without roll."""
     x, y, z = direction
-    return _turned(atan2(y, x), -atan2(z, hypot(x, y)))
+    return _yaw_then_pitch(atan2(y, x), -atan2(z, hypot(x, y)))
 
 
-def turned_up(angle_rad: float) -> Quaternion:
+def pitch_up(angle_rad: float) -> Quaternion:
     """Return the rotation that raises the x axis by an angle."""
-    return _turned(0.0, -angle_rad)
+    return _yaw_then_pitch(0.0, -angle_rad)
 
 
-def _turned(about_z_rad: float, then_about_y_rad: float) -> Quaternion:
+def _yaw_then_pitch(about_z_rad: float, then_about_y_rad: float) -> Quaternion:
     cz, sz = cos(0.5 * about_z_rad), sin(0.5 * about_z_rad)
     cy, sy = cos(0.5 * then_about_y_rad), sin(0.5 * then_about_y_rad)
     return cz * cy, -sz * sy, cz * sy, sz * cy
 
 
-def _off(now: Sequence[float], wanted: Sequence[float]) -> float:
+def _largest_difference(now: Sequence[float], wanted: Sequence[float]) -> float:
     return max(abs(a - b) for a, b in zip(now, wanted, strict=True))

@@ -60,7 +60,7 @@ _FIXED = {
 NAMES = (FACE, *_FIXED)
 
 
-def view(name: str, snapshot: Snapshot | None = None) -> View:
+def named_view(name: str, snapshot: Snapshot | None = None) -> View:
     """Return a view by its name; that of the face is fitted to the head of a snapshot."""
     if name in _FIXED:
         return _FIXED[name]
@@ -90,7 +90,7 @@ class Viewpoints:
         browser_of: the name of a client's browser by the client's number
         """
         self._server, self._browser_of = server, browser_of
-        self._face = view(FACE)
+        self._face = named_view(FACE)
         self._snapshot: Snapshot | None = None
         self._views: dict[int, str] = {}
         self._asked_early: dict[str, str] = {}
@@ -101,7 +101,7 @@ class Viewpoints:
     def fit(self, snapshot: Snapshot) -> None:
         """Fit the view of the face to the rig's dimensions, in all browsers that show it."""
         self._snapshot = snapshot
-        face = view(FACE, snapshot)
+        face = named_view(FACE, snapshot)
         if face == self._face:
             return
         self._face = face
@@ -125,7 +125,7 @@ class Viewpoints:
 
     def _take(self, client: viser.ClientHandle, name: str) -> None:
         self._views[client.client_id] = name
-        seen = view(name, self._snapshot)
+        seen = named_view(name, self._snapshot)
         with client.atomic():
             client.camera.position, client.camera.look_at = seen.position_m, seen.look_at_m
             _fit_field(client.camera, seen)
@@ -143,7 +143,7 @@ class Viewpoints:
         @client.camera.on_update
         def _(camera: viser.CameraHandle) -> None:
             name = self._views.get(client.client_id, FACE)
-            _fit_field(camera, view(name, self._snapshot))
+            _fit_field(camera, named_view(name, self._snapshot))
 
         # Viser knows a client after its scene has loaded; the buttons work before.
         early = self._asked_early.pop(self._browser_of(client.client_id), None)

@@ -5,8 +5,16 @@ from typing import Final
 
 import viser
 
-from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, PLASTIC, SKIN, Finish, glb, textured_glb
-from gazerig.robot.dashboard.view.scene_node import put
+from gazerig.robot.dashboard.view.glb import (
+    CLOTH,
+    FLAT,
+    PLASTIC,
+    SKIN,
+    Finish,
+    painted_glb,
+    textured_glb,
+)
+from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description.mesh import Painted, merged, smooth_normals
 from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
 
@@ -41,7 +49,7 @@ class WorldView:
                 handle.visible = pose is not None
             if pose is not None:
                 turn, p_world_m = pose
-                put(handle, p_world_m, turn)
+                set_pose(handle, p_world_m, turn)
 
     def _build(self, shapes: WorldShapes) -> None:
         for handle in (*self._still, *self._moving.values()):
@@ -77,12 +85,14 @@ def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
             plain.setdefault(part.finish, []).append(shape)
         else:
             files.append(part_glb(part))
-    return [glb(merged(shapes), _FINISHES[finish]) for finish, shapes in plain.items()] + files
+    return [
+        painted_glb(merged(shapes), _FINISHES[finish]) for finish, shapes in plain.items()
+    ] + files
 
 
 def part_glb(part: WorldPart) -> bytes:
     """Return one part as a binary glTF file."""
     finish = _FINISHES[part.finish]
     if isinstance(part.shape, Painted):
-        return glb(part.shape, finish)
+        return painted_glb(part.shape, finish)
     return textured_glb(part.shape, finish)

@@ -58,7 +58,14 @@ from gazerig.features.bringup.manual_control import JogParams, ManualControl
 from gazerig.gaze.types import Angles3
 from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
-from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.cli.terminal import (
+    ForceOption,
+    RigArgument,
+    clear_errors,
+    record_signals,
+    say,
+    status,
+)
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
@@ -144,7 +151,7 @@ def calibrate_camera(
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
     """Measure the lens and the place of the camera, with the printed board, or a face."""
-    with clear_errors(rig, port, mock), signals() as stopped:
+    with clear_errors(rig, port, mock), record_signals() as stopped:
         _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
         if what is not CalibrationTarget.lens and face_at is None:
             require_package("scipy", "calibration")

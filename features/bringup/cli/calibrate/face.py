@@ -45,7 +45,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
 from gazerig.robot.app.session import prepare_shutdown
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
 from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
@@ -91,7 +91,7 @@ def calibrate_face(
     port: PortOption = None,
 ) -> None:
     """Steer the gaze over your face to each of its parts, and store their positions."""
-    with clear_errors(rig, port, mock), signals() as stopped:
+    with clear_errors(rig, port, mock), record_signals() as stopped:
         loaded = load_rig(rig)
         refuse_unwritable(rig, out)
         lines = Lines(answers)

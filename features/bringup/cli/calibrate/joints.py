@@ -54,12 +54,12 @@ from gazerig.features.bringup.cli.rig_writer import (
 )
 from gazerig.features.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import coupled_pairs, partners
+from gazerig.robot.model.coupling_params import coupled_pairs, joint_partners
 
 JointMove = Calibration | LinkageFit
 
@@ -292,7 +292,7 @@ def calibrate_joints(
 
     Hobby servos report no position: you steer them by eye, and type the angles of some places.
     """
-    with clear_errors(rig, port, mock), signals() as stopped:
+    with clear_errors(rig, port, mock), record_signals() as stopped:
         loaded = load_rig(rig)
         refuse_packages(loaded, "calibrate joints")
         names = _names(loaded, joint)
@@ -345,7 +345,7 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
-    coupled = partners(coupled_pairs(rig.couplings))
+    coupled = joint_partners(coupled_pairs(rig.couplings))
     for name in rig.names:
         if name in coupled and (not asked or name in asked):
             text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"
