@@ -137,7 +137,7 @@ def test_programs_are_told_the_same(running: Running) -> None:
     tick = running.go(0.2)[-1]
     state = from_json(as_json(head_state(tick)))
     assert (
-        state.tick_control_source == tick_control_source(tick)
+        state.control_source == tick_control_source(tick)
         and state.headline == head_activity(tick).headline
     )
     assert (state.gaze.target, state.gaze.phase) == ("neck_yaw held", "held")

@@ -16,8 +16,8 @@ from gazerig.robot.model.frames import (
     CameraParams,
     LensParams,
     PoseHistory,
+    camera_at_pose,
     fixed_mount,
-    mounted_at,
 )
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics

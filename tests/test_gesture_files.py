@@ -89,11 +89,11 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     random = np.random.default_rng(3)
     times = np.cumsum(random.uniform(0.015, 0.025, 200))
     truth = 12.0 * np.sin(2 * pi * 0.6 * times) * np.minimum(1.0, times)
-    even, smooth = smooth(times, truth + random.normal(0.0, 0.15, 200))
-    found, values = fit_keys(even, smooth, TOLERANCE_DEG)
+    even, values_deg = smooth(times, truth + random.normal(0.0, 0.15, 200))
+    found, values = fit_keys(even, values_deg, TOLERANCE_DEG)
     assert 4 <= len(found) <= 30
-    curve = MinimumJerkCurve(float(smooth[0]), found.tolist(), values.tolist())
-    assert np.abs(curve.sample_at(even)[0] - smooth).max() <= TOLERANCE_DEG
+    curve = MinimumJerkCurve(float(values_deg[0]), found.tolist(), values.tolist())
+    assert np.abs(curve.sample_at(even)[0] - values_deg).max() <= TOLERANCE_DEG
     assert np.abs(curve.sample_at(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
     still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
     assert len(still[0]) == 0

@@ -28,8 +28,8 @@ from gazerig.robot.dashboard.feed.live_feed import (
     LiveFeed,
     LiveRig,
     RunState,
-    drain,
     gaze_pixel,
+    read_waiting,
 )
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher

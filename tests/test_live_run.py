@@ -131,12 +131,9 @@ def test_a_killed_rig_is_no_rig_and_the_next_clears_up(place: Path) -> None:
     killed = Run(place)
     killed.connected().close()
     killed.end(signal.SIGKILL)
-    socket_folder = socket_folder(os.environ, os.getuid())
-    assert (
-        list(find_sockets(socket_folder).values()) == [killed.process.pid]
-        and connect_to_all() == []
-    )
+    folder = socket_folder(os.environ, os.getuid())
+    assert list(find_sockets(folder).values()) == [killed.process.pid] and connect_to_all() == []
     second = Run(place)
     second.connected().close()
-    assert list(find_sockets(socket_folder).values()) == [second.process.pid]
+    assert list(find_sockets(folder).values()) == [second.process.pid]
     second.end(signal.SIGTERM)

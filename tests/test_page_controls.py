@@ -58,9 +58,9 @@ from gazerig.robot.dashboard.requests.inbox import (
     REQUEST,
     Inbox,
     is_superseded,
+    is_urgent,
     parse_request,
     request_message,
-    urgent,
 )
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.requests.request_handler import PAGE, PageRequestHandler

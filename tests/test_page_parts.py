@@ -29,10 +29,10 @@ from gazerig.robot.dashboard.feed.camera_overlay import (
     FARTHEST_M,
     IMAGE_WIDTH_PX,
     NEAREST_M,
+    background,
     depth_image,
     draw_detections,
     encode,
-    ground,
 )
 from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices
 from gazerig.robot.dashboard.feed.page_process import (
@@ -71,13 +71,13 @@ from gazerig.robot.dashboard.panels.servo_health import (
     group_reasons,
     guard_text,
     health_table,
+    no_data_text,
+    no_feedback_note,
     other_heads,
     servo_table,
-    silence,
     strain_of_heat,
     strain_of_load,
     strain_of_voltage,
-    without_feedback,
 )
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.head_view import lid_edges

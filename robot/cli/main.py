@@ -18,9 +18,9 @@ import gazerig
 from gazerig.drivers.plugins import COMMAND, SHIPPED, find
 from gazerig.robot.cli.command_list import (
     CommandEntry,
-    in_order,
     package_commands,
     shipped_commands,
+    sort_by_panel,
 )
 from gazerig.robot.cli.examples import EXAMPLES, add_examples
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, clear_errors, run_app

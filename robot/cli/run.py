@@ -21,8 +21,8 @@ from gazerig.robot.cli.terminal import (
     RigArgument,
     clear_errors,
     exit_on_signals,
+    record_signals,
     say,
-    signals,
     status,
 )
 from gazerig.robot.control.joint_faults import JointFault, joints_text

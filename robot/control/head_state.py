@@ -176,7 +176,7 @@ class HeadState:
         led: Client that controls gaze or joints, and its command; "" while the head chooses.
         lead: State of the newest client's control.
         gesture: The newest gesture.
-        leader: The present source of control: gaze models, a client, a gesture, a stop.
+        control_source: Present source of control: gaze models, a client, a gesture, a stop.
         headline: Present activity of the head in one sentence.
         frame_s: Time of the newest camera frame, None before the first.
     """
@@ -192,7 +192,7 @@ class HeadState:
     lead: ControlState = field(default=NO_CLIENT_CONTROL)
     gesture: GestureState = field(default=NO_GESTURE)
     frame_s: float | None = None
-    leader: ControlSource = field(default=ControlSource())
+    control_source: ControlSource = field(default=ControlSource())
     headline: str = ""
 
 
@@ -220,7 +220,11 @@ def head_state(tick: Tick) -> HeadState:
 
 def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
-    named: dict[str, Any] = {"lead": state.lead, "gesture": state.gesture, "leader": state.leader}
+    named: dict[str, Any] = {
+        "lead": state.lead,
+        "gesture": state.gesture,
+        "control_source": state.control_source,
+    }
     return {**asdict(state), **{name: value._asdict() for name, value in named.items()}}
 
 
@@ -245,8 +249,10 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
     )
     made["lead"] = ControlState(**_known_fields(ControlState, data["lead"]))
     made["gesture"] = GestureState(**_known_fields(GestureState, data["gesture"]))
-    if "leader" in data:
-        made["leader"] = ControlSource(**_known_fields(ControlSource, data["leader"]))
+    if "control_source" in data:
+        made["control_source"] = ControlSource(
+            **_known_fields(ControlSource, data["control_source"])
+        )
     return HeadState(**made)
 
 

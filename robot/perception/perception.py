@@ -22,8 +22,8 @@ from gazerig.robot.perception.egomotion_residual import (
     EgomotionResidual,
     ResidualFigures,
     TrackedPoint,
+    rotation_rate_rad_s,
     turn_bound,
-    turning_rad_s,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
 from gazerig.robot.perception.gyro_fusion import GyroFusion

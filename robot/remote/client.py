@@ -43,9 +43,9 @@ from gazerig.robot.remote.socket_io import (
     MalformedMessage,
     Wire,
     connect_to_socket,
-    folder,
+    find_sockets,
     is_private,
-    sockets,
+    socket_folder,
     user_id,
 )
 

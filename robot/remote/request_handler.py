@@ -13,8 +13,8 @@ from pathlib import Path
 
 from gazerig.robot.control.command_handler import (
     FIXED,
-    Commandable,
     CommandHandler,
+    CommandTarget,
     ParamAccess,
     ParamsChanged,
     ParamsSaved,

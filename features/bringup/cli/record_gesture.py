@@ -29,8 +29,8 @@ from gazerig.robot.cli.terminal import (
     ForceOption,
     RigArgument,
     clear_errors,
+    record_signals,
     say,
-    signals,
 )
 from gazerig.robot.model.clock import RealClock
 

@@ -99,7 +99,7 @@ def encode_snapshot(snapshot: Snapshot) -> bytes:
 
 
 def decode_snapshot(message: bytes) -> Snapshot:
-    """Read a message that ``encode_snapshot`` wrote; only ever fed by the process that started the page."""
+    """Read a message of ``encode_snapshot``, which must come from the parent process."""
     values, faces, bodies = pickle.loads(memoryview(message)[1:])
     return Snapshot(
         **dict(zip(_PLAIN, values, strict=True)),
