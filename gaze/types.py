@@ -194,6 +194,7 @@ class Target(NamedTuple):
     plan:     choice of the action planner (gazerig.gaze.attention.action_planner) with its reason;
         "" without one
     saliences: of the winner and of the next three, highest first
+    is_lost:  whether it is out of sight and its last position is looked at
     """
 
     p_world_m: Vec3
@@ -209,6 +210,7 @@ class Target(NamedTuple):
     centre_world_m: Vec3 | None = None
     plan: str = ""
     saliences: tuple[Salience, ...] = ()
+    is_lost: bool = False
 
 
 class GazeState(NamedTuple):

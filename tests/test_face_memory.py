@@ -1,23 +1,38 @@
 """Faces out of view: they stay in mind where they were, and keep their identity."""
 
 from dataclasses import replace
+from math import pi
 from typing import Any
 
 import numpy as np
 import pytest
 from attention_scene import FACE, attention, body, looking, percept
 
+from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.face_memory import FaceMemory
-from gazerig.gaze.types import Target
+from gazerig.gaze.types import Face, Target, Vec3
 
 OTHER = body(2, "face", (1.0, 0.6, 0.0))
 HAND = body(3, "hand", (0.8, 0.5, -0.1), (0.0, 1.0, 0.0))
 
 
-def looks(model: Attention, rows: list[Any], start_s: float, seconds: float) -> list[Target]:
+def looks(
+    model: Attention,
+    rows: list[Any],
+    start_s: float,
+    seconds: float,
+    speaker: int | None = None,
+) -> list[Target]:
     times = start_s + np.arange(round(30 * seconds)) / 30
-    return [model.choose(percept(t, *rows), looking(), t) for t in times]
+    seen = (percept(t, *rows) for t in times)
+    faces = () if speaker is None else (_speaking(speaker),)
+    return [model.choose(replace(one, faces=faces), looking(), one.captured_s) for one in seen]
+
+
+def _speaking(id: int) -> Face:
+    p: Vec3 = (1.0, 0.0, 0.0)
+    return Face(id, p, (0.0, 0.0, 0.0), rotation((pi, 0.0, 0.0)), (p,) * 8, 0.9, speaks=True)
 
 
 @pytest.mark.parametrize(("memory_s", "kind"), [(15.0, "face"), (0.0, "hand")])
@@ -64,11 +79,29 @@ def test_after_a_cut_nobody_is_looked_for_where_they_were(cut: bool) -> None:
 
 def test_memory_lasts_as_long_as_it_is_told_and_no_longer() -> None:
     memory = FaceMemory()
-    both, one = percept(0.0, FACE, OTHER).bodies, percept(0.0, FACE).bodies
-    assert memory.step(both, 1, 0.0, 5.0) is both
-    assert memory.step(one, 1, 1.0, 5.0).ids == (1, 2)
-    assert memory.step(one, 1, 5.0, 5.0).ids == (1, 2)
-    assert memory.step(one, 1, 5.1, 5.0) is one
-    memory.step(both, 1, 6.0, 5.0)
+    both, one = percept(0.0, HAND, OTHER).bodies, percept(0.0, HAND).bodies
+    assert memory.step(both, 3, 0.0, 5.0) is both
+    assert memory.step(one, 3, 1.0, 5.0).ids == (3, 2)
+    assert memory.step(one, 3, 5.0, 5.0).ids == (3, 2)
+    assert memory.step(one, 3, 5.1, 5.0) is one
+    memory.step(both, 3, 6.0, 5.0)
     memory.reset()
-    assert memory.step(one, 1, 6.1, 5.0) is one
+    assert memory.step(one, 3, 6.1, 5.0) is one
+
+
+@pytest.mark.parametrize("talked", [False, True])
+def test_after_a_turn_of_talk_the_gaze_goes_to_who_is_out_of_view(talked: bool) -> None:
+    model = attention()
+    looks(model, [FACE, OTHER], 0.0, 0.5)
+    looks(model, [FACE], 0.5, 2.0, speaker=1 if talked else None)
+    after = [t.id for t in looks(model, [FACE], 2.5, 2.0)]
+    assert (2 in after) is talked
+    if talked:
+        assert after.index(2) <= 0.5 * 30
+        assert after[-1] == 1  # who is not found is forgotten
+
+
+def test_who_speaks_in_view_keeps_the_gaze_from_who_spoke_before() -> None:
+    model = attention()
+    looks(model, [FACE, OTHER], 0.0, 2.0, speaker=2)
+    assert {t.id for t in looks(model, [FACE], 2.0, 5.0, speaker=1)[10:]} == {1}

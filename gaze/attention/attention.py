@@ -91,6 +91,7 @@ class Attention:
         self._identity: tuple[str, int] | None = None
         self._place = _STILL
         self._stay = NO_STAY
+        self._speakers = _NO_ONE
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
@@ -146,11 +147,11 @@ class Attention:
             self._idle.forget_places()
         attended = self._identity[1] if self._identity is not None else -1
         lasts_s = self._params.face_memory_s
-        bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
-        if "face" in percept.bodies.kinds:  # a remembered face never wins against a visible one
-            bodies = percept.bodies
         recovery_s = self._params.habituation.rhythm_recovery_s
         self._persons.update(percept, state.p_world_head_m, recovery_s)
+        unseen_s = self._persons.may_speak_unseen_s if self._params.speaker_share > 0.0 else -inf
+        bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s, unseen_s)
+        self._speakers = self._persons.speaking.union(bodies.ids[len(percept.bodies) :])
         if self.top_down.plans:
             self.top_down.plan(percept, state.p_world_head_m, t_s)
         trait = self.top_down.rule.person
@@ -226,7 +227,12 @@ class Attention:
         rule_target = self.top_down.step(rows, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         left = self._habituation.step(rows, eye, attended, t_s)
-        habituation = [*map(mul, map(mul, left, worth), self._novelty(bodies.ids)), 1.0]
+        left = [*map(mul, left, worth)]
+        if not self.top_down.counts_every_motion:
+            par = self._params
+            ratio = par.habituation.rhythm_ratio
+            self._persons.weaken_known(left, bodies.ids, ratio, par.sinking_ratio)
+        habituation = [*left, 1.0]
         rule = [0.0] * (n + 1)
         amount = [*[terms.total for terms in motion], 0.0]
         point = rule_target is not None and rule_target.point_world_m is not None
@@ -248,17 +254,6 @@ class Attention:
         return TargetComparison(
             bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
         )
-
-    def _novelty(self, ids: tuple[int, ...]) -> list[float]:
-        """Return the factor 0..1 of each body by the repetition of its motion; 0: no target."""
-        if self.top_down.plans:  # in a match every motion of a fist counts
-            return [1.0] * len(ids)
-        persons, ratio = self._persons, self._params.habituation.rhythm_ratio
-        sunk = self._params.sinking_ratio
-        return [
-            (sunk if id in persons.sinking else 1.0) * ratio ** persons.repetitions(id)
-            for id in ids
-        ]
 
     def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
         """Return the limit of each body's motion, and the share of it that counts."""
@@ -305,8 +300,8 @@ class Attention:
         return [one / most for one in shares]
 
     def _favour_speakers(self, ids: list[int], weights: list[float]) -> list[float]:
-        """Return the weights of people such that those who speak have their share of the sum."""
-        share, speaking = self._params.speaker_share, self._persons.speaking
+        """Return the weights of people, in which those who may speak have their share."""
+        share, speaking = self._params.speaker_share, self._speakers
         spoken = sum(one for id, one in zip(ids, weights, strict=True) if id in speaking)
         mute = sum(weights) - spoken
         if share == 0.0 or spoken <= 0.0 or mute <= 0.0:

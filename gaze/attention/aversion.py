@@ -18,7 +18,6 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
-from gazerig.gaze.attention.idle import LOST
 from gazerig.gaze.types import Target, Vec3
 from gazerig.params import Bounds
 
@@ -172,7 +171,7 @@ class Aversion:
         rests_until_s: end of the rest on a part of the face, which the gaze does not leave
             sooner; inf while it is moving there
         """
-        kept = (ordered and self._mode == "none") or target.why.endswith(LOST)
+        kept = (ordered and self._mode == "none") or target.is_lost
         face = target.id if target.kind == "face" and not kept else None
         if face != self._face:
             self._attend(face, t_s)

@@ -1,9 +1,10 @@
 """Memory of faces that have left the view, at their last positions.
 
 A camera sees less than people do, and it turns away with the head: some of several people are
-always out of its view. Remembered faces compete for the gaze like visible ones, so that the gaze
-returns to them. A remembered face that the gaze does not find is forgotten. So is a face that is
-lost under the gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
+always out of its view. The gaze returns to a remembered face when no face is visible. A visible
+one is left for it after the end of a turn of talk: if nobody in view goes on, someone out of view
+may. A remembered face that the gaze does not find is forgotten. So is a face that is lost under the
+gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
 """
 
 from dataclasses import dataclass
@@ -38,14 +39,24 @@ class FaceMemory:
         self._faces: dict[int, _RememberedFace] = {}
         self._captured_s = -inf
 
-    def step(self, bodies: Bodies, attended_id: int, captured_s: float, lasts_s: float) -> Bodies:
+    def step(
+        self,
+        bodies: Bodies,
+        attended_id: int,
+        captured_s: float,
+        lasts_s: float,
+        unseen_s: float = -inf,
+    ) -> Bodies:
         """Return the bodies of a new frame with the remembered faces behind them.
+
+        With a visible face these are only those who may have begun to speak out of view.
 
         Args:
             bodies: seen in the frame.
             attended_id: the present target; -1 for none.
             captured_s: of the frame.
             lasts_s: time for which a face is remembered.
+            unseen_s: time before which such a speaker was last seen; -inf: there is none.
         """
         before, self._captured_s = self._captured_s, captured_s
         seen = frozenset(bodies.ids)
@@ -65,7 +76,8 @@ class FaceMemory:
             del self._faces[id]
         if lasts_s > 0.0:
             self._record(bodies, captured_s)
-        return self._join(bodies, seen)
+        before_s = unseen_s if "face" in bodies.kinds else inf
+        return self._join(bodies, seen, before_s)
 
     def _record(self, bodies: Bodies, captured_s: float) -> None:
         """Record the faces in view."""
@@ -75,9 +87,13 @@ class FaceMemory:
                 radius_m = float(bodies.radius_m[row])
                 self._faces[bodies.ids[row]] = _RememberedFace((x, y, z), radius_m, captured_s)
 
-    def _join(self, bodies: Bodies, seen: frozenset[int]) -> Bodies:
-        """Return the bodies and the remembered faces that are not visible."""
-        rest = {id: face for id, face in self._faces.items() if id not in seen}
+    def _join(self, bodies: Bodies, seen: frozenset[int], before_s: float) -> Bodies:
+        """Return the bodies and the faces that are not visible, last seen before a time."""
+        rest = {
+            id: face
+            for id, face in self._faces.items()
+            if id not in seen and face.seen_s < before_s
+        }
         if not rest:
             return bodies
         still = np.zeros((len(rest), 3))

@@ -28,8 +28,6 @@ from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub,
 from gazerig.gaze.types import SEARCH, Angles2, Target, Vec3, body_name
 from gazerig.params import Bounds
 
-LOST = "lost, waiting"
-"""Reason of a target that was lost and is still looked at."""
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Angles2 = (0.0, 0.0)
 _TRIES = 12
@@ -180,8 +178,9 @@ class Idle:
             p_world_m=there,
             v_world_m_s=_STILL,
             at_s=t_s,
-            why=LOST,
+            why="lost, waiting",
             centre_world_m=None,
+            is_lost=True,
         )
         self._gone = gone._replace(p_world_m=there)
         self._until_s = t_s + par.hold_ms / 1e3

@@ -8,7 +8,7 @@ the one with the face nearest to it. Each further change of side of a hand at th
 motion less new: people look less and less at what repeats itself (Neo & Chua 2006).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import dist, exp, hypot, inf
 
@@ -37,6 +37,8 @@ _HAND, _OWN = "hand", "own"
 _TOGETHER_S = 0.5
 """People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
+_TALKS_S, _BEGINS_S = 6.0, 2.0
+"""Silence after which a talk is over; time after which a silent person may have begun to speak."""
 _GONE_S = 120.0
 
 
@@ -62,7 +64,7 @@ class Persons:
         raised: ids of bodies that move within a person's reach at the height of the face; without
             hands of a person who gestures and does not wave, as signs reach the face, too.
         sinking: ids of hands that move down, and of those that just did.
-        speaking: ids of the people who speak.
+        speaking: ids of the people in view who speak.
     """
 
     def __init__(self) -> None:
@@ -80,6 +82,7 @@ class Persons:
         self.sinking: set[int] = set()
         self.speaking: frozenset[int] = frozenset()
         self._sank_s: dict[int, float] = {}
+        self._spoke_s = -inf
         self._looking: frozenset[int] = frozenset()
         self._nearest = -1
         self._at_s = -inf
@@ -104,6 +107,8 @@ class Persons:
             self._seen_s[id] = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self.speaking = frozenset(face.id for face in percept.faces if face.speaks)
+        if self.speaking:
+            self._spoke_s = self._at_s
         self._forget_repeats(max(0.0, self._at_s - before_s), recovery_s)
         self._update_nearest(faces, p_world_eye_m)
         self.parts, self.raised = {}, set()
@@ -139,6 +144,16 @@ class Persons:
             return frozenset((self._nearest,)) if self._nearest >= 0 else frozenset()
         latest_s = max(self._came_s.values(), default=-inf)
         return frozenset(id for id, at_s in self._came_s.items() if latest_s - at_s < _TOGETHER_S)
+
+    @property
+    def may_speak_unseen_s(self) -> float:
+        """Return the time before which a possible speaker was last seen; -inf: there is none.
+
+        After a turn of talk anyone who was not seen to be silent since may have the next one.
+        """
+        if self.speaking or self._at_s - self._spoke_s > _TALKS_S:
+            return -inf
+        return max(self._spoke_s, self._at_s - _BEGINS_S)
 
     def _update_nearest(self, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
         """Update the nearest person; another one must be clearly nearer."""
@@ -209,13 +224,27 @@ class Persons:
             hand.repeats += 1.0
         return len(hand.turned_s) >= _TURNS
 
-    def repetitions(self, id: int) -> float:
-        """Return how often a hand has repeated its motion recently, 0 for a new motion.
+    def weaken_known(
+        self, factors: list[float], ids: Sequence[int], rhythm_ratio: float, sinking_ratio: float
+    ) -> None:
+        """Lower the factors of hands that repeat their motion or sink.
 
         The first change of side soon after another is still new.
+
+        Args:
+            factors: one for each body, changed in place.
+            ids: of the bodies.
+            rhythm_ratio: further factor for each repetition.
+            sinking_ratio: further factor for a hand that sinks.
         """
-        hand = self._hands.get(id)
-        return 0.0 if hand is None else max(0.0, hand.repeats - 1.0)
+        if not self._hands:
+            return
+        for row, id in enumerate(ids):
+            if id in self.sinking:
+                factors[row] *= sinking_ratio
+            hand = self._hands.get(id)
+            if hand is not None and hand.repeats > 1.0:
+                factors[row] *= rhythm_ratio ** (hand.repeats - 1.0)
 
     def _forget_repeats(self, dt_s: float, recovery_s: float) -> None:
         """Let the number of changes of side decay."""

@@ -209,6 +209,11 @@ class TopDown:
         return self._params.planner.enabled
 
     @property
+    def counts_every_motion(self) -> bool:
+        """Return whether repeated and sinking motion counts in full, as that of fists does."""
+        return self.plans
+
+    @property
     def plan_text(self) -> str:
         """Return the plan of the action planner and its reason, "" without a planner."""
         now = self._planner.plan

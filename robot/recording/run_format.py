@@ -77,6 +77,7 @@ _DESCRIPTIONS = {
     "lead": "the newest command of a client; left out before the first",
     "gesture": "the newest gesture; left out before the first",
     "plan": "choice of the action planner and its reason; left out without a planner",
+    "is_lost": "it is out of sight and its last position is looked at; left out if in sight",
     "before": "further reports of the machine since the previous tick",
     "looks_at_head": "null: too uncertain",
     "gaze_world": "null: the detector does not find the gaze of the eyes",

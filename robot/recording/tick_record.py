@@ -92,7 +92,8 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     """Return a tick from ``tick_stream.decode_plain`` as JSON.
 
     Fields without information are left out: ``guard_result.desired_rad`` if it equals the
-    tick's (null), ``lead`` and ``gesture`` before the first, ``target.plan`` without a planner.
+    tick's (null), ``lead`` and ``gesture`` before the first, ``target.plan`` without a planner,
+    ``target.is_lost`` of a target in sight.
 
     Args:
         row: The fields of a ``TickRow``.
@@ -109,8 +110,9 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     gaze["limited"] = [_name_fields(LimitedAngle, one) for one in gaze["limited"]]
     if data.pop("as_desired"):  # nearly always: written once
         data["guard_result"]["desired_rad"] = None
-    if not target["plan"]:
-        del target["plan"]
+    for name in ("plan", "is_lost"):
+        if not target[name]:
+            del target[name]
     for name, nothing in _NOTHING.items():
         if list(data[name].values()) == nothing:
             del data[name]
