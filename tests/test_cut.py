@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from gazerig.robot.description import head_mesh
 from gazerig.robot.description.head_shape import JAW_BOUNDS, JAW_HALF
-from gazerig.robot.description.mesh import Painted, ellipsoid, merged, painted
-from gazerig.robot.description.solid import cut
+from gazerig.robot.description.mesh import Painted, ellipsoid, merge_meshes, paint
+from gazerig.robot.description.solid import cut_mesh
 
-BALL = painted(ellipsoid((0.3, 0.5, 0.4)), (200, 100, 50))
+BALL = paint(ellipsoid((0.3, 0.5, 0.4)), (200, 100, 50))
 
 
 def _area_vector_and_area(one: Painted) -> tuple[np.ndarray, float]:
@@ -23,8 +23,8 @@ def _area_vector_and_area(one: Painted) -> tuple[np.ndarray, float]:
 @given(st.floats(-0.45, 0.45), st.integers(0, 2))
 @settings(deadline=None, max_examples=60)
 def test_the_two_parts_of_a_cut_are_the_whole(at: float, axis: int) -> None:
-    within, rest = cut(BALL, BALL.mesh.vertices[:, axis] - at)
-    whole, parts = _area_vector_and_area(BALL), _area_vector_and_area(merged([within, rest]))
+    within, rest = cut_mesh(BALL, BALL.mesh.vertices[:, axis] - at)
+    whole, parts = _area_vector_and_area(BALL), _area_vector_and_area(merge_meshes([within, rest]))
     # The same surface, turned the same way.
     assert np.allclose(whole[0], parts[0], atol=1e-12)
     assert parts[1] == pytest.approx(whole[1], rel=1e-9)
@@ -35,7 +35,7 @@ def test_the_two_parts_of_a_cut_are_the_whole(at: float, axis: int) -> None:
 
 
 def test_what_is_on_one_side_stays_whole() -> None:
-    everything, nothing = cut(BALL, np.full(len(BALL.mesh.vertices), -1.0))
+    everything, nothing = cut_mesh(BALL, np.full(len(BALL.mesh.vertices), -1.0))
     assert np.array_equal(everything.mesh.vertices, BALL.mesh.vertices)
     assert np.array_equal(everything.mesh.faces, BALL.mesh.faces)
     assert not len(nothing.mesh.faces)
@@ -44,7 +44,7 @@ def test_what_is_on_one_side_stays_whole() -> None:
 def test_colours_on_the_edge_are_in_between() -> None:
     height = BALL.mesh.vertices[:, 2]
     shaded = BALL._replace(colours=np.stack([100.0 + 100.0 * height] * 3, axis=1))
-    within, _ = cut(shaded, height - 0.123)
+    within, _ = cut_mesh(shaded, height - 0.123)
     edge = np.isclose(within.mesh.vertices[:, 2], 0.123)
     assert edge.sum() > 10
     assert np.allclose(within.colours[edge], 112.3)

@@ -29,7 +29,7 @@ from gazerig.robot.description.gltf import gltf
 from gazerig.robot.description.head_shape import JAW_HALF
 from gazerig.robot.description.links import Description, Inertia
 from gazerig.robot.description.mass import SHELL_M, join_inertias, sheet, skull
-from gazerig.robot.description.mesh import merged
+from gazerig.robot.description.mesh import merge_meshes
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
 from gazerig.robot.description.weights import carried_links
@@ -331,7 +331,7 @@ def test_a_head_weighs_what_its_file_says() -> None:
 
 def test_a_skull_weighs_as_its_mesh_does() -> None:
     skin = head_mesh.skin()
-    mesh = merged([skin.head, skin.jaw]).mesh
+    mesh = merge_meshes([skin.head, skin.jaw]).mesh
     # The walls beside the jaw are not of the shell.
     walls = np.isclose(np.abs(mesh.vertices[:, 1]), JAW_HALF)[mesh.faces].all(axis=1)
     mesh = mesh._replace(faces=mesh.faces[~walls])

@@ -23,7 +23,7 @@ from gazerig.robot.dashboard.view.scene_node import pitch_up
 from gazerig.robot.dashboard.view.viewpoints import BOTH, FACE, SHOULDER, View, named_view
 from gazerig.robot.description import head_mesh
 from gazerig.robot.description.head_shape import EYE_RADIUS, eye_rim, field, measures_of, surface
-from gazerig.robot.description.mesh import Mesh, Painted, grid, merged
+from gazerig.robot.description.mesh import Mesh, Painted, grid, merge_meshes
 from gazerig.robot.description.parts import LOWER_LID, UPPER_LID
 from gazerig.robot.description.person_shape import hand, head, torso
 from gazerig.robot.model.types import JointState, Snapshot
@@ -210,7 +210,7 @@ WHOLE: dict[str, Callable[[], Painted]] = {
     "ear": head_mesh.ear,
     "neck": head_mesh.neck,
     "bust": head_mesh.bust,
-    "skin": lambda: merged([head_mesh.skin().head, head_mesh.skin().jaw]),
+    "skin": lambda: merge_meshes([head_mesh.skin().head, head_mesh.skin().jaw]),
     "person": lambda: head(0, 0.8),
     "chest": lambda: torso(0, 0.34),
     "hand": lambda: hand(0),

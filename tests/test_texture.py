@@ -14,20 +14,20 @@ from gazerig.robot.description.mesh import (
     Mesh,
     Painted,
     cap,
-    merged,
-    mirror,
+    merge_meshes,
+    mirror_mesh,
     mix,
-    moved,
-    painted,
-    plain,
+    move_mesh,
+    paint,
     smooth_normals,
+    uniform_colours,
 )
-from gazerig.robot.description.texture import TexturedMesh, textured
+from gazerig.robot.description.texture import TexturedMesh, add_texture
 
 SHAPES: dict[str, Callable[[], Painted]] = {
     "eye": head_mesh.eye,
     "lid": lambda: head_mesh.eyelid(False),
-    "other brow": lambda: mirror(head_mesh.brow()),
+    "other brow": lambda: mirror_mesh(head_mesh.brow()),
     "skin": lambda: head_mesh.skin().head,
     "jaw": lambda: head_mesh.skin().jaw,
     "person": lambda: person_shape.head(1, 0.6),
@@ -58,7 +58,7 @@ def _corners(vertices: Floats, faces: np.ndarray, values: Floats) -> np.ndarray:
 @pytest.mark.parametrize("shape", SHAPES)
 def test_every_corner_has_its_place_colour_and_normal(shape: str) -> None:
     one = SHAPES[shape]()
-    mesh = textured(one)
+    mesh = add_texture(one)
     assert mesh.uv.min() > 0.0 and mesh.uv.max() < 1.0
     assert len(mesh.faces) == len(one.mesh.faces)
     out = smooth_normals(one.mesh) if one.normals is None else one.normals
@@ -75,7 +75,7 @@ def test_every_corner_has_its_place_colour_and_normal(shape: str) -> None:
 @pytest.mark.parametrize("shape", ["eye", "skin", "person"])
 def test_the_middle_of_a_triangle_is_between_its_corners(shape: str) -> None:
     one = SHAPES[shape]()
-    mesh = textured(one)
+    mesh = add_texture(one)
     corners = _seen(mesh, mesh.uv)[mesh.faces]
     middle = _seen(mesh, mesh.uv[mesh.faces].mean(axis=1))
     # A grid is interpolated between four corners, of which a triangle has three.
@@ -85,17 +85,19 @@ def test_the_middle_of_a_triangle_is_between_its_corners(shape: str) -> None:
 
 
 def test_a_plain_mesh_needs_no_more_than_a_few_texels() -> None:
-    mesh = textured(painted(cap(0.1, 1.0), (10, 20, 30)))
+    mesh = add_texture(paint(cap(0.1, 1.0), (10, 20, 30)))
     assert mesh.image.shape[0] * mesh.image.shape[1] <= 36
     assert (mesh.image == (10, 20, 30)).all()
 
 
 def test_parts_do_not_bleed_into_each_other() -> None:
     ball = cap(0.1, 3.0)
-    red = Painted(ball, mix(plain(ball, (255, 0, 0)), (200, 0, 0), ball.vertices[:, 2] * 10))
+    red = Painted(
+        ball, mix(uniform_colours(ball, (255, 0, 0)), (200, 0, 0), ball.vertices[:, 2] * 10)
+    )
     blue = red._replace(colours=red.colours[:, ::-1])
-    both = merged([one._replace(normals=smooth_normals(ball)) for one in (red, blue)])
-    image = textured(both).image.astype(int)
+    both = merge_meshes([one._replace(normals=smooth_normals(ball)) for one in (red, blue)])
+    image = add_texture(both).image.astype(int)
     # Half a texel further than any vertex lies every colour is still the part's own.
     assert not ((image[..., 0] > 0) & (image[..., 2] > 0)).any()
     assert (image.sum(axis=-1) > 0).mean() > 0.5
@@ -109,7 +111,7 @@ def test_any_triangles_keep_their_colours(count: int, seed: int) -> None:
     faces = np.stack([rng.permutation(count + 2)[:3] for _ in range(count)]).astype(np.uint32)
     colours = np.rint(rng.uniform(0.0, 255.0, (count + 2, 3)))
     one = Painted(Mesh(vertices, faces), colours, np.tile((0.0, 0.0, 1.0), (count + 2, 1)))
-    mesh = textured(moved(one, (0.0, 0.0, 0.0)))
+    mesh = add_texture(move_mesh(one, (0.0, 0.0, 0.0)))
     before = _corners(vertices, faces, colours)
     after = _corners(mesh.vertices, mesh.faces, _seen(mesh, mesh.uv))
     assert np.allclose(before, after, atol=0.51)

@@ -6,9 +6,9 @@ from math import sin
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.mesh import Mesh, Painted, grid, painted
+from gazerig.robot.description.mesh import Mesh, Painted, grid, paint
 from gazerig.robot.description.person_shape import head, torso
-from gazerig.robot.description.texture import textured
+from gazerig.robot.description.texture import add_texture
 from gazerig.robot.description.world_shapes import WorldPart
 from gazerig.robot.model.frames import Quaternion
 
@@ -22,7 +22,7 @@ def _plane(corner: Vec3, u: Vec3, v: Vec3) -> Mesh:
 
 
 def _chequered(mesh: Mesh) -> Painted:
-    plain = painted(mesh, (150, 175, 210))
+    plain = paint(mesh, (150, 175, 210))
     dark = 1.0 - 0.3 * (np.arange(len(mesh.vertices)) // 2 % 2)
     return plain._replace(colours=plain.colours * dark[:, None])
 
@@ -34,13 +34,13 @@ class SmallWorld:
     colour: tuple[int, int, int] = (190, 160, 130)
 
     def parts(self) -> list[WorldPart]:
-        floor = painted(_plane((-1.5, -2.0, -0.9), (0.0, 4.0, 0.0), (4.5, 0.0, 0.0)), self.colour)
+        floor = paint(_plane((-1.5, -2.0, -0.9), (0.0, 4.0, 0.0), (4.5, 0.0, 0.0)), self.colour)
         wall = _chequered(_plane((-1.5, -2.0, -0.9), (0.0, 0.0, 2.4), (0.0, 4.0, 0.0)))
-        stool = painted(_plane((-0.3, -0.4, -0.09), (0.0, 0.8, 0.0), (0.6, 0.0, 0.0)), (90, 60, 40))
+        stool = paint(_plane((-0.3, -0.4, -0.09), (0.0, 0.8, 0.0), (0.6, 0.0, 0.0)), (90, 60, 40))
         return [
             WorldPart("floor", floor),
             WorldPart("stool", stool._replace(normals=None)),
-            WorldPart("wall", textured(wall)),
+            WorldPart("wall", add_texture(wall)),
             WorldPart("ann/head", head(0, 0.8), "skin", moves=True),
             WorldPart("ann/chest", torso(0, 0.34), "cloth", moves=True),
         ]

@@ -65,7 +65,7 @@ class SearchRound:
         return bool(self.found) or self.board is not None
 
 
-def plan(
+def plan_search(
     usb: str, kinds: Sequence[BusKind], rates: Sequence[int] | None
 ) -> tuple[tuple[BusKind, int], ...]:
     """Return the kinds and rates to search, in order.
@@ -85,7 +85,7 @@ def plan(
     return tuple(rows)
 
 
-def search(
+def search_bus(
     port: BusPort,
     usb: str,
     asked: Sequence[tuple[BusKind, int]],
@@ -94,7 +94,7 @@ def search(
 ) -> Iterator[SearchRound]:
     """Search with one kind of bus after the other; end after the first kind that replied.
 
-    asked: result of ``plan``
+    asked: result of ``plan_search``
     thorough: wait long for Dynamixel servos, ask each STS id even if no servo answers a
         broadcast ping
     to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does

@@ -39,7 +39,7 @@ class ChannelPosition(NamedTuple):
     got: int
 
 
-def walk(
+def walk_channel(
     board: Board,
     setup: ServoConfig,
     places: Sequence[int],
@@ -65,26 +65,26 @@ def walk(
     )
     gone: list[ChannelPosition] = []
     now_s = board.line.port.now_s
-    with give_pulses(board, slow) as channel:
+    with start_pulses(board, slow) as channel:
         start = round(channel.ramp.pulse_steps)
         for nth, asked in enumerate(places):
             channel.record_goal(channel.clip(asked), now_s())
             board.send_goals([channel])
             takes_s = abs(asked - start) / speed_steps_s + SETTLE_S
             until_s = now_s() + takes_s + LATE_S
-            start = _advance(board, channel, sleep_until)
+            start = _wait_for_channel(board, channel, sleep_until)
             while abs(start - asked) > FINE_STEPS and now_s() < until_s:
-                start = _advance(board, channel, sleep_until)
+                start = _wait_for_channel(board, channel, sleep_until)
             gone.append(ChannelPosition(asked, start))
             until_s = now_s() + SETTLE_S
             # The board may have a timeout, so it is read meanwhile.
             while not nth and now_s() < until_s:
-                _advance(board, channel, sleep_until)
+                _wait_for_channel(board, channel, sleep_until)
     return tuple(gone)
 
 
 @contextmanager
-def give_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
+def start_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     """Send pulses on a channel: its present pulse, or its servo's rest pulse; off at the end.
 
     Raises:
@@ -117,7 +117,7 @@ def give_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
             )
 
 
-def _advance(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
+def _wait_for_channel(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
     """Wait a moment and return the pulse; move it on if the board does not do so itself."""
     sleep_until(board.line.port.now_s() + LOOK_S)
     channel.advance(board.line.port.now_s())

@@ -8,7 +8,7 @@ import numpy as np
 from gazerig.drivers.errors import DriverError, ServoFault, SetupError
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.features.bringup.telemetry import TelemetrySample
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.clock import Clock
@@ -43,7 +43,7 @@ def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
     """
     holding = []
     for name, joint in joints.items():
-        family = kind_of(joint.model).family
+        family = servo_kind(joint.model).family
         registers = Registers(port, family)
         registers.write(joint.id, "torque_enable", 0)
         if registers.read(joint.id, "torque_enable") != 0:
@@ -55,7 +55,7 @@ def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
         )
 
 
-def record(
+def record_hand_motion(
     sample: Callable[[], TelemetrySample],
     clock: Clock,
     stopped: Callable[[], str | None],

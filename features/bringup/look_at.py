@@ -104,7 +104,7 @@ def look_at(
     )
 
 
-def gaze_text(looked: GazeResult) -> tuple[str, ...]:
+def gaze_result_text(looked: GazeResult) -> tuple[str, ...]:
     """Return gaze error and vergence as text, as far as the mechanism has them."""
     eyes = [part for part in looked.moved.joints if part.joint.endswith(("_pan", "_tilt"))]
     known = " (estimated, not measured)" if any(part.estimated for part in eyes) else ""
@@ -123,7 +123,7 @@ def gaze_text(looked: GazeResult) -> tuple[str, ...]:
     )
 
 
-def ends_reached(
+def joints_at_limits(
     joints: Mapping[str, JointParams], narrower_deg: Mapping[str, float], moved: MoveResult
 ) -> tuple[str, ...]:
     """Name the joints that could turn no farther towards the point.

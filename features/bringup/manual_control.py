@@ -132,7 +132,7 @@ class GuardReasons:
         return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
 
 
-def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointMove, ...]:
+def move_result(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointMove, ...]:
     """Return every joint's result of a movement."""
     guard_result, joints = step.guard_result, step.joints
     has_feedback = joints.measured or (True,) * len(guard_result.joints)
@@ -263,7 +263,7 @@ class ManualControl:
                 outside the joint's range.
             DriverError: the bus is gone.
         """
-        refuse_beyond(joint, angle_deg, self.body.names, self._guard.limits)
+        refuse_angle(joint, angle_deg, self.body.names, self._guard.limits)
         return self.pose({joint: angle_deg})
 
     def pose(self, angles_deg: Mapping[str, float]) -> MoveResult:
@@ -371,7 +371,7 @@ class ManualControl:
             if ended is not None:
                 break
         self._goal = step.guard_result.command_rad
-        applied = outcome(step, step.desired_rad if ends_on is None else ends_on, notes)
+        applied = move_result(step, step.desired_rad if ends_on is None else ends_on, notes)
         level = step.guard_result.level
         events += self._said
         self._said.clear()
@@ -404,7 +404,7 @@ def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> 
             raise SetupError(f"{name}: {angle} is not an angle in degrees")
 
 
-def refuse_beyond(
+def refuse_angle(
     joint: str, angle_deg: float, joints: tuple[str, ...], limits: Sequence[JointLimit]
 ) -> None:
     """Refuse an angle outside a joint's range, before anything moves.

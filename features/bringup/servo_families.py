@@ -33,7 +33,7 @@ class Setting(NamedTuple):
         return now & ~self.mask | self.value & self.mask
 
 
-class Driving(NamedTuple):
+class CalibrationRegisters(NamedTuple):
     """Gentle motion of one servo of a kind.
 
     settings: without which its steps do not mean what they should
@@ -68,7 +68,7 @@ class ServoKind(NamedTuple):
     family: Family
     no_reply: str
     notes: tuple[str, ...]
-    driving: Driving | None
+    driving: CalibrationRegisters | None
     set_middle: Callable[[BusPort, Family, int], int] | None = None
 
 
@@ -104,7 +104,7 @@ DYNAMIXEL = ServoKind(
     no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
     "adaptor's plug the TTL one (3 pins), and the first cable in?",
     notes=(),
-    driving=Driving(
+    driving=CalibrationRegisters(
         settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
         offset="homing_offset",
         offset_usable=False,
@@ -125,7 +125,7 @@ FEETECH = ServoKind(
         "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
         "keep the switch of the servo supply at hand",
     ),
-    driving=Driving(
+    driving=CalibrationRegisters(
         settings=(
             Setting("operating_mode", 0),
             Setting("phase", 0, feetech.MULTI_TURN),
@@ -158,7 +158,7 @@ KINDS: dict[str, ServoKind] = {kind.name: kind for kind in (DYNAMIXEL, FEETECH)}
 _KIND_OF = {kind.family.name: kind for kind in (*KINDS.values(), SCS)}
 
 
-def kind_of(model: str) -> ServoKind:
+def servo_kind(model: str) -> ServoKind:
     """Return the kind of a servo by its model.
 
     Raises:

@@ -79,7 +79,7 @@ def read_snapshot(port: BusPort, kind: ServoKind, servo_id: int) -> ServoSnapsho
     )
 
 
-def restart(
+def reboot_servo(
     port: BusPort, kind: ServoKind, servo_id: int, baud: int, sleep_until: Callable[[float], None]
 ) -> RebootResult:
     """Restart a servo and wait until it answers; its torque is off then.

@@ -90,7 +90,7 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
         )
 
 
-def assign(
+def assign_servo(
     port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
 ) -> SetupResult:
     """Give the servo found the id of a joint and the bus's baud rate, and verify them.

@@ -1,7 +1,7 @@
 """Measurement of recorded and simulated gaze: report, compare, sweep, and fits to eye trackers.
 
 Interface: the commands ``report``, ``compare``, ``sweep`` and ``fit-scanpath`` (commands.py);
-``simulated_run.simulate`` returns the gaze trace of a simulated run, and ``report.report_of`` the
+``simulated_run.simulate`` returns the gaze trace of a simulated run, and ``report.make_report`` the
 measures of a trace.
 
 report/: measures, figures and pages of one run or of two; sweep/: many simulated runs over a grid,

@@ -9,11 +9,18 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gazerig.features.study.data_folder import InterimLook
-from gazerig.features.study.decisions import Decision, decisions
+from gazerig.features.study.decisions import Decision, decide_hypotheses
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.questionnaire import Questionnaire
-from gazerig.features.study.scores import Measure, Scores, item_answers, measures, scores, wins
+from gazerig.features.study.scores import (
+    Measure,
+    Scores,
+    choice_wins,
+    design_measures,
+    item_answers,
+    measure_scores,
+)
 from gazerig.features.study.statistics.contingency import Counts, counts_of
 from gazerig.features.study.statistics.effects import EffectSize, cronbachs_alpha
 from gazerig.gaze.types import Floats
@@ -119,7 +126,7 @@ def analyse_study(
 ) -> StudyAnalysis:
     """Analyse a study."""
     people = without_simulated(people)
-    known = [one for one in measures(design, questionnaires).values() if not one.once]
+    known = [one for one in design_measures(design, questionnaires).values() if not one.once]
     keys = tuple(design.conditions)
     summaries = [
         _summarise_measure(one, people, keys, questionnaires)
@@ -129,7 +136,7 @@ def analyse_study(
     choices = [_summarise_choices(one, people, keys) for one in known if one.kind == "choice"]
     return StudyAnalysis(
         name, design, questionnaires, design_sha256, tuple(people),
-        decisions(design, questionnaires, people), tuple(summaries), tuple(choices), deleted,
+        decide_hypotheses(design, questionnaires, people), tuple(summaries), tuple(choices), deleted,
     )  # fmt: skip
 
 
@@ -149,7 +156,7 @@ def _summarise_measure(
     conditions: tuple[str, ...],
     questionnaires: Mapping[str, Questionnaire],
 ) -> MeasureSummary:
-    found = scores(measure, people, conditions, questionnaires)
+    found = measure_scores(measure, people, conditions, questionnaires)
     counts = None
     if measure.kind == "item":
         counts = np.array([counts_of(found.answers(c), measure.points) for c in conditions])
@@ -192,7 +199,7 @@ def within_participant_half_widths(means: Floats) -> Floats:
 def _summarise_choices(
     measure: Measure, people: Sequence[Participation], conditions: tuple[str, ...]
 ) -> ChoiceSummary:
-    table = wins(measure, people, conditions)
+    table = choice_wins(measure, people, conditions)
     made = [
         row.value
         for one in people

@@ -120,7 +120,7 @@ class StudyData:
 
     def participant(self, number: int) -> Path:
         """Return the folder of a participant."""
-        return self.folder / "participants" / code_of(number)
+        return self.folder / "participants" / participant_code(number)
 
     def numbers(self) -> tuple[int, ...]:
         """Return the numbers of the participants with data, in order."""
@@ -173,8 +173,10 @@ class StudyData:
         """
         folder = self.participant(number)
         if not folder.is_dir():
-            there = ", ".join(map(code_of, self.numbers())) or "nobody"
-            raise SetupError(f"{self.folder} has nothing of {code_of(number)}; there is {there}")
+            there = ", ".join(map(participant_code, self.numbers())) or "nobody"
+            raise SetupError(
+                f"{self.folder} has nothing of {participant_code(number)}; there is {there}"
+            )
         with session_lock(folder):
             pass  # a damaged journal can be deleted, too
         made = [self.folder / name for name in ("report", "bids")]
@@ -183,14 +185,14 @@ class StudyData:
             for place in (folder, *made):
                 if place.exists():
                     shutil.rmtree(place)
-            codes = sorted({*self.deleted(), code_of(number)})
+            codes = sorted({*self.deleted(), participant_code(number)})
             write_file(self.folder / _DELETED, "\n".join(codes) + "\n", force=True)
         except OSError as error:
             raise SetupError(f"{folder}: {error.strerror}: not all was deleted") from error
         return len(gone)
 
 
-def code_of(number: int) -> str:
+def participant_code(number: int) -> str:
     """Return the code of a participant, e.g. P007.
 
     Raises:

@@ -16,9 +16,9 @@ from gazerig.features.study.scores import (
     Measure,
     Scores,
     choice_differences,
-    measures,
-    scores,
-    wins,
+    choice_wins,
+    design_measures,
+    measure_scores,
 )
 from gazerig.features.study.statistics.assumptions import (
     AssumptionCheck,
@@ -27,7 +27,12 @@ from gazerig.features.study.statistics.assumptions import (
 )
 from gazerig.features.study.statistics.contingency import chi_square, counts_of
 from gazerig.features.study.statistics.effects import EffectSize, StatisticalTest, cohens_dz
-from gazerig.features.study.statistics.ranks import friedman, rank_sum, sign, signed_rank
+from gazerig.features.study.statistics.ranks import (
+    friedman_test,
+    rank_sum_test,
+    sign_test,
+    signed_rank_test,
+)
 from gazerig.gaze.types import Floats
 
 Verdict = Literal["supported", "not supported", "against", "too few"]
@@ -62,13 +67,13 @@ class Decision:
     too_few: str = ""
 
 
-def decisions(
+def decide_hypotheses(
     design: StudyDesign,
     questionnaires: Mapping[str, Questionnaire],
     people: Sequence[Participation],
 ) -> tuple[Decision, ...]:
     """Decide on every hypothesis of a design, with the correction that it planned."""
-    known = measures(design, questionnaires)
+    known = design_measures(design, questionnaires)
     found = [
         _decide_rating(design, one, known[one.measure], questionnaires, people)
         for one in design.hypotheses
@@ -101,7 +106,7 @@ def _decide_rating(
     conditions = tuple(design.conditions)
     if measure.kind == "choice":
         return _decide_choice(design, one, measure, people)
-    found = scores(measure, people, conditions, questionnaires)
+    found = measure_scores(measure, people, conditions, questionnaires)
     sides = _Sides(found, design.side(one.better), design.side(one.than))
     better, than = sides.means
     n = len(better)
@@ -109,7 +114,7 @@ def _decide_rating(
         why = f"{n} of {design.plan.participants} participants have both conditions"
         nothing = (nan, nan)
         return Decision(one, measure, None, (), nan, "too few", n, nothing, nothing, None, (), why)
-    tests = [_run(key, one, sides, measure) for key in (one.test, *one.also)]
+    tests = [_run_test(key, one, sides, measure) for key in (one.test, *one.also)]
     checks = difference_checks(better - than, sides.better_first)
     if measure.kind in ("item", "scale"):
         answers = [found.answers(*sides.than), found.answers(*sides.better)]
@@ -151,14 +156,14 @@ class _Sides:
         return found
 
 
-def _run(key: Test, one: Hypothesis, sides: _Sides, measure: Measure) -> StatisticalTest:
+def _run_test(key: Test, one: Hypothesis, sides: _Sides, measure: Measure) -> StatisticalTest:
     found, (better, than) = sides.found, sides.means
     if key == "signed_rank":
-        return signed_rank(better - than, one.two_sided)
+        return signed_rank_test(better - than, one.two_sided)
     if key == "rank_sum":
-        return rank_sum(than, better, one.two_sided, paired=True)
+        return rank_sum_test(than, better, one.two_sided, paired=True)
     if key == "friedman":
-        return friedman(found.means[np.isfinite(found.means).all(axis=1)])
+        return friedman_test(found.means[np.isfinite(found.means).all(axis=1)])
     if key == "chi_square":
         rows = [counts_of(found.answers(*c), measure.points) for c in (sides.better, sides.than)]
         return chi_square(rows, paired=True)
@@ -170,7 +175,7 @@ def _decide_choice(
 ) -> Decision:
     """Decide on a hypothesis about choices between two conditions."""
     conditions = tuple(design.conditions)
-    table = wins(measure, people, conditions)
+    table = choice_wins(measure, people, conditions)
     better, than = (
         conditions.index(key) for name in (one.better, one.than) for key in design.side(name)
     )
@@ -180,7 +185,7 @@ def _decide_choice(
         why = "nobody has chosen"
         nothing = (nan, nan)
         return Decision(one, measure, None, (), nan, "too few", 0, nothing, nothing, None, (), why)
-    test = sign(leans, one.two_sided)
+    test = sign_test(leans, one.two_sided)
     share = float(table[better, than]) / direct
     return Decision(
         one, measure, test, (), nan, "not supported", len(leans), (nan, nan), (share, 1.0 - share),

@@ -28,7 +28,7 @@ AnswerValue = int | str | None
 
 
 @dataclass(frozen=True)
-class Opened:
+class ParticipationOpened:
     """A session began or was resumed.
 
     design_sha256: of the design's canonical text (gazerig.features.study.preregistration)
@@ -45,7 +45,7 @@ class Opened:
 
 
 @dataclass(frozen=True)
-class Consented:
+class ConsentGiven:
     """Consent to each use, as requested on the consent page."""
 
     given: bool
@@ -107,7 +107,7 @@ class ItemAnswered:
 
 
 @dataclass(frozen=True)
-class Measured:
+class TrialMeasured:
     """Measures of one presentation: name -> value, nan if unknown.
 
     values: the design's objective measures, and STEP_DEG
@@ -121,7 +121,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Closed:
+class ParticipationClosed:
     """The session ended: finished, withdrawn, or the experimenter excluded the participant."""
 
     how: Literal["finished", "withdrawn", "excluded"]
@@ -129,7 +129,15 @@ class Closed:
     utc: str
 
 
-Record = Opened | Consented | TrialBegan | TrialEnded | ItemAnswered | Measured | Closed
+Record = (
+    ParticipationOpened
+    | ConsentGiven
+    | TrialBegan
+    | TrialEnded
+    | ItemAnswered
+    | TrialMeasured
+    | ParticipationClosed
+)
 """``kind`` in JSON is the class's name."""
 
 
@@ -137,7 +145,15 @@ FILE = "journal.jsonl"
 _LOCK = "lock"
 _KINDS: Mapping[str, type[Record]] = {
     kind.__name__: kind
-    for kind in (Opened, Consented, TrialBegan, TrialEnded, ItemAnswered, Measured, Closed)
+    for kind in (
+        ParticipationOpened,
+        ConsentGiven,
+        TrialBegan,
+        TrialEnded,
+        ItemAnswered,
+        TrialMeasured,
+        ParticipationClosed,
+    )
 }
 
 
@@ -266,7 +282,7 @@ def decode_records(data: bytes, path: Path) -> tuple[Record, ...]:
                 numbers = {field.name for field in fields(kind) if field.type is float}
                 for name in numbers & said.keys():
                     said[name] = nan if said[name] is None else said[name]
-                if kind is Measured:
+                if kind is TrialMeasured:
                     values = said["values"].items()
                     said["values"] = {key: nan if one is None else one for key, one in values}
                 records.append(msgspec.convert(said, kind))

@@ -50,7 +50,7 @@ def block_trials(design: StudyDesign) -> tuple[str, ...]:
     return tuple(f"{a}{PAIR}{b}" for a, b in combinations(keys, 2))
 
 
-def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
+def participant_order(design: StudyDesign, participant: int) -> tuple[str, ...]:
     """Return the trials of a participant in order, each a condition key or a pair "a|b".
 
     Each repetition is a separate block with another order of the same balanced set. The last
@@ -82,7 +82,7 @@ def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
     return tuple(one for row in chosen for one in row)
 
 
-def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
+def practice_trials(design: StudyDesign, participant: int) -> tuple[str, ...]:
     """Return the practice trials of a participant, drawn at random; they do not count."""
     rng = np.random.default_rng((design.trials.seed, participant, _PRACTICE))
     drawn = rng.permutation(len(block_trials(design)))

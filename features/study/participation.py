@@ -18,14 +18,14 @@ from gazerig.features.study.design import Condition, StudyDesign
 from gazerig.features.study.journal import (
     FILE,
     AnswerValue,
-    Closed,
-    Consented,
+    ConsentGiven,
     ItemAnswered,
-    Measured,
-    Opened,
+    ParticipationClosed,
+    ParticipationOpened,
     Record,
     TrialBegan,
     TrialEnded,
+    TrialMeasured,
 )
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.questionnaire import Questionnaire
@@ -114,7 +114,7 @@ def participation(
     Raises:
         ValueError: the journal does not begin with Opened.
     """
-    if not records or not isinstance(records[0], Opened):
+    if not records or not isinstance(records[0], ParticipationOpened):
         raise ValueError("a journal begins with what opened it")
     opened = records[0]
     found: dict[tuple[int, int], TrialRow] = {}
@@ -136,7 +136,7 @@ def participation(
                 found[one.trial, one.side], outcome=one.outcome, seconds=one.seconds,
                 recording=one.recording, reason=one.reason, from_s=one.from_s, to_s=one.to_s,
             )  # fmt: skip
-        elif isinstance(one, Measured) and (one.trial, one.side) in found:
+        elif isinstance(one, TrialMeasured) and (one.trial, one.side) in found:
             before = found[one.trial, one.side]
             found[one.trial, one.side] = replace(before, measured=dict(one.values))
     trials = tuple(found.values())
@@ -160,7 +160,7 @@ def participation(
         else row
         for row in rows
     ]
-    closed = [r for r in records if isinstance(r, Closed)]
+    closed = [r for r in records if isinstance(r, ParticipationClosed)]
     how = closed[-1].how if closed else "unfinished"
     whole = Participation(
         opened.participant, opened.design_sha256, opened.order, opened.program, opened.utc,
@@ -199,7 +199,7 @@ def _misfit(
     number: int, one: Record, design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> str:
     """Return why a record does not fit the design's sessions, "" if it fits."""
-    if number == 1 and not isinstance(one, Opened):
+    if number == 1 and not isinstance(one, ParticipationOpened):
         return "a journal begins with Opened"
     shown: list[str] = []
     if isinstance(one, TrialBegan):
@@ -227,11 +227,11 @@ def _exclusion_reason(
     questionnaires: Mapping[str, Questionnaire],
 ) -> str:
     """Return the reason of a participant's exclusion, "" without one."""
-    consents = [r.given for r in records if isinstance(r, Consented)]
+    consents = [r.given for r in records if isinstance(r, ConsentGiven)]
     if not consents or not consents[-1]:
         return "did not consent"
     if one.how in ("withdrawn", "excluded"):
-        last = [r.reason for r in records if isinstance(r, Closed)][-1]
+        last = [r.reason for r in records if isinstance(r, ParticipationClosed)][-1]
         words = "withdrew" if one.how == "withdrawn" else "excluded by the experimenter"
         return f"{words}: {last}" if last else words
     if one.how == "unfinished" and design.exclusion.incomplete == "exclude":
@@ -292,9 +292,9 @@ def collect_study(folder: Path) -> CollectedStudy:
         each = data.participant(number)
         records = journal.read(each)
         for one in records:
-            if isinstance(one, Opened) and one.participant != each.name:
+            if isinstance(one, ParticipationOpened) and one.participant != each.name:
                 raise SetupError(f"{each} has the journal of {one.participant}: move it back")
-            if isinstance(one, Opened) and one.design_sha256 != sha256:
+            if isinstance(one, ParticipationOpened) and one.design_sha256 != sha256:
                 raise SetupError(
                     f"{each} was recorded with another design ({one.design_sha256[:12]}) than "
                     f"{path} ({sha256[:12]}): data of two designs are two studies; move it to the "

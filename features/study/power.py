@@ -24,7 +24,7 @@ from gazerig.features.study.simulation import (
     ITEM_SD,
     TRIAL_SD,
     choice_probability,
-    shift_of,
+    effect_shift,
     thresholds,
 )  # fmt: skip
 from gazerig.gaze.types import Floats
@@ -153,7 +153,7 @@ def joint_probabilities(effect: float, points: int) -> Floats:
 
     Rows are the rating of the condition expected to be better, columns of the other one.
     """
-    shift, noise = shift_of(effect, points), sqrt(TRIAL_SD**2 + ITEM_SD**2)
+    shift, noise = effect_shift(effect, points), sqrt(TRIAL_SD**2 + ITEM_SD**2)
     ends = np.array([-np.inf, *thresholds(points), np.inf])
     own = BETWEEN_SD * _NODES[:, None]
     above, below = (

@@ -7,11 +7,11 @@ from pathlib import Path
 import jinja2
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
-from gazerig.features.study.order import PAIR, balanced_group_size, block_trials, orders
+from gazerig.features.study.order import PAIR, balanced_group_size, block_trials, participant_order
 from gazerig.features.study.participation import LEAST_SAME
 from gazerig.features.study.power import MOST, PowerClaim, power_claim, power_of
 from gazerig.features.study.questionnaire import Item, Questionnaire, Texts
-from gazerig.features.study.scores import GAZE_MEASURES, measures
+from gazerig.features.study.scores import GAZE_MEASURES, design_measures
 
 TESTS: Mapping[Test, str] = {
     "signed_rank": "Wilcoxon's signed-rank test of participants' differences, zeros left out",
@@ -25,7 +25,7 @@ _QUESTION_S, _SHOWN_ROWS = 6.0, 12
 _FILES = ("rig", "profile", "character", "scanpath", "behaviour", "recording", "film")
 
 
-def text(
+def preregistration_text(
     design: StudyDesign,
     questionnaires: Mapping[str, Questionnaire],
     changes: Mapping[str, Mapping[str, object]],
@@ -36,7 +36,7 @@ def text(
     claims = claims_of(design, questionnaires)
     hypotheses = [
         {
-            "sentence": sentence(one, design),
+            "sentence": hypothesis_sentence(one, design),
             "analysis": (
                 f"`{one.measure}`, `{one.better}` against `{one.than}`: {TESTS[one.test]}."
                 + f" Exploratory, deciding nothing: {'; '.join(TESTS[test] for test in one.also)}."
@@ -56,7 +56,7 @@ def text(
     if trials.practice:
         many = f"{trials.practice} practice trial{'s' if trials.practice > 1 else ''}"
         practice = f"Before it, {many}."
-    if trials.rest_every and len(orders(design, 1)) > trials.rest_every:
+    if trials.rest_every and len(participant_order(design, 1)) > trials.rest_every:
         rests = f"After every {trials.rest_every} trials a rest of at least {trials.rest_s:g} s."
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined,
@@ -69,7 +69,7 @@ def text(
         repeated=f", {trials.repetitions} times" if trials.repetitions > 1 else "",
         course=" ".join(filter(None, (_order(design), practice, rests))),
         minutes=minutes(design, questionnaires),
-        rows=list(_rows(design)), questionnaires=list(_asked(design, questionnaires)),
+        rows=list(_rows(design)), questionnaires=list(_questionnaire_rows(design, questionnaires)),
         objective=[(n, GAZE_MEASURES.get(n, "as in gazerig report")) for n in design.objective],
         correction=_correction(design), curve=_curve(design, claims),
         exclusions=list(_exclusions(design)), privacy=list(_privacy(design)),
@@ -82,11 +82,11 @@ def claims_of(
     design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> tuple[PowerClaim, ...]:
     """Return the power of each hypothesis."""
-    known = measures(design, questionnaires)
+    known = design_measures(design, questionnaires)
     return tuple(power_claim(design, one, known[one.measure]) for one in design.hypotheses)
 
 
-def sentence(one: Hypothesis, design: StudyDesign) -> str:
+def hypothesis_sentence(one: Hypothesis, design: StudyDesign) -> str:
     """Return a hypothesis in words."""
     sides = "either sign counts" if one.two_sided else "the other sign does not count"
     better, than = design.side(one.better), design.side(one.than)
@@ -170,14 +170,17 @@ def _rows(design: StudyDesign) -> Iterator[tuple[str, str]]:
         else design.plan.participants
     )
     for number in range(1, min(every, _SHOWN_ROWS) + 1):
-        yield str(number), ", ".join(one.replace(PAIR, " then ") for one in orders(design, number))
+        yield (
+            str(number),
+            ", ".join(one.replace(PAIR, " then ") for one in participant_order(design, number)),
+        )
     if every > _SHOWN_ROWS:
         yield "...", f"{every - _SHOWN_ROWS} more, from the seed"
     if design.trials.order == "williams" and every < design.plan.participants:
         yield "...", f"participant {every + 1} as participant 1, and so on"
 
 
-def _asked(
+def _questionnaire_rows(
     design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> Iterator[dict[str, object]]:
     said = design.language

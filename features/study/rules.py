@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from gazerig.features.study.design import DECIDING, Hypothesis, StudyDesign, Test
 from gazerig.features.study.order import balanced_group_size
 from gazerig.features.study.questionnaire import Item, Questionnaire
-from gazerig.features.study.scores import GAZE_MEASURES, Measure, measures
+from gazerig.features.study.scores import GAZE_MEASURES, Measure, design_measures
 from gazerig.robot.model.types import JOINT_NAME
 
 Found = Iterator[tuple[str, str]]
@@ -170,7 +170,7 @@ def consistency_rules(design: StudyDesign, questionnaires: Mapping[str, Question
             yield place, f"{key!r} asks which of two was chosen, and at the end there are none"
     if not design.questionnaires:
         yield "questionnaires", "none is asked after a trial; name one"
-    known = measures(design, questionnaires)
+    known = design_measures(design, questionnaires)
     complete = all(key in questionnaires for key in every)
     chosen = [one for one in known.values() if one.kind == "choice"]
     if design.task == "pairwise" and complete and not chosen:
@@ -200,7 +200,7 @@ def _hypothesis_rules(
         if i == 0 and test not in DECIDING:
             right = "sign" if measure is not None and measure.kind == "choice" else "signed_rank"
             yield key, f"{test} {_EXPLORATORY[test]}: write test: {right}, and also: [{test}]"
-        elif measure is not None and (rule := _misfit(test, measure, len(design.conditions))):
+        elif measure is not None and (rule := _test_misfit(test, measure, len(design.conditions))):
             yield key, rule
         elif len(design.side(one.better)) > 1 and test not in LEVEL_TESTS:
             instead = "name two" if test == "sign" else f"take {' or '.join(LEVEL_TESTS)}"
@@ -241,7 +241,7 @@ LEVEL_TESTS = ("signed_rank", "rank_sum")
 """Tests of a participant's means, which may include several conditions."""
 
 
-def _misfit(test: str, measure: Measure, conditions: int) -> str:
+def _test_misfit(test: str, measure: Measure, conditions: int) -> str:
     """Return why a test cannot decide on a measure, "" if it can."""
     if (test == "sign") != (measure.kind == "choice"):
         fit = "sign" if measure.kind == "choice" else "signed_rank"

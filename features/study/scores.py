@@ -43,7 +43,7 @@ class Measure:
     once: bool = False
 
 
-def measures(
+def design_measures(
     design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> dict[str, Measure]:
     """Return the measures of a study by name, without free text.
@@ -109,7 +109,7 @@ class Scores:
         return found
 
 
-def scores(
+def measure_scores(
     measure: Measure,
     people: Sequence[Participation],
     conditions: Sequence[str],
@@ -187,7 +187,7 @@ def item_answers(
     return np.array(whole, float).reshape(-1, len(measure.items))
 
 
-def wins(
+def choice_wins(
     measure: Measure, people: Sequence[Participation], conditions: Sequence[str]
 ) -> NDArray[np.int64]:
     """Return how often the row was chosen over the column, (conditions, conditions)."""
@@ -210,7 +210,7 @@ def choice_differences(
 
     Participants who did not choose between these two are left out.
     """
-    each = (wins(measure, [one], (better, than)) for one in people)
+    each = (choice_wins(measure, [one], (better, than)) for one in people)
     found = [int(table[0, 1]) - int(table[1, 0]) for table in each if table.any()]
     return np.array(found, float)
 

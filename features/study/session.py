@@ -19,16 +19,16 @@ from gazerig.features.study.answers import WrongAnswer, check_answer
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.journal import (
     AnswerValue,
-    Closed,
-    Consented,
+    ConsentGiven,
     ItemAnswered,
-    Opened,
     Outcome,
+    ParticipationClosed,
+    ParticipationOpened,
     Record,
     TrialBegan,
     TrialEnded,
 )
-from gazerig.features.study.order import PAIR, orders, practice
+from gazerig.features.study.order import PAIR, participant_order, practice_trials
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.screens import (
     ConsentScreen,
@@ -78,12 +78,12 @@ class StudyProgress:
 
     def __init__(self, design: StudyDesign, participant: int) -> None:
         self._design = design
-        warm_up = practice(design, participant)
-        self.order = orders(design, participant)
+        warm_up = practice_trials(design, participant)
+        self.order = participant_order(design, participant)
         self.trials = dict(enumerate((*warm_up, *self.order), start=-len(warm_up)))
         self.began: TrialBegan | None = None
-        self.consented: Consented | None = None
-        self.closed: Closed | None = None
+        self.consented: ConsentGiven | None = None
+        self.closed: ParticipationClosed | None = None
         self._sides = 2 if design.task == "pairwise" else 1
         self._attempts: dict[tuple[int, int], int] = {}
         self._lost: Counter[int] = Counter()
@@ -95,7 +95,7 @@ class StudyProgress:
         """Apply records that are on disk."""
         for one in records:
             match one:
-                case Consented():
+                case ConsentGiven():
                     self.consented = one
                 case TrialBegan():
                     self.began = one
@@ -109,7 +109,7 @@ class StudyProgress:
                     self._lost[one.trial] += one.outcome == "head_lost"
                 case ItemAnswered():
                     self._answered.add((one.trial, one.questionnaire))
-                case Closed():
+                case ParticipationClosed():
                     self.closed = one
 
     def leave_place(self, place: StudyPlace) -> None:
@@ -291,9 +291,9 @@ class StudySession:
 
     def opened(
         self, code: str, design_sha256: str, program: str, utc: str, simulated: bool = False
-    ) -> Opened:
+    ) -> ParticipationOpened:
         """Return the record of the start or resumption of a session."""
-        return Opened(code, design_sha256, self.order, program, utc, simulated)
+        return ParticipationOpened(code, design_sha256, self.order, program, utc, simulated)
 
     def resumed(self, utc: str) -> tuple[Record, ...]:
         """Return the records of a presentation that was interrupted by the end of the program."""
@@ -310,8 +310,8 @@ class StudySession:
         self._require_step("consent")
         asked = self._consent_screen()
         uses = given and pictures and asked.pictures, given and gaze and asked.gaze
-        said = Consented(given, *uses, utc)
-        return (said,) if given else (said, Closed("withdrawn", "no consent", utc))
+        said = ConsentGiven(given, *uses, utc)
+        return (said,) if given else (said, ParticipationClosed("withdrawn", "no consent", utc))
 
     def _consent_screen(self) -> ConsentScreen:
         camera, kept = self.design.presentation.on == "head", self.design.privacy
@@ -400,13 +400,16 @@ class StudySession:
         """Return the record of the end, once nothing remains to show or ask."""
         if self.closed or self._progress.place.step != "end":
             return ()
-        return (Closed("finished", "", utc),)
+        return (ParticipationClosed("finished", "", utc),)
 
     def withdraw(self, utc: str) -> tuple[Record, ...]:
         """Return the records of a participant's withdrawal."""
         if self.closed:
             return ()
-        return (*self._end_presentation("withdrawn", nan, utc), Closed("withdrawn", "", utc))
+        return (
+            *self._end_presentation("withdrawn", nan, utc),
+            ParticipationClosed("withdrawn", "", utc),
+        )
 
     def exclude(self, reason: str, utc: str) -> tuple[Record, ...]:
         """Return the records of the experimenter's exclusion of the participant."""
@@ -414,7 +417,7 @@ class StudySession:
             return ()
         return (
             *self._end_presentation("interrupted", nan, utc, reason),
-            Closed("excluded", reason, utc),
+            ParticipationClosed("excluded", reason, utc),
         )
 
     def add(self, records: Iterable[Record]) -> None:

@@ -51,7 +51,7 @@ class Population:
 # fmt: on
 
 
-def levels(design: StudyDesign) -> dict[str, int]:
+def factor_levels(design: StudyDesign) -> dict[str, int]:
     """Return the rank of each condition by the hypotheses, the lowest at 0.
 
     Without hypotheses the first condition is above the others.
@@ -84,7 +84,7 @@ def thresholds(points: int) -> tuple[float, ...]:
 
 
 @cache
-def shift_of(effect: float, points: int, items: int = 1, repetitions: int = 1) -> float:
+def effect_shift(effect: float, points: int, items: int = 1, repetitions: int = 1) -> float:
     """Return the latent shift that gives differences of this d_z.
 
     Args:
@@ -96,13 +96,13 @@ def shift_of(effect: float, points: int, items: int = 1, repetitions: int = 1) -
     wanted = abs(effect)
 
     def missing(shift: float) -> float:
-        return effect_of(shift, points, items, repetitions) - wanted
+        return shift_effect(shift, points, items, repetitions) - wanted
 
     found = float(optimize.brentq(missing, 0.0, _LARGEST_SHIFT, xtol=1e-9)) if wanted else 0.0
     return found if effect >= 0.0 else -found
 
 
-def effect_of(shift: float, points: int, items: int = 1, repetitions: int = 1) -> float:
+def shift_effect(shift: float, points: int, items: int = 1, repetitions: int = 1) -> float:
     """Return d_z of the differences from a shift of half up and half down.
 
     By Gauss-Hermite quadrature over the participant's level and the trial's deviation.
@@ -142,7 +142,7 @@ def differences(
     effect: float, shape: tuple[int, int], rng: np.random.Generator, points: int = 5
 ) -> Floats:
     """Return differences of one item's ratings between two conditions, (studies, participants)."""
-    shift, own = shift_of(effect, points), rng.normal(0.0, BETWEEN_SD, shape)
+    shift, own = effect_shift(effect, points), rng.normal(0.0, BETWEEN_SD, shape)
     noise = sqrt(TRIAL_SD**2 + ITEM_SD**2)
     above = ratings_from_latent(own + 0.5 * shift + rng.normal(0.0, noise, shape), points)
     return above - ratings_from_latent(own - 0.5 * shift + rng.normal(0.0, noise, shape), points)
@@ -161,7 +161,7 @@ class SimulatedParticipant:
         """Draw the participant's properties."""
         self._design, self._questionnaires = design, questionnaires
         self._number, self._population = number, population
-        self._levels = levels(design)
+        self._levels = factor_levels(design)
         self._middle = 0.5 * max(self._levels.values())
         self._shown = compared_trials(design)
         careless, hasty = self._rng("manner").random(2)
@@ -235,7 +235,7 @@ class SimulatedParticipant:
         asked = self._questionnaires[questionnaire].items.values()
         items = sum(one.scale == item.scale for one in asked) if item.scale else 1
         repetitions = 1 if trial is None else self._shown
-        shift = shift_of(self._population.effect, item.points, items, repetitions)
+        shift = effect_shift(self._population.effect, item.points, items, repetitions)
         latent = (
             BETWEEN_SD * self._rng(construct).normal()
             + TRIAL_SD * self._rng(f"{trial} {construct}").normal()

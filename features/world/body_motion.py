@@ -9,21 +9,26 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gazerig.features.world import faces, motions, object_handover
-from gazerig.features.world.gait import Base, base_motion
+from gazerig.features.world.gait import BasePose, base_motion
 from gazerig.features.world.measures import Measures
 from gazerig.features.world.room import places_for, places_of
 from gazerig.features.world.rotations import (
     axes_along,
     pitch_of,
     quaternions,
-    rotate,
+    rotate_vectors,
     two_bones,
     unit,
     wrap_angle,
     yaw_of,
     yaw_pitch_roll,
 )
-from gazerig.features.world.time_profiles import periodic, rise, smooth, there_and_back
+from gazerig.features.world.time_profiles import (
+    moving_average,
+    periodic,
+    smooth_rise,
+    there_and_back,
+)
 from gazerig.features.world.timeline import HEAD_M, floor_m
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.person_shape import EYE_FACE_M, MOUTH_FACE_M
@@ -90,7 +95,7 @@ class BodyMotion:
         self.floor = floor_m(script)
         places = places_for(script, name)
         legs = [one for one in self.acts if "legs" in one.tracks]
-        self.base: Base = base_motion(
+        self.base: BasePose = base_motion(
             t_s, places[self.person.start], legs, places, self.body, self.person.gloves
         )
         self.yaw = self.base.heading_rad
@@ -120,7 +125,7 @@ class BodyMotion:
             away = np.linalg.norm(hip - ankle[:, :2], axis=1)
             reach = np.sqrt(np.maximum((_REACH_SHARE * body.leg_m) ** 2 - away**2, 0.01))
             limit = np.minimum(limit, ankle[:, 2] - self.floor + reach)
-        standing = smooth(np.minimum(limit, smooth(limit, 31)), 21)
+        standing = moving_average(np.minimum(limit, moving_average(limit, 31)), 21)
         seat = base.seat_m + _SEAT_FLESH_M
         z = standing + base.seated * (np.where(base.seat_m > 0.0, seat, standing) - standing)
         return np.concatenate((flat, (self.floor + z)[:, None]), axis=1)
@@ -133,8 +138,8 @@ class BodyMotion:
         if self.person.gloves:
             back = back - 0.12
         lifted = np.clip(base.feet_m[:, foot, 2] / 0.03, 0.0, 1.0)
-        up = _HEEL_RAD * rise((back - 0.12) / 0.32)
-        return np.asarray(up - _TOE_RAD * lifted * rise((-back - 0.10) / 0.30))
+        up = _HEEL_RAD * smooth_rise((back - 0.12) / 0.32)
+        return np.asarray(up - _TOE_RAD * lifted * smooth_rise((-back - 0.10) / 0.30))
 
     def ankle(self, foot: int) -> Floats:
         """Return an ankle's places (n, 3) in the world."""
@@ -150,7 +155,7 @@ class BodyMotion:
         """Return places and quaternions (n, 7) of every segment, in their order."""
         found: dict[str, Pose] = {}
         taken = object_handover.receiving_acts(self.timelines, self.name)
-        hand_acts = [one for one in (*self.acts, *taken) if motions.is_of_arm(one)]
+        hand_acts = [one for one in (*self.acts, *taken) if motions.moves_arm(one)]
         hand_acts.sort(key=lambda one: one.start_s)
         at = [self._at(one, eyes) for one in hand_acts]
         self._trunk(found, hand_acts, at)
@@ -188,14 +193,14 @@ class BodyMotion:
         R_pelvis = yaw_pitch_roll(self.yaw + 0.3 * twist, -0.25 * lean)
         R_torso = yaw_pitch_roll(self.yaw + twist, -lean)
         found["pelvis"] = (self.hips_m, R_pelvis)
-        waist = self.hips_m + rotate(R_pelvis, np.array((0.0, 0.0, body.waist_m)))
+        waist = self.hips_m + rotate_vectors(R_pelvis, np.array((0.0, 0.0, body.waist_m)))
         found["torso"] = (waist, R_torso)
 
     def _head(self, found: dict[str, Pose], eyes: Mapping[str, Floats]) -> None:
         body = self.body
         waist, R_torso = found["torso"]
         neck_base = 0.838 * body.stature_m - body.hip_m - body.waist_m
-        base_m = waist + rotate(R_torso, np.array((-0.012, 0.0, neck_base)))
+        base_m = waist + rotate_vectors(R_torso, np.array((-0.012, 0.0, neck_base)))
         eyes_about = base_m + 0.08 * self.ahead + (0.0, 0.0, body.neck_m + 0.05)
         rows = (len(self.t_s), 3)
         targets = {HEAD: np.broadcast_to(np.array(HEAD_M), rows), **eyes}
@@ -207,7 +212,7 @@ class BodyMotion:
             place = places_of(self.script)[self.person.looks_at]
             first = np.broadcast_to((place.x_m, place.y_m, self.floor + place.height_m), rows)
         chest_yaw = self.yaw + 0.5 * wrap_angle(yaw_of(R_torso[:, :, 0]) - self.yaw)
-        look = faces.looks(
+        look = faces.look_angles(
             self.t_s, self.acts, first, targets, eyes_about, chest_yaw, HEAD, self.rng
         )
         yaw, pitch = faces.head_gestures(self.t_s, self.acts, self.script.round_s)
@@ -216,18 +221,18 @@ class BodyMotion:
         R_neck = yaw_pitch_roll(
             self.yaw + 0.4 * wrap_angle(yaw - self.yaw), 0.6 * torso_pitch + 0.35 * pitch - 0.12
         )
-        skull = base_m + rotate(R_neck, np.array((0.0, 0.0, body.neck_m)))
+        skull = base_m + rotate_vectors(R_neck, np.array((0.0, 0.0, body.neck_m)))
         R_head = yaw_pitch_roll(yaw, pitch)
         found["neck"], found["head"] = (base_m, R_neck), (skull, R_head)
         self._face(found, skull, R_head, look)
 
     def _face(
-        self, found: dict[str, Pose], skull: Floats, R_head: Floats, look: faces.Looks
+        self, found: dict[str, Pose], skull: Floats, R_head: Floats, look: faces.LookAngles
     ) -> None:
         body = self.body
-        nose = skull - rotate(R_head, np.array(body.skull_m))
-        shut = faces.lids_shut(self.t_s, self.rng)
-        speaks = faces.lips_open(self.t_s, self.acts, self.rng)
+        nose = skull - rotate_vectors(R_head, np.array(body.skull_m))
+        shut = faces.lid_closure(self.t_s, self.rng)
+        speaks = faces.lip_opening(self.t_s, self.acts, self.rng)
         still = np.zeros_like(self.t_s)
         yaw, pitch = faces.eyes_in_head(R_head, self._eye(nose, R_head, 0.0), look)
         for name, side in zip(SIDES, (1.0, -1.0), strict=True):
@@ -238,11 +243,11 @@ class BodyMotion:
         down = np.array(MOUTH_FACE_M) * body.head_scale - (
             _LIPS_DOWN_M * body.head_scale * speaks[:, None] * np.array((-0.15, 0.0, 1.0))
         )
-        found["lips"] = (nose + rotate(R_head, down), R_head)
+        found["lips"] = (nose + rotate_vectors(R_head, down), R_head)
 
     def _eye(self, nose: Floats, R_head: Floats, side: float) -> Floats:
         x, y, z = (self.body.head_scale * one for one in EYE_FACE_M)
-        return nose + rotate(R_head, np.array((x, side * y, z)))
+        return nose + rotate_vectors(R_head, np.array((x, side * y, z)))
 
     def _arm(
         self, found: dict[str, Pose], side: float, acts: Sequence[TimedAct], at: Sequence[Floats]
@@ -250,7 +255,9 @@ class BodyMotion:
         body, name = self.body, SIDES[0 if side > 0 else 1]
         waist, R_torso = found["torso"]
         up = body.shoulder_m - body.hip_m - body.waist_m
-        shoulder = waist + rotate(R_torso, np.array((-0.01, side * body.half_shoulders_m, up)))
+        shoulder = waist + rotate_vectors(
+            R_torso, np.array((-0.01, side * body.half_shoulders_m, up))
+        )
         chin = self.hips_m + (0.0, 0.0, 0.885 * body.stature_m - body.hip_m) + 0.08 * self.ahead
         ahead = unit(R_torso[:, :, 0] * (1.0, 1.0, 0.0))
         left = np.stack((-ahead[:, 1], ahead[:, 0], 0.0 * ahead[:, 0]), axis=1)
@@ -265,9 +272,9 @@ class BodyMotion:
             holders = object_handover.holders(self.script, self.timelines, thing)
             share = object_handover.holding_share(self.t_s, holders, self.name, name)
             holds = np.maximum(holds, share)
-        held = motions.PostureShares(rise(self.base.seated), self._guarding(), holds)
-        rest = motions.resting(frame, held, self._swing(side), self.person.gloves)
-        hand = motions.hand(
+        held = motions.PostureShares(smooth_rise(self.base.seated), self._guarding(), holds)
+        rest = motions.resting_pose(frame, held, self._swing(side), self.person.gloves)
+        hand = motions.hand_pose(
             frame, self.t_s, [one for one, _ in mine], [target for _, target in mine], rest
         )
         upper, fore, own = arm_poses(shoulder, hand, body)
@@ -278,10 +285,10 @@ class BodyMotion:
         """Return how far an arm swings ahead: as far as the other side's foot is."""
         other = 1 if side > 0 else 0
         way = self.base.feet_m[:, other, :2] - self.base.hips_m
-        ahead = (way * self.ahead[:, :2]).sum(axis=1) * (1.0 - rise(2.0 * self.base.seated))
+        ahead = (way * self.ahead[:, :2]).sum(axis=1) * (1.0 - smooth_rise(2.0 * self.base.seated))
         if self.person.gloves:
             ahead = 0.0 * ahead
-        return np.asarray(np.clip(1.1 * smooth(ahead, 30), -0.5, 0.5) + 0.03)
+        return np.asarray(np.clip(1.1 * moving_average(ahead, 30), -0.5, 0.5) + 0.03)
 
     def _guarding(self) -> Floats:
         total = np.full_like(self.t_s, 0.0)

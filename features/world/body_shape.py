@@ -16,12 +16,12 @@ from gazerig.robot.description.mesh import (
     Mesh,
     Painted,
     grid,
-    merged,
-    mirror,
+    merge_meshes,
+    mirror_mesh,
     mix,
-    painted,
-    spot,
-    step,
+    paint,
+    smooth_step,
+    spot_weight,
 )
 from gazerig.robot.description.person_shape import PersonLook, open_right_hand
 from gazerig.robot.description.solid import Solid, capsule, ellipsoid, union
@@ -35,7 +35,7 @@ Row = tuple[float, float, float, float]
 """Height of a section, how far ahead its middle is, half its depth, half its width."""
 
 
-def loft(rows: Sequence[Row], around: int = _AROUND) -> Mesh:
+def loft_surface(rows: Sequence[Row], around: int = _AROUND) -> Mesh:
     """Return a skin through sections from below to above, closed at both ends."""
     first, last = rows[0], rows[-1]
     closed = [(first[0], first[1], 1e-4, 1e-4), *rows, (last[0], last[1], 1e-4, 1e-4)]
@@ -61,7 +61,7 @@ def _limb(
     top = [(high * r0 * scale * s - z0 * length, r0 * scale * c) for s, c in ball]
     low = [(-z1 * length - r1 * scale * s, r1 * scale * c) for s, c in ball]
     middle = [(-z * length, r * scale) for z, r in rows][::-1]
-    return loft([(z, 0.0, r, r) for z, r in (*low, *middle, *top[::-1])], 12)
+    return loft_surface([(z, 0.0, r, r) for z, r in (*low, *middle, *top[::-1])], 12)
 
 
 def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str, Painted]:
@@ -77,20 +77,20 @@ def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str
     fore = _limb(((0.0, 0.040), (0.25, 0.041), (0.7, 0.034), (0.96, 0.031)), k, body.forearm_m)
     thigh = _limb(((0.0, 0.086), (0.3, 0.082), (0.7, 0.067), (1.0, 0.058)), k, body.thigh_m)
     shank = _limb(((0.0, 0.058), (0.3, 0.060), (0.7, 0.048), (1.0, 0.044)), k, body.shank_m)
-    pelvis = loft([(z * k, x * k, a * k, b * k) for z, x, a, b in _PELVIS])
+    pelvis = loft_surface([(z * k, x * k, a * k, b * k) for z, x, a, b in _PELVIS])
     found = {
-        "pelvis": painted(pelvis, look.trousers),
+        "pelvis": paint(pelvis, look.trousers),
         "torso": _shirt(look, k),
-        "neck": painted(_neck(body.neck_m, k), _mixed(look.skin, (120, 60, 44), 0.18)),
+        "neck": paint(_neck(body.neck_m, k), _mix_colours(look.skin, (120, 60, 44), 0.18)),
     }
     right = boxing_glove(k) if gloves else _hand(look, k)
     for side in ("left", "right"):
-        found[f"{side}_upper_arm"] = painted(upper, look.shirt)
-        found[f"{side}_forearm"] = painted(fore, sleeve)
-        found[f"{side}_hand"] = right if side == "right" else mirror(right)
-        found[f"{side}_thigh"] = painted(thigh, look.trousers)
-        found[f"{side}_shank"] = painted(shank, look.trousers)
-        found[f"{side}_foot"] = painted(_shoe(body), look.shoes)
+        found[f"{side}_upper_arm"] = paint(upper, look.shirt)
+        found[f"{side}_forearm"] = paint(fore, sleeve)
+        found[f"{side}_hand"] = right if side == "right" else mirror_mesh(right)
+        found[f"{side}_thigh"] = paint(thigh, look.trousers)
+        found[f"{side}_shank"] = paint(shank, look.trousers)
+        found[f"{side}_foot"] = paint(_shoe(body), look.shoes)
     return found
 
 
@@ -128,17 +128,17 @@ def _shirt(look: PersonLook, k: float) -> Painted:
 
     at = np.linspace(0.0, len(_TORSO) - 1.0, 3 * (len(_TORSO) - 1) + 1)
     smooth = PchipInterpolator(np.arange(len(_TORSO)), np.array(_TORSO))(at)
-    mesh = loft([(z, x, a, b) for z, x, a, b in smooth.tolist()], 28)
+    mesh = loft_surface([(z, x, a, b) for z, x, a, b in smooth.tolist()], 28)
     points = mesh.vertices.copy()
     height = points[:, 2].copy()
     top = _TORSO[-1][0]
     share = np.clip((height - _LEANS_M) / (top - _LEANS_M), 0.0, 1.0)
     points[:, 2] -= _LEAN * share * share * (points[:, 0] + 0.015)
-    shirt = painted(Mesh(points * k, mesh.faces), look.shirt)
-    pale = _mixed(look.shirt, (255, 255, 255), 0.40)
-    dark = _mixed(look.shirt, (20, 20, 30), 0.35)
-    colours = mix(shirt.colours, pale, step(height - 0.3845, 0.002))
-    return shirt._replace(colours=mix(colours, dark, 0.5 * step(-height - 0.108, 0.004)))
+    shirt = paint(Mesh(points * k, mesh.faces), look.shirt)
+    pale = _mix_colours(look.shirt, (255, 255, 255), 0.40)
+    dark = _mix_colours(look.shirt, (20, 20, 30), 0.35)
+    colours = mix(shirt.colours, pale, smooth_step(height - 0.3845, 0.002))
+    return shirt._replace(colours=mix(colours, dark, 0.5 * smooth_step(-height - 0.108, 0.004)))
 
 
 def _neck(neck_m: float, k: float) -> Mesh:
@@ -146,7 +146,7 @@ def _neck(neck_m: float, k: float) -> Mesh:
         (-0.075, 0.000, 0.058), (-0.045, 0.000, 0.059), (-0.020, 0.0, 0.057),
         (0.35 * neck_m, 0.002, 0.054), (0.75 * neck_m, 0.003, 0.054), (neck_m + 0.03, 0.002, 0.056),
     ]  # fmt: skip
-    return loft([(z, x, r * k, 1.04 * r * k) for z, x, r in rows], 18)
+    return loft_surface([(z, x, r * k, 1.04 * r * k) for z, x, r in rows], 18)
 
 
 def _hand(look: PersonLook, k: float) -> Painted:
@@ -189,11 +189,13 @@ def boxing_glove(k: float = 1.0) -> Painted:
     found = Solid(field, (0.0, 0.0, -0.06), 0.26).all_round(26, 26)
     points = found.points.reshape(-1, 3)
     colours = np.broadcast_to(np.array(_GLOVE, float), points.shape)
-    colours = mix(colours, (240, 238, 232), step(points[:, 2] - 0.005, 0.006))
+    colours = mix(colours, (240, 238, 232), smooth_step(points[:, 2] - 0.005, 0.006))
     colours = mix(
-        colours, (242, 240, 234), step(spot(points, (-0.066, 0.0, -0.10), 0.05) - 0.62, 0.1)
+        colours,
+        (242, 240, 234),
+        smooth_step(spot_weight(points, (-0.066, 0.0, -0.10), 0.05) - 0.62, 0.1),
     )
-    colours = mix(colours, (120, 14, 20), step(points[:, 0] - 0.05, 0.01))
+    colours = mix(colours, (120, 14, 20), smooth_step(points[:, 0] - 0.05, 0.01))
     return Painted(
         Mesh(found.points.reshape(-1, 3) * k, grid(found.points, closed=True).faces),
         colours,
@@ -201,28 +203,28 @@ def boxing_glove(k: float = 1.0) -> Painted:
     )
 
 
-def cup() -> Painted:
+def cup_shape() -> Painted:
     """Return a mug about the middle of its height, z up."""
     rows = [(-0.048, 0.0, 0.030, 0.030), (0.048, 0.0, 0.040, 0.040)]
-    mug = painted(loft(rows, 24), (236, 232, 222))
-    stripe = step(0.014 - np.abs(mug.mesh.vertices[:, 2] + 0.048), 0.004)
+    mug = paint(loft_surface(rows, 24), (236, 232, 222))
+    stripe = smooth_step(0.014 - np.abs(mug.mesh.vertices[:, 2] + 0.048), 0.004)
     turn = np.linspace(-0.5 * pi, 0.5 * pi, 8)
     handle = np.stack([0.038 + 0.026 * np.cos(turn), 0 * turn, 0.028 * np.sin(turn)], axis=1)
     ring = [(0.006 * cos(w), 0.006 * sin(w)) for w in np.linspace(0, 2 * pi, 8, endpoint=False)]
     tube = [[(x, y + b, z + a) for a, b in ring] for x, y, z in handle.tolist()]
-    grip = painted(grid(np.array(tube), closed=True), (196, 84, 60))
-    return merged([mug._replace(colours=mix(mug.colours, (196, 84, 60), stripe)), grip])
+    grip = paint(grid(np.array(tube), closed=True), (196, 84, 60))
+    return merge_meshes([mug._replace(colours=mix(mug.colours, (196, 84, 60), stripe)), grip])
 
 
-def ball() -> Painted:
+def ball_shape() -> Painted:
     """Return a ball with stripes."""
     angles = [radians(d) for d in range(-90, 91, 12)]
-    mesh = loft([(0.06 * sin(a), 0.0, 0.06 * cos(a), 0.06 * cos(a)) for a in angles], 24)
-    plain = painted(mesh, (220, 150, 40))
-    stripe = step(np.sin(5.0 * np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])), 0.3)
+    mesh = loft_surface([(0.06 * sin(a), 0.0, 0.06 * cos(a), 0.06 * cos(a)) for a in angles], 24)
+    plain = paint(mesh, (220, 150, 40))
+    stripe = smooth_step(np.sin(5.0 * np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])), 0.3)
     return plain._replace(colours=mix(plain.colours, (60, 90, 170), stripe))
 
 
-def _mixed(colour: Colour, other: Colour, share: float) -> Colour:
+def _mix_colours(colour: Colour, other: Colour, share: float) -> Colour:
     r, g, b = (round(a + share * (o - a)) for a, o in zip(colour, other, strict=True))
     return r, g, b

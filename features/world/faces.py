@@ -11,7 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.features.world.rotations import limit_angle, pitch_of, wrap_angle, yaw_of
-from gazerig.features.world.time_profiles import hump, periodic, rise, smooth, there_and_back
+from gazerig.features.world.time_profiles import (
+    moving_average,
+    periodic,
+    smooth_bump,
+    smooth_rise,
+    there_and_back,
+)
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
@@ -30,7 +36,7 @@ _BLINK_MEAN_S, _BLINK_LEAST_S = 3.2, 0.8
 _SYLLABLES_HZ = 4.5
 
 
-class Looks(NamedTuple):
+class LookAngles(NamedTuple):
     """Direction of head and eyes, a row a time.
 
     yaw, pitch: of the head in the world, rad; p_m: (n, 3) gaze target
@@ -43,7 +49,7 @@ class Looks(NamedTuple):
     wander: Floats
 
 
-def looks(
+def look_angles(
     t_s: Floats,
     acts: Sequence[TimedAct],
     first: Floats,
@@ -52,7 +58,7 @@ def looks(
     body_yaw: Floats,
     robot: str,
     rng: np.random.Generator,
-) -> Looks:
+) -> LookAngles:
     """Return the gaze of a person over a round.
 
     Args:
@@ -68,29 +74,31 @@ def looks(
     found = [one for one in acts if one.act.do == "look_at"]
     start = targets[found[-1].act.to] if found else first
     before = found[-1].act.to == robot if found else True
-    yaw, pitch = _turn(start, before, eyes_m, body_yaw)
+    yaw, pitch = _turn_to_target(start, before, eyes_m, body_yaw)
     p_m = start
     for one in found:
         target = targets[one.act.to]
-        new_yaw, new_pitch = _turn(target, one.act.to == robot, eyes_m, body_yaw)
+        new_yaw, new_pitch = _turn_to_target(target, one.act.to == robot, eyes_m, body_yaw)
         row = min(len(t_s) - 1, int(np.searchsorted(t_s, one.start_s)))
         far = float(abs(wrap_angle(new_yaw[row] - yaw[row])) + abs(new_pitch[row] - pitch[row]))
-        share = rise((t_s - one.start_s - _HEAD_LATER_S) / (_HEAD_S + _HEAD_S_PER_RAD * far))
+        share = smooth_rise((t_s - one.start_s - _HEAD_LATER_S) / (_HEAD_S + _HEAD_S_PER_RAD * far))
         yaw = yaw + share * wrap_angle(new_yaw - yaw)
         pitch = pitch + share * (new_pitch - pitch)
-        eyes = rise((t_s - one.start_s) / _SACCADE_S)[:, None]
+        eyes = smooth_rise((t_s - one.start_s) / _SACCADE_S)[:, None]
         p_m = p_m + eyes * (target - p_m)
-    aside = smooth(yaw - body_yaw, _EASED_ROWS)
-    return Looks(body_yaw + aside, smooth(pitch, _EASED_ROWS), p_m, _wander(t_s, rng))
+    aside = moving_average(yaw - body_yaw, _EASED_ROWS)
+    return LookAngles(body_yaw + aside, moving_average(pitch, _EASED_ROWS), p_m, _wander(t_s, rng))
 
 
-def _turn(target: Floats, fully: bool, eyes_m: Floats, body_yaw: Floats) -> tuple[Floats, Floats]:
+def _turn_to_target(
+    target: Floats, fully: bool, eyes_m: Floats, body_yaw: Floats
+) -> tuple[Floats, Floats]:
     way = target - eyes_m
     aside = wrap_angle(yaw_of(way) - body_yaw)
     # People do not turn to a target behind them, nor to a target that they pass closely.
     near = np.hypot(way[:, 0], way[:, 1])
-    share = (1.0 if fully else _OTHERS_SHARE) * rise((near - 0.25) / 0.6)
-    share = share * (1.0 - rise((np.abs(aside) - 1.9) / 1.0))
+    share = (1.0 if fully else _OTHERS_SHARE) * smooth_rise((near - 0.25) / 0.6)
+    share = share * (1.0 - smooth_rise((np.abs(aside) - 1.9) / 1.0))
     aside = np.clip(share * aside, -HEAD_YAW_RAD, HEAD_YAW_RAD)
     up = np.clip(share * pitch_of(way), -HEAD_DOWN_RAD, HEAD_UP_RAD)
     return body_yaw + aside, up
@@ -101,12 +109,12 @@ def _wander(t_s: Floats, rng: np.random.Generator) -> Floats:
     out, at_s = np.zeros((len(t_s), 2)), float(rng.uniform(0.4, 1.5))
     while at_s < t_s[-1] - 0.6:
         new = rng.normal(0.0, _WANDER_RAD, 2).clip(-2.0 * _WANDER_RAD, 2.0 * _WANDER_RAD)
-        out += rise((t_s - at_s) / 0.03)[:, None] * (new - out)
+        out += smooth_rise((t_s - at_s) / 0.03)[:, None] * (new - out)
         at_s += float(rng.uniform(0.35, 1.8))
-    return np.asarray(out * (1.0 - rise((t_s - t_s[-1] + 0.3) / 0.03))[:, None])
+    return np.asarray(out * (1.0 - smooth_rise((t_s - t_s[-1] + 0.3) / 0.03))[:, None])
 
 
-def eyes_in_head(R_head: Floats, eyes_m: Floats, look: Looks) -> tuple[Floats, Floats]:
+def eyes_in_head(R_head: Floats, eyes_m: Floats, look: LookAngles) -> tuple[Floats, Floats]:
     """Return yaw and pitch of the eyes in the head."""
     way = ((look.p_m - eyes_m)[:, None, :] @ R_head)[:, 0]
     way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
@@ -122,7 +130,7 @@ def head_gestures(t_s: Floats, acts: Sequence[TimedAct], round_s: float) -> tupl
         lasts_s = one.end_s - one.start_s
         share = (t_s - one.start_s) / max(lasts_s, 1e-3)
         gone_s = t_s - one.start_s
-        swell = hump(share)
+        swell = smooth_bump(share)
         if one.act.do == "nod":
             pitch = pitch - radians(11.0) * swell**0.5 * np.sin(2 * np.pi * 1.7 * gone_s)
         elif one.act.do == "shake":
@@ -137,7 +145,7 @@ def head_gestures(t_s: Floats, acts: Sequence[TimedAct], round_s: float) -> tupl
     return np.asarray(yaw), np.asarray(pitch)
 
 
-def lips_open(t_s: Floats, acts: Sequence[TimedAct], rng: np.random.Generator) -> Floats:
+def lip_opening(t_s: Floats, acts: Sequence[TimedAct], rng: np.random.Generator) -> Floats:
     """Return how far the mouth is open (n,), 0..1: syllables of several loudnesses, and pauses."""
     out = np.zeros_like(t_s)
     for one in acts:
@@ -147,14 +155,14 @@ def lips_open(t_s: Floats, acts: Sequence[TimedAct], rng: np.random.Generator) -
         while at_s < one.end_s - 0.25:
             lasts_s = float(rng.uniform(0.8, 1.25)) / _SYLLABLES_HZ
             loud = float(rng.uniform(0.35, 1.0))
-            out = np.maximum(out, loud * hump((t_s - at_s) / (1.1 * lasts_s)))
+            out = np.maximum(out, loud * smooth_bump((t_s - at_s) / (1.1 * lasts_s)))
             at_s, left = at_s + lasts_s, left - 1
             if left == 0:
                 at_s, left = at_s + float(rng.uniform(0.2, 0.5)), int(rng.integers(5, 12))
     return out
 
 
-def lids_shut(t_s: Floats, rng: np.random.Generator) -> Floats:
+def lid_closure(t_s: Floats, rng: np.random.Generator) -> Floats:
     """Return how far blinks have shut the lids (n,), 0..1."""
     out, at_s = np.zeros_like(t_s), float(rng.uniform(0.5, 3.0))
     while at_s < t_s[-1] - 0.5:

@@ -19,10 +19,10 @@ from gazerig.features.world.body_motion import SIDES as SIDES
 from gazerig.features.world.body_motion import BodyMotion, arm_poses
 from gazerig.features.world.gait import RATE_HZ
 from gazerig.features.world.measures import Measures, measures
-from gazerig.features.world.motions import FIST_M, Frame, fist
+from gazerig.features.world.motions import FIST_M, Frame, fist_pose
 from gazerig.features.world.opponent import Opponent, OpponentRow, OpponentTrack
 from gazerig.features.world.rotations import quaternions, rotation_matrix, unit
-from gazerig.features.world.time_profiles import rise
+from gazerig.features.world.time_profiles import smooth_rise
 from gazerig.features.world.timeline import timed_acts
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.sim_mock.scenes.script import SceneScript
@@ -185,7 +185,7 @@ class Figures:
             at = [_SEGMENT[f"{side}_{part}"] for part in ("upper_arm", "forearm", "hand")]
             shoulder, wrist = found[:, at[0], :3].copy(), found[:, at[2], :3] + by_m
             frame = Frame(shoulder, shoulder, shoulder, ahead, left, sign, body)
-            hand = fist(frame, wrist, rise((by_m * ahead).sum(axis=1) / _PUNCH_OUT_M))
+            hand = fist_pose(frame, wrist, smooth_rise((by_m * ahead).sum(axis=1) / _PUNCH_OUT_M))
             for segment, (p_m, R_segment) in zip(at, arm_poses(shoulder, hand, body), strict=True):
                 found[:, segment] = np.concatenate((p_m, quaternions(R_segment)), axis=1)
         return found

@@ -5,13 +5,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from gazerig.features.world.body_shape import ball, body_segments, cup
+from gazerig.features.world.body_shape import ball_shape, body_segments, cup_shape
 from gazerig.features.world.figure import SEGMENTS, Figures
 from gazerig.features.world.measures import Measures
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.mesh import Painted, moved
+from gazerig.robot.description.mesh import Painted, move_mesh
 from gazerig.robot.description.person_shape import WORLD_LOOKS, head_segments
-from gazerig.robot.description.texture import textured
+from gazerig.robot.description.texture import add_texture
 
 FINENESS = 0.45
 SOLID_GROUP = 3
@@ -43,15 +43,15 @@ def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Pai
         here: Vec3 = (0.0, 0.0, 0.0)
         k = body.head_scale
         parts = {
-            "head": moved(head.head, (nose[0], nose[1], nose[2]), k),
-            "lips": moved(head.lips, here, k),
-            **{f"{side}_eye": moved(head.eye, here, k) for side in ("left", "right")},
-            **{f"{side}_lid": moved(head.lid, here, k) for side in ("left", "right")},
+            "head": move_mesh(head.head, (nose[0], nose[1], nose[2]), k),
+            "lips": move_mesh(head.lips, here, k),
+            **{f"{side}_eye": move_mesh(head.eye, here, k) for side in ("left", "right")},
+            **{f"{side}_lid": move_mesh(head.lid, here, k) for side in ("left", "right")},
         }
         parts |= body_segments(body, look, person.gloves)
         found |= {f"{name}/{segment}": parts[segment] for segment in SEGMENTS}
     for name, thing in figures.script.things.items():
-        found[f"thing/{name}"] = cup() if thing.kind == "cup" else ball()
+        found[f"thing/{name}"] = cup_shape() if thing.kind == "cup" else ball_shape()
     return found
 
 
@@ -81,7 +81,7 @@ def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
         mesh.userface = shape.mesh.faces.ravel()
         material.rgba = [*(shape.colours[0, :3] / 255.0), 1.0]
     else:
-        skin = textured(shape)
+        skin = add_texture(shape)
         mesh.uservert, mesh.usernormal = skin.vertices.ravel(), skin.normals.ravel()
         mesh.userface, mesh.usertexcoord = skin.faces.ravel(), skin.uv.ravel()
         rows, columns = skin.image.shape[:2]

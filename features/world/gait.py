@@ -19,7 +19,7 @@ from gazerig.features.world.room import (
     Place,
     way_points,
 )
-from gazerig.features.world.time_profiles import hump, rise, smooth
+from gazerig.features.world.time_profiles import moving_average, smooth_bump, smooth_rise
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
@@ -35,7 +35,7 @@ _SAME_M = 1e-4
 _BOX_STANCE_M, _BOX_OUT_RAD = 0.16, 0.35
 
 
-class Base(NamedTuple):
+class BasePose(NamedTuple):
     """Hips and feet of a person, a row a time; heights above the floor.
 
     hips_m: (n, 2) on the floor; heading_rad: (n,) unwrapped; seated: (n,) 0 standing .. 1 sitting
@@ -69,7 +69,7 @@ class _Path:
         """Add an act that moves hips or feet."""
         act, start_s, end_s = one.act, one.start_s, one.end_s
         rows = self.t_s >= start_s
-        share = rise((self.t_s - start_s) / (end_s - start_s))
+        share = smooth_rise((self.t_s - start_s) / (end_s - start_s))
         if act.do in ("sit", "stand"):
             self.seated[rows] = (share if act.do == "sit" else 1.0 - share)[rows]
             if act.do == "sit":
@@ -84,13 +84,13 @@ class _Path:
         if act.do == "step":
             if act.to:
                 target = self.places[act.to]
-                x, y, facing = target.x_m, target.y_m, _nearest(target.facing_rad, facing)
+                x, y, facing = target.x_m, target.y_m, _nearest_angle(target.facing_rad, facing)
             else:
                 c, s = np.cos(facing), np.sin(facing)
                 x += act.ahead_m * c - act.left_m * s
                 y += act.ahead_m * s + act.left_m * c
         elif one.target is not None:
-            facing = _nearest(atan2(one.target[1] - y, one.target[0] - x), facing)
+            facing = _nearest_angle(atan2(one.target[1] - y, one.target[0] - x), facing)
         self.at = Place(x, y, facing)
         self.way[rows] = self.way[rows] + share[rows, None] * ((x, y) - self.way[rows])
         self.heading[rows] += share[rows] * (facing - self.heading[rows])
@@ -108,16 +108,18 @@ class _Path:
         lengths = np.linalg.norm(legs, axis=1)
         along = np.concatenate(((0.0,), np.cumsum(lengths)))
         begin_s, arrive_s = start_s + WALK_STARTS_S, end_s - WALK_ENDS_S
-        gone = along[-1] * _steady((self.t_s - begin_s) / (arrive_s - begin_s), arrive_s - begin_s)
+        gone = along[-1] * _steady_progress(
+            (self.t_s - begin_s) / (arrive_s - begin_s), arrive_s - begin_s
+        )
         rows = self.t_s >= begin_s
         for axis in (0, 1):
             self.way[rows, axis] = np.interp(gone[rows], along, points[:, axis])
         tangents = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
-        tangents += _nearest(tangents[0], float(self.heading[-1])) - tangents[0]
+        tangents += _nearest_angle(tangents[0], float(self.heading[-1])) - tangents[0]
         which = np.clip(np.searchsorted(along, gone, "right") - 1, 0, len(legs) - 1)
         walking = rows & (self.t_s < arrive_s)
         self.heading[walking] = tangents[which][walking]
-        facing = _nearest(target.facing_rad, float(tangents[-1]))
+        facing = _nearest_angle(target.facing_rad, float(tangents[-1]))
         self.heading[self.t_s >= arrive_s] = facing
         self.at = target
         self.stretches.append((start_s, end_s))
@@ -130,7 +132,7 @@ def base_motion(
     places: Mapping[str, Place],
     body: Measures,
     boxes: bool,
-) -> Base:
+) -> BasePose:
     """Return hips and feet over a round.
 
     Args:
@@ -144,14 +146,14 @@ def base_motion(
     path = _Path(t_s, start, places)
     for act in acts:
         path.add(act)
-    way = smooth(path.way, round(_PATH_S * RATE_HZ))
-    heading = smooth(path.heading, round(_HEADING_S * RATE_HZ))
+    way = moving_average(path.way, round(_PATH_S * RATE_HZ))
+    heading = moving_average(path.heading, round(_HEADING_S * RATE_HZ))
     feet = _Feet(t_s, way, heading, body, boxes)
     for start_s, end_s in path.stretches:
         feet.step(start_s, end_s)
     back = SEAT_AHEAD_M * path.seated[:, None]
     hips = way - back * np.stack((np.cos(heading), np.sin(heading)), axis=1)
-    return Base(hips, heading, path.seated, path.seat_m, feet.p_m, feet.yaw_rad)
+    return BasePose(hips, heading, path.seated, path.seat_m, feet.p_m, feet.yaw_rad)
 
 
 class _Feet:
@@ -187,12 +189,12 @@ class _Feet:
             place, yaw = self._home(foot, row)
             share = (self.t_s - lift_s) / swing_s
             rows = share >= 0.0
-            moved = rise(share)[rows]
+            moved = smooth_rise(share)[rows]
             before, yaw_before = self.p_m[-1, foot, :2].copy(), float(self.yaw_rad[-1, foot])
             self.p_m[rows, foot, :2] = before + moved[:, None] * (place - before)
             self.yaw_rad[rows, foot] = yaw_before + moved * (yaw - yaw_before)
             far = float(np.linalg.norm(place - before)) + 0.15 * abs(yaw - yaw_before)
-            self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * hump(share)[rows]
+            self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * smooth_bump(share)[rows]
 
     def _home(self, foot: int, row: int) -> tuple[Floats, float]:
         """Return place and direction of a foot under the hips of a row."""
@@ -209,15 +211,15 @@ class _Feet:
         return place, heading + out
 
 
-def _steady(share: Floats, lasts_s: float) -> Floats:
+def _steady_progress(share: Floats, lasts_s: float) -> Floats:
     """Return a path from 0 to 1 at constant speed with a smooth start and end."""
     ramp = min(0.5, 0.45 / lasts_s)
     fine = np.linspace(0.0, 1.0, 400)
-    speed = rise(fine / ramp) * rise((1.0 - fine) / ramp)
+    speed = smooth_rise(fine / ramp) * smooth_rise((1.0 - fine) / ramp)
     gone = np.concatenate(((0.0,), np.cumsum(0.5 * (speed[1:] + speed[:-1]))))
     return np.asarray(np.interp(np.clip(share, 0.0, 1.0), fine, gone / gone[-1]))
 
 
-def _nearest(angle_rad: float, to_rad: float) -> float:
+def _nearest_angle(angle_rad: float, to_rad: float) -> float:
     """Return an angle plus whole turns, as near as possible to another."""
     return angle_rad + 2.0 * np.pi * round((to_rad - angle_rad) / (2.0 * np.pi))

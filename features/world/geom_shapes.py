@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Mesh, Painted, ellipsoid, lathe, merged, smooth_normals
+from gazerig.robot.description.mesh import (
+    Mesh,
+    Painted,
+    ellipsoid,
+    lathe,
+    merge_meshes,
+    smooth_normals,
+)
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 
@@ -35,7 +42,7 @@ class _Surface(NamedTuple):
     uv: Floats
 
 
-def still_parts(
+def fixed_parts(
     model: Any, moving: Collection[str], rig_joints: Collection[str]
 ) -> Iterator[WorldPart]:
     """Yield every static part of a model, in place.
@@ -56,14 +63,14 @@ def still_parts(
         if model.geom_bodyid[geom] in left_out or (made := _surface(model, geom)) is None:
             continue
         pose = data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy()
-        surface = _placed(made, *pose)
+        surface = _move_surface(made, *pose)
         if _is_wall(model, geom):
             # Only the faces that are visible from the room.
             (vertices, faces), normals, _ = surface
             first = faces[:, 0]
             seen = ((_ROOM_M - vertices[first]) * normals[first]).sum(axis=1) > 0.0
             surface = surface._replace(mesh=Mesh(vertices, faces[seen]))
-        yield WorldPart(f"geom{geom}", _coloured(model, geom, surface), "cloth")
+        yield WorldPart(f"geom{geom}", _paint_surface(model, geom, surface), "cloth")
 
 
 def body_parts(model: Any, bodies: Iterable[int]) -> Iterator[tuple[int, WorldPart]]:
@@ -81,14 +88,14 @@ def body_parts(model: Any, bodies: Iterable[int]) -> Iterator[tuple[int, WorldPa
                 continue
             R = np.empty(9)
             mujoco.mju_quat2Mat(R, model.geom_quat[geom])
-            surface = _placed(made, model.geom_pos[geom].copy(), R.reshape(3, 3))
-            shape = _coloured(model, geom, surface)
+            surface = _move_surface(made, model.geom_pos[geom].copy(), R.reshape(3, 3))
+            shape = _paint_surface(model, geom, surface)
             if isinstance(shape, Painted):
                 plain.append(shape)
             else:
                 yield body, WorldPart(f"{name}/{geom}", shape, "plastic", moves=True)
         if plain:
-            yield body, WorldPart(name, merged(plain), "plastic", moves=True)
+            yield body, WorldPart(name, merge_meshes(plain), "plastic", moves=True)
 
 
 def _surface(model: Any, geom: int) -> _Surface | None:
@@ -107,8 +114,8 @@ def _rgba(model: Any, geom: int) -> Floats:
     return np.asarray(model.mat_rgba[material], float)
 
 
-def _coloured(model: Any, geom: int, surface: _Surface) -> Painted | TexturedMesh:
-    picture, rgba = _picture(model, geom), _rgba(model, geom)
+def _paint_surface(model: Any, geom: int, surface: _Surface) -> Painted | TexturedMesh:
+    picture, rgba = _texture_image(model, geom), _rgba(model, geom)
     if picture is None:
         colours = np.tile(255.0 * rgba[:3], (len(surface.mesh.vertices), 1))
         return Painted(surface.mesh, colours, surface.normals)
@@ -118,7 +125,7 @@ def _coloured(model: Any, geom: int, surface: _Surface) -> Painted | TexturedMes
     )
 
 
-def _picture(model: Any, geom: int) -> NDArray[np.uint8] | None:
+def _texture_image(model: Any, geom: int) -> NDArray[np.uint8] | None:
     """Return the picture of a geom's material, None without one."""
     material = int(model.geom_matid[geom])
     role = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
@@ -135,7 +142,7 @@ def _picture(model: Any, geom: int) -> NDArray[np.uint8] | None:
     return image.reshape(rows, columns, channels)[:, :, :3]
 
 
-def _placed(surface: _Surface, p_m: Floats, R: Floats) -> _Surface:
+def _move_surface(surface: _Surface, p_m: Floats, R: Floats) -> _Surface:
     mesh = surface.mesh._replace(vertices=surface.mesh.vertices @ R.T + p_m)
     return surface._replace(mesh=mesh, normals=surface.normals @ R.T)
 
@@ -147,7 +154,7 @@ def _is_wall(model: Any, geom: int) -> bool:
     return bool(thin <= _WALL_THICK_M and middle >= _WALL_WIDE_M)
 
 
-def _projected(model: Any, geom: int, vertices: Floats, half: Floats) -> Floats:
+def _project_texture(model: Any, geom: int, vertices: Floats, half: Floats) -> Floats:
     """Return texture coordinates of vertices for a picture projected along the geom's z axis."""
     material = int(model.geom_matid[geom])
     repeat = np.ones(2) if material < 0 else model.mat_texrepeat[material].astype(float)
@@ -158,7 +165,7 @@ def _projected(model: Any, geom: int, vertices: Floats, half: Floats) -> Floats:
 
 def _smooth(model: Any, geom: int, mesh: Mesh) -> _Surface:
     half = np.ptp(mesh.vertices, axis=0) / 2.0
-    return _Surface(mesh, smooth_normals(mesh), _projected(model, geom, mesh.vertices, half))
+    return _Surface(mesh, smooth_normals(mesh), _project_texture(model, geom, mesh.vertices, half))
 
 
 def _box(model: Any, geom: int) -> _Surface:
@@ -175,7 +182,9 @@ def _box(model: Any, geom: int) -> _Surface:
     corners = np.array(vertices) * half
     quad = np.array(((0, 1, 2), (0, 2, 3)))
     faces = (4 * np.arange(6)[:, None, None] + quad).reshape(-1, 3).astype(np.uint32)
-    return _Surface(Mesh(corners, faces), np.array(normals), _projected(model, geom, corners, half))
+    return _Surface(
+        Mesh(corners, faces), np.array(normals), _project_texture(model, geom, corners, half)
+    )
 
 
 def _plane(model: Any, geom: int) -> _Surface:
@@ -183,7 +192,7 @@ def _plane(model: Any, geom: int) -> _Surface:
     corners = np.array(((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))) * (half[0], half[1], 1.0)
     mesh = Mesh(corners, np.array(((0, 1, 2), (0, 2, 3)), np.uint32))
     normals = np.tile((0.0, 0.0, 1.0), (4, 1))
-    return _Surface(mesh, normals, _projected(model, geom, corners, half))
+    return _Surface(mesh, normals, _project_texture(model, geom, corners, half))
 
 
 def _cylinder(model: Any, geom: int) -> _Surface:
@@ -226,7 +235,7 @@ def _mesh(model: Any, geom: int) -> _Surface:
     mesh = Mesh(vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3))
     if model.mesh_texcoordadr[number] < 0:
         half = np.ptp(vertices, axis=0) / 2.0
-        return _Surface(mesh, normals, _projected(model, geom, vertices, half))
+        return _Surface(mesh, normals, _project_texture(model, geom, vertices, half))
     uv = of(
         model.mesh_texcoord, model.mesh_texcoordadr, model.mesh_texcoordnum, model.mesh_facetexcoord
     )

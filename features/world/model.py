@@ -77,7 +77,7 @@ def world_model(
         SetupError: the user's file cannot be used; names the file and the remedy.
     """
     if mjcf_file is None:
-        spec = _room(figures, rigs)
+        spec = _room_spec(figures, rigs)
     else:
         refuse_excessive(mjcf_file)
         try:
@@ -100,7 +100,7 @@ def world_model(
     return WorldModel(model, figures, tuple(_indices(model, *one) for one in placed))
 
 
-def _room(figures: Figures | None, rigs: Sequence[RigInWorld]) -> Any:
+def _room_spec(figures: Figures | None, rigs: Sequence[RigInWorld]) -> Any:
     """Return a specification of the room and the people of a script."""
     spec = mujoco.MjSpec()
     if figures is not None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gazerig.features.world.measures import Measures
 from gazerig.features.world.rotations import axes_along, limit_angle, unit
-from gazerig.features.world.time_profiles import blend, hump, rise, there_and_back
+from gazerig.features.world.time_profiles import blend, smooth_bump, smooth_rise, there_and_back
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
@@ -67,12 +67,12 @@ def _point(frame: Frame, origin: Floats, ahead: float, out: float, up: float) ->
     return np.asarray(origin + ahead * frame.ahead + out * frame.side * frame.left + up * UP)
 
 
-def _way(frame: Frame, ahead: float, out: float, up: float) -> Floats:
+def _direction(frame: Frame, ahead: float, out: float, up: float) -> Floats:
     """Return a direction."""
     return np.asarray(ahead * frame.ahead + out * frame.side * frame.left + up * UP)
 
 
-def resting(frame: Frame, held: PostureShares, swing_rad: Floats, boxes: bool) -> HandPose:
+def resting_pose(frame: Frame, held: PostureShares, swing_rad: Floats, boxes: bool) -> HandPose:
     """Return an idle hand: it hangs and swings, rests in the lap, holds a thing, or guards."""
     arm = frame.body.arm_m
     swing = swing_rad[:, None]
@@ -80,39 +80,39 @@ def resting(frame: Frame, held: PostureShares, swing_rad: Floats, boxes: bool) -
     hanging = HandPose(
         frame.shoulder_m + down + 0.05 * frame.side * frame.left + 0.03 * frame.ahead,
         unit(down) + 0.12 * frame.ahead,
-        _way(frame, -0.25, -1.0, 0.0),
-        _way(frame, -1.0, 0.35, 0.0),
+        _direction(frame, -0.25, -1.0, 0.0),
+        _direction(frame, -1.0, 0.35, 0.0),
     )
     thigh = 0.68 * frame.body.thigh_m
     lap = HandPose(
         _point(frame, frame.hips_m, thigh, 0.7 * frame.body.half_hips_m + 0.03, 0.115),
-        _way(frame, 1.0, -0.45, -0.15),
-        _way(frame, 0.1, -0.1, -1.0),
-        _way(frame, -0.6, 1.0, -0.3),
+        _direction(frame, 1.0, -0.45, -0.15),
+        _direction(frame, 0.1, -0.1, -1.0),
+        _direction(frame, -0.6, 1.0, -0.3),
     )
     ahead = (0.30 if frame.side > 0 else 0.24) if boxes else 0.27
     guard = HandPose(
         _point(frame, frame.chin_m, ahead - 0.06, 0.125, -0.235),
-        _way(frame, 0.55, -0.10, 0.85),
-        _way(frame, -0.35, -1.0, 0.1),
-        _way(frame, 0.0, 0.35, -1.0),
+        _direction(frame, 0.55, -0.10, 0.85),
+        _direction(frame, -0.35, -1.0, 0.1),
+        _direction(frame, 0.0, 0.35, -1.0),
     )
     chest = frame.shoulder_m - frame.side * frame.body.half_shoulders_m * frame.left
     holding = HandPose(
         _point(frame, chest, 0.30, 0.16, -0.28),
-        _way(frame, 1.0, -0.55, 0.1),
-        _way(frame, 0.3, -1.0, 0.0),
-        _way(frame, -0.4, 0.7, -1.0),
+        _direction(frame, 1.0, -0.55, 0.1),
+        _direction(frame, 0.3, -1.0, 0.0),
+        _direction(frame, -0.4, 0.7, -1.0),
     )
     return hanging.towards(lap, held.seated).towards(holding, held.holds).towards(guard, held.guard)
 
 
-def _beat(t_s: Floats, start_s: float, rate_hz: float, phase: float) -> Floats:
+def _oscillation(t_s: Floats, start_s: float, rate_hz: float, phase: float) -> Floats:
     return np.sin(2.0 * np.pi * rate_hz * (t_s - start_s) + phase)[:, None]
 
 
 def _wave(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
-    swing = _beat(t_s, one.start_s, 1.5, 0.0)
+    swing = _oscillation(t_s, one.start_s, 1.5, 0.0)
     to = unit((target - frame.shoulder_m) * (1.0, 1.0, 0.0))
     aside = frame.side * frame.left
     wrist = frame.shoulder_m + 0.24 * to + (0.15 + 0.09 * swing) * aside + 0.10 * UP
@@ -121,35 +121,43 @@ def _wave(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPos
 
 def _gesture(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
     phase = 0.9 * frame.side
-    beat, slow = _beat(t_s, one.start_s, 1.3, phase), _beat(t_s, one.start_s, 0.45, 2.0 * phase)
+    beat, slow = (
+        _oscillation(t_s, one.start_s, 1.3, phase),
+        _oscillation(t_s, one.start_s, 0.45, 2.0 * phase),
+    )
     wrist = _point(frame, frame.shoulder_m, 0.27, 0.02, -0.27)
     wrist = wrist + (0.035 * beat + 0.025 * slow) * UP + 0.05 * slow * frame.side * frame.left
     return HandPose(
         wrist,
-        _way(frame, 1.0, -0.15, 0.35),
-        _way(frame, 0.1, -0.8, 0.5),
-        _way(frame, -0.2, 0.6, -1.0),
+        _direction(frame, 1.0, -0.15, 0.35),
+        _direction(frame, 0.1, -0.8, 0.5),
+        _direction(frame, -0.2, 0.6, -1.0),
     )
 
 
 def _point_at(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
     to = unit(target - frame.shoulder_m)
     wrist = frame.shoulder_m + 0.94 * frame.body.arm_m * to
-    return HandPose(wrist, to, _way(frame, 0.0, -0.4, -1.0), _way(frame, 0.0, 0.4, -1.0))
+    return HandPose(
+        wrist, to, _direction(frame, 0.0, -0.4, -1.0), _direction(frame, 0.0, 0.4, -1.0)
+    )
 
 
 def _reach(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
     to = unit(target - frame.shoulder_m)
     return HandPose(
-        target - FIST_M * to, to, _way(frame, 0.1, -0.7, -0.8), _way(frame, 0.0, 0.6, -1.0)
+        target - FIST_M * to,
+        to,
+        _direction(frame, 0.1, -0.7, -0.8),
+        _direction(frame, 0.0, 0.6, -1.0),
     )
 
 
 def _pass(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
     to = unit(target - frame.shoulder_m)
     fingers = unit(to * (1.0, 1.0, 0.2) + 0.3 * frame.ahead)
-    palm = _way(frame, 0.2, -1.0, 0.0)
-    return HandPose(target - FIST_M * to, fingers, palm, _way(frame, 0.0, 0.7, -1.0))
+    palm = _direction(frame, 0.2, -1.0, 0.0)
+    return HandPose(target - FIST_M * to, fingers, palm, _direction(frame, 0.0, 0.7, -1.0))
 
 
 def _push(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
@@ -159,7 +167,7 @@ def _push(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPos
     middle = target + _FOREHEAD - level * (PUSH_FROM_M - PUSH_BY_M * press[:, None])
     fingers = unit(UP + 0.6 * level)
     return HandPose(
-        middle - FIST_M * fingers, fingers, level - 0.4 * UP, _way(frame, 0.0, 0.7, -1.0)
+        middle - FIST_M * fingers, fingers, level - 0.4 * UP, _direction(frame, 0.0, 0.7, -1.0)
     )
 
 
@@ -167,7 +175,10 @@ def _punch(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPo
     to = unit(target - frame.shoulder_m)
     middle = target - PUNCH_ENDS_M * to
     return HandPose(
-        middle - FIST_M * to, to, _way(frame, 0.0, -0.2, -1.0), _way(frame, 0.0, 0.6, -0.8)
+        middle - FIST_M * to,
+        to,
+        _direction(frame, 0.0, -0.2, -1.0),
+        _direction(frame, 0.0, 0.6, -0.8),
     )
 
 
@@ -178,18 +189,20 @@ def _feint(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPo
 def _open(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
     return HandPose(
         _point(frame, frame.shoulder_m, 0.20, 0.14, -0.36),
-        _way(frame, 0.9, -0.1, 0.1),
-        _way(frame, 0.0, -1.0, -0.2),
-        _way(frame, -0.8, 0.6, -0.8),
+        _direction(frame, 0.9, -0.1, 0.1),
+        _direction(frame, 0.0, -1.0, -0.2),
+        _direction(frame, -0.8, 0.6, -0.8),
     )
 
 
-def fist(frame: Frame, wrist_m: Floats, out: Floats) -> HandPose:
+def fist_pose(frame: Frame, wrist_m: Floats, out: Floats) -> HandPose:
     """Return a fist at a place, from the guard (out 0) to a stretched punch (out 1), (n,)."""
     one = np.ones(len(wrist_m))
-    guard = resting(frame, PostureShares(0.0 * one, one, 0.0 * one), 0.0 * one, boxes=True)
+    guard = resting_pose(frame, PostureShares(0.0 * one, one, 0.0 * one), 0.0 * one, boxes=True)
     to = unit(wrist_m - frame.shoulder_m)
-    punch = HandPose(wrist_m, to, _way(frame, 0.0, -0.2, -1.0), _way(frame, 0.0, 0.6, -0.8))
+    punch = HandPose(
+        wrist_m, to, _direction(frame, 0.0, -0.2, -1.0), _direction(frame, 0.0, 0.6, -0.8)
+    )
     return guard._replace(wrist_m=wrist_m).towards(punch, out)
 
 
@@ -228,7 +241,7 @@ def act_share(one: TimedAct, t_s: Floats) -> Floats:
     return there_and_back(t_s, one.start_s, out, lasts_s - out - back, back)
 
 
-def hand(
+def hand_pose(
     frame: Frame, t_s: Floats, acts: Sequence[TimedAct], at: Sequence[Floats], rest: HandPose
 ) -> HandPose:
     """Return a hand over a round; ``at``: (n, 3) target of each act of this arm."""
@@ -238,12 +251,12 @@ def hand(
         now = now.towards(_MOTIONS[one.act.do](frame, one, t_s, target, now), share)
         # A raised hand passes in front of the body, not through it.
         wide = 0.12 if one.act.do not in ("punch", "feint") else 0.0
-        bow = wide * 4.0 * share * (1.0 - share) * (1.0 - 0.5 * rise(share))
+        bow = wide * 4.0 * share * (1.0 - share) * (1.0 - 0.5 * smooth_rise(share))
         now = now._replace(wrist_m=now.wrist_m + bow[:, None] * frame.ahead)
     return now
 
 
-def is_of_arm(one: TimedAct) -> bool:
+def moves_arm(one: TimedAct) -> bool:
     """Return whether an act moves a hand."""
     return one.act.do in _MOTIONS
 
@@ -281,7 +294,7 @@ def hit_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
     total = np.zeros_like(t_s)
     for one in acts:
         if one.act.do == "be_hit":
-            total += 0.10 * hump((t_s - one.start_s) / (one.end_s - one.start_s))
+            total += 0.10 * smooth_bump((t_s - one.start_s) / (one.end_s - one.start_s))
     return total
 
 

@@ -5,8 +5,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gazerig.features.world.rotations import quaternions, rotate, yaw_of, yaw_pitch_roll
-from gazerig.features.world.time_profiles import rise
+from gazerig.features.world.rotations import quaternions, rotate_vectors, yaw_of, yaw_pitch_roll
+from gazerig.features.world.time_profiles import smooth_rise
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.script import Act, Fault, SceneScript
 from gazerig.sim_mock.scenes.timeline import TimedAct, Timelines
@@ -58,7 +58,7 @@ def holding_share(t_s: Floats, found: Sequence[Holder], person: str, side: str) 
     total = np.zeros_like(t_s)
     for i, one in enumerate(found):
         now = 1.0 if (one.person, one.side) == (person, side) else 0.0
-        since = np.ones_like(t_s) if i == 0 else rise((t_s - one.from_s + 0.6) / 1.2)
+        since = np.ones_like(t_s) if i == 0 else smooth_rise((t_s - one.from_s + 0.6) / 1.2)
         total = total + since * (now - total)
     return total
 
@@ -80,8 +80,8 @@ def thing_poses(
     place, yaw = np.zeros((len(t_s), 3)), np.zeros_like(t_s)
     for i, one in enumerate(found):
         p_m, R = hands[one.person, one.side]
-        since = np.ones_like(t_s) if i == 0 else rise((t_s - one.from_s) / _CHANGES_S + 0.5)
-        place = place + since[:, None] * (p_m + rotate(R, GRIP_M) - place)
+        since = np.ones_like(t_s) if i == 0 else smooth_rise((t_s - one.from_s) / _CHANGES_S + 0.5)
+        place = place + since[:, None] * (p_m + rotate_vectors(R, GRIP_M) - place)
         turn = np.unwrap(yaw_of(ahead[one.person]))
         yaw = turn if i == 0 else yaw + since * (turn - yaw)
     return np.concatenate((place, quaternions(yaw_pitch_roll(yaw, 0.0 * yaw))), axis=1)

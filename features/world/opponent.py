@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.features.world.time_profiles import rise
+from gazerig.features.world.time_profiles import smooth_rise
 from gazerig.features.world.timeline import HEAD_M
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.sim_mock.scenes.scene import Event
@@ -75,11 +75,11 @@ class OpponentMotion:
             self._fist, self._speed = self._home, np.zeros(3)
             self._body, self._body_speed = np.zeros(2), np.zeros(2)
         before_m = self._fist
-        self._fist, self._speed = _follow(
+        self._fist, self._speed = _follow_target(
             self._fist, self._speed, self._target if held else self._home, _RATE_HZ, MAX_M_S
         )
         aside = np.clip((self._fist - self._home)[:2], _BODY_FROM_M, _BODY_TO_M)
-        self._body, self._body_speed = _follow(
+        self._body, self._body_speed = _follow_target(
             self._body, self._body_speed, aside, _BODY_RATE_HZ, BODY_M_S
         )
         change = STEP_S / TAKE_S if held else -STEP_S / TAKE_S
@@ -87,7 +87,9 @@ class OpponentMotion:
         if self.spans_s:
             self.spans_s[-1] = (self.spans_s[-1][0], t_s)
         self._find_events(before_m, t_s)
-        return OpponentRow(number, float(rise(np.array(self._share))), self._fist, self._body)
+        return OpponentRow(
+            number, float(smooth_rise(np.array(self._share))), self._fist, self._body
+        )
 
     def _find_events(self, before_m: Floats, t_s: float) -> None:
         """Note a fast approach that has ended near the head, and a guard that was open."""
@@ -114,16 +116,16 @@ class OpponentMotion:
         self.events.append(Event(name, "look", kind, start_s, end_s, (x, y, z), 0.6, due_s))
 
 
-def _follow(
+def _follow_target(
     p: Floats, v: Floats, target: Floats, rate_hz: float, most_m_s: float
 ) -> tuple[Floats, Floats]:
     """Return place and speed a step later: critically damped, within the limits."""
-    push = _limited(rate_hz * (rate_hz * (target - p) - 2.0 * v), MAX_M_S2)
-    v = _limited(v + STEP_S * push, most_m_s)
+    push = _limit_speed(rate_hz * (rate_hz * (target - p) - 2.0 * v), MAX_M_S2)
+    v = _limit_speed(v + STEP_S * push, most_m_s)
     return p + STEP_S * v, v
 
 
-def _limited(v: Floats, most: float) -> Floats:
+def _limit_speed(v: Floats, most: float) -> Floats:
     return np.asarray(v * (most / max(most, float(np.linalg.norm(v)))))
 
 

@@ -109,7 +109,7 @@ def _landscape() -> Floats:
     rgb[y > 0.45 + 0.12 * np.sin(4.0 * x)] = (92, 122, 152)
     rgb[y > 0.66 + 0.07 * np.sin(7.0 * x + 1.0)] = (62, 88, 82)
     rgb[(x - 0.72) ** 2 + (1.0 * (y - 0.28)) ** 2 < 0.010] = (226, 116, 68)
-    return _framed(rgb, x, y, (240, 236, 226), (52, 44, 38))
+    return _add_frame(rgb, x, y, (240, 236, 226), (52, 44, 38))
 
 
 def _shapes() -> Floats:
@@ -121,10 +121,10 @@ def _shapes() -> Floats:
         (0.72, 0.76, 0.08, (40, 44, 52)),
     ):
         rgb[(x - cx) ** 2 + (1.27 * (y - cy)) ** 2 < r * r] = colour
-    return _framed(rgb, x, y, (246, 244, 238), (120, 88, 58))
+    return _add_frame(rgb, x, y, (246, 244, 238), (120, 88, 58))
 
 
-def _framed(rgb: Floats, x: Floats, y: Floats, mount: Colour, frame: Colour) -> Floats:
+def _add_frame(rgb: Floats, x: Floats, y: Floats, mount: Colour, frame: Colour) -> Floats:
     edge = np.maximum(np.abs(x - 0.5), np.abs(y - 0.5)) * 2.0
     rgb[edge > 0.80] = mount
     rgb[edge > 0.92] = frame
@@ -177,7 +177,7 @@ def _poster() -> Floats:
     for cx in (0.34, 0.66):
         rgb[(x - cx) ** 2 + (1.4 * (y - 0.34)) ** 2 < 0.020] = (188, 36, 40)
         rgb[(np.abs(x - cx) < 0.07) & (y > 0.42) & (y < 0.52)] = (240, 238, 230)
-    return _framed(rgb, x, y, (244, 240, 230), (40, 38, 40))
+    return _add_frame(rgb, x, y, (244, 240, 230), (40, 38, 40))
 
 
 def _tiles() -> Floats:

@@ -24,7 +24,7 @@ def yaw_pitch_roll(yaw: Floats, pitch: Floats, roll: Floats | float = 0.0) -> Fl
     return out
 
 
-def rotate(R: Floats, v: Floats) -> Floats:
+def rotate_vectors(R: Floats, v: Floats) -> Floats:
     """Return vectors (n, 3) or one (3,) turned by rotations (n, 3, 3)."""
     return np.asarray((R @ np.asarray(v)[..., None])[..., 0])
 

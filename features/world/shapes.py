@@ -46,7 +46,7 @@ class SpecShapes(NamedTuple):
         spec = self.spec if self.others is None else self.spec._replace(rigs=(own[0], *rigs))
         model = spec.compiled()
         from gazerig.features.world.figure_model import figure_shapes
-        from gazerig.features.world.geom_shapes import still_parts
+        from gazerig.features.world.geom_shapes import fixed_parts
 
         figures = self.spec.figures
         moving = {} if figures is None else figure_shapes(figures, _FINENESS)
@@ -54,7 +54,7 @@ class SpecShapes(NamedTuple):
         bodies = [] if self.others is None else self.others.bodies(model, 1)
         elsewhere = {*moving, *(model.mj.body(i).name for i in bodies)}
         return (
-            *still_parts(model.mj, elsewhere, self.rig_joints),
+            *fixed_parts(model.mj, elsewhere, self.rig_joints),
             *heads,
             *(
                 WorldPart(
@@ -106,7 +106,7 @@ def _no_body() -> tuple[str, Mapping[str, bytes]]:
     return "<mujoco/>", {}
 
 
-class ShapesFrom(NamedTuple):
+class ShapesInFrame(NamedTuple):
     """The shapes of a world in the frame of a rig."""
 
     shapes: WorldShapes

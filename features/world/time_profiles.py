@@ -7,7 +7,7 @@ import numpy as np
 from gazerig.gaze.types import Floats
 
 
-def rise(share: Floats) -> Floats:
+def smooth_rise(share: Floats) -> Floats:
     """Return a minimum-jerk path from 0 to 1 for shares of its time, constant before and after."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s * s * s * (10.0 + s * (6.0 * s - 15.0)))
@@ -18,16 +18,16 @@ def there_and_back(
 ) -> Floats:
     """Return 0, a smooth rise to 1 within ``out_s`` of the start, a hold, and a smooth fall."""
     down_s = start_s + out_s + hold_s
-    return np.asarray(rise((t_s - start_s) / out_s) - rise((t_s - down_s) / back_s))
+    return np.asarray(smooth_rise((t_s - start_s) / out_s) - smooth_rise((t_s - down_s) / back_s))
 
 
-def hump(share: Floats) -> Floats:
+def smooth_bump(share: Floats) -> Floats:
     """Return a smooth hump over shares 0..1: 0 at its ends with level slopes, 1 in its middle."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(16.0 * s * s * (1.0 - s) ** 2)
 
 
-def smooth(values: Floats, width: int) -> Floats:
+def moving_average(values: Floats, width: int) -> Floats:
     """Return averages over ``width`` rows with bell-shaped weights; the end values are repeated."""
     if width < 2:
         return values

@@ -56,13 +56,13 @@ HEADS_APART_M = 0.4
 """Smallest distance of two necks."""
 
 
-def faults(script: SceneScript) -> Iterable[Fault]:
+def script_faults(script: SceneScript) -> Iterable[Fault]:
     """Yield the faults of a script, each with its key."""
     if script.room == "none":
         yield "room", "a world needs one: play the script with --scene, or name a room"
         return
     yield from _misplaced_heads(script)
-    found = [*_without_room(script), *name_faults(script, places_of(script))]
+    found = [*_space_faults(script), *name_faults(script, places_of(script))]
     yield from found
     if found:
         return
@@ -70,8 +70,8 @@ def faults(script: SceneScript) -> Iterable[Fault]:
     yield from handover_faults(script, timelines)
     for name, person in script.people.items():
         yield from overlap_faults(script, f"people.{name}", timelines[name])
-        yield from _legs(script, name, person)
-    yield from _crowded(script)
+        yield from _walk_paths(script, name, person)
+    yield from _crowding_faults(script)
 
 
 def _misplaced_heads(script: SceneScript) -> Iterator[Fault]:
@@ -88,7 +88,7 @@ def _misplaced_heads(script: SceneScript) -> Iterator[Fault]:
         placed.append((name, head.x_m, head.y_m))
 
 
-def _without_room(script: SceneScript) -> Iterator[Fault]:
+def _space_faults(script: SceneScript) -> Iterator[Fault]:
     """Find what only a script without a room may have, and things that nobody holds."""
     people = ", ".join(script.people)
     for name, person in script.people.items():
@@ -105,7 +105,7 @@ def _without_room(script: SceneScript) -> Iterator[Fault]:
             yield f"things.{name}", "at, acts, and kinds other than cup and ball need room: none"
 
 
-def _legs(script: SceneScript, name: str, person: PersonScript) -> Iterator[Fault]:
+def _walk_paths(script: SceneScript, name: str, person: PersonScript) -> Iterator[Fault]:
     """Find a walk of a seated person, a sitting without a seat, or an end of round elsewhere."""
     places = places_of(script)
     at = person.start
@@ -138,7 +138,7 @@ def _legs(script: SceneScript, name: str, person: PersonScript) -> Iterator[Faul
         )
 
 
-def _crowded(script: SceneScript) -> Iterator[Fault]:
+def _crowding_faults(script: SceneScript) -> Iterator[Fault]:
     """Find two people at one place at the same time."""
     stays: dict[str, list[tuple[float, float, str, str]]] = {}
     for name, person in script.people.items():
@@ -157,5 +157,5 @@ def _crowded(script: SceneScript) -> Iterator[Fault]:
                     yield key, f"{other} is at {at} then; choose another place or time"
 
 
-CHECKS = (faults,)
+CHECKS = (script_faults,)
 """Rules between several fields, for ``gazerig.config.load.load`` of a SceneScript."""

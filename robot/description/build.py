@@ -18,8 +18,8 @@ from gazerig.robot.description.head_shape import HeadMeasures
 from gazerig.robot.description.links import (
     CameraFrame,
     Description,
-    Follows,
     Link,
+    LinkageFollower,
     LinkJoint,
 )
 from gazerig.robot.description.own_meshes import OwnMesh, with_own_meshes
@@ -134,7 +134,7 @@ class _Builder:
                 place, axis = parts.facial_joint_axis(name, self._measures)
                 joint = self._joint(name, axis)
                 self._links.append(
-                    parts.further(link_name(name), HEAD, place, joint, self._measures)
+                    parts.facial_part(link_name(name), HEAD, place, joint, self._measures)
                 )
         self._links = [weighed(link, rig.mass, i >= first) for i, link in enumerate(self._links)]
         self._links.insert(first, self._build_head(neck, self._links[first:]))
@@ -157,7 +157,7 @@ class _Builder:
         return Description(rig.name, tuple(self._links), frame, tuple(touching))
 
     def _joint(
-        self, name: str, axis: Vec3, of: str = "", follows: Follows | None = None
+        self, name: str, axis: Vec3, of: str = "", follows: LinkageFollower | None = None
     ) -> LinkJoint:
         limit = self._rig.joints[of or name].limit()
         return LinkJoint(
@@ -231,7 +231,7 @@ class _Builder:
                 name = f"{side}_eyes_{turn}"
                 while name in joints:
                     name += "_"
-                joint = self._joint(name, _AXES[turn], both, Follows(both))
+                joint = self._joint(name, _AXES[turn], both, LinkageFollower(both))
             else:
                 joint = self._joint(both, _AXES[turn])
             name = link_name(joint.name)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Colour, Mesh, Painted, grid, painted
+from gazerig.robot.description.mesh import Colour, Mesh, Painted, grid, paint
 from gazerig.robot.description.solid import Solid
 
 _COLUMNS, _ROWS = 31, 7
@@ -49,9 +49,9 @@ def lips(head: Solid, mouth: Mouth, colour: Colour, dark: Colour) -> Lips:
     lower = line - mouth.lower * taper**0.60
     width = 0.10 * mouth.upper
     return Lips(
-        painted(_band(head, y, line, upper, 0.30 * mouth.upper), colour),
-        painted(_band(head, y, lower, line, 0.38 * mouth.lower), colour),
-        painted(_band(head, 1.06 * y, line - width, line + width, 0.30 * mouth.upper), dark),
+        paint(_band(head, y, line, upper, 0.30 * mouth.upper), colour),
+        paint(_band(head, y, lower, line, 0.38 * mouth.lower), colour),
+        paint(_band(head, 1.06 * y, line - width, line + width, 0.30 * mouth.upper), dark),
     )
 
 
@@ -83,4 +83,4 @@ def brow(
     radius = thick * (1.0 - 0.70 * share**1.6) * np.sqrt(np.clip(share / 0.05, 0.25, 1.0))
     turn = np.linspace(2.0 * pi, 0.0, around, endpoint=False)
     ring = np.stack((0.55 * np.cos(turn), np.zeros(around), np.sin(turn)), axis=1)
-    return painted(grid(middle[:, None] + radius[:, None, None] * ring, closed=True), colour)
+    return paint(grid(middle[:, None] + radius[:, None, None] * ring, closed=True), colour)

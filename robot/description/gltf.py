@@ -24,7 +24,7 @@ from gazerig.robot.description.links import (
     Visual,
     turn_about,
 )
-from gazerig.robot.description.texture import textured
+from gazerig.robot.description.texture import add_texture
 
 _ROUGHNESS: dict[Finish, float] = {
     "skin": 0.7, "plastic": 0.45, "cloth": 0.95, "eye": 0.12, "dark": 1.0,
@@ -95,7 +95,7 @@ def gltf(description: Description) -> bytes:
 
 
 def _mesh(visual: Visual) -> Any:
-    mesh = textured(visual.painted)
+    mesh = add_texture(visual.painted)
     material = PBRMaterial(  # type: ignore[no-untyped-call]
         name=visual.name,
         baseColorTexture=Image.fromarray(mesh.image),

@@ -17,16 +17,16 @@ from gazerig.robot.description.mesh import (
     ellipsoid,
     grid,
     lathe,
-    merged,
-    mirror,
+    merge_meshes,
+    mirror_mesh,
     mix,
-    painted,
-    plain,
+    paint,
     smooth_normals,
-    spot,
-    step,
+    smooth_step,
+    spot_weight,
+    uniform_colours,
 )
-from gazerig.robot.description.solid import cut
+from gazerig.robot.description.solid import cut_mesh
 
 SKIN: Colour = (247, 206, 178)
 LID: Colour = (243, 198, 170)
@@ -76,7 +76,7 @@ def skin() -> HeadSkin:
     jaw = Painted(whole, colours.reshape(-1, 3), normals.reshape(-1, 3))
     stays = []
     for bound in JAW_BOUNDS:
-        jaw, beyond = cut(jaw, bound(jaw.mesh.vertices))
+        jaw, beyond = cut_mesh(jaw, bound(jaw.mesh.vertices))
         stays.append(beyond)
     upper, lower, line = lips(HEAD, MOUTH, _LIPS, _MOUTH_LINE)
     sides = [_jaw_side(jaw, sign, 0.8, SKIN) for sign in (1.0, -1.0)]
@@ -86,7 +86,9 @@ def skin() -> HeadSkin:
         mesh = Mesh(side.mesh.vertices, side.mesh.faces[:, ::-1])
         cheeks.append(Painted(mesh, side.colours, smooth_normals(mesh)))
     return HeadSkin(
-        merged([*stays, *_eye_rims(), upper, line]), merged([jaw, *sides, lower]), merged(cheeks)
+        merge_meshes([*stays, *_eye_rims(), upper, line]),
+        merge_meshes([jaw, *sides, lower]),
+        merge_meshes(cheeks),
     )
 
 
@@ -100,7 +102,7 @@ def _eye_rims() -> tuple[Painted, Painted]:
     colours = _complexion(points, normals)
     colours[0] = colours[1] = colours[1] * 0.82
     left = Painted(mesh, colours.reshape(-1, 3), normals.reshape(-1, 3))
-    return left, mirror(left)
+    return left, mirror_mesh(left)
 
 
 def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted:
@@ -143,10 +145,10 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
     colours = np.broadcast_to(np.array(SKIN, float), points.shape).copy()
     below = np.clip(-normals[..., 2], 0.0, 1.0)
     colours = mix(colours, _SHADE, 0.45 * below)
-    colours = mix(colours, _BLUSH, 0.50 * spot(folded, (0.10, 0.62, -0.52), 0.30))
-    colours = mix(colours, _BLUSH, 0.30 * spot(folded, (0.42, 0.0, -0.55), 0.14))
-    colours = mix(colours, _SHADE, 0.22 * spot(folded, (0.10, 0.5, 0.0), 0.46))
-    colours = mix(colours, _HOLLOW, 0.8 * spot(folded, (0.33, 0.075, -0.655), 0.042))
+    colours = mix(colours, _BLUSH, 0.50 * spot_weight(folded, (0.10, 0.62, -0.52), 0.30))
+    colours = mix(colours, _BLUSH, 0.30 * spot_weight(folded, (0.42, 0.0, -0.55), 0.14))
+    colours = mix(colours, _SHADE, 0.22 * spot_weight(folded, (0.10, 0.5, 0.0), 0.46))
+    colours = mix(colours, _HOLLOW, 0.8 * spot_weight(folded, (0.33, 0.075, -0.655), 0.042))
     return colours
 
 
@@ -160,7 +162,7 @@ def mouth() -> Painted:
     body = Mesh(ball.vertices + (-0.62, 0.0, -0.92), ball.faces)
     mesh, _, normals = skin().head
     inside = Mesh(mesh.vertices - 0.03 * np.asarray(normals), mesh.faces[:, ::-1])
-    return merged([painted(body, _MOUTH), painted(inside, _MOUTH), skin().cheeks])
+    return merge_meshes([paint(body, _MOUTH), paint(inside, _MOUTH), skin().cheeks])
 
 
 @lru_cache(maxsize=1)
@@ -202,12 +204,12 @@ def _eye_colours(angles: Floats, columns: int) -> Floats:
     colours = mix(colours, _IRIS_INNER, np.exp(-(((share - 0.18) / 0.20) ** 2)) * 0.75)
     colours = mix(colours, _IRIS_INNER, np.clip(fibres, 0.0, 1.0) * np.sin(pi * share) * 0.55)
     colours = mix(colours, _LIMBUS, np.clip(-fibres, 0.0, 1.0) * np.sin(pi * share) * 0.40)
-    colours = mix(colours, _LIMBUS, step(a - 27.4, 1.6) * 0.95)
+    colours = mix(colours, _LIMBUS, smooth_step(a - 27.4, 1.6) * 0.95)
     white = np.broadcast_to(np.array(_SCLERA, float), colours.shape)
     white = mix(white, _SCLERA_FAR, np.clip((a - 48.0) / 40.0, 0.0, 1.0))
-    outside = step(a - 30.6, 0.8)[..., None]
+    outside = smooth_step(a - 30.6, 0.8)[..., None]
     colours = colours * (1.0 - outside) + white * outside
-    return mix(colours, _PUPIL, step(np.degrees(_PUPIL_RAD) - a, 0.7))
+    return mix(colours, _PUPIL, smooth_step(np.degrees(_PUPIL_RAD) - a, 0.7))
 
 
 @lru_cache(maxsize=2)
@@ -250,7 +252,9 @@ def ear() -> Painted:
     mesh = lathe([*profile, (0.30, 0.13), (0.0, 0.13)])
     radius = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1])
     accent = np.exp(-(((radius - 0.62) / 0.10) ** 2))
-    return Painted(mesh, mix(plain(mesh, CAP), (64, 190, 220), accent), smooth_normals(mesh))
+    return Painted(
+        mesh, mix(uniform_colours(mesh, CAP), (64, 190, 220), accent), smooth_normals(mesh)
+    )
 
 
 @lru_cache(maxsize=1)
@@ -260,7 +264,7 @@ def neck() -> Painted:
     profile = [(1.0 + 0.05 * cos(18.0 * pi * h), h) for h in height]
     mesh = lathe(profile, around=28)
     groove = np.repeat(0.5 - 0.5 * np.cos(18.0 * pi * height), len(mesh.vertices) // 55)
-    return Painted(mesh, mix(plain(mesh, (104, 110, 124)), (44, 47, 56), groove * 0.8),
+    return Painted(mesh, mix(uniform_colours(mesh, (104, 110, 124)), (44, 47, 56), groove * 0.8),
                    smooth_normals(mesh))  # fmt: skip
 
 
@@ -282,7 +286,7 @@ def bust() -> Painted:
     )
     mesh = grid(points, closed=True)
     ring = np.exp(-(((mesh.vertices[:, 2] + 0.02) / 0.035) ** 2))
-    colours = mix(plain(mesh, (74, 84, 108)), (150, 160, 182), ring * 0.7)
+    colours = mix(uniform_colours(mesh, (74, 84, 108)), (150, 160, 182), ring * 0.7)
     return Painted(mesh, colours, smooth_normals(mesh))
 
 

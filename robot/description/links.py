@@ -57,7 +57,7 @@ class Visual(NamedTuple):
     R: Mat3 = IDENTITY
 
 
-class Follows(NamedTuple):
+class LinkageFollower(NamedTuple):
     """A joint that a linkage moves with another one: its angle is ``ratio`` times the other's."""
 
     joint: str
@@ -79,7 +79,7 @@ class LinkJoint(NamedTuple):
     high_rad: float
     max_speed_rad_s: float
     max_torque_nm: float
-    follows: Follows | None = None
+    follows: LinkageFollower | None = None
     awake_rad: float = 0.0
 
 

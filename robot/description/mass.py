@@ -133,7 +133,9 @@ def join_inertias(parts: Iterable[Inertia]) -> Inertia:
     com = sum((body.mass_kg * np.array(body.com_m) for body in bodies), np.zeros(3)) / mass
     tensor = np.zeros((3, 3))
     for body in bodies:
-        tensor += np.array(body.tensor_kg_m2) + _steiner(np.array(body.com_m) - com, body.mass_kg)
+        tensor += np.array(body.tensor_kg_m2) + _parallel_axis_tensor(
+            np.array(body.com_m) - com, body.mass_kg
+        )
     return Inertia(mass, _vector(com), matrix(tensor))
 
 
@@ -149,7 +151,7 @@ def diagonal(x: float, y: float, z: float) -> Mat3:
     return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
 
 
-def _steiner(off: Floats, mass_kg: float) -> Floats:
+def _parallel_axis_tensor(off: Floats, mass_kg: float) -> Floats:
     return np.asarray(mass_kg * ((off @ off) * np.eye(3) - np.outer(off, off)))
 
 

@@ -118,12 +118,12 @@ class Painted(NamedTuple):
     normals: Floats | None = None
 
 
-def painted(mesh: Mesh, colour: Colour) -> Painted:
+def paint(mesh: Mesh, colour: Colour) -> Painted:
     """Return a mesh in one colour, smoothly shaded."""
-    return Painted(mesh, plain(mesh, colour), smooth_normals(mesh))
+    return Painted(mesh, uniform_colours(mesh, colour), smooth_normals(mesh))
 
 
-def plain(mesh: Mesh, colour: Colour) -> Floats:
+def uniform_colours(mesh: Mesh, colour: Colour) -> Floats:
     """Return one colour for every vertex."""
     return np.tile(np.array(colour, float), (len(mesh.vertices), 1))
 
@@ -134,31 +134,31 @@ def mix(colours: Floats, colour: Colour, share: Floats) -> Floats:
     return np.asarray(colours * (1.0 - part) + np.array(colour, float) * part)
 
 
-def step(value: Floats, width: float) -> Floats:
+def smooth_step(value: Floats, width: float) -> Floats:
     """Return 0 below and 1 above zero, with a smooth transition."""
     share = np.clip(0.5 + value / (2.0 * width), 0.0, 1.0)
     return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
-def spot(points: Floats, at: Vec3, size: float) -> Floats:
+def spot_weight(points: Floats, at: Vec3, size: float) -> Floats:
     """Return 1 at a place and less around it, for points (..., 3)."""
     away = ((points - np.array(at)) ** 2).sum(axis=-1)
     return np.asarray(np.exp(-away / (size * size)))
 
 
-def mirror(one: Painted) -> Painted:
+def mirror_mesh(one: Painted) -> Painted:
     """Return the same on the other side of y = 0."""
     other = np.array((1.0, -1.0, 1.0))
     mesh = Mesh(one.mesh.vertices * other, one.mesh.faces[:, ::-1])
     return Painted(mesh, one.colours, None if one.normals is None else one.normals * other)
 
 
-def moved(one: Painted, by: Vec3, scale: float = 1.0) -> Painted:
+def move_mesh(one: Painted, by: Vec3, scale: float = 1.0) -> Painted:
     """Return the same, scaled about the origin and then moved."""
     return one._replace(mesh=Mesh(one.mesh.vertices * scale + np.array(by), one.mesh.faces))
 
 
-def merged(parts: Sequence[Painted]) -> Painted:
+def merge_meshes(parts: Sequence[Painted]) -> Painted:
     """Return several as one; every part has normals."""
     first = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
     faces = [part.mesh.faces + start for part, start in zip(parts, first, strict=False)]

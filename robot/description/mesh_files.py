@@ -13,7 +13,7 @@ import numpy as np
 
 from gazerig.gaze.types import Floats, Mat3
 from gazerig.robot.description.mesh import Mesh, Painted
-from gazerig.robot.description.texture import textured
+from gazerig.robot.description.texture import add_texture
 
 
 def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
@@ -59,7 +59,7 @@ class _ObjText(NamedTuple):
 # all parts of four rigs.
 @lru_cache(maxsize=64)
 def _write_obj(content: _Content) -> _ObjText:
-    mesh = textured(content.painted)
+    mesh = add_texture(content.painted)
     points, point_of = _unique_rows(mesh.vertices, 6)
     normals, normal_of = _unique_rows(mesh.normals, 3)
     # In this format an image begins at its left lower corner.

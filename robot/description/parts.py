@@ -18,10 +18,10 @@ from gazerig.robot.description.mesh import (
     Mesh,
     Painted,
     ellipsoid,
-    merged,
-    mirror,
-    moved,
-    painted,
+    merge_meshes,
+    mirror_mesh,
+    move_mesh,
+    paint,
 )
 
 FLOOR_M = -0.09
@@ -107,7 +107,7 @@ def base(name: str, measures: HeadMeasures, head_m: Vec3, column_m: float, necke
     top = shoulders_m(measures, head_m)
     tall = max(LEAST_M, top - FLOOR_M)
     looks = [
-        Visual("bust", _stretch(head_mesh.bust(), (BUST * unit, BUST * unit, tall)), "cloth",
+        Visual("bust", _scale_axes(head_mesh.bust(), (BUST * unit, BUST * unit, tall)), "cloth",
                (x, y, top))
     ]  # fmt: skip
     end = column_m if necked else throat[2]
@@ -207,13 +207,13 @@ def _head_looks(
     unit = measures.interocular_m
     skin = head_mesh.skin()
     looks = [
-        Visual("skin", moved(skin.head, _ORIGIN, unit), "skin"),
-        Visual("cap", moved(head_mesh.cap(), _ORIGIN, unit), "plastic"),
+        Visual("skin", move_mesh(skin.head, _ORIGIN, unit), "skin"),
+        Visual("cap", move_mesh(head_mesh.cap(), _ORIGIN, unit), "plastic"),
     ]
     if "jaw" in moved_parts:
-        looks.append(Visual("mouth", moved(head_mesh.mouth(), _ORIGIN, unit), "dark"))
+        looks.append(Visual("mouth", move_mesh(head_mesh.mouth(), _ORIGIN, unit), "dark"))
     else:
-        looks.append(Visual("jaw", moved(skin.jaw, _ORIGIN, unit), "skin"))
+        looks.append(Visual("jaw", move_mesh(skin.jaw, _ORIGIN, unit), "skin"))
     for side in ("left", "right"):
         if f"{side}_brow" not in moved_parts:
             looks.append(Visual(f"{side}_brow", _brow(side, unit, _ORIGIN), "skin"))
@@ -231,7 +231,7 @@ def eye_m(side: str, interocular_m: float) -> Vec3:
 
 def eye(name: str, parent: str, p_m: Vec3, measures: HeadMeasures) -> Link:
     """Return an eyeball with iris and pupil that looks along its x axis."""
-    ball = moved(head_mesh.eye(), _ORIGIN, measures.eye_radius_m)
+    ball = move_mesh(head_mesh.eye(), _ORIGIN, measures.eye_radius_m)
     look = Visual(name, ball, "eye")
     return Link(name, parent, p_m, inertia=mass.globe(measures.eye_radius_m), visuals=(look,))
 
@@ -285,7 +285,9 @@ def facial_joint_axis(name: str, measures: HeadMeasures) -> tuple[Vec3, Vec3]:
     return measures.scaled(_MIDDLE), up
 
 
-def further(name: str, parent: str, p_m: Vec3, joint: LinkJoint, measures: HeadMeasures) -> Link:
+def facial_part(
+    name: str, parent: str, p_m: Vec3, joint: LinkJoint, measures: HeadMeasures
+) -> Link:
     """Return a part of the face that a joint of the rig moves besides eyes and lids."""
     unit = measures.interocular_m
     back: Vec3 = (-p_m[0], -p_m[1], -p_m[2])
@@ -293,7 +295,7 @@ def further(name: str, parent: str, p_m: Vec3, joint: LinkJoint, measures: HeadM
     looks: tuple[Visual, ...] = ()
     shapes: tuple[CollisionShape, ...] = ()
     if joint.name == "jaw":
-        skin = moved(head_mesh.skin().jaw, back, unit)
+        skin = move_mesh(head_mesh.skin().jaw, back, unit)
         looks = (Visual("jaw", skin, "skin"),)
         shapes = tuple(_body(measures, *body, back) for body in _JAW_BODIES)
     elif part == "brow" and side in ("left", "right"):
@@ -315,9 +317,9 @@ def further(name: str, parent: str, p_m: Vec3, joint: LinkJoint, measures: HeadM
 
 def camera(name: str, parent: str, p_m: Vec3, R: Mat3) -> Link:
     """Return the camera's housing, behind the lens at its origin."""
-    box = painted(ellipsoid((0.006, 0.012, 0.008), 0.35, 9), (44, 46, 52))
-    lens = painted(ellipsoid((0.003, 0.0045, 0.0045), 1.0, 9), (14, 16, 22))
-    look = merged([moved(box, (-0.0085, 0.0, 0.0)), moved(lens, (-0.0035, 0.0, 0.0))])
+    box = paint(ellipsoid((0.006, 0.012, 0.008), 0.35, 9), (44, 46, 52))
+    lens = paint(ellipsoid((0.003, 0.0045, 0.0045), 1.0, 9), (14, 16, 22))
+    look = merge_meshes([move_mesh(box, (-0.0085, 0.0, 0.0)), move_mesh(lens, (-0.0035, 0.0, 0.0))])
     return Link(name, parent, p_m, R, visuals=(Visual(name, look, "plastic"),))
 
 
@@ -345,7 +347,7 @@ def _body(measures: HeadMeasures, centre: Vec3, half: Vec3, by: Vec3 = _ORIGIN) 
 
 def _brow(side: str, unit: float, by: Vec3) -> Painted:
     brow = head_mesh.brow()
-    return moved(brow if side == "left" else mirror(brow), by, unit)
+    return move_mesh(brow if side == "left" else mirror_mesh(brow), by, unit)
 
 
 def _ear(side: str, unit: float, by: Vec3) -> Visual:
@@ -356,22 +358,22 @@ def _ear(side: str, unit: float, by: Vec3) -> Visual:
     c, s = cos(-sign * _EAR_RAD), sin(-sign * _EAR_RAD)
     R: Mat3 = ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
     return Visual(
-        f"{side}_ear", moved(head_mesh.ear(), _ORIGIN, _EAR_SCALE * unit), "plastic", place, R
+        f"{side}_ear", move_mesh(head_mesh.ear(), _ORIGIN, _EAR_SCALE * unit), "plastic", place, R
     )
 
 
 def _lid_look(name: str, measures: HeadMeasures, upper: bool, edge_rad: float, p_m: Vec3) -> Visual:
     radius = (UPPER_LID if upper else LOWER_LID) * measures.eye_radius_m
-    lid_shape = moved(head_mesh.eyelid(upper), _ORIGIN, radius)
+    lid_shape = move_mesh(head_mesh.eyelid(upper), _ORIGIN, radius)
     return Visual(name, lid_shape, "skin", p_m, rotation((0.0, edge_rad, 0.0)))
 
 
 def _tube(unit: float, length_m: float) -> Painted:
     radius = NECK_RADIUS * unit
-    return _stretch(head_mesh.neck(), (radius, radius, length_m))
+    return _scale_axes(head_mesh.neck(), (radius, radius, length_m))
 
 
-def _stretch(one: Painted, by: Vec3) -> Painted:
+def _scale_axes(one: Painted, by: Vec3) -> Painted:
     """Return the same, longer or shorter along each axis."""
     mesh = Mesh(one.mesh.vertices * by, one.mesh.faces)
     if one.normals is None:

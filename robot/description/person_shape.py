@@ -19,13 +19,13 @@ from gazerig.robot.description.mesh import (
     Painted,
     cap,
     grid,
-    merged,
-    mirror,
+    merge_meshes,
+    mirror_mesh,
     mix,
-    moved,
-    painted,
-    spot,
-    step,
+    move_mesh,
+    paint,
+    smooth_step,
+    spot_weight,
 )
 from gazerig.robot.description.mesh import ellipsoid as ellipsoid_mesh
 from gazerig.robot.description.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
@@ -127,12 +127,15 @@ def head_parts(number: int, fineness: float = 1.0) -> HeadParts:
     """
     look = LOOKS[number % len(LOOKS)]
     solid = _head_solid(look, fineness)
-    red, dark = _toward(look.skin, (186, 62, 66), 0.55), _toward(look.skin, (70, 24, 24), 0.8)
+    red, dark = (
+        _mix_colours(look.skin, (186, 62, 66), 0.55),
+        _mix_colours(look.skin, (70, 24, 24), 0.8),
+    )
     # Both eyes with their lids' edges, and the brows.
     eye, glint, lid, still = _eye_parts(look, fineness)
-    left = [*(moved(part, _EYE) for part in (*eye, glint, lid)), *still]
-    face = merged([*left, *map(mirror, left), *lips(_HEAD, _MOUTH, red, dark)])
-    return HeadParts(solid, moved(face, (0.0, 0.0, 0.0), PUPIL_DISTANCE_M))
+    left = [*(move_mesh(part, _EYE) for part in (*eye, glint, lid)), *still]
+    face = merge_meshes([*left, *map(mirror_mesh, left), *lips(_HEAD, _MOUTH, red, dark)])
+    return HeadParts(solid, move_mesh(face, (0.0, 0.0, 0.0), PUPIL_DISTANCE_M))
 
 
 def _head_solid(look: PersonLook, fineness: float) -> Painted:
@@ -142,7 +145,9 @@ def _head_solid(look: PersonLook, fineness: float) -> Painted:
     plain = Painted(
         mesh, _complexion(skin.points, look).reshape(-1, 3), skin.normals.reshape(-1, 3)
     )
-    return moved(merged([plain, *_hair(look, fineness)]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M)
+    return move_mesh(
+        merge_meshes([plain, *_hair(look, fineness)]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M
+    )
 
 
 class HeadSegments(NamedTuple):
@@ -168,43 +173,46 @@ MOUTH_FACE_M: Vec3 = (-0.34 * PUPIL_DISTANCE_M, 0.0, _MOUTH.z * PUPIL_DISTANCE_M
 @lru_cache(maxsize=8)
 def head_segments(look: PersonLook, fineness: float = 1.0) -> HeadSegments:
     """Return the head of a person in parts."""
-    red, dark = _toward(look.skin, (186, 62, 66), 0.55), _toward(look.skin, (40, 12, 14), 0.92)
+    red, dark = (
+        _mix_colours(look.skin, (186, 62, 66), 0.55),
+        _mix_colours(look.skin, (40, 12, 14), 0.92),
+    )
     mouth = lips(_HEAD, _MOUTH, red, dark)
     inside = _MOUTH._replace(upper=0.03, lower=_MOUTH.lower + 0.045, half_width=0.30)
-    open_mouth = moved(lips(_HEAD, inside, dark, dark).lower, (-0.004, 0.0, 0.0))
+    open_mouth = move_mesh(lips(_HEAD, inside, dark, dark).lower, (-0.004, 0.0, 0.0))
     eye, glint, lid, still = _eye_parts(look, fineness, 20)
     # The glint is flat on the eyeball, so that the lid goes over it.
-    flat = moved(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
+    flat = move_mesh(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
     solid = _head_solid(look, fineness)
-    features = [*still, *(mirror(part) for part in still), mouth.upper, mouth.line, open_mouth]
+    features = [*still, *(mirror_mesh(part) for part in still), mouth.upper, mouth.line, open_mouth]
     back = tuple(-one / PUPIL_DISTANCE_M for one in MOUTH_FACE_M)
     size, here = PUPIL_DISTANCE_M, (0.0, 0.0, 0.0)
     # The lower lip is in front of the open mouth, which it covers while it is up.
-    lower = moved(mouth.lower, (back[0] + 0.035, back[1], back[2]))
+    lower = move_mesh(mouth.lower, (back[0] + 0.035, back[1], back[2]))
     return HeadSegments(
-        merged([solid, moved(merged(features), here, size)]),
-        moved(lower, here, size),
-        moved(merged([*eye, flat]), here, size),
-        moved(lid, here, size),
+        merge_meshes([solid, move_mesh(merge_meshes(features), here, size)]),
+        move_mesh(lower, here, size),
+        move_mesh(merge_meshes([*eye, flat]), here, size),
+        move_mesh(lid, here, size),
     )
 
 
 def head(number: int, fineness: float = 1.0) -> Painted:
     """Return the head of a person as one shape."""
-    return merged(head_parts(number, fineness))
+    return merge_meshes(head_parts(number, fineness))
 
 
 def _complexion(points: Floats, look: PersonLook) -> Floats:
     folded = points * (1.0, 1.0, 1.0)
     folded[..., 1] = np.abs(folded[..., 1])
     x, y, z = np.moveaxis(folded, -1, 0)
-    shade, blush = (_toward(look.skin, to) for to in ((120, 60, 44), (236, 110, 96)))
+    shade, blush = (_mix_colours(look.skin, to) for to in ((120, 60, 44), (236, 110, 96)))
     colours = np.broadcast_to(np.array(look.skin, float), points.shape)
-    colours = mix(colours, blush, 0.55 * spot(folded, (-0.50, 0.58, -0.02), 0.32))
-    colours = mix(colours, blush, 0.35 * spot(folded, (0.0, 0.0, -0.02), 0.16))
-    colours = mix(colours, shade, 0.55 * spot(folded, (-0.50, 0.5, 0.57), 0.30))
-    colours = mix(colours, shade, 0.80 * spot(folded, (-0.14, 0.07, -0.10), 0.055))
-    return mix(colours, shade, 0.6 * step(-z - 1.25, 0.3))
+    colours = mix(colours, blush, 0.55 * spot_weight(folded, (-0.50, 0.58, -0.02), 0.32))
+    colours = mix(colours, blush, 0.35 * spot_weight(folded, (0.0, 0.0, -0.02), 0.16))
+    colours = mix(colours, shade, 0.55 * spot_weight(folded, (-0.50, 0.5, 0.57), 0.30))
+    colours = mix(colours, shade, 0.80 * spot_weight(folded, (-0.14, 0.07, -0.10), 0.055))
+    return mix(colours, shade, 0.6 * smooth_step(-z - 1.25, 0.3))
 
 
 class _EyeParts(NamedTuple):
@@ -226,23 +234,23 @@ def _eye_parts(look: PersonLook, fineness: float, around: int = 48) -> _EyeParts
         (1.04, 14.0, (14, 12, 14)),
     )
     parts = [
-        painted(cap(size * _EYE_RADIUS, radians(deg), rings, around), colour)
+        paint(cap(size * _EYE_RADIUS, radians(deg), rings, around), colour)
         for size, deg, colour in balls
     ]
-    glint = painted(cap(0.035, pi, 4, around), (255, 255, 255))
-    glint = moved(glint, (1.02 * _EYE_RADIUS, 0.045, 0.05))
-    tone = _toward(look.skin, (120, 60, 44), 0.12)
+    glint = paint(cap(0.035, pi, 4, around), (255, 255, 255))
+    glint = move_mesh(glint, (1.02 * _EYE_RADIUS, 0.045, 0.05))
+    tone = _mix_colours(look.skin, (120, 60, 44), 0.12)
     lids = []
     for edge_deg, end_deg, dark in ((20.0, 118.0, 1.0), (-25.0, -84.0, 0.35)):
-        lid = painted(_shell(1.09 * _EYE_RADIUS, edge_deg, end_deg), tone)
+        lid = paint(_shell(1.09 * _EYE_RADIUS, edge_deg, end_deg), tone)
         x, _, up = lid.mesh.vertices.T
         swept = np.arctan2(up, x)  # about the y axis, from straight ahead
-        edge = step(0.05 - np.abs(swept - radians(edge_deg)), 0.05)
+        edge = smooth_step(0.05 - np.abs(swept - radians(edge_deg)), 0.05)
         lids.append(lid._replace(colours=mix(lid.colours, (40, 28, 26), dark * edge)))
     share = np.linspace(0.0, 1.0, 12)
     y, z = 0.20 + 0.62 * share, 0.90 + 0.13 * np.sin(pi * (0.2 + 0.6 * share))
     hair = brow(_HEAD, y, z, 0.052, look.hair, 8)
-    return _EyeParts(parts, glint, lids[0], [moved(lids[1], _EYE), hair])
+    return _EyeParts(parts, glint, lids[0], [move_mesh(lids[1], _EYE), hair])
 
 
 def _shell(radius: float, edge_deg: float, end_deg: float) -> Mesh:
@@ -284,15 +292,17 @@ def _hair(look: PersonLook, fineness: float) -> list[Painted]:
     points[1:] += wave[:, None] * found.normals[1:]
     mesh = grid(np.concatenate((rim[None], points)), closed=True)
     shine = np.clip(mesh.vertices[:, 2] - 0.9, 0.0, 1.0) * 0.22
-    hair = painted(mesh, look.hair)
-    parts = [hair._replace(colours=mix(hair.colours, _toward(look.hair, (255, 230, 200)), shine))]
+    hair = paint(mesh, look.hair)
+    parts = [
+        hair._replace(colours=mix(hair.colours, _mix_colours(look.hair, (255, 230, 200)), shine))
+    ]
     if look.long_hair:
-        fall = painted(ellipsoid_mesh((0.42, 0.30, 1.35), 0.9, 13), look.hair)
-        left = moved(fall, (-1.95, 1.02, -0.55))
-        back = moved(
-            painted(ellipsoid_mesh((0.45, 1.05, 1.35), 0.9, 13), look.hair), (-2.35, 0.0, -0.55)
+        fall = paint(ellipsoid_mesh((0.42, 0.30, 1.35), 0.9, 13), look.hair)
+        left = move_mesh(fall, (-1.95, 1.02, -0.55))
+        back = move_mesh(
+            paint(ellipsoid_mesh((0.45, 1.05, 1.35), 0.9, 13), look.hair), (-2.35, 0.0, -0.55)
         )
-        parts += [left, mirror(left), back]
+        parts += [left, mirror_mesh(left), back]
     return parts
 
 
@@ -312,15 +322,17 @@ def torso(number: int, length_m: float) -> Painted:
         [[(-1.85 + x * cos(a), y * sin(a), z) for a in around.tolist()] for z, x, y in rows[::-1]]
     )
     mesh = grid(points, closed=True)
-    collar = step(mesh.vertices[:, 2] + 1.80, 0.06)
-    shirt = painted(mesh, look.shirt)
-    shirt = shirt._replace(colours=mix(shirt.colours, _toward(look.shirt, (255, 255, 255)), collar))
+    collar = smooth_step(mesh.vertices[:, 2] + 1.80, 0.06)
+    shirt = paint(mesh, look.shirt)
+    shirt = shirt._replace(
+        colours=mix(shirt.colours, _mix_colours(look.shirt, (255, 255, 255)), collar)
+    )
     neck_rows = ((-1.70, 0.60, 0.60), (-1.55, 0.60, 0.60), (-1.0, 0.62, 0.64), (-0.4, 0.60, 0.62))
     tube = [
         [(-1.75 + x * cos(a), y * sin(a), z) for a in around[::2].tolist()] for z, x, y in neck_rows
     ]
-    neck = painted(grid(np.array(tube), closed=True), _toward(look.skin, (120, 60, 44), 0.22))
-    return moved(merged([shirt, neck]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M)
+    neck = paint(grid(np.array(tube), closed=True), _mix_colours(look.skin, (120, 60, 44), 0.22))
+    return move_mesh(merge_meshes([shirt, neck]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M)
 
 
 def hand(number: int) -> Painted:
@@ -337,7 +349,9 @@ def open_right_hand(look: PersonLook, rows: int = 34) -> Painted:
     colours = np.broadcast_to(np.array(look.skin, float), points.shape)
     y, z = points[:, 1], points[:, 2]
     gaps = np.exp(-((np.abs(np.abs(y) - 0.20) / 0.03) ** 2)) + np.exp(-((y / 0.03) ** 2))
-    colours = mix(colours, _toward(look.skin, (120, 60, 44)), 0.8 * gaps * step(z - 0.28, 0.1))
+    colours = mix(
+        colours, _mix_colours(look.skin, (120, 60, 44)), 0.8 * gaps * smooth_step(z - 0.28, 0.1)
+    )
     return Painted(grid(found.points, closed=True), colours, normals)
 
 
@@ -350,7 +364,7 @@ def _mitten_field(points: Floats) -> Floats:
     return union(solid, wrist, 0.2)
 
 
-def _toward(colour: Colour, other: Colour, share: float = 0.5) -> Colour:
+def _mix_colours(colour: Colour, other: Colour, share: float = 0.5) -> Colour:
     """Return a colour between two."""
     r, g, b = (round(a + share * (o - a)) for a, o in zip(colour, other, strict=True))
     return r, g, b

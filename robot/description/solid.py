@@ -199,7 +199,7 @@ def ray_grid(rows: int, columns: int, focus_rad: float, spread_rad: float) -> Fl
     )
 
 
-def cut(one: Painted, outside: Floats) -> tuple[Painted, Painted]:
+def cut_mesh(one: Painted, outside: Floats) -> tuple[Painted, Painted]:
     """Return the part of a mesh where values at its vertices are below 0, and the rest.
 
     Triangles that have both are divided at the line on which the value, linear between their
@@ -227,11 +227,13 @@ def cut(one: Painted, outside: Floats) -> tuple[Painted, Painted]:
     pieces = []
     for side, kept in ((True, whole_in), (False, whole_out)):
         rest = stumps[alone != side].reshape(-1, 3)
-        pieces.append(_piece(one, ends, outside, np.concatenate((kept, tips[alone == side], rest))))
+        pieces.append(
+            _mesh_piece(one, ends, outside, np.concatenate((kept, tips[alone == side], rest)))
+        )
     return pieces[0], pieces[1]
 
 
-def _piece(
+def _mesh_piece(
     one: Painted, ends: NDArray[np.int64], outside: Floats, faces: NDArray[np.int64]
 ) -> Painted:
     """Return some faces of a mesh that has new points between pairs of its vertices."""

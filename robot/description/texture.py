@@ -49,9 +49,9 @@ class _TexturePart(NamedTuple):
     texels: Floats
 
 
-def textured(painted: Painted) -> TexturedMesh:
+def add_texture(painted: Painted) -> TexturedMesh:
     """Return a painted mesh with its colours as a texture; the triangles stay the same."""
-    parts = [_part(piece) for piece in _pieces(painted)]
+    parts = [_texture_part(piece) for piece in _pieces(painted)]
     corners, size = _pack_rectangles([part.texels.shape[:2] for part in parts])
     image = np.zeros((*size, painted.colours.shape[1]))
     first, uv, faces = 0, [], []
@@ -87,7 +87,7 @@ def _pieces(painted: Painted) -> Iterator[Painted]:
         yield Painted(local, colours[start:end], normals[start:end])
 
 
-def _part(piece: Painted) -> _TexturePart:
+def _texture_part(piece: Painted) -> _TexturePart:
     """Return the texels of one part, in the simplest form that holds its colours."""
     (vertices, faces), colours, normals = piece
     assert normals is not None

@@ -14,7 +14,7 @@ import numpy as np
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import Painted, lathe, painted
+from gazerig.robot.description.mesh import Painted, lathe, paint
 from gazerig.robot.description.person_shape import LOOKS, hand, head_parts, torso
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.cameras.canvas import Canvas
@@ -120,7 +120,7 @@ def _limb(number: int, sleeve: bool) -> Painted:
     mesh = lathe(
         [(0.0, -0.10), (0.7 * thick, -0.06), (thick, 0.0), (thin, 1.0), (0.0, 1.04)], around=16
     )
-    return painted(mesh, look.shirt if sleeve else look.skin)
+    return paint(mesh, look.shirt if sleeve else look.skin)
 
 
 def _place_link(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _PlacedShape:

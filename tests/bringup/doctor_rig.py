@@ -5,7 +5,7 @@ import pytest
 from gazerig.drivers.feetech.memory_table import REGISTERS
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.run import apply_fixes, check, check_all
+from gazerig.features.bringup.doctor.run import apply_fixes, examine_bus, examine_ports
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -81,13 +81,13 @@ class Rig:
 
     def check(self):
         self.reported.clear()
-        return check(self.port, self.kind, self.setups, BAUD, self.reported.append)
+        return examine_bus(self.port, self.kind, self.setups, BAUD, self.reported.append)
 
     def fix(self, findings):
         return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))
 
     def check_all(self, host):
-        return check_all(self.port, host, self.check)
+        return examine_ports(self.port, host, self.check)
 
 
 def one(findings, level, where, words):

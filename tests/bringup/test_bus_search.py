@@ -8,8 +8,8 @@ from gazerig.features.bringup.bus_search import (
     SearchRound,
     found_servos,
     parse_kinds,
-    plan,
-    search,
+    plan_search,
+    search_bus,
 )
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -33,7 +33,7 @@ class Line:
         self.sent += data
 
     def search(self, rates=FEW, usb="", to_the_end=False, thorough=False):
-        return list(search(self.port, usb, plan(usb, ALL, rates), thorough, to_the_end))
+        return list(search_bus(self.port, usb, plan_search(usb, ALL, rates), thorough, to_the_end))
 
 
 def maestro(channels=12, crc=False, **chosen):
@@ -74,8 +74,8 @@ def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers(
     (only,) = line.search(usb=MINI, rates=None, to_the_end=True)
     assert only.board is None and line.sent and b"\xff" not in line.sent
     for kind in ("dynamixel", "feetech"):
-        assert plan(MINI, parse_kinds(kind), None) == ()
-    assert plan(MICRO, ALL, (1_000_000,)) == (("maestro", BOARD_RATES[0]),)
+        assert plan_search(MINI, parse_kinds(kind), None) == ()
+    assert plan_search(MICRO, ALL, (1_000_000,)) == (("maestro", BOARD_RATES[0]),)
 
 
 def test_a_board_on_usb_tells_its_size_by_its_product():
@@ -95,10 +95,13 @@ def test_pulses_go_on_while_it_is_asked():
 
 
 def test_kinds_that_are_named_are_asked_and_no_other():
-    assert {kind for kind, _ in plan("", ("feetech",), None)} == {"feetech"}
-    assert {kind for kind, _ in plan("", ("dynamixel",), None)} == {"dynamixel"}
+    assert {kind for kind, _ in plan_search("", ("feetech",), None)} == {"feetech"}
+    assert {kind for kind, _ in plan_search("", ("dynamixel",), None)} == {"dynamixel"}
     # Whether a board is there is asked at whatever rate, before servo packets are sent.
-    assert plan("", ALL, (4_500_000,)) == (("maestro", BOARD_RATES[0]), ("dynamixel", 4_500_000))
+    assert plan_search("", ALL, (4_500_000,)) == (
+        ("maestro", BOARD_RATES[0]),
+        ("dynamixel", 4_500_000),
+    )
 
 
 # --- servos of each kind hear the other's packets and are left as they are
@@ -154,7 +157,7 @@ def test_nobody():
 
 
 def test_all_rates_of_a_kind_are_in_the_plan():
-    rows = plan("", ALL, None)
+    rows = plan_search("", ALL, None)
     assert [rate for kind, rate in rows if kind == "dynamixel"] == list(DYNAMIXEL.scan_rates)
     assert rows[0] == ("maestro", 115_200)
 
@@ -170,8 +173,8 @@ def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_sea
     chain = build_feetech([ServoSpec(5, "sts3215")], lambda: 0.0)
     chain.choose_behaviour("broadcast-ping", "silence")
     line = Line(chain)
-    asked = plan("", ("feetech",), (1_000_000,))
-    assert not any(one.found for one in search(line.port, "", asked))
+    asked = plan_search("", ("feetech",), (1_000_000,))
+    assert not any(one.found for one in search_bus(line.port, "", asked))
     assert len(line.sent) < 100
-    (one,) = search(line.port, "", asked, thorough=True)
+    (one,) = search_bus(line.port, "", asked, thorough=True)
     assert [servo.id for servo in one.found] == [5]

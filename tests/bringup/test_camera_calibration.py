@@ -37,9 +37,9 @@ from gazerig.features.bringup.calibration.charuco_views import (
     RULER_MM,
     BoardView,
     ViewParams,
+    board_page,
     board_view,
     coverage,
-    page,
     write_page,
 )
 from gazerig.features.bringup.calibration.field_of_view import LEAST_FRAMES, estimate_field
@@ -289,7 +289,7 @@ def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path)
 
 @pytest.mark.parametrize("paper", sorted(PAPERS_MM))
 def test_squares_and_ruler_on_the_page_are_as_long_as_they_say(paper: str) -> None:
-    sheet = page(PRINTED, paper)
+    sheet = board_page(PRINTED, paper)
     seen = PRINTED.find(cv2.GaussianBlur(sheet, (0, 0), 2.0).astype(np.uint8))
     assert seen is not None and len(seen.ids) == 24
     sides = np.diff(seen.corners_px.reshape(4, 6, 2)[:, :, 0], axis=1) / PX_PER_MM

@@ -8,7 +8,7 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.channel_test import SLOW_STEPS_S, ChannelPosition, walk
+from gazerig.features.bringup.channel_test import SLOW_STEPS_S, ChannelPosition, walk_channel
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
@@ -46,7 +46,7 @@ class Bench:
             if fault and looks in (None, len(self.seen)):
                 self.board.faults.command(fault)
 
-        return walk(self.driver, LID, PLACES, sleep_until)
+        return walk_channel(self.driver, LID, PLACES, sleep_until)
 
 
 def test_the_first_place_at_once_the_others_slowly_and_the_pulses_end():
@@ -106,7 +106,7 @@ def test_ctrl_c_ends_the_pulses():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        walk(bench.driver, LID, PLACES, interrupted)
+        walk_channel(bench.driver, LID, PLACES, interrupted)
     assert bench.board.faults.reports()[2]["position"] == 0
 
 

@@ -26,7 +26,7 @@ from gazerig.features.bringup.cli.calibration_keys import (
     Keys,
     PageKeys,
     key_and_count,
-    keys_of,
+    split_words,
 )
 from gazerig.robot.app.run_observers import stop_only_handler
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
@@ -151,7 +151,7 @@ def test_without_a_face_it_says_so_and_a_script_ends(
 
 
 def test_what_a_terminal_sends_for_keys() -> None:
-    keys, rest = keys_of("\x1b[A\x1b[B\x1bOC\x1b[1;5Dwasd+-=\rnb\x1b[3~\x1bOPQ\x1b[")
+    keys, rest = split_words("\x1b[A\x1b[B\x1bOC\x1b[1;5Dwasd+-=\rnb\x1b[3~\x1bOPQ\x1b[")
     assert keys == [
         "up", "down", "right", "left", "up", "left", "down", "right", "larger", "smaller",
         "larger", "enter", "skip", "back", "end",
@@ -163,14 +163,14 @@ def test_what_a_terminal_sends_for_keys() -> None:
 def test_keys_are_the_same_however_the_bytes_are_cut(sent: list[str], data: st.DataObject) -> None:
     text = "".join(sent)
     cut = data.draw(st.integers(0, len(text)))
-    first, rest = keys_of(text[:cut])
-    second, left = keys_of(rest + text[cut:])
-    assert first + second == keys_of(text)[0] and left == ""
+    first, rest = split_words(text[:cut])
+    second, left = split_words(rest + text[cut:])
+    assert first + second == split_words(text)[0] and left == ""
 
 
 @given(st.text(st.sampled_from("\x1b[O;0123ABw~ \x00é"), max_size=40))
 def test_no_bytes_are_lost_or_stop_it(text: str) -> None:
-    _, rest = keys_of(text)
+    _, rest = split_words(text)
     assert text.endswith(rest) and len(rest) <= len(text)
 
 

@@ -29,15 +29,15 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.bus_search import SearchRound
 from gazerig.features.bringup.channel_test import send_home
-from gazerig.features.bringup.cli.scan import remarks
-from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
+from gazerig.features.bringup.cli.scan import scan_remarks
+from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
 from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
     Fix,
     group_findings,
     join_places,
     summarize,
-    worst,
+    worst_level,
 )
 from gazerig.features.bringup.doctor.families import CHECKS
 from gazerig.features.bringup.doctor.run import (
@@ -49,7 +49,7 @@ from gazerig.features.bringup.doctor.run import (
     find_servos,
     fix_latency,
 )
-from gazerig.features.bringup.doctor.servo_rules import examine, read_state
+from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.maestro_settings import (
     clipping_text,
     instructions,
@@ -77,7 +77,7 @@ def healthy(name):
     found = ping(rig.port, kind.family, 1, BAUD)
     registers = Registers(rig.port, kind.family)
     state = read_state(registers, CHECKS[kind.name], rig.setups[0], present(found), 0)
-    assert None not in state.values.values() and worst(examine(state)) == "ok"
+    assert None not in state.values.values() and worst_level(apply_rules(state)) == "ok"
     return state
 
 
@@ -163,7 +163,7 @@ RULES = [
 
 @pytest.mark.parametrize(("kind", "values", "level", "words", "remedy"), RULES)
 def test_what_can_be_wrong(kind, values, level, words, remedy):
-    found = one(examine(servo_state(kind, **values)), level, PAN, words)
+    found = one(apply_rules(servo_state(kind, **values)), level, PAN, words)
     assert remedy in found.remedy
     assert bool(found.fixes) == ("--fix" in found.remedy)
     for fix in found.fixes:
@@ -195,11 +195,11 @@ def test_what_can_be_wrong(kind, values, level, words, remedy):
     ],
 )
 def test_at_the_edge(kind, values, edge):
-    assert worst(examine(servo_state(kind, **values))) == edge
+    assert worst_level(apply_rules(servo_state(kind, **values))) == edge
 
 
 def test_two_latches_are_two_findings():
-    findings = examine(servo_state(DYNAMIXEL, hardware_error_status=0x24))
+    findings = apply_rules(servo_state(DYNAMIXEL, hardware_error_status=0x24))
     assert [f.what for f in findings if f.level == "error"] == [
         "has latched: overheating",
         "has latched: overload",
@@ -208,7 +208,7 @@ def test_two_latches_are_two_findings():
 
 def test_a_twelve_volt_servo_that_is_still_set_for_less():
     strong = setups_of(FEETECH)[0]._replace(model="sts3215-12v")
-    findings = examine(servo_state(FEETECH, strong, present_input_voltage=120))
+    findings = apply_rules(servo_state(FEETECH, strong, present_input_voltage=120))
     found = one(findings, "error", PAN, "limits are 4.0..8.0 V")
     assert "must come off this supply" in found.remedy
     assert "Max Voltage (14) to 140" in found.remedy
@@ -217,36 +217,36 @@ def test_a_twelve_volt_servo_that_is_still_set_for_less():
 
 def test_a_joint_that_asks_for_more_speed_than_there_is():
     fast = setups_of(FEETECH)[0]._replace(max_speed_steps_s=4000.0)
-    assert one(examine(servo_state(FEETECH, fast)), "note", PAN, "asks its shaft for 352 deg/s")
+    assert one(apply_rules(servo_state(FEETECH, fast)), "note", PAN, "asks its shaft for 352 deg/s")
 
 
 @each
 def test_firmware_that_is_too_old(kind):
     now = FIRMWARE[kind.name]
     wanted = setups_of(kind)[0]._replace(firmware_min=now + 1)
-    findings = examine(servo_state(kind, wanted))
+    findings = apply_rules(servo_state(kind, wanted))
     assert one(findings, "error", PAN, f"firmware {now}, the YAML wants {now + 1}")
 
 
 def test_what_old_firmware_of_a_dynamixel_lacks():
-    old = examine(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=45)))
+    old = apply_rules(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=45)))
     assert one(old, "warn", PAN, "no fast sync read").remedy
-    known = examine(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=52)))
+    known = apply_rules(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=52)))
     assert one(known, "note", PAN, "firmware 52")
 
 
 @each
 def test_a_wrong_model_or_two_servos_are_not_judged_further(kind):
     other = found_as(kind, number=1240 if kind is DYNAMIXEL else 1029)
-    (only,) = examine(servo_state(kind, found=other, torque_enable=1))
+    (only,) = apply_rules(servo_state(kind, found=other, torque_enable=1))
     assert only.level == "error" and f"the YAML says {EYE[kind.name]}" in only.what
     assert "gazerig setup --joint left_eye_pan" in only.remedy
-    (only,) = examine(servo_state(kind, corrupt=3, torque_enable=1))
+    (only,) = apply_rules(servo_state(kind, corrupt=3, torque_enable=1))
     assert "two servos share id 1" in only.what
 
 
 def test_what_was_not_read_is_said():
-    findings = examine(servo_state(DYNAMIXEL, shutdown=None, velocity_limit=None))
+    findings = apply_rules(servo_state(DYNAMIXEL, shutdown=None, velocity_limit=None))
     found = one(findings, "error", PAN, "gave no good answer about")
     assert "shutdown" in found.what and "velocity limit" in found.what
 
@@ -255,7 +255,9 @@ def test_what_was_not_read_is_said():
 def test_every_rule_stands_registers_that_were_not_read(kind):
     state = servo_state(kind)
     for name in state.values:
-        assert one(examine(servo_state(kind, **{name: None})), "error", PAN, "no good answer about")
+        assert one(
+            apply_rules(servo_state(kind, **{name: None})), "error", PAN, "no good answer about"
+        )
 
 
 @each
@@ -266,7 +268,7 @@ def test_a_servo_that_does_not_tell(kind):
     found = ping(rig.port, kind.family, 1, BAUD, 1)
     rig.command("lose 1")
     checks = CHECKS[kind.name]
-    (only,) = examine(
+    (only,) = apply_rules(
         read_state(Registers(rig.port, kind.family), checks, rig.setups[0], present(found), 0)
     )
     says = "no good answer about its registers" if kind is FEETECH else "answers pings and nothing"
@@ -378,7 +380,7 @@ def test_fix_mends_what_is_safe_and_says_it():
     assert all(one.done for one in done)
     assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
     assert f"{TILT}: bus watchdog 255 -> 0: done" in map(str, done)
-    assert worst(rig.check()) == "note" and not any(f.fixes for f in rig.check())
+    assert worst_level(rig.check()) == "note" and not any(f.fixes for f in rig.check())
     assert rig.chain.positions_steps() == before
     assert rig.fix(rig.check()) == []
 
@@ -398,7 +400,7 @@ def test_fix_mends_an_sts_servo_for_good():
     for i in (1, 2):  # it outlives the power
         rig.chain[i].restart()
     rig.pass_time(1.0)
-    assert not any(f.fixes for f in rig.check()) and worst(rig.check()) == "note"
+    assert not any(f.fixes for f in rig.check()) and worst_level(rig.check()) == "note"
     assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1) == b"\1"
 
 
@@ -409,7 +411,7 @@ def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
     servo.status_level = 0
     found = one(rig.check(), "error", TILT, "answers pings and nothing else")
     (done,) = rig.fix([found])
-    assert done.done and worst(rig.check()) == "note"
+    assert done.done and worst_level(rig.check()) == "note"
 
 
 @each
@@ -504,7 +506,7 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
     rig.port.port_name = "/dev/null"  # a character device that may be opened
     rig.port.faults.command("deny on")
     findings = rig.check_all(host)
-    assert worst(findings) == "error" and findings[-1].where == "/dev/null"
+    assert worst_level(findings) == "error" and findings[-1].where == "/dev/null"
     rig.port.faults.command("clear")
     assert len(rig.check_all(host)) > 3
     assert not rig.port.is_open
@@ -519,7 +521,7 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
 def test_findings_in_words():
     finding = Diagnostic("warn", "hot", "neck_yaw (servo 7)", "let it cool")
     assert str(finding) == "warn: neck_yaw (servo 7): hot: let it cool"
-    assert worst([]) == "ok"
+    assert worst_level([]) == "ok"
     same = [Diagnostic("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
     worst_first = group_findings([*same, finding])
     assert [row[0] for row in worst_first] == ["warn", "note"]
@@ -534,22 +536,22 @@ def test_findings_in_words():
 
 def test_remarks_of_a_scan():
     two = (FoundServo(1, 1190, 53, BAUD, "xl330-m077"), FoundServo(1, 1190, 53, BAUD, "xl330-m077"))
-    said = " ".join(remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
+    said = " ".join(scan_remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
     assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
     merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared=(1,))]
-    assert "two or more servos have id 1" in " ".join(remarks(merged, "/dev/x"))
+    assert "two or more servos have id 1" in " ".join(scan_remarks(merged, "/dev/x"))
     rounds = [
         SearchRound("dynamixel", 9600, junk=40),
         SearchRound("dynamixel", 57_600, protocol_1=(5,)),
         SearchRound("dynamixel", 1, possible=False),
     ]
-    lines = list(remarks(rounds, "/dev/x"))
+    lines = list(scan_remarks(rounds, "/dev/x"))
     assert any("only pieces came" in line for line in lines)
     assert any("Protocol 1 as id 5" in line for line in lines)
     assert "searched dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
     # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
     sts = SearchRound("feetech", 57_600, True, two[:1])
-    assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))
+    assert not any("Protocol 1" in line for line in scan_remarks([*rounds, sts], "/dev/x"))
 
 
 # --- Findings about boards of hobby servos and their channels, fixes, and settings of a Maestro
@@ -577,7 +579,7 @@ class BoardRig:
         self.board.exchange(bytes.fromhex(text))
 
     def check(self):
-        return visit_maestro(self.port, self.params, self.setups, self.usb)
+        return examine_maestro(self.port, self.params, self.setups, self.usb)
 
     def errors(self):
         return self.board.faults.board_status()["errors"]
@@ -626,7 +628,7 @@ def test_another_device_number():
     found = one(rig.check(), "error", "the board", "answers the compact form only")
     assert "its device number is not 12" in found.remedy
     assert (
-        worst(BoardRig(params=MaestroParams(protocol="pololu", device=3), device=3).check())
+        worst_level(BoardRig(params=MaestroParams(protocol="pololu", device=3), device=3).check())
         == "note"
     )
 
@@ -685,7 +687,7 @@ def test_a_script_is_stopped_by_fix():
     assert rig.board.faults.board_status()["script"]  # looking alone does not stop it
     (done,) = apply_fixes(lambda _: stop_script(rig.port, rig.params), findings)
     assert str(done) == "the board: script 1 -> 0: done"
-    assert not rig.board.faults.board_status()["script"] and worst(rig.check()) != "warn"
+    assert not rig.board.faults.board_status()["script"] and worst_level(rig.check()) != "warn"
 
 
 def test_pulses_without_a_program():
@@ -791,21 +793,21 @@ class Pca9685Rig:
 
 
 def test_a_good_pca9685_is_well_and_what_it_cannot_tell_is_said() -> None:
-    findings = visit_pca9685(Pca9685Rig().port, PCA9685, CHANNELS)
-    assert worst(findings) == "note"
+    findings = examine_pca9685(Pca9685Rig().port, PCA9685, CHANNELS)
+    assert worst_level(findings) == "note"
     assert findings[0].what == "answers at 0x40; pulses on 0 of 2 channels"
     assert any("no watchdog" in one.what for one in findings)
 
 
 def test_a_board_that_is_not_there_is_one_finding_with_its_remedy() -> None:
-    (only,) = visit_pca9685(Pca9685Rig().port, Pca9685Params(address=0x41), CHANNELS)
+    (only,) = examine_pca9685(Pca9685Rig().port, Pca9685Params(address=0x41), CHANNELS)
     assert only.level == "error" and only.what == "no PCA9685 answers at 0x41"
     assert "VCC" in only.remedy and "jumpers" in only.remedy
 
 
 def test_a_channel_that_no_board_has() -> None:
     wrong = CHANNELS[1]._replace(id=16)
-    findings = visit_pca9685(Pca9685Rig().port, PCA9685, (CHANNELS[0], wrong))
+    findings = examine_pca9685(Pca9685Rig().port, PCA9685, (CHANNELS[0], wrong))
     assert findings[0].level == "error" and "channels 0 to 15" in findings[0].what
     assert "eyes_tilt" in findings[0].where
 
@@ -817,6 +819,6 @@ def test_a_channel_that_no_board_has() -> None:
 def test_pulses_of_a_pca9685_that_were_left_on(counts: int, level: str, remedy: str) -> None:
     rig = Pca9685Rig()
     rig.leave_pulse(0, counts)
-    found = visit_pca9685(rig.port, PCA9685, CHANNELS)[0]
+    found = examine_pca9685(rig.port, PCA9685, CHANNELS)[0]
     assert found.level == level and "though no program runs it" in found.what
     assert remedy in found.remedy

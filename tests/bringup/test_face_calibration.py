@@ -22,7 +22,7 @@ from gazerig.features.bringup.calibration.face_steering import (
     FaceSteering,
     Key,
     apply_key,
-    changes,
+    changed_places,
     initial_calibration,
     place_in_face_mm,
     point_world_m,
@@ -65,7 +65,7 @@ def test_what_was_chosen_on_one_face_is_there_on_the_face_at_any_other_pose(
         met = point_world_m(place, p_then, rotation(turn_then))
         in_face = place_in_face_mm(met, p_then, rotation(turn_then))
         carried = add(p_now, rotate(rotation(turn_now), tuple(v / 1e3 for v in in_face)))  # type: ignore[arg-type]
-        stored = changes(state)[f"face_parts_mm.{part}"]
+        stored = changed_places(state)[f"face_parts_mm.{part}"]
         found = point_world_m(stored, p_now, rotation(turn_now))
         assert dist(found, carried) < 1e-4  # stored to 0.1 mm
 
@@ -80,7 +80,7 @@ def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]) -> None:
         assert x == pytest.approx(PARTS_FACE_M[part][0] * 1e3)
         assert abs(y) <= FARTHEST_MM and abs(z) <= FARTHEST_MM
     assert state.step_mm in STEPS_MM
-    assert {key.partition(".")[2] for key in changes(state)} == set(state.chosen)
+    assert {key.partition(".")[2] for key in changed_places(state)} == set(state.chosen)
 
 
 def test_every_part_is_asked_for_once_and_named() -> None:
@@ -102,7 +102,7 @@ def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does() -> None:
 
 def test_only_parts_with_an_enter_are_written() -> None:
     state = after("left", "enter", "up", "skip", "down", "enter", "end")
-    assert changes(state) == {
+    assert changed_places(state) == {
         "face_parts_mm.N": (0.0, 5.0, 0.0),
         "face_parts_mm.RE": (-33.0, -30.9, 30.0),
     }
@@ -111,9 +111,9 @@ def test_only_parts_with_an_enter_are_written() -> None:
 
 def test_back_and_skip_take_a_choice_back() -> None:
     state = after("left", "enter", "back", "skip")
-    assert changes(state) == {} and state.place_mm("N") == (0.0, 0.0, 0.0)
+    assert changed_places(state) == {} and state.place_mm("N") == (0.0, 0.0, 0.0)
     state = after("left", "enter", "back", "left", "enter")
-    assert changes(state) == {"face_parts_mm.N": (0.0, 10.0, 0.0)}
+    assert changed_places(state) == {"face_parts_mm.N": (0.0, 10.0, 0.0)}
     assert after("back").part == "N"
 
 
@@ -121,7 +121,7 @@ def test_a_rigs_own_places_are_where_it_begins() -> None:
     own = {"N": (-4.0, 3.0, 160.0)}
     state = after("up", "right", "enter", own=own)
     # Farther out than keys lead: it stays, and moves only inwards.
-    assert changes(state) == {"face_parts_mm.N": (-4.0, -2.0, 160.0)}
+    assert changed_places(state) == {"face_parts_mm.N": (-4.0, -2.0, 160.0)}
     assert after("down", own=own).place_mm("N")[2] == 155.0
 
 
@@ -132,7 +132,7 @@ def test_steps_end_at_the_largest_and_smallest() -> None:
 
 def test_after_the_last_part_it_has_ended() -> None:
     state = after(*8 * ("enter",))
-    assert state.ended and len(changes(state)) == 8
+    assert state.ended and len(changed_places(state)) == 8
 
 
 # --- A gaze steered over a face: the nearest one, the eyes on the point, and what is refused

@@ -19,8 +19,8 @@ from gazerig.features.bringup.calibration.endstop_search import (
     EndStop,
     StopSearch,
     StopSearchParams,
-    go,
-    search,
+    find_end_stop,
+    move_to_goal,
 )
 from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
@@ -28,12 +28,12 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     CalibrationRefused,
     Marks,
     PositionUnwrapper,
-    calibration,
     centre_zero,
-    changes,
-    ends_of,
+    end_names,
     is_lid,
+    joint_calibration,
     lid_keys,
+    rig_changes,
     with_calibration,
 )
 from gazerig.features.bringup.calibration.joint_procedure import (
@@ -54,7 +54,7 @@ from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
 )
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
@@ -85,7 +85,7 @@ class Bench:
         self.chain = build([spec], self.clock.now_s)
         self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
         self.port.setBaudRate(1_000_000)
-        self.kind = kind_of(joint.model)
+        self.kind = servo_kind(joint.model)
         self.registers = Registers(self.port, self.kind.family)
         self.why: str | None = None
         self.id = joint.id
@@ -197,7 +197,7 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
     ends = [end - turn * TURN for end in marks[:2]]
     inside = all(0 <= end < TURN for end in ends)
     try:
-        found = calibration("left_eye_pan", marks, joint, margin)
+        found = joint_calibration("left_eye_pan", marks, joint, margin)
     except CalibrationRefused as refused:
         roomy = plus_deg > margin + 0.2 and minus_deg > margin + 0.2
         wide = plus_deg + minus_deg - 2.0 * margin > 5.5
@@ -219,7 +219,7 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
     start = TURN - 1 - int(below * (span - 1))
     marks = Marks(start + span, start, start + round(at * span))
     with pytest.raises(CalibrationRefused, match="seam") as refused:
-        calibration("neck_yaw", marks, JOINT, 0.0)
+        joint_calibration("neck_yaw", marks, JOINT, 0.0)
     words = str(refused.value).split()
     turn_deg = float(words[words.index("by") + 1])
     more = "towards more steps" in str(refused.value)
@@ -239,21 +239,21 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
 )
 def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says: str) -> None:
     with pytest.raises(CalibrationRefused, match=says):
-        calibration("left_eye_pan", marks, JOINT, 2.0)
+        joint_calibration("left_eye_pan", marks, JOINT, 2.0)
 
 
 def test_a_geared_joint_beyond_half_a_turn_is_refused() -> None:
     geared = replace(JOINT, ratio=0.1, min_deg=-1.0, max_deg=1.0)
     with pytest.raises(CalibrationRefused, match="more than a joint may turn"):
-        calibration("neck_yaw", Marks(2600, 1500, 2048), geared, 2.0)
+        joint_calibration("neck_yaw", Marks(2600, 1500, 2048), geared, 2.0)
 
 
 def test_every_joint_has_names_for_its_ends() -> None:
     for name in EVERY:
-        positive, negative = ends_of(name)
+        positive, negative = end_names(name)
         assert positive != negative
-    assert ends_of("right_eye_tilt") == ends_of("eyes_tilt") == ("UPPER", "LOWER")
-    assert ends_of("left_lower_lid") == ("OPEN", "SHUT")
+    assert end_names("right_eye_tilt") == end_names("eyes_tilt") == ("UPPER", "LOWER")
+    assert end_names("left_lower_lid") == ("OPEN", "SHUT")
 
 
 def test_the_keys_of_lids_are_those_of_the_rig_file() -> None:
@@ -264,9 +264,9 @@ def test_the_keys_of_lids_are_those_of_the_rig_file() -> None:
 def test_the_cure_for_the_seam_is_what_the_servo_can_do() -> None:
     sts = replace(JOINT, model="sts3215")
     with pytest.raises(CalibrationRefused, match="--set-middle"):
-        calibration("neck_yaw", Marks(4200, 3900, 4050), sts, 0.0)
+        joint_calibration("neck_yaw", Marks(4200, 3900, 4050), sts, 0.0)
     with pytest.raises(CalibrationRefused, match="take the horn off"):
-        calibration("neck_yaw", Marks(4200, 3900, 4050), JOINT, 0.0)
+        joint_calibration("neck_yaw", Marks(4200, 3900, 4050), JOINT, 0.0)
 
 
 # --- what goes into the rig file
@@ -274,13 +274,13 @@ def test_the_cure_for_the_seam_is_what_the_servo_can_do() -> None:
 
 def test_only_what_differs_is_changed() -> None:
     found = Calibration(cast(int, JOINT.zero_step), 1, -35.0, 30.0)
-    assert changes("left_eye_pan", JOINT, found, {}) == {"joints.left_eye_pan.max_deg": 30.0}
+    assert rig_changes("left_eye_pan", JOINT, found, {}) == {"joints.left_eye_pan.max_deg": 30.0}
 
 
 @pytest.mark.parametrize(("lid", "key"), [("upper", "left"), ("lower", "left_lower")])
 def test_a_lid_s_own_ends_and_its_parking_follow_the_new_range(lid: str, key: str) -> None:
     name, found = f"left_{lid}_lid", Calibration(2000, -1, -20.0, 22.0)
-    wanted = changes(name, JOINT, found, {name: -25.0, "neck_pitch": -12.0})
+    wanted = rig_changes(name, JOINT, found, {name: -25.0, "neck_pitch": -12.0})
     ends = {f"lid_joints.{key}_shut_deg": -20.0, f"lid_joints.{key}_open_deg": 22.0}
     assert {one: wanted[one] for one in wanted if one.startswith("lid_joints")} == ends
     assert wanted[f"park_deg.{name}"] == -20.0 and "park_deg.neck_pitch" not in wanted
@@ -332,7 +332,7 @@ def test_a_stop_is_found_where_it_is_and_never_pushed_for_half_a_second(
     at: float, low: int, span: int, way: int, friction: float
 ) -> None:
     toy = Toy(low + at * span, low, low + span, friction)
-    found = search(PARAMS, way, (0, TURN - 1), toy.exchange)
+    found = find_end_stop(PARAMS, way, (0, TURN - 1), toy.exchange)
     end = low + span if way > 0 else low
     assert found.kind == "stop"
     assert abs(found.position_steps - end) <= 2
@@ -351,10 +351,10 @@ def test_the_goal_never_runs_far_ahead_nor_fast() -> None:
 
 def test_current_without_motion_ends_a_push_early() -> None:
     gentle = Toy(1000, 0, 1000, 0.0)
-    strong = search(PARAMS, 1, (0, TURN - 1), gentle.exchange)
+    strong = find_end_stop(PARAMS, 1, (0, TURN - 1), gentle.exchange)
     assert strong.pushed_s < PARAMS.longest_push_ms / 1e3
     blind = Toy(1000, 0, 1000, 0.0)
-    late = search(
+    late = find_end_stop(
         PARAMS, 1, (0, TURN - 1), lambda goal: (*blind.exchange(goal)[:1], 0.0, blind.t_s)
     )
     assert late.kind == "stop" and strong.pushed_s < late.pushed_s <= 0.5
@@ -362,26 +362,26 @@ def test_current_without_motion_ends_a_push_early() -> None:
 
 def test_the_end_of_the_turn_is_no_stop() -> None:
     free = Toy(3900, -5000, 9000)
-    assert search(PARAMS, 1, (0, TURN - 1), free.exchange).kind == "limit"
-    assert isinstance(search(PARAMS, -1, (3000, TURN - 1), free.exchange), EndStop)
+    assert find_end_stop(PARAMS, 1, (0, TURN - 1), free.exchange).kind == "limit"
+    assert isinstance(find_end_stop(PARAMS, -1, (3000, TURN - 1), free.exchange), EndStop)
 
 
 def test_going_somewhere_tells_whether_something_was_in_the_way() -> None:
     toy = Toy(1000, 500, 2000)
-    assert go(1800, PARAMS, toy.exchange)
+    assert move_to_goal(1800, PARAMS, toy.exchange)
     assert abs(toy.x - 1800) < 1.5 * STEPS_PER_DEG
-    assert not go(2500, PARAMS, toy.exchange)
+    assert not move_to_goal(2500, PARAMS, toy.exchange)
     assert toy.longest_push_s <= 0.5
 
 
 def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
     joint = load_rig("expressive").joints["jaw"]
-    assert ends_of("jaw") == ends_of("car_lid") == ("POSITIVE", "NEGATIVE")
-    made = calibration("jaw", Marks(2400, 2047, 2045), joint, 2.0)
+    assert end_names("jaw") == end_names("car_lid") == ("POSITIVE", "NEGATIVE")
+    made = joint_calibration("jaw", Marks(2400, 2047, 2045), joint, 2.0)
     assert (made.zero_step, made.min_deg, made.sign) == (2047, 0.0, 1)
     assert made.max_deg == pytest.approx(29.0, abs=0.05)
     with pytest.raises(CalibrationRefused, match=r"straight ahead .* is not between"):
-        calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)
+        joint_calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)
 
 
 # --- Calibrating one emulated joint by hand or by motion; refused joints; and a push rod
@@ -733,7 +733,7 @@ def test_the_range_lies_inside_what_was_marked(
 def test_a_lid_ends_where_it_was_marked_and_its_keys_are_its_own() -> None:
     made = fit_linkage("left_lower_lid", [(20.0, 1250.0), (-9.0, 1600.0), (5.0, 1450.0)], LID, 2.0)
     assert (made.min_deg, made.max_deg) == (-9.0, 20.0)
-    wanted = changes("left_lower_lid", LID, made, {"left_lower_lid": -12.0})
+    wanted = rig_changes("left_lower_lid", LID, made, {"left_lower_lid": -12.0})
     assert wanted == {
         "joints.left_lower_lid.transmission_points": ((-9, 1600), (5, 1450), (20, 1250)),
         "joints.left_lower_lid.min_deg": -9.0,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.look_at import GazeResult, ends_reached, gaze_text, look_at
+from gazerig.features.bringup.look_at import GazeResult, gaze_result_text, joints_at_limits, look_at
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, duration_s
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.bus_wiring import rig_bus
@@ -264,7 +264,7 @@ def test_both_eyes_meet_a_point(bench: Bench, point: Vec3) -> None:
 def test_a_point_behind_is_missed_and_the_error_says_so(bench: Bench) -> None:
     looked = bench.look((-1.0, 0.1, 0.2), 4.0)
     assert min(looked.left_error, looked.right_error) > 20.0
-    ends = ends_reached(RIG.joints, {"eye_pan": 34.0}, looked.moved)
+    ends = joints_at_limits(RIG.joints, {"eye_pan": 34.0}, looked.moved)
     assert any("left_eye_pan is at the end of its range (-34..34 deg)" in line for line in ends)
     assert not any("tilt" in line for line in ends)
 
@@ -286,7 +286,7 @@ def test_eyes_on_one_linkage_are_judged_by_their_mean_line_of_sight(
     # Each eye by itself is beside the point by half the vergence that it needs.
     worst = max(looked.left_error, looked.right_error)
     assert worst == pytest.approx(looked.desired_vergence / 2.0, abs=1.0)
-    words = "\n".join(gaze_text(looked))
+    words = "\n".join(gaze_result_text(looked))
     assert "estimated, not measured" in words and "vergence: none, as one servo" in words
 
 
@@ -295,7 +295,7 @@ def test_eyes_that_cannot_turn_so_far_are_said_to_be_at_their_end(other: Bench) 
     looked = other.look((0.2, 1.0, 0.1), 2.0)
     assert looked.error > 10.0
     narrower = {"eyes_pan": other.rig.ranges.eye_yaw_deg}
-    ends = ends_reached(other.rig.joints, narrower, looked.moved)
+    ends = joints_at_limits(other.rig.joints, narrower, looked.moved)
     assert any("eyes_pan is at the end" in line for line in ends)
 
 
@@ -303,7 +303,7 @@ def test_eyes_that_cannot_turn_so_far_are_said_to_be_at_their_end(other: Bench) 
 def test_separate_eyes_converge_and_are_measured(other: Bench) -> None:
     looked = other.look((0.5, 0.0, 0.14), 3.0)
     assert looked.converges and looked.error == max(looked.left_error, looked.right_error) < 2.0
-    assert "estimated" not in "\n".join(gaze_text(looked))
+    assert "estimated" not in "\n".join(gaze_result_text(looked))
 
 
 @on("mixed")
@@ -312,4 +312,4 @@ def test_a_mixed_head_looks_with_a_neck_that_is_measured_and_eyes_that_are_not(
 ) -> None:
     looked = other.look((1.0, 0.5, 0.1), 3.0)
     assert not looked.converges and looked.error < 2.0 and looked.head[0] > 3.0
-    assert "estimated" in gaze_text(looked)[0]
+    assert "estimated" in gaze_result_text(looked)[0]

@@ -11,8 +11,8 @@ from gazerig.drivers.servo_bus.discovery import FoundServo, has_any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
-from gazerig.features.bringup.servo_reboot import ServoSnapshot, restart
-from gazerig.features.bringup.servo_setup import assign, find_alone, search_order
+from gazerig.features.bringup.servo_reboot import ServoSnapshot, reboot_servo
+from gazerig.features.bringup.servo_setup import assign_servo, find_alone, search_order
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -49,11 +49,13 @@ class Bench:
 
     def assign(self, setup=None, baud=BAUD):
         found = self.find()
-        return assign(self.port, self.kind, found, setup or self.yaw, baud, self.reported.append)
+        return assign_servo(
+            self.port, self.kind, found, setup or self.yaw, baud, self.reported.append
+        )
 
     def restart(self, servo_id=1, sleep_until=None):
         sleep_until = sleep_until or self.sleep_until
-        return restart(self.port, self.kind, servo_id, self.baud, sleep_until)
+        return reboot_servo(self.port, self.kind, servo_id, self.baud, sleep_until)
 
     def hold(self, servo_id=1):
         """Open the port at the servo's rate, and switch the torque on."""
@@ -184,7 +186,7 @@ def test_a_servo_that_falls_silent_is_said_to_be_where_it_was(kind):
     bench.port.faults.command("lose all")
     where = f"it answered last as id 1 at {bench.baud} bit/s"
     with pytest.raises(ServoFault, match=where):
-        assign(bench.port, kind, found, bench.yaw._replace(id=5), bench.baud, print)
+        assign_servo(bench.port, kind, found, bench.yaw._replace(id=5), bench.baud, print)
 
 
 @each
@@ -330,7 +332,7 @@ def test_an_adaptor_that_cannot_run_at_the_rate():
         baud == 57_600 and InProcessPort.setBaudRate(bench.port, baud)
     )
     with pytest.raises(PortError, match="cannot run at 1000000"):
-        assign(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
+        assign_servo(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
 
 
 def test_a_servo_that_is_gone_after_is_missed():
@@ -343,7 +345,7 @@ def test_a_servo_that_is_gone_after_is_missed():
     found = bench.find()
     bench.port.faults.command("lose 7")
     with pytest.raises(ServoMissing):
-        assign(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
+        assign_servo(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
 
 
 @pytest.mark.parametrize("address", [7, 8])

@@ -20,7 +20,7 @@ from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
 from gazerig.features.bringup.cli.record_gesture import app
-from gazerig.features.bringup.hand_recording import record, switch_off
+from gazerig.features.bringup.hand_recording import record_hand_motion, switch_off
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
 from gazerig.features.bringup.telemetry import (
     Monitor,
@@ -308,7 +308,7 @@ def test_a_head_moved_by_hand_becomes_a_gesture_that_moves_it_so(tmp_path: Path)
         up = 10.0 * sin(pi * t) ** 2 if t < 2.0 else 0.0
         return {"neck_pitch": -up, "neck_yaw": 0.4 * up}
 
-    found = record(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
+    found = record_hand_motion(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
     assert found.ended_by == "the time is over" and set(found.series) == set(DESK.names)
     path, fitted = write_gesture(
         DESK, "mine", gesture_text(DESK, found.series, "by hand"), tmp_path, False
@@ -335,7 +335,7 @@ def test_torque_that_comes_on_ends_the_recording() -> None:
         return bench.monitor.sample()
 
     with pytest.raises(SetupError, match="the torque of neck_yaw came on: another program"):
-        record(sample, bench.rig.clock, lambda: None, 2.0)
+        record_hand_motion(sample, bench.rig.clock, lambda: None, 2.0)
 
 
 def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off() -> None:

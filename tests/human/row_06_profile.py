@@ -14,7 +14,7 @@ from human.measured_run import Runner
 from gazerig.robot.analysis import human_norms as people
 
 pytest.importorskip("gazerig.features.lab")  # its measures
-from gazerig.features.lab.report.saccades import table  # noqa: E402
+from gazerig.features.lab.report.saccades import saccade_table  # noqa: E402
 
 SCENES = ("visitor", "face-to-face")
 SIZES_DEG = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 26.0, 30.0)
@@ -49,7 +49,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         [(float(one.done_deg[-1]), *one.timing()) for one in steps("desk", SIZES_DEG)]
     )
     scenes = np.vstack(
-        [table(run(s, seed=n, seconds=seconds).trace) for s in SCENES for n in seeds]
+        [saccade_table(run(s, seed=n, seconds=seconds).trace) for s in SCENES for n in seeds]
     )
     fast, long = inside(single)
     scene_fast, scene_long = inside(scenes)

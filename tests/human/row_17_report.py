@@ -11,7 +11,7 @@ from human.measured_run import MeasuredRun
 
 pytest.importorskip("gazerig.features.lab")  # its measures
 
-from gazerig.features.lab.report.report import findings_of  # noqa: E402
+from gazerig.features.lab.report.report import judge_run  # noqa: E402
 
 SCENES = ("visitor", "face-to-face")
 WANTED = {f"{scene}, outside, most of all seeds": (0.0, 2.0) for scene in SCENES}
@@ -25,7 +25,7 @@ def measure(
     for scene in SCENES:
         verdicts: dict[str, list[float]] = {"outside": [], "uncertain": [], "pass": []}
         for seed in seeds:
-            measures = findings_of(run(scene, seed=seed, seconds=seconds).trace)
+            measures = judge_run(run(scene, seed=seed, seconds=seconds).trace)
             for verdict, counts in verdicts.items():
                 counts.append(sum(one.verdict == verdict for one in measures))
             for one in measures:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
-from gazerig.features.lab.report.report import findings_of
+from gazerig.features.lab.report.report import judge_run
 from gazerig.features.lab.report.statistics import MeasureResult
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import CommandedSaccade, SaccadeEvent
@@ -12,7 +12,7 @@ EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 
 
 def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
-    return {finding.band.key: finding for finding in findings_of(run)}
+    return {finding.band.key: finding for finding in judge_run(run)}
 
 
 def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -> GazeTrace:

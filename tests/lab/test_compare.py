@@ -12,7 +12,7 @@ from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import report as build
-from gazerig.features.lab.report.compare import chance, compare, differences_of
+from gazerig.features.lab.report.compare import compare, measure_differences, permutation_p_value
 from gazerig.features.lab.report.page import RunHeader
 from gazerig.features.lab.report.statistics import MeasuredValue, correct_p_values, mean, median
 from gazerig.robot.analysis.human_norms import BY_KEY
@@ -35,7 +35,7 @@ def rates(mean_s: float, count: int, seed: int) -> MeasuredValue:
 
 
 def test_what_differs_is_more_than_chance() -> None:
-    (found,) = differences_of([rates(0.25, 200, 1)], [rates(0.35, 200, 2)])
+    (found,) = measure_differences([rates(0.25, 200, 1)], [rates(0.35, 200, 2)])
     assert found.word == "more than chance"
     assert found.low95 < found.difference < found.high95 and found.low95 > 0.0
     assert found.chance < 0.01 and found.chance_shape < 0.01
@@ -44,7 +44,7 @@ def test_what_differs_is_more_than_chance() -> None:
 def test_the_same_is_chance_nineteen_times_of_twenty() -> None:
     words = []
     for seed in range(20):
-        (found,) = differences_of([rates(0.3, 80, seed)], [rates(0.3, 80, 100 + seed)])
+        (found,) = measure_differences([rates(0.3, 80, seed)], [rates(0.3, 80, 100 + seed)])
         words.append(found.word)
     assert words.count("more than chance") <= 3
     assert set(words) <= {"more than chance", "may be chance"}
@@ -53,22 +53,22 @@ def test_the_same_is_chance_nineteen_times_of_twenty() -> None:
 def test_another_spread_is_found_where_the_middle_is_the_same() -> None:
     narrow = MeasuredValue("vergence", DICE.normal(0.0, 0.1, 300), median)
     wide = MeasuredValue("vergence", DICE.normal(0.0, 0.6, 300), median)
-    (found,) = differences_of([narrow], [wide])
+    (found,) = measure_differences([narrow], [wide])
     assert found.chance_shape < 0.001 and found.word == "more than chance"
 
 
 def test_too_few_events_tell_nothing() -> None:
     few = MeasuredValue("visit", np.full(BY_KEY["visit"].min_events - 1, 9.0), mean)
-    (found,) = differences_of([few], [rates(0.3, 200, 1)])
+    (found,) = measure_differences([few], [rates(0.3, 200, 1)])
     assert found.word == "too few events" and np.isnan(found.difference)
-    assert differences_of([few], [MeasuredValue("rate", np.ones(40), mean)]) == ()
+    assert measure_differences([few], [MeasuredValue("rate", np.ones(40), mean)]) == ()
 
 
 def test_dealing_out_again_gives_the_chance_of_a_known_case() -> None:
     a, b = MeasuredValue("visit", np.zeros(4), mean), MeasuredValue("visit", np.ones(4), mean)
     # of the 70 deals of 8 events, 2 are as extreme
-    assert chance(a, b, np.random.default_rng(0)) == pytest.approx(2 / 70, abs=0.012)
-    assert chance(a, a, np.random.default_rng(0)) == 1.0
+    assert permutation_p_value(a, b, np.random.default_rng(0)) == pytest.approx(2 / 70, abs=0.012)
+    assert permutation_p_value(a, a, np.random.default_rng(0)) == 1.0
 
 
 def test_chances_are_corrected_for_their_number() -> None:

@@ -9,7 +9,7 @@ import pytest
 from gazerig.config.load import ConfigError, load, shipped_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
-from gazerig.features.lab.analysis.fit_scanpath import fit
+from gazerig.features.lab.analysis.fit_scanpath import fit_to_recording
 from gazerig.features.lab.analysis.fixations import FixationParams, PartBoxes, fixations_of
 from gazerig.gaze.scanpath.scanpath import (
     Scanpath,
@@ -99,7 +99,7 @@ def labelled_csv(path: Path, count: int, seed: int = 1) -> Path:
 
 def test_labelled_fixations_of_a_known_walk_give_it_back(tmp_path: Path) -> None:
     out = tmp_path / "mine.yaml"
-    report = fit(labelled_csv(tmp_path / "looks.csv", 8000), None, out)
+    report = fit_to_recording(labelled_csv(tmp_path / "looks.csv", 8000), None, out)
     walk = load(out, Walk)
     wanted, found = normalise(WALK.matrix), normalise(walk.matrix)
     assert "8000 fixations on the face, 0 elsewhere, 7999 transitions" in report
@@ -122,7 +122,7 @@ def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) 
     # Looks of a fifth of a second: a detector needs at least 60 ms.
     recording = as_csv(tmp_path / "gaze.csv", samples(boxes, walked(1000, 2, 0.2), 3))
     out = tmp_path / "mine.yaml"
-    report = fit(recording, boxes, out, "none")
+    report = fit_to_recording(recording, boxes, out, "none")
     walk = load(out, Walk)
     wanted, found = normalise(WALK.matrix), normalise(walk.matrix)
     for i, share in enumerate((0.0607, 0.0842, 0.0931, 0.0999, 0.2217, 0.0946, 0.2550, 0.0907)):
@@ -158,11 +158,11 @@ def test_a_short_loss_is_bridged_and_a_long_one_ends_a_fixation(boxes: PartBoxes
 def test_fixations_with_places_are_labelled_by_the_boxes(tmp_path: Path, boxes: PartBoxes) -> None:
     rows = (f"{300 * k},250,{(400, 300)[k % 2]},{(400, 300)[k % 2]}" for k in range(80))
     recording = written(tmp_path / "looks.csv", "onset,duration,X,Y", rows)
-    report = fit(recording, boxes, tmp_path / "mine.yaml")
+    report = fit_to_recording(recording, boxes, tmp_path / "mine.yaml")
     assert "80 fixations on the face" in report and "times are in ms" in report
     assert load(tmp_path / "mine.yaml", Walk).dwell_mean_s == (0.25,) * 8
     with pytest.raises(SetupError, match="without a part column need the rectangles"):
-        fit(recording, None, tmp_path / "none.yaml")
+        fit_to_recording(recording, None, tmp_path / "none.yaml")
 
 
 @pytest.mark.parametrize("header", ["time_ms;X;Y;pupil", "Timestamp\tgaze_x\tgaze_y\tpupil"])
@@ -179,7 +179,7 @@ def test_headers_separators_and_units_are_understood(tmp_path: Path, header: str
 def test_same_seed_same_bytes(tmp_path: Path) -> None:
     recording = labelled_csv(tmp_path / "looks.csv", 300)
     for name in ("a", "b"):
-        fit(recording, None, tmp_path / name, "bootstrap", seed=7)
+        fit_to_recording(recording, None, tmp_path / name, "bootstrap", seed=7)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
@@ -216,7 +216,7 @@ def test_files_that_cannot_be_trusted_are_refused(
     recording, out = tmp_path / "bad.csv", tmp_path / "mine.yaml"
     recording.write_text(text, encoding="utf-8")
     with pytest.raises(SetupError, match=why) as caught:
-        fit(recording, boxes, out)
+        fit_to_recording(recording, boxes, out)
     assert "\n" not in str(caught.value) and "bad.csv" in str(caught.value)
     assert not out.exists()
 
@@ -224,19 +224,19 @@ def test_files_that_cannot_be_trusted_are_refused(
 def test_what_else_can_be_wrong_is_said(tmp_path: Path, boxes: PartBoxes) -> None:
     looks = labelled_csv(tmp_path / "looks.csv", 300)
     with pytest.raises(SetupError, match="no smoothing 'some'; there are none, laplace"):
-        fit(looks, None, tmp_path / "out.yaml", "some")
+        fit_to_recording(looks, None, tmp_path / "out.yaml", "some")
     with pytest.raises(SetupError, match="is the recording itself"):
-        fit(looks, None, looks)
+        fit_to_recording(looks, None, looks)
     with pytest.raises(SetupError, match="No such file"):
-        fit(tmp_path / "absent.csv", None, tmp_path / "out.yaml")
+        fit_to_recording(tmp_path / "absent.csv", None, tmp_path / "out.yaml")
     with pytest.raises(SetupError, match="No such file or directory\\): name another file"):
-        fit(looks, None, tmp_path / "nowhere" / "out.yaml")
+        fit_to_recording(looks, None, tmp_path / "nowhere" / "out.yaml")
     (tmp_path / "gaze.csv").write_text("time,x,y\n0,1,2\n0.1,1,2\n", encoding="utf-8")
     with pytest.raises(SetupError, match=r"need the rectangles of the face's parts \(--parts\)"):
-        fit(tmp_path / "gaze.csv", None, tmp_path / "out.yaml")
+        fit_to_recording(tmp_path / "gaze.csv", None, tmp_path / "out.yaml")
     (tmp_path / "latin.csv").write_bytes(b"time,x,y\n\xff")
     with pytest.raises(SetupError, match="not UTF-8 text"):
-        fit(tmp_path / "latin.csv", boxes, tmp_path / "out.yaml")
+        fit_to_recording(tmp_path / "latin.csv", boxes, tmp_path / "out.yaml")
 
 
 @pytest.mark.parametrize(

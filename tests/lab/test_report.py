@@ -25,7 +25,7 @@ from gazerig.features.lab.cli.report import app, page_file
 from gazerig.features.lab.report import blinks as blink_measures
 from gazerig.features.lab.report import eye_contact, face, landing, rests
 from gazerig.features.lab.report import report as build
-from gazerig.features.lab.report.compare import compare_page, differences_of
+from gazerig.features.lab.report.compare import compare_page, measure_differences
 from gazerig.features.lab.report.face import published_walk, rig_walk
 from gazerig.features.lab.report.gaze_trace import (
     GazeTrace,
@@ -39,20 +39,20 @@ from gazerig.features.lab.report.page import (
     Figure,
     RunHeader,
     band_text,
-    files_of,
-    gauge,
+    make_gauge,
+    report_files,
     report_page,
     write_all,
 )
-from gazerig.features.lab.report.plotting import COLOURS, Shown, png
-from gazerig.features.lab.report.report import DRAWINGS, findings_of, measure_run, report_of
+from gazerig.features.lab.report.plotting import COLOURS, ShownRun, drawing_png
+from gazerig.features.lab.report.report import DRAWINGS, judge_run, make_report, measure_run
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
+    format_number,
     judge,
     longest,
     mean,
     median,
-    number,
 )
 from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
@@ -168,7 +168,7 @@ def test_too_few_events_are_no_pass_and_nothing_is_too_few() -> None:
     ones = np.full(band.min_events - 1, 0.4)
     few = judge(MeasuredValue("rate", ones, mean), band)
     assert few.verdict == "too few events" and np.isnan(few.low95)
-    assert {finding.verdict for finding in findings_of(EMPTY)} == {"too few events"}
+    assert {finding.verdict for finding in judge_run(EMPTY)} == {"too few events"}
 
 
 def test_a_verdict_rests_on_the_band_alone() -> None:
@@ -252,7 +252,7 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
         "a <run>", (("rig", "desk"),), frozenset({"saccade min_jerk"}), warnings=("cut & short",)
     )
     out = tmp_path / "deep" / "report.html"
-    made = report_of(walking, about, out, lambda words, share: reported.append((words, share)))
+    made = make_report(walking, about, out, lambda words, share: reported.append((words, share)))
     raw = out.read_text(encoding="utf-8")
     page = unescape(raw)
     assert "a &lt;run&gt;" in raw and "cut &amp; short" in raw
@@ -276,13 +276,13 @@ HOSTILE = "<img src=x onerror=alert(1)> $\\frac{$"
 @pytest.mark.usefixtures("unlaid_figures")
 def test_names_are_never_markup_nor_formulas(walking: GazeTrace) -> None:
     about = RunHeader(HOSTILE, (("rig", HOSTILE), (HOSTILE, "x")), warnings=(HOSTILE,))
-    findings = build.findings_of(walking)
-    shown = [Shown(HOSTILE, walking, colour) for colour in COLOURS]
+    findings = build.judge_run(walking)
+    shown = [ShownRun(HOSTILE, walking, colour) for colour in COLOURS]
     for drawing in DRAWINGS[:3]:
-        assert png(drawing, shown).startswith(b"\x89PNG")
+        assert drawing_png(drawing, shown).startswith(b"\x89PNG")
     pages = (
         report_page(about, walking, findings, ()),
-        compare_page((about, about), [walking, walking], differences_of((), ()), ()),
+        compare_page((about, about), [walking, walking], measure_differences((), ()), ()),
     )
     for page in pages:
         assert "<img src=x" not in page and page.count("&lt;img src=x onerror=alert(1)&gt;") >= 3
@@ -291,7 +291,7 @@ def test_names_are_never_markup_nor_formulas(walking: GazeTrace) -> None:
 @pytest.mark.usefixtures("unlaid_figures")
 @pytest.mark.parametrize("drawing", DRAWINGS, ids=[d.key for d in DRAWINGS])
 def test_a_figure_of_nothing_says_so(drawing: object) -> None:
-    assert png(drawing, [Shown("none", EMPTY, COLOURS[0])])[:4] == b"\x89PNG"  # type: ignore[arg-type]
+    assert drawing_png(drawing, [ShownRun("none", EMPTY, COLOURS[0])])[:4] == b"\x89PNG"  # type: ignore[arg-type]
 
 
 def test_an_empty_run_and_a_bad_place_are_told_in_one_line(
@@ -299,16 +299,16 @@ def test_an_empty_run_and_a_bad_place_are_told_in_one_line(
 ) -> None:
     monkeypatch.setattr(build, "DRAWINGS", build.DRAWINGS[:1])  # all are drawn elsewhere
     with pytest.raises(SetupError, match="0 ticks are too few for a report"):
-        build.read([], RunHeader("empty"), lambda words, share: None)
+        build.read_run([], RunHeader("empty"), lambda words, share: None)
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(SetupError, match="name another file"):
-        report_of(EMPTY, RunHeader("x"), tmp_path / "file" / "r.html", lambda words, share: None)
+        make_report(EMPTY, RunHeader("x"), tmp_path / "file" / "r.html", lambda words, share: None)
 
 
 def test_numbers_are_short() -> None:
     values = {0.0: "0", 0.123456: "0.12", 1.5: "1.5", 20.0: "20", 123.4: "123", -0.002: "-0.002"}
-    assert {value: number(value) for value in values} == values
-    place = gauge(
+    assert {value: format_number(value) for value in values} == values
+    place = make_gauge(
         judge(MeasuredValue("vergence", np.full(40, 9.0), median), bands.BY_KEY["vergence"])
     )
     assert place.value == 100.0 and place.band_from == pytest.approx(30.0)
@@ -420,14 +420,14 @@ def test_a_report_writes_over_nothing_that_no_report_has_made(
 
 def test_a_report_writes_over_one_of_before_when_it_is_forced(tmp_path: Path) -> None:
     run = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
-    about, findings = RunHeader("x"), findings_of(run)
+    about, findings = RunHeader("x"), judge_run(run)
     drawing = DRAWINGS[0]
-    figure = Figure(drawing, png(drawing, [Shown("x", run, COLOURS[0])]), "nothing")
+    figure = Figure(drawing, drawing_png(drawing, [ShownRun("x", run, COLOURS[0])]), "nothing")
     page = report_page(about, run, findings, [figure])
     numbers: list[dict[str, object]] = [{"key": f.band.key} for f in findings]
     out = tmp_path / "x.html"
     write_all(out, page, [figure], numbers)
-    files = files_of(out, [drawing.key])
+    files = report_files(out, [drawing.key])
     for file in files:
         file.write_bytes(file.read_bytes() + b"old")
     with pytest.raises(SetupError, match="already exists"):
@@ -661,9 +661,9 @@ def flown(
 
 
 def test_a_landing_is_short_and_corrected_or_beyond() -> None:
-    short = landing.landings(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
+    short = landing.landing_errors(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
     assert short[0] == pytest.approx((11.0 / 12.0, 1.0), abs=0.01) and len(short) == 1
-    late = landing.landings(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
+    late = landing.landing_errors(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
     assert late[0, 1] == 0.0
     assert landing.overshoots(flown([(0.5, 0.0, 12.0)])) == pytest.approx([0.0], abs=0.01)
     assert landing.overshoots(flown([(0.5, 0.0, 12.0)], over=1.8)) == pytest.approx(
@@ -675,8 +675,8 @@ def test_an_eye_at_the_end_of_its_range_has_not_landed() -> None:
     run = flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)])
     rows = run.rows.copy()
     rows[80:200, TraceRow._fields.index("eye_limited")] = 1.0
-    assert len(landing.landings(run)) == 1
-    assert len(landing.landings(replace(run, rows=rows))) == 0
+    assert len(landing.landing_errors(run)) == 1
+    assert len(landing.landing_errors(replace(run, rows=rows))) == 0
 
 
 def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:

@@ -51,7 +51,7 @@ def quiet(words: str, share: float) -> None:
 def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
     out = tmp_path / "six.html"
     about = RunHeader("six")
-    made = build.report_of(build.read(maker.ticks, about, quiet), about, out, quiet)
+    made = build.make_report(build.read_run(maker.ticks, about, quiet), about, out, quiet)
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
     assert {row["basis"] for row in rows.values()} == {"estimated"}
     page = unescape(out.read_text(encoding="utf-8"))

@@ -31,18 +31,24 @@ from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import (
     Axis,
     Point,
-    axes_of,
     check_points,
     grid,
     latin_hypercube,
+    make_axes,
 )
-from gazerig.features.lab.sweep.fit import counted_measures, fit, search, snippet_of, trial_of
+from gazerig.features.lab.sweep.fit import (
+    counted_measures,
+    fit_settings,
+    make_trial,
+    search_best,
+    yaml_snippet,
+)
 from gazerig.features.lab.sweep.outcome import (
     OUTSIDE,
     Outcome,
-    figures_of,
     grade,
-    rows_of,
+    run_figures,
+    table_rows,
     write_tables,
 )
 from gazerig.features.lab.sweep.response_figure import most_responsive, response_png
@@ -181,7 +187,7 @@ def test_two_processes_make_the_table_of_one(tmp_path: Path) -> None:
         Outcome(point, seed, figures_at(RIG, _with_seed(seed), point, lambda: None))
         for point, seed in runs
     ]
-    assert rows_of(ordered) == rows_of(alone)
+    assert table_rows(ordered) == table_rows(alone)
     assert ordered[0].figures != ordered[1].figures
 
 
@@ -350,7 +356,7 @@ def test_a_column_of_numbers_and_words_is_text_in_parquet(tmp_path: Path) -> Non
 
 def test_a_run_gives_what_the_report_and_the_summary_give() -> None:
     run = simulate(RIG, OPTIONS)
-    figures = figures_of(*run)
+    figures = run_figures(*run)
     assert figures["seconds"] == run.figures["seconds"] and figures["events"] == 0
     assert figures["gaze_error_deg.median"] == run.figures["gaze_error_deg"]["median"]  # type: ignore[index]
     verdicts = [held for name, held in figures.items() if name.startswith("verdict.")]
@@ -396,7 +402,7 @@ LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
 
 
 def read(*settings: str) -> list[Axis]:
-    return axes_of(RIG, settings, read_value)
+    return make_axes(RIG, settings, read_value)
 
 
 def test_steps_lists_and_ranges_are_read() -> None:
@@ -562,7 +568,7 @@ def blinking(points: Sequence[Point]) -> list[list[Outcome]]:
 
 
 def test_a_search_puts_the_measures_inside_their_bands() -> None:
-    found = fit(blinking, FITTED, START, 96, 1)
+    found = fit_settings(blinking, FITTED, START, 96, 1)
     assert found.counted and set(found.counted) == set(KEYS)
     assert found.start.point == START and found.start.outside == 3.0
     assert found.best.outside == 0.0 and found.best.score == 0.0
@@ -571,10 +577,12 @@ def test_a_search_puts_the_measures_inside_their_bands() -> None:
 
 
 def test_the_same_search_asks_for_the_same_points() -> None:
-    assert fit(blinking, FITTED, START, 24, 1) == fit(blinking, FITTED, START, 24, 1)
-    other = fit(blinking, FITTED, START, 24, 2)
+    assert fit_settings(blinking, FITTED, START, 24, 1) == fit_settings(
+        blinking, FITTED, START, 24, 1
+    )
+    other = fit_settings(blinking, FITTED, START, 24, 2)
     assert [one.point for one in other.trials] != [
-        one.point for one in fit(blinking, FITTED, START, 24, 1).trials
+        one.point for one in fit_settings(blinking, FITTED, START, 24, 1).trials
     ]
 
 
@@ -588,7 +596,7 @@ def test_no_point_is_run_twice() -> None:
             for p in points
         ]
 
-    fit(run, FITTED[2:], {FITTED[2].key: "min_jerk"}, 30, 0)
+    fit_settings(run, FITTED[2:], {FITTED[2].key: "min_jerk"}, 30, 0)
     assert len(asked) == len(set(asked)) == 3
 
 
@@ -605,7 +613,7 @@ def test_the_search_beats_chance_and_takes_the_start_along() -> None:
             found += [dist(bowl, [float(str(x)) for x in p.values()]) for p in points]
             return found[-len(points) :]
 
-        search(scores, axes, begun, 96, seed)
+        search_best(scores, axes, begun, 96, seed)
         assert len(found) == 96
         nearest.append(min(found))
     assert sum(nearest) / len(nearest) < 0.05
@@ -623,9 +631,9 @@ def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
 def test_what_can_no_longer_be_judged_is_outside_and_a_failure_worst_of_all() -> None:
     band = BY_KEY["blink_rate"]
     just = band.high + 0.25 * (band.high - band.low)
-    trial = trial_of(START, [outcome(START, 0, (just, 80.0, None))], KEYS)
+    trial = make_trial(START, [outcome(START, 0, (just, 80.0, None))], KEYS)
     assert trial.score == pytest.approx(1.5) and trial.outside == 2.0
-    failed = trial_of(
+    failed = make_trial(
         START, [outcome(START, 0, (17.0, 80.0, 0.3)), Outcome(START, 1, {}, "x")], KEYS
     )
     assert failed.score > len(KEYS) and failed.failed == "x"
@@ -634,11 +642,11 @@ def test_what_can_no_longer_be_judged_is_outside_and_a_failure_worst_of_all() ->
 def test_the_best_point_is_yaml_that_a_run_takes(tmp_path: Path) -> None:
     file = tmp_path / "best.yaml"
     point: Point = {"gaze.lids.close_ms": 90.5, "gaze.saccade.profile": "main_sequence"}
-    file.write_text(snippet_of(RunOptions(character="shy"), point), encoding="utf-8")
+    file.write_text(yaml_snippet(RunOptions(character="shy"), point), encoding="utf-8")
     made, shy = load_rig("desk", str(file)), load_rig("desk", "shy")
     assert made.gaze.lids.close_ms == 90.5 and made.gaze.saccade.profile == "main_sequence"
     assert made.gaze.attention == shy.gaze.attention and shy != load_rig("desk")
-    file.write_text(snippet_of(RunOptions(), point), encoding="utf-8")
+    file.write_text(yaml_snippet(RunOptions(), point), encoding="utf-8")
     assert file.read_text(encoding="utf-8") == (
         "gaze:\n  lids:\n    close_ms: 90.5\n  saccade:\n    profile: main_sequence\n"
     )

@@ -204,7 +204,7 @@ MUTANTS = (
            "upper arms collide beyond the elbow", ("world_shapes",)),
     Mutant("features/world/state_file.py", "if self.count <= count:", "if True:",
            "a reader that was overtaken returns half of two states", ("world_state_file",)),
-    Mutant("features/world/faces.py", "share = share * (1.0 - rise((np.abs(aside) - 1.9) / 1.0))", "pass",
+    Mutant("features/world/faces.py", "share = share * (1.0 - smooth_rise((np.abs(aside) - 1.9) / 1.0))", "pass",
            "people turn their heads to what is behind them", ("world_people", "world_acts", "world_faces")),
     Mutant("sim_mock/scenes/timeline.py", "begins_s = one.act.at_s - spare_s", "begins_s = one.act.at_s",
            "two acts of one arm may meet by what varies", ("world_scripts",)),

@@ -21,7 +21,7 @@ path.insert(0, str(Path(__file__).parents[1]))
 import study_records
 from study_records import design, pairs, records
 
-from gazerig.features.study.decisions import decisions
+from gazerig.features.study.decisions import decide_hypotheses
 from gazerig.features.study.design import (
     Condition,
     Exclusion,
@@ -33,7 +33,7 @@ from gazerig.features.study.design import (
 )
 from gazerig.features.study.participation import participation
 from gazerig.features.study.power import power_claim
-from gazerig.features.study.scores import measures
+from gazerig.features.study.scores import design_measures
 from gazerig.features.study.simulation import Population
 from gazerig.features.study.statistics import effects
 
@@ -157,7 +157,7 @@ def is_significant(one: Planned, seed: int) -> bool:
         for k in range(1, one.study.plan.participants + 1)
     ]
     study = replace(one.study, hypotheses=(one.tested or one.study.hypotheses[0],))
-    (found,) = decisions(study, QUESTIONS, people)
+    (found,) = decide_hypotheses(study, QUESTIONS, people)
     return found.test is not None and found.test.deciding_p <= one.study.plan.alpha
 
 
@@ -187,7 +187,7 @@ def main() -> None:
             study = one.study
             plan = replace(study.plan, effect=one.population.effect)
             hypothesis = study.hypotheses[0]
-            known = measures(study, QUESTIONS)[hypothesis.measure]
+            known = design_measures(study, QUESTIONS)[hypothesis.measure]
             said = power_claim(replace(study, plan=plan), hypothesis, known).power
             found = share(one)
             took = time.perf_counter() - began

@@ -25,7 +25,7 @@ from branch import Branch, gazerig
 from study_at_the_page import Tab, answers
 
 from gazerig.drivers.files.film_writer import film_writer
-from gazerig.features.study.journal import Closed, ItemAnswered, read
+from gazerig.features.study.journal import ItemAnswered, ParticipationClosed, read
 from gazerig.robot.model import clock
 
 STUDY = """\
@@ -97,7 +97,7 @@ def killed(folder: Path, kills: int, seed: int = 0, longest_s: float = 0.6) -> K
 def _ended(folder: Path, number: int) -> bool:
     """Whether a participant's session is over, though nobody was told."""
     place = folder / "data" / "participants" / f"P{number:03d}"
-    return place.exists() and any(isinstance(one, Closed) for one in read(place))
+    return place.exists() and any(isinstance(one, ParticipationClosed) for one in read(place))
 
 
 @contextlib.contextmanager
@@ -194,5 +194,5 @@ def _counted(folder: Path, told: dict[int, list[Page]], kills: int) -> Kills:
         keys = [(one.trial, one.questionnaire, one.item) for one in found]
         kept += sum(map(len, pages))
         twice += len(keys) - len(set(keys))
-        finished += isinstance(records[-1], Closed)
+        finished += isinstance(records[-1], ParticipationClosed)
     return Kills(kills, kept, lost, twice, finished)

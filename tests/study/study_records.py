@@ -5,15 +5,15 @@ from dataclasses import replace
 
 from gazerig.features.study.design import Condition, Hypothesis, StatisticalPlan, StudyDesign, Test
 from gazerig.features.study.journal import (
-    Closed,
-    Consented,
+    ConsentGiven,
     ItemAnswered,
-    Opened,
+    ParticipationClosed,
+    ParticipationOpened,
     Record,
     TrialBegan,
     TrialEnded,
 )
-from gazerig.features.study.order import orders
+from gazerig.features.study.order import participant_order
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.simulation import Population, SimulatedParticipant
 
@@ -79,10 +79,10 @@ def records(
 ) -> list[Record]:
     """Return all that a simulated participant did, from consent to the last page."""
     person = SimulatedParticipant(study, questions, number, population or Population())
-    order = orders(study, number)
+    order = participant_order(study, number)
     found: list[Record] = [
-        Opened(f"P{number:03d}", sha256, order, "0.1.0", UTC, simulated=True),
-        Consented(True, False, True, UTC),
+        ParticipationOpened(f"P{number:03d}", sha256, order, "0.1.0", UTC, simulated=True),
+        ConsentGiven(True, False, True, UTC),
     ]
     for trial, condition in enumerate(order):
         for side, shown in enumerate(condition.split("|")):
@@ -90,7 +90,7 @@ def records(
             found.append(TrialEnded(trial, 0, "complete", 30.0, UTC, side))
         found += asked(person, study.questionnaires, trial, condition, questions)
     found += asked(person, study.after, None, "", questions)
-    return [*found, Closed("finished", "", UTC)]
+    return [*found, ParticipationClosed("finished", "", UTC)]
 
 
 def asked(

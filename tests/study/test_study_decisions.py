@@ -16,7 +16,7 @@ from study_records import PAPER, QUESTIONS, UTC, design, pairs, records
 
 from gazerig.features.lab.report.statistics import Correction, correct_p_values
 from gazerig.features.study.analysis import analyse_study, circular_triples
-from gazerig.features.study.decisions import Decision, decisions
+from gazerig.features.study.decisions import Decision, decide_hypotheses
 from gazerig.features.study.design import (
     Condition,
     Exclusion,
@@ -27,22 +27,22 @@ from gazerig.features.study.design import (
     Trials,
 )
 from gazerig.features.study.journal import (
-    Closed,
-    Consented,
+    ConsentGiven,
     ItemAnswered,
-    Measured,
+    ParticipationClosed,
     Record,
     TrialBegan,
     TrialEnded,
+    TrialMeasured,
 )
 from gazerig.features.study.participation import Participation, participation
 from gazerig.features.study.power import power_claim, power_of
-from gazerig.features.study.preregistration_text import sentence
+from gazerig.features.study.preregistration_text import hypothesis_sentence
 from gazerig.features.study.questionnaire import Questionnaire
 from gazerig.features.study.report import apa
 from gazerig.features.study.rules import consistency_rules
-from gazerig.features.study.scores import item_answers, measures, scores, wins
-from gazerig.features.study.simulation import Population, levels
+from gazerig.features.study.scores import choice_wins, design_measures, item_answers, measure_scores
+from gazerig.features.study.simulation import Population, factor_levels
 from gazerig.features.study.statistics import effects, ranks
 from gazerig.features.study.statistics.contingency import chi_square, counts_of
 from gazerig.features.study.statistics.effects import cronbachs_alpha
@@ -60,7 +60,7 @@ def people_of(
 
 
 def decided(study: StudyDesign, count: int, effect: float = 0.6) -> tuple[Decision, ...]:
-    return decisions(study, QUESTIONS, people_of(study, count, effect))
+    return decide_hypotheses(study, QUESTIONS, people_of(study, count, effect))
 
 
 def left_out(found: list[Record], study: StudyDesign | None = None) -> str:
@@ -82,14 +82,15 @@ def test_answers_become_rows_and_practice_does_not_count() -> None:
 def test_who_is_left_out_as_a_whole() -> None:
     found = records(design(), 1)
     assert (
-        left_out([found[0], Consented(False, False, False, UTC), *found[2:]]) == "did not consent"
+        left_out([found[0], ConsentGiven(False, False, False, UTC), *found[2:]])
+        == "did not consent"
     )
     assert left_out(found[:-1]) == "did not finish"
     kept = replace(design(), exclusion=Exclusion(incomplete="keep"))
     assert left_out(found[:-1], kept) == ""
-    gone = Closed("withdrawn", "felt unwell", UTC)
+    gone = ParticipationClosed("withdrawn", "felt unwell", UTC)
     assert left_out([*found[:-1], gone], kept) == "withdrew: felt unwell"
-    sent = Closed("excluded", "", UTC)
+    sent = ParticipationClosed("excluded", "", UTC)
     assert left_out([*found[:-1], sent]) == "excluded by the experimenter"
 
 
@@ -147,16 +148,16 @@ def test_scales_are_means_with_reversed_items_turned_round() -> None:
         else r
         for r in records(study, 1)
     ]
-    measure = measures(study, QUESTIONS)["calmness.ease"]
+    measure = design_measures(study, QUESTIONS)["calmness.ease"]
     one = participation(found, study, QUESTIONS)
-    table = scores(measure, [one], tuple(study.conditions), QUESTIONS)
+    table = measure_scores(measure, [one], tuple(study.conditions), QUESTIONS)
     assert table.means.tolist() == [[pytest.approx(13 / 3), pytest.approx(13 / 3)]]
     assert item_answers(measure, [one], QUESTIONS).tolist() == [[4, 4, 5], [4, 4, 5]]
 
 
 def test_what_was_not_answered_is_left_out_and_the_rest_counts() -> None:
     study = replace(design(questionnaires=("paper", "calmness")), may_skip=True)
-    measured = measures(study, QUESTIONS)
+    measured = design_measures(study, QUESTIONS)
     found = records(study, 1)
     skipped = {("looked_at", "walk"), ("calm", "walk"), ("calm", "centre"), ("easy", "centre")}
     found = [
@@ -168,14 +169,14 @@ def test_what_was_not_answered_is_left_out_and_the_rest_counts() -> None:
     assert [row.left_out for row in one.answers].count("not answered") == 4
 
     def means(name: str) -> list[float]:
-        table = scores(measured[name], [one], tuple(study.conditions), QUESTIONS)
+        table = measure_scores(measured[name], [one], tuple(study.conditions), QUESTIONS)
         found: list[float] = table.means[0].tolist()
         return found
 
     assert means("paper.looked_at") == pytest.approx([np.nan, 2.0], nan_ok=True)
     # Tense is turned round; a scale counts with at least half of its items.
     assert means("calmness.ease") == pytest.approx([3.0, np.nan], nan_ok=True)
-    decided = decisions(study, QUESTIONS, [one, *people_of(study, 13)[1:]])
+    decided = decide_hypotheses(study, QUESTIONS, [one, *people_of(study, 13)[1:]])
     assert [d.n for d in decided] == [13, 12]
 
 
@@ -187,13 +188,13 @@ def test_choices_that_were_not_made_are_left_out() -> None:
         if number == 1:
             found = [replace(r, value=None) if isinstance(r, ItemAnswered) else r for r in found]
         people.append(participation(found, study, QUESTIONS))
-    assert decisions(study, QUESTIONS, people)[0].n == 9
+    assert decide_hypotheses(study, QUESTIONS, people)[0].n == 9
 
 
 def test_repetitions_are_averaged_and_counted_one_by_one() -> None:
     study = replace(design(), trials=Trials(repetitions=3))
-    table = scores(
-        measures(study, QUESTIONS)["paper.looked_at"], people_of(study, 4),
+    table = measure_scores(
+        design_measures(study, QUESTIONS)["paper.looked_at"], people_of(study, 4),
         tuple(study.conditions), QUESTIONS,
     )  # fmt: skip
     assert table.means.shape == (4, 2) and len(table.answers("walk")) == 12
@@ -205,10 +206,10 @@ def test_objective_measures_come_from_the_trials() -> None:
     found = records(study, 1)
     for trial, value in ((0, 1.5), (1, float("nan"))):
         at = next(k for k, r in enumerate(found) if isinstance(r, TrialEnded) and r.trial == trial)
-        found.insert(at + 1, Measured(trial, "walk", {"first_look_s": value}))
+        found.insert(at + 1, TrialMeasured(trial, "walk", {"first_look_s": value}))
     one = participation(found, study, QUESTIONS)
-    measure = measures(study, QUESTIONS)["first_look_s"]
-    table = scores(measure, [one], tuple(study.conditions), QUESTIONS)
+    measure = design_measures(study, QUESTIONS)["first_look_s"]
+    table = measure_scores(measure, [one], tuple(study.conditions), QUESTIONS)
     assert sorted(table.means[0].tolist(), key=str) == [1.5, pytest.approx(np.nan, nan_ok=True)]
 
 
@@ -227,9 +228,9 @@ def test_hypotheses_are_decided_and_corrected_together() -> None:
 def test_the_figures_are_those_of_scipy_on_the_same_answers() -> None:
     study = design()
     people = people_of(study, 24)
-    table = scores(measures(study, QUESTIONS)["paper.looked_at"], people, ("walk", "centre"),
+    table = measure_scores(design_measures(study, QUESTIONS)["paper.looked_at"], people, ("walk", "centre"),
                    QUESTIONS)  # fmt: skip
-    (_, one) = decisions(study, QUESTIONS, people)
+    (_, one) = decide_hypotheses(study, QUESTIONS, people)
     walk, centre = table.column("walk"), table.column("centre")
     expected = stats.wilcoxon(walk, centre, correction=True, method="asymptotic")
     assert one.test is not None
@@ -247,7 +248,7 @@ def test_a_difference_of_the_other_sign_is_against_the_hypothesis() -> None:
     turned = (Hypothesis("paper.looked_at", "walk", "centre"),)
     study = design(hypotheses=turned)
     people = people_of(study, 24, -1.2)
-    assert decisions(study, QUESTIONS, people)[0].verdict == "against"
+    assert decide_hypotheses(study, QUESTIONS, people)[0].verdict == "against"
     assert decided(design(hypotheses=turned), 24, 0.0)[0].verdict == "not supported"
 
 
@@ -269,7 +270,8 @@ def test_a_third_condition_that_differs_decides_nothing_between_two_equal_ones(t
         Hypothesis("paper.looked_at", "centre", "random"),
     ))  # fmt: skip
     found = [
-        decisions(study, QUESTIONS, people_of(two_above, 24, 1.5, seed))[0] for seed in range(4)
+        decide_hypotheses(study, QUESTIONS, people_of(two_above, 24, 1.5, seed))[0]
+        for seed in range(4)
     ]
     assert all(one.also[0].deciding_p < 0.01 for one in found)
     assert [one.verdict for one in found] == ["not supported"] * 4
@@ -290,23 +292,23 @@ def test_a_verdict_has_the_sign_of_the_tests_own_effect() -> None:
             for r in records(study, number, questions=questions)
         ]  # fmt: skip
         people.append(participation(answered, study, questions))
-    (one,) = decisions(study, questions, people)
+    (one,) = decide_hypotheses(study, questions, people)
     assert one.test is not None and one.test.deciding_p == pytest.approx(0.0014, abs=0.0003)
     assert one.means[0] < one.means[1] and one.test.effect.value > 0.0
     assert one.verdict == "supported"
-    said = apa.sentence(one, analyse_study("mine", study, questions, "ab", people))
+    said = apa.result_sentence(one, analyse_study("mine", study, questions, "ab", people))
     assert "was above" in said and "have the other sign" in said
 
 
 def test_choices_are_decided_by_the_exact_sign_test_of_participants() -> None:
     study = pairs()
     people = people_of(study, 30, 0.9)
-    (one,) = decisions(study, QUESTIONS, people)
+    (one,) = decide_hypotheses(study, QUESTIONS, people)
     assert one.verdict == "supported" and one.n == 30 and one.means[0] > 0.5
-    table = wins(one.measure, people, tuple(study.conditions))
+    table = choice_wins(one.measure, people, tuple(study.conditions))
     assert table.sum() == 90 and one.test is not None
     assert one.test.deciding_p == stats.binomtest(int(table[0, 1]), 30).pvalue
-    (nobody,) = decisions(study, QUESTIONS, [])
+    (nobody,) = decide_hypotheses(study, QUESTIONS, [])
     assert nobody.verdict == "too few" and nobody.too_few == "nobody has chosen"
 
 
@@ -321,8 +323,8 @@ def test_a_participant_counts_once_however_often_he_or_she_chose() -> None:
                 r = replace(r, value="first" if r.condition.startswith("walk") else "second")
             answered.append(r)
         people.append(participation(answered, study, QUESTIONS))
-    (one,) = decisions(study, QUESTIONS, people)
-    assert wins(one.measure, people, TWO).tolist() == [[0, 24], [0, 0]]
+    (one,) = decide_hypotheses(study, QUESTIONS, people)
+    assert choice_wins(one.measure, people, TWO).tolist() == [[0, 24], [0, 0]]
     assert one.test is not None and one.test.deciding_p == pytest.approx(2 / 2**4)
     assert one.verdict == "too few" and one.n == 4
 
@@ -352,15 +354,15 @@ def ours(rows: np.ndarray) -> dict[str, float]:
     a, b = rows[:, 0].astype(float), rows[:, 1].astype(float)
     table = chi_square([counts_of(a, 5), counts_of(b, 5)])
     out = {
-        f"signed_rank {zeros} {side}": ranks.signed_rank(b - a, side == "two-sided", zeros).p
+        f"signed_rank {zeros} {side}": ranks.signed_rank_test(b - a, side == "two-sided", zeros).p
         for zeros in ("wilcox", "pratt")
         for side in ("two-sided", "greater")
     }
-    friedman = ranks.friedman(rows.astype(float))
+    friedman = ranks.friedman_test(rows.astype(float))
     return out | {
         "matched correlation": float(effects.matched_correlation(b - a)),
-        "rank_sum two-sided": ranks.rank_sum(a, b).p,
-        "rank_sum greater": ranks.rank_sum(a, b, two_sided=False).p,
+        "rank_sum two-sided": ranks.rank_sum_test(a, b).p,
+        "rank_sum greater": ranks.rank_sum_test(a, b, two_sided=False).p,
         "dominance": float(effects.dominance(a, b)),
         "friedman": friedman.p,
         "concordance": friedman.effect.value,
@@ -441,12 +443,12 @@ def test_the_rank_sum_of_the_same_people_has_the_chance_of_their_swaps(people: i
     rng = np.random.default_rng(people)
     own = rng.normal(0.0, 3.0, people)
     a, b = own + rng.normal(size=people), own + rng.normal(0.15, 1.0, people)
-    found = ranks.rank_sum(a, b, paired=True)
+    found = ranks.rank_sum_test(a, b, paired=True)
     rank = stats.rankdata(np.concatenate([a, b]))
     score = rank[people:] - rank[:people]
     swapped = np.abs(rng.choice((-1.0, 1.0), (4000, people)) @ score)
     assert found.deciding_p == pytest.approx(np.mean(swapped >= abs(score.sum())), abs=0.03)
-    assert ranks.rank_sum(a, b).deciding_p > found.deciding_p + 0.1
+    assert ranks.rank_sum_test(a, b).deciding_p > found.deciding_p + 0.1
 
 
 def test_without_ties_the_exact_chances_are_scipys() -> None:
@@ -461,8 +463,8 @@ def test_without_ties_the_exact_chances_are_scipys() -> None:
 def test_all_of_nine_above_is_the_papers_first_study_at_its_clearest() -> None:
     """Nine people (Nakamoto & Tsuruno 4.4.3): by hand 2/2^9, and 2/C(18, 9)."""
     a, b = np.array([1, 2, 2, 1, 2, 1, 2, 2, 1.0]), np.array([4, 5, 4, 4, 5, 5, 4, 4, 3.0])
-    assert ranks.signed_rank(b - a).exact_p == pytest.approx(2 / 2**9)
-    found = ranks.rank_sum(a, b)
+    assert ranks.signed_rank_test(b - a).exact_p == pytest.approx(2 / 2**9)
+    found = ranks.rank_sum_test(a, b)
     assert found.exact_p == pytest.approx(2 / comb(18, 9)) == found.least_p
     assert found.statistic == 81 and found.effect.value == 1.0
     # By hand: 4 columns-pairs never shared: chi-square is the number of answers.
@@ -523,26 +525,26 @@ def test_the_drawn_chance_of_friedman_is_that_of_all_orders() -> None:
         (np.sum([list(r) for r in orders], axis=0) ** 2).sum() >= seen - 1e-9
         for orders in product(*(list(permutations(r)) for r in rank))
     ]
-    assert ranks.friedman(rows).exact_p == pytest.approx(np.mean(every), abs=0.01)
+    assert ranks.friedman_test(rows).exact_p == pytest.approx(np.mean(every), abs=0.01)
     with pytest.raises(ValueError, match="three conditions"):
-        ranks.friedman(rows[:, :2])
+        ranks.friedman_test(rows[:, :2])
 
 
 def test_who_answers_alike_everywhere_differs_in_nothing() -> None:
     same = np.full(12, 3.0)
-    assert ranks.signed_rank(same - same).deciding_p == 1.0
-    assert ranks.rank_sum(same, same).deciding_p == 1.0
-    assert ranks.friedman(np.stack([same] * 3, axis=1)).deciding_p == 1.0
+    assert ranks.signed_rank_test(same - same).deciding_p == 1.0
+    assert ranks.rank_sum_test(same, same).deciding_p == 1.0
+    assert ranks.friedman_test(np.stack([same] * 3, axis=1)).deciding_p == 1.0
     assert isnan(effects.cohens_dz(same - same).value)
     assert isnan(effects.rank_biserial(same - same).low95)
     with pytest.raises(ValueError, match="both sides"):
-        ranks.rank_sum(same, same[:0])
+        ranks.rank_sum_test(same, same[:0])
 
 
 def test_so_few_that_nothing_could_be_found_are_known_before() -> None:
-    five = ranks.signed_rank(np.array([1.0, 2, 1, 3, 2]))
+    five = ranks.signed_rank_test(np.array([1.0, 2, 1, 3, 2]))
     assert five.exact_p == five.least_p == 2 / 2**5 > 0.05
-    assert ranks.signed_rank(np.array([1.0, 2, 1, 3, 2, 1])).least_p < 0.05
+    assert ranks.signed_rank_test(np.array([1.0, 2, 1, 3, 2, 1])).least_p < 0.05
 
 
 def test_intervals_hold_the_truth_about_nineteen_times_of_twenty() -> None:
@@ -620,7 +622,7 @@ def test_a_level_is_all_conditions_that_have_it() -> None:
 def test_the_figures_are_those_of_scipy_on_the_means_of_each_participant() -> None:
     study = crossed(GAZE, LIDS)
     people = people_of(study, 24, 0.9)
-    gaze, lids = decisions(study, QUESTIONS, people)
+    gaze, lids = decide_hypotheses(study, QUESTIONS, people)
     answers = {
         (p.participant, row.condition, row.item): float(row.value or 0)
         for p in people for row in p.counted
@@ -649,17 +651,25 @@ def test_who_misses_a_condition_of_a_level_is_not_compared() -> None:
     whole = records(study, 1)
     gone = [r for r in whole if not (isinstance(r, ItemAnswered) and r.condition == "walk_stare")]
     people = [*people_of(study, 5)[1:], participation(gone, study, QUESTIONS)]
-    (one,) = decisions(study, QUESTIONS, people)
+    (one,) = decide_hypotheses(study, QUESTIONS, people)
     assert one.n == 4
 
 
 def test_simulated_participants_have_the_effect_between_levels() -> None:
     study = crossed(GAZE, LIDS)
-    assert levels(study) == {"walk_blink": 2, "walk_stare": 1, "centre_blink": 1, "centre_stare": 0}
+    assert factor_levels(study) == {
+        "walk_blink": 2,
+        "walk_stare": 1,
+        "centre_blink": 1,
+        "centre_stare": 0,
+    }
     people = people_of(study, 240)
     for one in (GAZE, LIDS):
-        found = scores(
-            measures(study, QUESTIONS)[one.measure], people, tuple(study.conditions), QUESTIONS
+        found = measure_scores(
+            design_measures(study, QUESTIONS)[one.measure],
+            people,
+            tuple(study.conditions),
+            QUESTIONS,
         )
         d = found.column(*study.side(one.better)) - found.column(*study.side(one.than))
         # The standard error of d_z (Hedges & Olkin 1985) is sqrt(1/n + d^2/2n).
@@ -669,7 +679,9 @@ def test_simulated_participants_have_the_effect_between_levels() -> None:
 def test_power_is_that_of_means_which_have_hardly_any_ties() -> None:
     one = Hypothesis("paper.looked_at", "walk_blink", "centre_blink")
     level, single = (
-        power_claim(crossed(each), each, measures(crossed(each), QUESTIONS)["paper.looked_at"])
+        power_claim(
+            crossed(each), each, design_measures(crossed(each), QUESTIONS)["paper.looked_at"]
+        )
         for each in (GAZE, one)
     )
     assert level.question.points == 0 and single.question.points == 5
@@ -678,7 +690,7 @@ def test_power_is_that_of_means_which_have_hardly_any_ties() -> None:
 
 
 def test_the_pre_registration_says_what_is_averaged() -> None:
-    said = sentence(GAZE, crossed(GAZE))
+    said = hypothesis_sentence(GAZE, crossed(GAZE))
     assert (
         "mean of `walk_blink`, `walk_stare` against that of `centre_blink`, `centre_stare`" in said
     )
@@ -718,8 +730,8 @@ def test_a_factor_alone_names_its_conditions() -> None:
     alone = {key: Condition(factors={"gaze": key}) for key in study.conditions}
     study = replace(study, conditions=alone)
     assert not list(consistency_rules(study, QUESTIONS))
-    (one,) = decisions(study, QUESTIONS, people_of(study, 24, 1.2))
+    (one,) = decide_hypotheses(study, QUESTIONS, people_of(study, 24, 1.2))
     by_name = Hypothesis("paper.looked_at", "walk", "centre", also=("chi_square",))
     named = replace(study, hypotheses=(by_name,))
-    (same,) = decisions(named, QUESTIONS, people_of(named, 24, 1.2))
+    (same,) = decide_hypotheses(named, QUESTIONS, people_of(named, 24, 1.2))
     assert (one.test, one.also) == (same.test, same.also)

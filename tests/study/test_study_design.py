@@ -19,15 +19,15 @@ from gazerig.config.schema import Rig
 from gazerig.config.shipped_files import SHIPPED, shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.simulated_run import simulate
-from gazerig.features.study.cli.design import EXAMPLE, notes, state
+from gazerig.features.study.cli.design import EXAMPLE, design_notes, design_state
 from gazerig.features.study.data_folder import StudyData
 from gazerig.features.study.design import Condition, StudyDesign, Trials
 from gazerig.features.study.order import (
     PAIR,
     balanced_group_size,
     block_trials,
-    orders,
-    practice,
+    participant_order,
+    practice_trials,
     williams,
 )
 from gazerig.features.study.run.study_file import LoadedStudy, load_checked_study, load_study
@@ -102,19 +102,19 @@ def test_a_study_is_stated_before_somebody_takes_part(elsewhere: Path, capfd: Te
     file, folder = elsewhere / "study.yaml", elsewhere / "d"
     file.write_text(EXAMPLE, encoding="utf-8")
     first = load_checked_study("study.yaml")
-    state("study.yaml", first, folder)
+    design_state("study.yaml", first, folder)
     stated = (folder / "preregistration.md").read_text(encoding="utf-8")
     assert first.sha256 in stated
-    state("study.yaml", first, folder)
+    design_state("study.yaml", first, folder)
     file.write_text(EXAMPLE.replace("seconds: 20", "seconds: 25"), encoding="utf-8")
     with pytest.raises(SetupError, match="gazerig study design study.yaml --force"):
-        state("study.yaml", load_checked_study("study.yaml"), folder)
+        design_state("study.yaml", load_checked_study("study.yaml"), folder)
     StudyData(folder).claim("study", first.canonical)  # the first participant
     with pytest.raises(SetupError, match="begin a new study with --data"):
-        state("study.yaml", load_checked_study("study.yaml"), folder)
+        design_state("study.yaml", load_checked_study("study.yaml"), folder)
     (folder / "preregistration.md").unlink()
     with pytest.raises(SetupError, match="data of another design"):
-        state("study.yaml", load_checked_study("study.yaml"), folder)
+        design_state("study.yaml", load_checked_study("study.yaml"), folder)
     assert not (folder / "preregistration.md").exists()
 
 
@@ -168,7 +168,7 @@ def test_what_is_allowed_and_should_be_known_is_said(elsewhere: Path) -> None:
     text = EXAMPLE.replace("[nakamoto_tsuruno]", "[nakamoto_tsuruno, godspeed]")
     text = text[: text.index("hypotheses")] + "privacy: {pictures: true}\nlanguage: ja\n"
     (elsewhere / "s.yaml").write_text(text + "plan: {participants: 2}\n", encoding="utf-8")
-    said = " ".join(notes(load_checked_study("./s.yaml")))
+    said = " ".join(design_notes(load_checked_study("./s.yaml")))
     assert "exploratory" in said and "pictures of participants are kept" in said
     assert "godspeed is not all in 'ja'" in said and "nakamoto_tsuruno is not" not in said
     assert "privacy.contact is empty" in said
@@ -244,7 +244,9 @@ def test_multiples_of_the_rows_are_balanced_to_the_last_cell(
     n: int, repetitions: int, seed: int, times: int
 ) -> None:
     design = design_of(n, repetitions=repetitions, seed=seed)
-    every = [orders(design, p) for p in range(1, times * balanced_group_size(design) + 1)]
+    every = [
+        participant_order(design, p) for p in range(1, times * balanced_group_size(design) + 1)
+    ]
     for k in range(repetitions):
         blocks = [order[k * n : (k + 1) * n] for order in every]
         assert all(sorted(block) == sorted(design.conditions) for block in blocks)
@@ -259,7 +261,7 @@ def test_no_condition_is_shown_twice_in_a_row_across_blocks(n: int) -> None:
     for order in ("williams", "random"):
         design = design_of(n, repetitions=4, order=order)
         for participant in range(1, 30):
-            trials = orders(design, participant)
+            trials = participant_order(design, participant)
             assert all(a != b for a, b in zip(trials, trials[1:], strict=False))
 
 
@@ -267,7 +269,7 @@ def test_no_condition_is_shown_twice_in_a_row_across_blocks(n: int) -> None:
 def test_pairs_are_seen_both_ways_round_equally_often_in_every_place(n: int) -> None:
     design = replace(design_of(n), task="pairwise")
     assert balanced_group_size(design) == n * (n - 1)
-    every = [orders(design, p) for p in range(1, balanced_group_size(design) + 1)]
+    every = [participant_order(design, p) for p in range(1, balanced_group_size(design) + 1)]
     cells = Counter((i, one) for order in every for i, one in enumerate(order))
     pairs = len(block_trials(design))
     assert len(cells) == pairs * pairs * 2 and set(cells.values()) == {1}
@@ -281,7 +283,7 @@ def test_pairs_are_seen_both_ways_round_equally_often_in_every_place(n: int) -> 
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_repeated_pairs_stay_balanced_and_one_pair_is_turned(n: int) -> None:
     design = replace(design_of(n, repetitions=3), task="pairwise")
-    every = [orders(design, p) for p in range(1, balanced_group_size(design) + 1)]
+    every = [participant_order(design, p) for p in range(1, balanced_group_size(design) + 1)]
     pairs = len(block_trials(design))
     for k in range(3):
         cells = Counter((i, o[k * pairs + i]) for o in every for i in range(pairs))
@@ -293,23 +295,25 @@ def test_repeated_pairs_stay_balanced_and_one_pair_is_turned(n: int) -> None:
 
 def test_the_participant_and_the_seed_decide_and_nothing_else() -> None:
     design = design_of(5, order="random", seed=4)
-    assert orders(design, 3) == orders(design, 3)
-    assert len({orders(design, p) for p in range(1, 40)}) > 20
-    assert orders(design_of(5, order="random", seed=5), 3) != orders(design, 3)
+    assert participant_order(design, 3) == participant_order(design, 3)
+    assert len({participant_order(design, p) for p in range(1, 40)}) > 20
+    assert participant_order(design_of(5, order="random", seed=5), 3) != participant_order(
+        design, 3
+    )
     assert balanced_group_size(design) == 1
-    squares = {orders(design_of(4, seed=seed), 1) for seed in range(30)}
+    squares = {participant_order(design_of(4, seed=seed), 1) for seed in range(30)}
     assert len(squares) > 5, "which condition has which letter is drawn by the seed"
     with pytest.raises(ValueError, match="counted from 1"):
-        orders(design, 0)
+        participant_order(design, 0)
 
 
 def test_practice_shows_what_counts_later_and_is_not_the_first_trial_for_all() -> None:
     design = design_of(3, practice=5)
-    drawn = practice(design, 1)
+    drawn = practice_trials(design, 1)
     assert len(drawn) == 5 and set(drawn) == set(design.conditions)
-    assert drawn == practice(design, 1)
-    assert len({practice(design, p)[0] for p in range(1, 20)}) == 3
-    assert practice(design_of(3, practice=0), 1) == ()
+    assert drawn == practice_trials(design, 1)
+    assert len({practice_trials(design, p)[0] for p in range(1, 20)}) == 3
+    assert practice_trials(design_of(3, practice=0), 1) == ()
 
 
 # --- A study's hash is of what it says, and of nothing else

@@ -10,7 +10,7 @@ from slow_rigs import at_rate
 
 from gazerig.features.study.journal import STEP_DEG, Record, TrialBegan, TrialEnded
 from gazerig.features.study.run.head_presenter import HeadPresenter
-from gazerig.features.study.run.head_process import as_line, options_in
+from gazerig.features.study.run.head_process import decode_options, encode_options
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.run.trial_measures import SWITCH_S, measure_presentations
 from gazerig.features.study.session import ShownTrial
@@ -39,7 +39,7 @@ def presenter(study: LoadedStudy, folder: Path, agreed: tuple[bool, bool]) -> He
 
 def test_options_come_through_as_a_line(tmp_path: Path) -> None:
     options = RunOptions(mock=True, scene="visitor", record=tmp_path / "a.mcap", seed=3)
-    assert options_in(as_line(options)) == options
+    assert decode_options(encode_options(options)) == options
 
 
 @pytest.mark.slow

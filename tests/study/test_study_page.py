@@ -16,9 +16,9 @@ from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answe
 
 from gazerig.features.study.design import Condition
 from gazerig.features.study.journal import (
-    Closed,
-    Consented,
+    ConsentGiven,
     ItemAnswered,
+    ParticipationClosed,
     TrialBegan,
     TrialEnded,
     WriteFailed,
@@ -293,7 +293,7 @@ def consented(pages: Pages, asked: list[str], ticked: list[str]) -> tuple[bool, 
     page = tab.page()
     assert (page["kind"], page["uses"]) == ("consent", asked)
     tab.do(page["page"], do="consent", given=True, uses=ticked)
-    said = next(one for one in pages.journal.records if isinstance(one, Consented))
+    said = next(one for one in pages.journal.records if isinstance(one, ConsentGiven))
     return said.given, said.pictures, said.gaze
 
 
@@ -320,7 +320,7 @@ def test_who_leaves_is_told_nothing_of_the_conditions_and_keeps_the_code(
     assert (end["how"], end["code"], end["text"]) == ("withdrawn", CODE, [])
     ended, closed = pages.journal.records[-2:]
     assert isinstance(ended, TrialEnded) and ended.outcome == "withdrawn"
-    assert isinstance(closed, Closed) and closed.how == "withdrawn"
+    assert isinstance(closed, ParticipationClosed) and closed.how == "withdrawn"
 
 
 def test_a_film_that_was_not_seen_to_its_end_counts_as_an_attempt(pages: Pages, tab: Tab) -> None:
@@ -585,7 +585,7 @@ def test_who_is_excluded_is_so_for_a_reason(
     assert experimenter.press("exclude", why="  ")[0] == 503
     assert experimenter.press("exclude", why="the fire alarm went off") == (204, "")
     closed = lossy.journal.records[-1]
-    assert isinstance(closed, Closed) and closed.how == "excluded"
+    assert isinstance(closed, ParticipationClosed) and closed.how == "excluded"
     assert closed.reason == "the fire alarm went off"
     assert participant.page()["how"] == "excluded"
     assert experimenter.state()["session"]["how"] == "excluded"

@@ -20,7 +20,7 @@ from gazerig.features.study.power import (
     sample_size_by_formula,
 )
 from gazerig.features.study.run.study_file import load_study
-from gazerig.features.study.scores import measures, scores, wins
+from gazerig.features.study.scores import choice_wins, design_measures, measure_scores
 from gazerig.features.study.simulation import (
     BETWEEN_SD,
     ITEM_SD,
@@ -29,12 +29,12 @@ from gazerig.features.study.simulation import (
     SimulatedParticipant,
     choice_probability,
     differences,
-    effect_of,
-    levels,
+    effect_shift,
+    factor_levels,
     ratings_from_latent,
-    shift_of,
+    shift_effect,
 )
-from gazerig.features.study.statistics.ranks import exact_signed_rank, exact_swaps, sign
+from gazerig.features.study.statistics.ranks import exact_signed_rank, exact_swaps, sign_test
 
 SIGNED = PowerQuestion("signed_rank", 0.6, 0.05)
 STUDIES = 500
@@ -63,7 +63,7 @@ def test_the_joint_chances_are_those_of_the_effect() -> None:
     mean = (chances * difference).sum()
     spread = np.sqrt((chances * (difference - mean) ** 2).sum())
     assert mean / spread == pytest.approx(0.6, abs=2e-3)
-    assert effect_of(shift_of(0.6, 5), 5) == pytest.approx(0.6, abs=1e-6)
+    assert shift_effect(effect_shift(0.6, 5), 5) == pytest.approx(0.6, abs=1e-6)
     assert joint_probabilities(0.0, 5) == pytest.approx(joint_probabilities(0.0, 5).T)
 
 
@@ -143,7 +143,7 @@ def test_choices_have_the_sign_tests_power() -> None:
 def test_repeated_choices_have_the_power_of_participants_and_not_of_choices() -> None:
     asked = PowerQuestion("sign", 0.3, 0.05, choices=4)
     more = np.random.default_rng(3).binomial(4, stats.norm.cdf(0.3), (400, 24)) - 2
-    found = np.mean([sign(row).deciding_p <= 0.05 for row in more])
+    found = np.mean([sign_test(row).deciding_p <= 0.05 for row in more])
     # The standard error of 400 studies is .025; the seed is fixed.
     assert power_of(asked, 24) == pytest.approx(found, abs=0.06)
     assert power_of(asked, 24) < power_of(replace(asked, choices=1), 96)
@@ -151,7 +151,7 @@ def test_repeated_choices_have_the_power_of_participants_and_not_of_choices() ->
 
 def test_a_hypothesis_gets_its_share_of_the_false_alarms() -> None:
     study = load_study("default_against_papers")
-    known = measures(study.design, study.questionnaires)
+    known = design_measures(study.design, study.questionnaires)
     one = study.design.hypotheses[0]
     found = power_claim(study.design, one, known[one.measure])
     assert found.question.alpha == pytest.approx(0.05 / 4)
@@ -173,7 +173,7 @@ def test_differences_have_the_effect_asked_for(points: int, effect: float) -> No
 
 @pytest.mark.parametrize(("items", "repetitions"), [(1, 1), (6, 1), (1, 3), (6, 3)])
 def test_means_of_scales_and_repetitions_have_it_too(items: int, repetitions: int) -> None:
-    shift = shift_of(0.6, 5, items, repetitions)
+    shift = effect_shift(0.6, 5, items, repetitions)
     rng, people = np.random.default_rng(2), 20000
     own = rng.normal(0.0, BETWEEN_SD, (people, 1, 1))
     means = []
@@ -183,7 +183,7 @@ def test_means_of_scales_and_repetitions_have_it_too(items: int, repetitions: in
         means.append(ratings_from_latent(own + trial + item + side * shift, 5).mean(axis=(1, 2)))
     found = means[0] - means[1]
     assert found.mean() / found.std() == pytest.approx(0.6, abs=0.025)
-    assert effect_of(shift, 5, items, repetitions) == pytest.approx(0.6)
+    assert shift_effect(shift, 5, items, repetitions) == pytest.approx(0.6)
 
 
 @pytest.mark.parametrize(("people", "effect"), [(12, 0.8), (24, 0.6), (40, 0.5)])
@@ -197,10 +197,10 @@ def test_500_studies_find_as_often_as_their_design_claims(people: int, effect: f
 
 def test_levels_follow_the_hypotheses() -> None:
     chain = (Hypothesis("paper.looked_at", "a", "b"), Hypothesis("paper.looked_at", "b", "c"))
-    assert levels(design(("a", "b", "c"), hypotheses=chain)) == {"a": 2, "b": 1, "c": 0}
-    assert levels(design(("a", "b", "c"), hypotheses=())) == {"a": 1, "b": 0, "c": 0}
+    assert factor_levels(design(("a", "b", "c"), hypotheses=chain)) == {"a": 2, "b": 1, "c": 0}
+    assert factor_levels(design(("a", "b", "c"), hypotheses=())) == {"a": 1, "b": 0, "c": 0}
     circle = (*chain, Hypothesis("paper.looked_at", "c", "a"))
-    assert max(levels(design(("a", "b", "c"), hypotheses=circle)).values()) <= 2
+    assert max(factor_levels(design(("a", "b", "c"), hypotheses=circle)).values()) <= 2
 
 
 def test_the_same_participant_answers_the_same_in_any_order() -> None:
@@ -224,9 +224,9 @@ def test_the_same_participant_answers_the_same_in_any_order() -> None:
 def test_a_whole_study_has_the_effect_on_items_and_on_scales() -> None:
     study = design(questionnaires=("paper", "calmness"))
     people = [participation(records(study, k), study, QUESTIONS) for k in range(1, 241)]
-    known = measures(study, QUESTIONS)
+    known = design_measures(study, QUESTIONS)
     for name in ("paper.naturalness", "calmness.ease"):
-        found = scores(known[name], people, tuple(study.conditions), QUESTIONS)
+        found = measure_scores(known[name], people, tuple(study.conditions), QUESTIONS)
         d = found.column("walk") - found.column("centre")
         # The standard error of d_z (Hedges & Olkin 1985) is sqrt(1/n + d^2/2n).
         assert d.mean() / d.std() == pytest.approx(0.6, abs=3 * sqrt(1 / 240 + 0.18 / 240))
@@ -235,7 +235,9 @@ def test_a_whole_study_has_the_effect_on_items_and_on_scales() -> None:
 def test_choices_prefer_as_often_as_differences_are_positive() -> None:
     study = pairs(("walk", "centre"))
     people = [participation(records(study, k), study, QUESTIONS) for k in range(1, 301)]
-    table = wins(measures(study, QUESTIONS)["choice.alive"], people, tuple(study.conditions))
+    table = choice_wins(
+        design_measures(study, QUESTIONS)["choice.alive"], people, tuple(study.conditions)
+    )
     assert table.sum() == 300
     assert table[0, 1] / 300 == pytest.approx(stats.norm.cdf(0.6), abs=0.08)
     assert choice_probability(0.0) == 0.5

@@ -21,14 +21,14 @@ from gazerig.features.study.analysis import (
     within_participant_half_widths,
 )
 from gazerig.features.study.cli.analyse import verdicts
-from gazerig.features.study.data_folder import StudyData, code_of
+from gazerig.features.study.data_folder import StudyData, participant_code
 from gazerig.features.study.design import Condition, Exclusion, Hypothesis, StudyDesign, Trials
 from gazerig.features.study.journal import (
     FILE,
     STEP_DEG,
     ItemAnswered,
     Journal,
-    Opened,
+    ParticipationOpened,
     Record,
     TrialBegan,
     TrialEnded,
@@ -88,7 +88,7 @@ def page(ratings: StudyAnalysis) -> str:
      (nan, "p not known")],
 )  # fmt: skip
 def test_chances_are_written_as_the_apa_wants(p: float, says: str) -> None:
-    assert unescape(re.sub("<[^>]*>", "", apa.chance(p))) == says
+    assert unescape(re.sub("<[^>]*>", "", apa.p_text(p))) == says
 
 
 @pytest.mark.parametrize(
@@ -96,26 +96,26 @@ def test_chances_are_written_as_the_apa_wants(p: float, says: str) -> None:
     [(0.618, ".62"), (-0.618, "\N{MINUS SIGN}.62"), (1.0, "1.00"), (-0.001, ".00")],
 )
 def test_what_cannot_exceed_one_has_no_zero_before_the_point(value: float, says: str) -> None:
-    assert apa.bounded(value) == says
+    assert apa.bounded_text(value) == says
 
 
 def test_effects_are_written_with_their_interval() -> None:
     dz = EffectSize("Cohen's d_z", "d_z", 0.62, -0.04, 1.2, "BCa bootstrap", bounded=False)
-    assert apa.effect(dz) == ("<i>d</i><sub>z</sub> = 0.62, 95% CI [\N{MINUS SIGN}0.04, 1.20]")
-    assert apa.effect(dz._replace(low95=nan)) == "<i>d</i><sub>z</sub> = 0.62"
-    assert apa.effect(dz._replace(value=nan)) == ""
+    assert apa.effect_text(dz) == ("<i>d</i><sub>z</sub> = 0.62, 95% CI [\N{MINUS SIGN}0.04, 1.20]")
+    assert apa.effect_text(dz._replace(low95=nan)) == "<i>d</i><sub>z</sub> = 0.62"
+    assert apa.effect_text(dz._replace(value=nan)) == ""
 
 
 def test_a_chi_square_has_its_degrees_of_freedom_and_its_answers() -> None:
     nothing = EffectSize("V", "V", 0.3, nan, nan, "none")
     found = StatisticalTest("chi_square", "χ²", 9.2, 4.0, 0.05, nan, 0.001, 48, nothing)
-    assert re.sub("<[^>]*>", "", apa.statistic(found)) == "χ²(4, N = 48) = 9.20"
+    assert re.sub("<[^>]*>", "", apa.statistic_text(found)) == "χ²(4, N = 48) = 9.20"
 
 
 def test_the_sentence_says_who_was_above_and_by_which_figures(ratings: StudyAnalysis) -> None:
     one = ratings.decisions[0]
     assert one.test is not None and one.verdict == "supported"
-    said = unescape(re.sub("<[^>]*>", "", apa.sentence(one, ratings)))
+    said = unescape(re.sub("<[^>]*>", "", apa.result_sentence(one, ratings)))
     assert re.fullmatch(
         r"The walk \(Mdn = [\d.]+\) was above the centre \(Mdn = [\d.]+\) in naturalness "
         r"\(Wilcoxon signed-rank test\), T = [\d.]+, p [=<] \.\d{3} \(exact\), "
@@ -201,7 +201,7 @@ def test_simulated_ones_do_not_count_beside_people() -> None:
     of = design()
     found = [records(of, k) for k in range(1, 5)]
     first = found[0][0]
-    assert isinstance(first, Opened)
+    assert isinstance(first, ParticipationOpened)
     found[0][0] = replace(first, simulated=False)
     one = analyse_study("m", of, QUESTIONS, SHA, [participation(r, of, QUESTIONS) for r in found])
     assert [p.left_out for p in one.people] == ["", "simulated", "simulated", "simulated"]
@@ -396,7 +396,7 @@ def test_a_folder_gives_back_the_design_and_all_answers(data: Path) -> None:
     # Names of rigs and films are replaced by their values, which the analysis does not need.
     assert found.design == wanted and found.name == "mine"
     assert list(found.questionnaires["paper"].items) == ["naturalness", "looked_at"]
-    assert [one.participant for one in found.people] == [code_of(k) for k in range(1, 13)]
+    assert [one.participant for one in found.people] == [participant_code(k) for k in range(1, 13)]
     assert len(found.folders) == 12 and found.deleted == ()
 
 
@@ -456,7 +456,7 @@ def test_a_torn_line_is_no_record_and_hinders_nothing(tmp_path: Path) -> None:
     journal = data.participant(1) / FILE
     whole = collect_study(tmp_path)
     with journal.open("ab") as file:
-        file.write(b'[{"kind": "Closed", "how": "wit')
+        file.write(b'[{"kind": "ParticipationClosed", "how": "wit')
     assert collect_study(tmp_path) == whole
 
 
@@ -480,7 +480,7 @@ def test_whatever_a_damaged_journal_holds_is_one_message_and_nothing_is_lost(
     path = data.participant(1) / FILE
     whole = json.loads(path.read_bytes())
     each = {one["kind"]: at for at, one in enumerate(whole)}
-    whole.insert(0, whole.pop(each["Opened"]))
+    whole.insert(0, whole.pop(each["ParticipationOpened"]))
     refused = 0
     for at in {*each.values(), len(whole) - 2}:
         for field in whole[at]:
@@ -545,7 +545,7 @@ def real(folder: Path, count: int) -> StudyData:
     sha256 = data.claim("mine", bytes_of(of))
     for number in range(len(data.numbers()) + 1, count + 1):
         first, *rest = records(of, number, Population(1.2), sha256=sha256)
-        assert isinstance(first, Opened)
+        assert isinstance(first, ParticipationOpened)
         with Journal(data.participant(number)) as journal:
             journal.write([replace(first, simulated=False), *rest])
     return data

@@ -14,18 +14,18 @@ from study_runs import UTC, run_of, screens, step
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.answers import LONGEST_TEXT, WrongAnswer
-from gazerig.features.study.data_folder import StudyData, code_of
+from gazerig.features.study.data_folder import StudyData, participant_code
 from gazerig.features.study.journal import (
     FILE,
-    Closed,
-    Consented,
+    ConsentGiven,
     ItemAnswered,
     Journal,
-    Measured,
-    Opened,
+    ParticipationClosed,
+    ParticipationOpened,
     Record,
     TrialBegan,
     TrialEnded,
+    TrialMeasured,
     WriteFailed,
     encode_records,
     read,
@@ -84,7 +84,7 @@ def test_all_of_a_study_is_shown_and_asked_in_its_order(name: str, tmp_path: Pat
     at_end = sum(len(study.questionnaires[q].items) for q in study.design.after)
     trials = len(run._session.order) + study.design.trials.practice
     assert len(answers) == trials * per_trial + at_end
-    assert [type(one) for one in journal.records].count(Closed) == 1
+    assert [type(one) for one in journal.records].count(ParticipationClosed) == 1
     journal.close()
 
 
@@ -226,8 +226,8 @@ def test_who_declines_or_leaves_is_asked_nothing_more(tmp_path: Path) -> None:
     run.withdraw()
     run.withdraw()
     assert run.now()[1] == EndScreen("withdrawn")
-    ends = [one for one in journal.records if isinstance(one, TrialEnded | Closed)]
-    assert [type(one) for one in ends] == [TrialEnded, Closed]
+    ends = [one for one in journal.records if isinstance(one, TrialEnded | ParticipationClosed)]
+    assert [type(one) for one in ends] == [TrialEnded, ParticipationClosed]
     journal.close()
 
 
@@ -327,7 +327,9 @@ def test_the_experimenter_may_repeat_and_exclude(tmp_path: Path) -> None:
     assert isinstance(screen, ReadyScreen) and screen.again
     run.exclude("asked what the difference is")
     assert run.now()[1] == EndScreen("excluded")
-    assert journal.records[-1] == Closed("excluded", "asked what the difference is", UTC)
+    assert journal.records[-1] == ParticipationClosed(
+        "excluded", "asked what the difference is", UTC
+    )
     journal.close()
 
 
@@ -427,14 +429,14 @@ def test_a_response_time_on_a_page_of_an_earlier_program_is_not_known(tmp_path: 
 
 
 ALL: tuple[Record, ...] = (
-    Opened("P001", "ab" * 32, ("a", "b|c"), "0.1", UTC),
-    Consented(True, False, True, UTC),
+    ParticipationOpened("P001", "ab" * 32, ("a", "b|c"), "0.1", UTC),
+    ConsentGiven(True, False, True, UTC),
     TrialBegan(-1, 0, "a", UTC),
     TrialEnded(-1, 0, "head_lost", 3.5, UTC, 1, "run-01.mcap", "servo 3", 1.0, 4.5),
     ItemAnswered(0, "b|c", "choice", "alive", "first", 812.5, UTC),
     ItemAnswered(None, "", "free_text", "what", 'schön\n"ja" 目', 1.0, UTC),
-    Measured(0, "b", {"first_look_s": 1.5}, 1, 2),
-    Closed("finished", "", UTC),
+    TrialMeasured(0, "b", {"first_look_s": 1.5}, 1, 2),
+    ParticipationClosed("finished", "", UTC),
 )
 
 
@@ -450,9 +452,11 @@ def test_all_kinds_of_records_come_back(tmp_path: Path) -> None:
 
 def test_what_is_not_a_number_comes_back_as_that(tmp_path: Path) -> None:
     with Journal(tmp_path) as journal:
-        journal.write((Measured(0, "a", {"x": nan}), TrialEnded(0, 0, "interrupted", nan, UTC)))
+        journal.write(
+            (TrialMeasured(0, "a", {"x": nan}), TrialEnded(0, 0, "interrupted", nan, UTC))
+        )
     measured, ended = read(tmp_path)
-    assert isinstance(measured, Measured) and isnan(measured.values["x"])
+    assert isinstance(measured, TrialMeasured) and isnan(measured.values["x"])
     assert isinstance(ended, TrialEnded) and isnan(ended.seconds) and isnan(ended.from_s)
 
 
@@ -556,8 +560,8 @@ def test_simulated_participants_finish_and_the_same_seed_gives_the_same_journals
     assert texts[0] == texts[1] != texts[2]
     for number in one.numbers():
         records = read(one.participant(number))
-        assert isinstance(records[0], Opened) and records[0].simulated
-        assert isinstance(records[-1], Closed) and records[-1].how == "finished"
+        assert isinstance(records[0], ParticipationOpened) and records[0].simulated
+        assert isinstance(records[-1], ParticipationClosed) and records[-1].how == "finished"
         assert sum(isinstance(record, ItemAnswered) for record in records) == 2 * 2 + 1
 
 
@@ -631,10 +635,10 @@ def test_a_participant_with_a_damaged_journal_can_be_deleted(
 
 
 def test_participants_have_numbers_and_no_names() -> None:
-    assert [code_of(7), code_of(1234)] == ["P007", "P1234"]
+    assert [participant_code(7), participant_code(1234)] == ["P007", "P1234"]
     for number in (0, -1, 1_000_000):
         with pytest.raises(SetupError, match="a whole number from 1 to 999999; no names"):
-            code_of(number)
+            participant_code(number)
 
 
 def test_the_secret_stays_and_is_the_owners_alone(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.room import HOME
 from gazerig.features.world.run.head_group import compose_group
-from gazerig.features.world.run.recorded_world import recorded_shapes, world_info
-from gazerig.features.world.shapes import ShapesFrom, SpecShapes
+from gazerig.features.world.run.recorded_world import recorded_shapes, recorded_world_info
+from gazerig.features.world.shapes import ShapesInFrame, SpecShapes
 from gazerig.features.world.world_scene import RigFrame
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose, run
@@ -80,7 +80,7 @@ def test_another_head_has_the_people_of_the_first_as_from_where_it_stands(tmp_pa
     first, other = RunRecording(file), RunRecording(tmp_path / "run-other.mcap")
     assert first.world == other.world and other.world is not None and other.world.seed == 4
     shapes = recorded_shapes(other.world, other.info.placement)
-    assert isinstance(shapes, ShapesFrom)
+    assert isinstance(shapes, ShapesInFrame)
     assert shapes.frame.p_m == pytest.approx((0.9, 0.0, 0.0))
 
 
@@ -89,7 +89,7 @@ def test_all_is_turned_and_moved_to_where_another_rig_stands(
 ) -> None:
     _, world = recorded
     frame = RigFrame(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), (0.9, 0.2, 0.0))
-    seen = ShapesFrom(world, frame)
+    seen = ShapesInFrame(world, frame)
     poses, turned = world.poses(8.0), seen.poses(8.0)
     assert poses.keys() == turned.keys()
     for name, (_, p_m) in poses.items():
@@ -115,7 +115,7 @@ def test_a_run_in_no_world_and_an_older_recording_have_none(tmp_path: Path) -> N
 def test_what_cannot_be_shown_is_said_in_one_line(tmp_path: Path) -> None:
     own = tmp_path / "mine.xml"
     own.write_text("<mujoco/>")
-    info = world_info(replace(ASKED, world=str(own)), 0)
+    info = recorded_world_info(replace(ASKED, world=str(own)), 0)
     assert info == WorldInfo("mine")
     with pytest.raises(SetupError, match="^the room is not shown: mine is in MuJoCo's own format"):
         recorded_shapes(info, ())

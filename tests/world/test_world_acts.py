@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gazerig.features.world.figure import SEGMENTS, Figures
-from gazerig.features.world.timeline import faults
+from gazerig.features.world.timeline import script_faults
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.script import Act, Do, PersonScript, SceneScript, ThingScript
 
@@ -122,7 +122,7 @@ def test_who_sits_is_lower_with_the_thighs_level_and_stands_up_again() -> None:
 @pytest.mark.parametrize("stature_m", [0.95, 1.3, 1.72, 2.05])
 def test_children_and_tall_people_are_as_tall_as_they_say(stature_m: float) -> None:
     script = SceneScript({"anna": PersonScript("front", stature_m=stature_m)}, round_s=4.0)
-    assert not list(faults(script))
+    assert not list(script_faults(script))
     found = Figures(script, 0).segments(1.0)
     eyes_m = float(found.p_m[Figures(script, 0).row["anna/left_eye"], 2]) + script.neck_height_m
     assert eyes_m == pytest.approx(0.92 * stature_m, rel=0.03)

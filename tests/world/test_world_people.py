@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from world_scripts import WORLDS, shipped_world
 
 from gazerig.features.world.body_shape import body_segments
-from gazerig.features.world.faces import looks
+from gazerig.features.world.faces import look_angles
 from gazerig.features.world.figure import SEGMENTS, Figures
 from gazerig.features.world.rotations import rotation_matrix
 from gazerig.features.world.timeline import HEAD_M
@@ -320,7 +320,7 @@ def test_a_head_does_not_turn_to_what_is_behind_it() -> None:
         act = TimedAct(Act(at_s=1.0, do="look_at", to=name), 1.0, 1.0)
         first = np.tile((1.0, 0.0, 1.6), (len(t_s), 1))
         rng = np.random.default_rng(0)
-        found = looks(t_s, (act,), first, places, eyes, ahead, "head", rng)
+        found = look_angles(t_s, (act,), first, places, eyes, ahead, "head", rng)
         turned[name] = float(np.degrees(found.yaw[len(t_s) // 2 :]).mean())
     assert turned["aside"] > 40.0
     assert abs(turned["behind"]) < 5.0

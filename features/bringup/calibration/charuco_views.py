@@ -203,7 +203,7 @@ _EDGE_MM, _STRIP_MM = 5.0, 13.0
 _BLACK = 0
 
 
-def page(board: CharucoBoard, paper: str) -> ImageArray:
+def board_page(board: CharucoBoard, paper: str) -> ImageArray:
     """Draw the page: (h, w) grey, 12 px a millimetre.
 
     Raises:
@@ -254,7 +254,7 @@ def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) 
     """
     if out.suffix.lower() not in (".pdf", ".png"):
         raise SetupError(f"{out}: a page is written as .pdf or .png; choose such a name")
-    image = Image.fromarray(page(board, paper))
+    image = Image.fromarray(board_page(board, paper))
     with output_file(out, force) as file:
         if out.suffix.lower() == ".pdf":
             # Two grey values compressed without loss: a JPEG inside would blur the corners.

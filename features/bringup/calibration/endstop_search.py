@@ -104,7 +104,7 @@ Exchange = Callable[[int | None], tuple[int, float, float]]
 """Sends a goal (None: none) and returns position in steps, load share and time in seconds."""
 
 
-def search(
+def find_end_stop(
     params: StopSearchParams, direction: int, limits: tuple[int, int], exchange: Exchange
 ) -> EndStop:
     """Run one search to its end and move back; return the stop."""
@@ -117,7 +117,7 @@ def search(
     return look.found
 
 
-def go(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
+def move_to_goal(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
     """Move a joint slowly to a position; return whether it came there unhindered."""
     position, _, _ = exchange(None)
     way = 1 if goal_steps > position else -1

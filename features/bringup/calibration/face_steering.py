@@ -101,7 +101,7 @@ def initial_calibration(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
     own_mm: part -> place in the face frame, as under ``face_parts_mm`` of a rig file
     """
     starts = [
-        own_mm[part] if part in own_mm else _tenths((x * 1e3, y * 1e3, z * 1e3))
+        own_mm[part] if part in own_mm else _round_to_tenths((x * 1e3, y * 1e3, z * 1e3))
         for part, (x, y, z) in ((part, PARTS_FACE_M[part]) for part in ORDER)
     ]
     return FaceCalibration(tuple(starts), tuple(starts))
@@ -114,17 +114,21 @@ def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
         return state
     if key in _WAYS:
         (x, y, z), (left, up) = state.place_mm(part), _WAYS[key]
-        place = x, _within(y, left * state.step_mm), _within(z, up * state.step_mm)
+        place = (
+            x,
+            _step_within_range(y, left * state.step_mm),
+            _step_within_range(z, up * state.step_mm),
+        )
         return _with_place(state, place)
     match key:
         case "larger" | "smaller":
             step = state.step + (1 if key == "larger" else -1)
             return replace(state, step=max(0, min(len(STEPS_MM) - 1, step)))
         case "enter":
-            return _next(replace(state, chosen=state.chosen | {part}))
+            return _next_part(replace(state, chosen=state.chosen | {part}))
         case "skip":
             left_alone = _with_place(state, state.starts_mm[state.at])
-            return _next(replace(left_alone, chosen=state.chosen - {part}))
+            return _next_part(replace(left_alone, chosen=state.chosen - {part}))
         case "back":
             return replace(state, at=max(0, state.at - 1))
         case _:
@@ -143,21 +147,21 @@ def place_in_face_mm(p_world_m: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) 
     return x * 1e3, y * 1e3, z * 1e3
 
 
-def changes(state: FaceCalibration) -> dict[str, Vec3]:
+def changed_places(state: FaceCalibration) -> dict[str, Vec3]:
     """Return the chosen places as dotted keys of a rig file and values, to 0.1 mm."""
     return {
-        f"face_parts_mm.{part}": _tenths(state.place_mm(part))
+        f"face_parts_mm.{part}": _round_to_tenths(state.place_mm(part))
         for part in ORDER
         if part in state.chosen
     }
 
 
-def _tenths(place_mm: Vec3) -> Vec3:
+def _round_to_tenths(place_mm: Vec3) -> Vec3:
     x, y, z = (round(v, 1) + 0.0 for v in place_mm)  # + 0.0: no -0.0 in a file
     return x, y, z
 
 
-def _within(value: float, by: float) -> float:
+def _step_within_range(value: float, by: float) -> float:
     # A place that was written down farther out stays, but moves only inwards.
     far = max(FARTHEST_MM, abs(value))
     return max(-far, min(far, value + by))
@@ -168,7 +172,7 @@ def _with_place(state: FaceCalibration, place_mm: Vec3) -> FaceCalibration:
     return replace(state, places_mm=places)
 
 
-def _next(state: FaceCalibration) -> FaceCalibration:
+def _next_part(state: FaceCalibration) -> FaceCalibration:
     at = state.at + 1
     return replace(state, at=at, ended=at >= len(ORDER))
 

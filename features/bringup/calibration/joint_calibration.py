@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
@@ -117,14 +117,14 @@ class PositionUnwrapper:
         return self._at
 
 
-def ends_of(joint_name: str) -> tuple[str, str]:
+def end_names(joint_name: str) -> tuple[str, str]:
     """Return the names of a joint's positive and negative end."""
     if joint_name not in GAZE_JOINTS:
         return "POSITIVE", "NEGATIVE"
     return next(ends for part, ends in ENDS.items() if joint_name.endswith(part))
 
 
-def zero_of(joint_name: str) -> str:
+def zero_name(joint_name: str) -> str:
     """Return what people call the position of a joint at 0 deg."""
     return "straight ahead" if joint_name in GAZE_JOINTS else "at rest"
 
@@ -145,7 +145,9 @@ def centre_zero(marks: Marks) -> Marks:
     return marks._replace(zero=(marks.positive_end + marks.negative_end) // 2)
 
 
-def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) -> Calibration:
+def joint_calibration(
+    name: str, marks: Marks, joint: JointParams, margin_deg: float
+) -> Calibration:
     """Return zero, sign and range of a joint, ``margin_deg`` short of each end.
 
     joint: as it is configured now; its gear ratio is taken as right
@@ -165,10 +167,10 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
             f"{SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, "
             "and is its horn screwed on?"
         )
-    _refuse_seam(name, low, high, steps_per_deg, kind_of(joint.model).set_middle is not None)
+    _refuse_seam(name, low, high, steps_per_deg, servo_kind(joint.model).set_middle is not None)
     if not (low < marks.zero < high or (at_end and low <= marks.zero <= high)):
         raise CalibrationRefused(
-            f"{name}: {zero_of(name)} (step {marks.zero % STEPS_PER_TURN}) is not between "
+            f"{name}: {zero_name(name)} (step {marks.zero % STEPS_PER_TURN}) is not between "
             f"the ends (steps {low % STEPS_PER_TURN} and {high % STEPS_PER_TURN}): "
             "mark the three places again"
         )
@@ -248,7 +250,7 @@ def with_calibration(joint: JointParams, made: Calibration) -> JointParams:
     return replace(joint, **made._asdict())
 
 
-def changes(
+def rig_changes(
     name: str, joint: JointParams, made: Calibration | LinkageFit, park_deg: Mapping[str, float]
 ) -> dict[str, Value]:
     """Return dotted keys of the rig file and their new values, only those that differ.

@@ -13,11 +13,11 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     CalibrationRefused,
     Marks,
     PositionUnwrapper,
-    calibration,
     centre_zero,
-    ends_of,
+    end_names,
     is_lid,
-    zero_of,
+    joint_calibration,
+    zero_name,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import SmartServoAccess
 
@@ -78,7 +78,7 @@ def calibrate_by_hand(single: SmartServoAccess, person: Operator, margin_deg: fl
     """
     single.disable_torque()
     watched = PositionTracker(single)
-    positive, negative = ends_of(single.name)
+    positive, negative = end_names(single.name)
     person.tell(f"{single.who}: torque off, it can be turned by hand")
 
     def mark(where: str) -> int:
@@ -90,9 +90,9 @@ def calibrate_by_hand(single: SmartServoAccess, person: Operator, margin_deg: fl
     marks = (
         centre_zero(marks)
         if is_lid(single.name)
-        else marks._replace(zero=mark(zero_of(single.name)))
+        else marks._replace(zero=mark(zero_name(single.name)))
     )
-    return calibration(single.name, marks, single.joint, margin_deg)
+    return joint_calibration(single.name, marks, single.joint, margin_deg)
 
 
 def calibrate_by_motion(
@@ -110,7 +110,7 @@ def calibrate_by_motion(
         CalibrationStopped: the person ended it.
     """
     try:
-        positive, negative = ends_of(single.name)
+        positive, negative = end_names(single.name)
         way = single.joint.sign
         single.enable_torque(params)
         person.tell(
@@ -130,11 +130,11 @@ def calibrate_by_motion(
     person.tell(f"{single.who}: torque off")
     if zero_by == "person" and not is_lid(single.name):
         watched = PositionTracker(single)
-        person.wait(f"turn {single.name} {zero_of(single.name)}, then press Enter", watched.live)
+        person.wait(f"turn {single.name} {zero_name(single.name)}, then press Enter", watched.live)
         marks = marks._replace(zero=watched.steps())
     else:
         marks = centre_zero(marks)
-    return calibration(single.name, marks, single.joint, margin_deg)
+    return joint_calibration(single.name, marks, single.joint, margin_deg)
 
 
 def _find_stop(

@@ -17,10 +17,10 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     SMALLEST_RANGE_DEG,
     CalibrationRefused,
     LinkageFit,
-    ends_of,
+    end_names,
     is_lid,
     round_inwards,
-    zero_of,
+    zero_name,
 )
 from gazerig.features.bringup.calibration.joint_procedure import Operator, PositionTracker
 from gazerig.features.bringup.calibration.smart_servo_access import SmartServoAccess
@@ -77,7 +77,7 @@ def fit_linkage(
             + (
                 "call half open 0"
                 if is_lid(name)
-                else f"call it {zero_of(name)} 0, or lessen the margin"
+                else f"call it {zero_name(name)} 0, or lessen the margin"
             )
         )
     if high - low <= SMALLEST_RANGE_DEG:
@@ -258,13 +258,13 @@ def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: 
         CalibrationStopped: the person ended it.
     """
     placer.begin()
-    positive, negative = ends_of(placer.name)
+    positive, negative = end_names(placer.name)
     if is_lid(placer.name):
         shut = next(where for part, where in SHUT_WHERE.items() if placer.name.endswith(part))
         marked, ends = [], (("to where it is fully OPEN", 1), (shut, -1))
     else:
         end = "to its {} end, as far as it goes freely"
-        marked = [(0.0, placer.mark(zero_of(placer.name)))]
+        marked = [(0.0, placer.mark(zero_name(placer.name)))]
         ends = ((end.format(positive), 1), (end.format(negative), -1))
     for where, sign in ends:
         at = placer.mark(where)
@@ -284,6 +284,6 @@ def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: 
 
 def _angle(placer: Marker, person: Jogger, at: float, proposed: float) -> float:
     """Ask for the angle of the joint's present position."""
-    towards = f" ({ends_of(placer.name)[0]} is +)"
+    towards = f" ({end_names(placer.name)[0]} is +)"
     asked = f"{placer.name} at {at:g} {placer.joint.facts.unit}: how many degrees{towards}?"
     return person.number(asked, proposed, placer.live)

@@ -15,10 +15,10 @@ from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
     EndStop,
     StopSearchParams,
-    go,
-    search,
+    find_end_stop,
+    move_to_goal,
 )
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
@@ -67,7 +67,7 @@ class SmartServoAccess:
     ) -> None:
         self.name, self.joint = name, joint
         self.who = f"{name} (servo {joint.id})"
-        self._kind = kind_of(joint.model)
+        self._kind = servo_kind(joint.model)
         if self._kind.driving is None:
             raise SetupError(
                 f"{self.who}: {self._kind.title} servos are not calibrated by this program: turn "
@@ -232,7 +232,7 @@ class SmartServoAccess:
             ServoFault: it let go during the search, so it was not at a stop.
             CalibrationStopped: a person or the system requested it.
         """
-        stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
+        stop = find_end_stop(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
         if not self._value("torque_enable"):
             raise ServoFault(
                 f"{self.who} let go during the search: it protected itself or restarted; "
@@ -242,7 +242,7 @@ class SmartServoAccess:
 
     def go(self, params: StopSearchParams, goal_steps: int) -> bool:
         """Move it slowly to a position; return whether it came there unhindered."""
-        return go(goal_steps, params, self._exchange)
+        return move_to_goal(goal_steps, params, self._exchange)
 
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:
         """Send a goal, if any; return position, load and time."""

@@ -31,7 +31,7 @@ _WORDS: dict[str, Key] = {
 }  # fmt: skip
 
 
-def keys_of(text: str) -> tuple[list[Key], str]:
+def split_words(text: str) -> tuple[list[Key], str]:
     """Return the keys in what a terminal has sent, and the rest that a sequence begins with."""
     typed, rest = split_keys(text)
     named = ((one if len(one) > 1 else _PLAIN.get(one.lower())) for one in typed)
@@ -78,7 +78,7 @@ class TerminalKeys(TerminalInput, Keys):
             text = self.text()
             if text is None:
                 return "end"
-            self._ready, self._rest = keys_of(self._rest + text)
+            self._ready, self._rest = split_words(self._rest + text)
         return self._ready.pop(0) if self._ready else None
 
 

@@ -27,7 +27,7 @@ from gazerig.features.bringup.cli.ports import (
     setups_on,
 )
 from gazerig.features.bringup.doctor import run as checkup
-from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
+from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
 from gazerig.features.bringup.doctor.camera import LOOK_S, examine_camera
 from gazerig.features.bringup.doctor.diagnostics import (
     BOARD,
@@ -36,10 +36,10 @@ from gazerig.features.bringup.doctor.diagnostics import (
     finding_json,
     group_findings,
     summarize,
-    worst,
+    worst_level,
 )
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
 from gazerig.robot.model.clock import RealClock
@@ -93,7 +93,7 @@ def doctor(
             print(json.dumps(rows))
         whole = [*(one for some in findings.values() for one in some), *eyes]
         tell(summarize(whole, rig, fix))
-    if worst(whole) == "error":
+    if worst_level(whole) == "error":
         raise typer.Exit(FAULT)
 
 
@@ -113,9 +113,9 @@ def _examine_buses(
         if config.kind in BOARDS:
             examine = partial(BOARDS[config.kind], line, config, setups)
         else:
-            kind = kind_of(setups[0].model)
-            examine = partial(checkup.check, line, kind, setups, config.baud, progress)
-        findings[bus] = checkup.check_all(line, bench.host, examine)
+            kind = servo_kind(setups[0].model)
+            examine = partial(checkup.examine_bus, line, kind, setups, config.baud, progress)
+        findings[bus] = checkup.examine_ports(line, bench.host, examine)
         if can_be_released(rig, bus):
             findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
         clear_progress()
@@ -126,10 +126,10 @@ def _examine_buses(
 
 
 BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[Diagnostic]]] = {
-    "maestro": lambda line, config, setups: visit_maestro(
+    "maestro": lambda line, config, setups: examine_maestro(
         line, config.maestro, setups, bench.usb_id(line.port_name)
     ),
-    "pca9685": lambda line, config, setups: visit_pca9685(line, config.pca9685, setups),
+    "pca9685": lambda line, config, setups: examine_pca9685(line, config.pca9685, setups),
 }
 """Examinations of boards, by the kind of bus."""
 
@@ -161,7 +161,7 @@ def _apply_fixes(
             ) -> str:
                 if one.servo_id == BOARD:
                     return stop_script(line, config.maestro)
-                return apply_fix(line, kind_of(setups_on(rig, bus)[0].model), one)
+                return apply_fix(line, servo_kind(setups_on(rig, bus)[0].model), one)
 
             done += checkup.apply_fixes(write, findings[bus])
             line.closePort()

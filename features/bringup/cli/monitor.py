@@ -23,7 +23,7 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
     setups_on,
 )
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.features.bringup.telemetry import (
     MaestroTelemetry,
     Monitor,
@@ -99,7 +99,7 @@ def _readers(rig: Rig, wire: RigPorts) -> Iterator[dict[str, TelemetryReader]]:
         readers = {}
         for name in bus_names(rig):
             port, config = ports.enter_context(open_port(rig, wire, name)), rig.bus_named(name)
-            kind = None if config.kind in BOARDS else kind_of(setups_on(rig, name)[0].model)
+            kind = None if config.kind in BOARDS else servo_kind(setups_on(rig, name)[0].model)
             readers[name] = (
                 BOARDS[config.kind](port, config)
                 if kind is None

@@ -13,14 +13,19 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.manual_session import holding_rig, holding_text
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
-from gazerig.features.bringup.look_at import ends_reached, gaze_text, look_at, refuse_not_finite
+from gazerig.features.bringup.look_at import (
+    gaze_result_text,
+    joints_at_limits,
+    look_at,
+    refuse_not_finite,
+)
 from gazerig.features.bringup.manual_control import (
     PASSING,
     JogParams,
     ManualControl,
     MoveResult,
     Step,
-    refuse_beyond,
+    refuse_angle,
 )
 from gazerig.robot.app.rig_limits import lid_ends, limits
 from gazerig.robot.cli.rig_command import RigCommand
@@ -66,7 +71,7 @@ def jog(
     """Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20."""
     with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
-        refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
+        refuse_angle(joint, deg, loaded.names, limits(loaded.joints))
     with _manual_control(loaded, rig, mock, port, yes, speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))
@@ -134,11 +139,11 @@ def look_at_command(
         if any(name.startswith("neck") for name in loaded.names):
             yaw, pitch, roll = looked.head
             say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
-        for line in gaze_text(looked):
+        for line in gaze_result_text(looked):
             say(line)
         for applied in looked.moved.remarkable():
             say(f"limited: {applied}")
-        for line in () if good else ends_reached(loaded.joints, narrower, looked.moved):
+        for line in () if good else joints_at_limits(loaded.joints, narrower, looked.moved):
             say(f"limited: {line}")
         _hold(control, 0.0, hold)
     _exit_unless(good)

@@ -24,7 +24,7 @@ from gazerig.features.bringup.cli.ports import (
     setups_on,
     unopened_port,
 )
-from gazerig.features.bringup.servo_families import KINDS, ServoKind, kind_of
+from gazerig.features.bringup.servo_families import KINDS, ServoKind, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say
@@ -65,7 +65,7 @@ def reboot(
                     if config.kind in BOARDS:
                         BOARDS[config.kind](model, bus, line, yes)
                         continue
-                    kind = kind_of(setups_on(model, bus)[0].model)
+                    kind = servo_kind(setups_on(model, bus)[0].model)
                     again += [_reboot(line, kind, model, bus, one, yes) for one in ids]
     if any(again):
         raise typer.Exit(FAULT)
@@ -107,7 +107,7 @@ def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, y
     if before.torque and not yes and not typer.confirm(question, err=True):
         say(f"{name}: left as it is")
         return False
-    result = servo_reboot.restart(line, kind, servo_id, baud, RealClock().sleep_until)
+    result = servo_reboot.reboot_servo(line, kind, servo_id, baud, RealClock().sleep_until)
     say(f"{name}: back after {result.away_s:.1f} s: {result.after}")
     if result.after.errors:
         say(f"{name}: the cause is still there: gazerig doctor names the cure")

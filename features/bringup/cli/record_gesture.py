@@ -19,8 +19,8 @@ from gazerig.features.bringup.cli.ports import (
     open_port,
     rig_ports,
 )
-from gazerig.features.bringup.hand_recording import LONGEST_S, record, switch_off
-from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.hand_recording import LONGEST_S, record_hand_motion, switch_off
+from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
 from gazerig.robot.cli.gestures import FolderOption, print_gesture_fit
 from gazerig.robot.cli.rig_command import RigCommand
@@ -82,11 +82,11 @@ def record_gesture(
                 line = ports.enter_context(open_port(loaded, wire, bus))
                 own = {one: joint for one, joint in there.items() if joint.bus == bus}
                 switch_off(own, line)
-                readers[bus] = SmartServoTelemetry(line, kind_of(next(iter(own.values())).model))
+                readers[bus] = SmartServoTelemetry(line, servo_kind(next(iter(own.values())).model))
             say(f"the torque is off; move the head, Enter ends it (within {seconds:g} s)")
             watch = Monitor(readers, there, clock.now_s)
             end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
-            recorded = record(watch.sample, clock, end, seconds)
+            recorded = record_hand_motion(watch.sample, clock, end, seconds)
             say(f"recorded {len(recorded.series)} joints; the torque stays off")
             ended = stopped()
         if ended:

@@ -25,8 +25,8 @@ from gazerig.features.bringup.bus_search import (
     SearchRound,
     found_servos,
     parse_kinds,
-    plan,
-    search,
+    plan_search,
+    search_bus,
 )
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.cli.ports import (
@@ -37,7 +37,7 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
 )
 from gazerig.features.bringup.doctor.run import name_ports
-from gazerig.features.bringup.servo_families import KINDS, kind_of
+from gazerig.features.bringup.servo_families import KINDS, servo_kind
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
 
@@ -181,7 +181,7 @@ def _search_port(
 ) -> bool:
     """Search one port and show what was found; return whether a servo answered."""
     usb = bench.usb_id(path)
-    asked = plan(usb, kinds, rates)
+    asked = plan_search(usb, kinds, rates)
     if not asked and usb.startswith(POLOLU):
         raise SetupError(
             f"{path} is a board of Pololu: packets for servos would move what hangs on it; "
@@ -211,7 +211,7 @@ def _search(
     errors = Console(stderr=True)
     with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
         task = bar.add_task("asking", total=len(asked))
-        for one in search(line, usb, asked, thorough, to_the_end):
+        for one in search_bus(line, usb, asked, thorough, to_the_end):
             rounds.append(one)
             bar.update(task, advance=1, description=f"searched {one.kind} at {one.baud} bit/s")
     return rounds
@@ -242,7 +242,7 @@ def _show(
     if found:
         table = Table("id", "model", "firmware", "baud", "kind")
         for kind, servo in found:
-            made = kind_of(servo.model) if servo.model in FAMILY_OF else KINDS[kind]
+            made = servo_kind(servo.model) if servo.model in FAMILY_OF else KINDS[kind]
             version = made.family.format_firmware(servo.firmware)
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
@@ -260,11 +260,11 @@ def _show(
             script.get(board.is_script_running, "its script: no answer"),
         ):
             out.print(f"{where}: {line}", markup=False)
-    for line in remarks(rounds, where, requested):
+    for line in scan_remarks(rounds, where, requested):
         out.print(complete_suggestions(line), markup=False)
 
 
-def remarks(
+def scan_remarks(
     rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind] = ()
 ) -> Iterator[str]:
     """Return remarks on a scan beyond its tables of servos and boards.

@@ -29,7 +29,7 @@ from gazerig.features.bringup.cli.setup_boards import (
     set_up_maestro,
     set_up_pca9685,
 )
-from gazerig.features.bringup.servo_families import ServoKind, kind_of
+from gazerig.features.bringup.servo_families import ServoKind, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.run_bus import CHAINS
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
@@ -98,7 +98,7 @@ def _set_up_chain(task: SetupTask) -> list[str]:
 
 def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
-    kind = kind_of(one.model)
+    kind = servo_kind(one.model)
     # As it comes from the factory.
     spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
     fresh = {task.bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
@@ -128,7 +128,7 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
     question = f"   give it id {wanted.id} and {baud} bit/s?"
     if not yes and not typer.confirm(question, default=True, err=True):
         return False
-    result = servo_setup.assign(line, kind, found, wanted, baud, progress)
+    result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
     clear_progress()
     done = "; ".join(result.done) or "nothing to change"
     say(

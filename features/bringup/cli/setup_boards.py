@@ -35,7 +35,12 @@ from gazerig.drivers.pca9685.registers import CHANNELS, COUNTS, PulseClock
 from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.channel_test import FINE_STEPS, ChannelPosition, give_pulses, walk
+from gazerig.features.bringup.channel_test import (
+    FINE_STEPS,
+    ChannelPosition,
+    start_pulses,
+    walk_channel,
+)
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import clipping_text, instructions, settings_file
 from gazerig.robot.app.bus_wiring import bus_names
@@ -129,7 +134,7 @@ def _walk_channel(
             stopped.refuse()
             clock.sleep_until(t_s)
 
-        return walk(board, setup, places, sleep_until, *speed_steps_s)
+        return walk_channel(board, setup, places, sleep_until, *speed_steps_s)
 
 
 def _rest_steps(setup: ServoConfig) -> int:
@@ -320,7 +325,7 @@ def _measure_clocks(line: BusPort, params: Pca9685Params, task: SetupTask) -> Pc
         pulse = ServoConfig(
             free[-1], "hobby", PULSE_STEPS, PULSE_STEPS, 1.0, "no joint", rest_steps=PULSE_STEPS
         )
-        with give_pulses(Pca9685Board(line, params), pulse):
+        with start_pulses(Pca9685Board(line, params), pulse):
             found[n] = _ask_oscillator_hz(params, address, free[-1] % CHANNELS, found[n])
     return replace(params, oscillator_hz=found[0], further_oscillators_hz=tuple(found[1:]))
 

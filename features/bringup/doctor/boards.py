@@ -131,7 +131,7 @@ PCA9685 = BoardRules(
 )
 
 
-def examine(
+def examine_channels(
     rules: BoardRules,
     setups: Sequence[ServoConfig],
     pulses: Mapping[int, int | None],
@@ -177,7 +177,7 @@ def examine(
 # --- Maestro
 
 
-def visit_maestro(
+def examine_maestro(
     port: BusPort, params: MaestroParams, setups: Sequence[ServoConfig], usb: str
 ) -> list[Diagnostic]:
     """Read and check everything that a board reports; nothing moves.
@@ -219,7 +219,7 @@ def visit_maestro(
         own.append(advice.at(WHERE, error=error, cure=cure))
     if found.is_script_running:
         own.append(ADVICE["script"].at(WHERE, Fix(BOARD, SCRIPT, 0, 1)))
-    findings = examine(MAESTRO, setups, pulses, channels, own, well)
+    findings = examine_channels(MAESTRO, setups, pulses, channels, own, well)
     wide = [
         ADVICE["wide range"].at(
             servo_label(setup),
@@ -285,7 +285,7 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
 # --- PCA9685
 
 
-def visit_pca9685(
+def examine_pca9685(
     port: BusPort, params: Pca9685Params, setups: Sequence[ServoConfig]
 ) -> list[Diagnostic]:
     """Read and check everything that the boards of one bus report; nothing moves.
@@ -314,4 +314,6 @@ def visit_pca9685(
         return [*findings, Diagnostic("error", what, WHERE, remedy)]
     named = " and ".join(f"{address:#x}" for address in params.addresses)
     read = dict(zip((setup.id for setup in fitting), pulses, strict=True))
-    return examine(PCA9685, fitting, read, params.channels, findings, f"answers at {named}")
+    return examine_channels(
+        PCA9685, fitting, read, params.channels, findings, f"answers at {named}"
+    )

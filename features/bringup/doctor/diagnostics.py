@@ -70,7 +70,7 @@ class Advice(NamedTuple):
         return Diagnostic(self.level, what, where, remedy, fixes)
 
 
-def worst(findings: Iterable[Diagnostic]) -> Level:
+def worst_level(findings: Iterable[Diagnostic]) -> Level:
     """Return the worst level, "ok" without findings."""
     return max((finding.level for finding in findings), key=LEVELS.index, default="ok")
 

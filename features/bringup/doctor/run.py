@@ -32,8 +32,8 @@ from gazerig.drivers.servo_bus.discovery import (
     scan_ids,
 )
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst
-from gazerig.features.bringup.doctor.servo_rules import visit
+from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst_level
+from gazerig.features.bringup.doctor.servo_rules import examine_servo
 from gazerig.features.bringup.servo_families import ServoKind, Tell
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
@@ -84,7 +84,7 @@ class AppliedFix:
         return f"{self.where}: {self.what}"
 
 
-def check_all(
+def examine_ports(
     port: BusPort, host: Host, examine: Callable[[], list[Diagnostic]]
 ) -> list[Diagnostic]:
     """Examine a port and, if it can be used, its servos; the port is closed at the end.
@@ -95,7 +95,7 @@ def check_all(
     """
     device = port.port_name
     findings = examine_port(port_facts(device, host))
-    if worst(findings) == "error":
+    if worst_level(findings) == "error":
         return findings
     try:
         behind = examine()
@@ -108,7 +108,7 @@ def check_all(
         port.closePort()
 
 
-def check(
+def examine_bus(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
 ) -> list[Diagnostic]:
     """Examine every servo of a bus, and any other on it; torque is left as it is.
@@ -132,7 +132,7 @@ def check(
         if setup.id in presence.there:
             tell(f"reading {servo_label(setup)}")
             found, spoilt = presence.there[setup.id], presence.corrupt.get(setup.id, 0)
-            findings += visit(port, kind, setup, found, spoilt)
+            findings += examine_servo(port, kind, setup, found, spoilt)
     if presence.there:
         findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
     return findings

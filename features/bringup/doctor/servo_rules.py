@@ -129,7 +129,7 @@ class RegisterRule:
             yield state.finding(self.advice, *self.fixes)
 
 
-def visit(
+def examine_servo(
     port: BusPort, kind: ServoKind, setup: ServoConfig, found: FoundServo, corrupt: int
 ) -> list[Diagnostic]:
     """Read one servo and examine it; its torque stays as it is.
@@ -138,7 +138,7 @@ def visit(
         BusLost: the port is gone.
     """
     checks = CHECKS[kind.family.name]
-    return examine(read_state(Registers(port, kind.family), checks, setup, found, corrupt))
+    return apply_rules(read_state(Registers(port, kind.family), checks, setup, found, corrupt))
 
 
 def read_state(
@@ -153,7 +153,7 @@ def read_state(
     return ServoState(checks, setup, found, values, corrupt)
 
 
-def examine(state: ServoState) -> list[Diagnostic]:
+def apply_rules(state: ServoState) -> list[Diagnostic]:
     """Return all faults of one servo; a healthy one has one finding that describes it.
 
     A servo of another model, or with an id that another one has, is not examined further.

@@ -123,7 +123,7 @@ def _samples(table: _TrackerTable) -> Samples:
 def _fixations(table: _TrackerTable) -> FixationTable:
     start, duration = _require_column(table, "start"), _require_column(table, "duration")
     part = _find(table, "part")
-    starts, durations = _numbers(table, start, _finite), _numbers(table, duration, _above_0)
+    starts, durations = _numbers(table, start, _finite), _numbers(table, duration, _is_positive)
     _refuse_unsorted(table, start, starts)
     if part is None and (_find(table, "x") is None or _find(table, "y") is None):
         raise _missing_column_error(table, "part")
@@ -227,7 +227,7 @@ def _finite(cell: str) -> float:
     return number
 
 
-def _above_0(cell: str) -> float:
+def _is_positive(cell: str) -> float:
     number = _finite(cell)
     if number <= 0.0:
         raise ValueError(f"{cell} is not above 0")

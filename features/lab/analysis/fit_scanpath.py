@@ -27,7 +27,7 @@ from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PART_NAMES, PARTS
 
 
-def fit(
+def fit_to_recording(
     recording: Path,
     parts: PartBoxes | None,
     out: Path,

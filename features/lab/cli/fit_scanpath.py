@@ -28,4 +28,4 @@ def fit_scanpath(
         from gazerig.features.lab.analysis.fixations import PartBoxes
 
         boxes = load(parts, PartBoxes) if parts is not None else None
-        say(fitting.fit(recording, boxes, out, smoothing, seed, force))
+        say(fitting.fit_to_recording(recording, boxes, out, smoothing, seed, force))

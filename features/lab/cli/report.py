@@ -72,19 +72,19 @@ def report(
         if file is None and other is not None:
             raise SetupError("--with takes the recording of another head: give both recordings")
         # Drawing and models are heavy; `--help` does not import them.
-        from gazerig.features.lab.report.page import banner, files_of, refuse_foreign
-        from gazerig.features.lab.report.report import FIGURE_KEYS, read, report_of
+        from gazerig.features.lab.report.page import banner, refuse_foreign, report_files
+        from gazerig.features.lab.report.report import FIGURE_KEYS, make_report, read_run
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         default = Path(f"report-{scene}.html") if file is None else file.with_suffix(".html")
         target = page_file(out or default)
-        refuse_foreign(files_of(target, FIGURE_KEYS), force)
+        refuse_foreign(report_files(target, FIGURE_KEYS), force)
         with progress_bar() as tell:
             if file is not None:
                 recording = RunRecording(file)
                 about = _recording_header(recording, file.stem)
                 with report_bad_contents(file):
-                    run = read(recording.ticks(), about, tell)
+                    run = read_run(recording.ticks(), about, tell)
             else:
                 from gazerig.robot.app.options import RunOptions
 
@@ -95,7 +95,7 @@ def report(
                 ).check_and_complete()  # fmt: skip
                 about, run = _simulate_run(options, tell)
             gaze = None if file is None or other is None else _mutual_gaze(file, other)
-            made = report_of(run, about, target, tell, force, gaze)
+            made = make_report(run, about, target, tell, force, gaze)
         if text := banner(run.joints):
             say(text)
         for finding in made.findings:
@@ -127,12 +127,12 @@ def compare(
     with clear_errors():
         from gazerig.features.lab.report.compare import LEVEL
         from gazerig.features.lab.report.compare import compare as comparing
-        from gazerig.features.lab.report.page import files_of, refuse_foreign
+        from gazerig.features.lab.report.page import refuse_foreign, report_files
         from gazerig.features.lab.report.report import FIGURE_KEYS
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
         target = page_file(out)
-        refuse_foreign(files_of(target, FIGURE_KEYS), force)
+        refuse_foreign(report_files(target, FIGURE_KEYS), force)
         recordings = RunRecording(first), RunRecording(second)
         names = _names(first, second)
         abouts = (

@@ -149,23 +149,23 @@ def _plan_runs(
     import gazerig.features.lab.sweep.response_figure  # noqa: F401
     from gazerig.features.lab.simulated_run import refuse_unfit
     from gazerig.features.lab.sweep.axes import (
-        axes_of,
         check_points,
         grid,
         latin_hypercube,
-        one_by_one,
+        make_axes,
+        vary_one_by_one,
     )
     from gazerig.features.lab.sweep.sweep import SweepSpec
     from gazerig.robot.app.run_rig import run_rig
 
     rig = run_rig(asked)
     refuse_unfit(rig, asked)
-    axes = axes_of(rig, settings, read_value)
+    axes = make_axes(rig, settings, read_value)
     if not axes:
         example = "--set gaze.head.comfort_deg=4:16:7"
         raise SetupError(f"nothing to vary: give --set KEY=VALUES, for example {example}")
     if fit:
-        points = one_by_one(axes)
+        points = vary_one_by_one(axes)
     else:
         points = grid(axes) if number is None else latin_hypercube(axes, number, seeds[0])
     check_points(rig, axes, points)
@@ -179,7 +179,7 @@ def _search_best(
 ) -> "list[Outcome]":
     """Search for the best point; write it as YAML, with the table and picture of all runs."""
     from gazerig.config.parameters import value_of
-    from gazerig.features.lab.sweep.fit import SNIPPET, fit, snippet_of
+    from gazerig.features.lab.sweep.fit import SNIPPET, fit_settings, yaml_snippet
 
     count, seed = int(str(spec.search["fit"])), int(str(spec.search["seed"]))
     start = {axis.key: value_of(spec.rig, axis.key) for axis in spec.axes}
@@ -193,9 +193,9 @@ def _search_best(
             n = len(spec.seeds)
             return [outcomes[i : i + n] for i in range(before, len(outcomes), n)]
 
-        found = fit(run, spec.axes, start, count, seed)
+        found = fit_settings(run, spec.axes, start, count, seed)
     _write(spec, folder, outcomes, shown)
-    write_file(folder / SNIPPET, snippet_of(spec.options, found.best.point), force=True)
+    write_file(folder / SNIPPET, yaml_snippet(spec.options, found.best.point), force=True)
     _say_failures(outcomes)
     _say_fit(found, folder / SNIPPET, spec.options)
     return outcomes

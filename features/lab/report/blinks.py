@@ -8,8 +8,8 @@ import numpy as np
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
-    figure,
     mean,
+    measured_value,
     median,
     spread_over_mean,
 )
@@ -28,14 +28,14 @@ _SHUT = 0.96
 """A blink of this depth has shut the eye, given the resolution of a servo."""
 
 
-def intervals(run: GazeTrace) -> Floats:
+def blink_intervals(run: GazeTrace) -> Floats:
     """Return seconds from blink to blink; a double blink counts once."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     apart = np.diff(onsets)
     return apart[apart > _DOUBLE_S]
 
 
-def shapes(blinks: Sequence[BlinkEvent]) -> Floats:
+def blink_shapes(blinks: Sequence[BlinkEvent]) -> Floats:
     """Return (n, 4) closing, shut and opening in ms, and fastest closing over fastest opening."""
     rows = [
         (1e3 * b.close_s, 1e3 * b.hold_s, 1e3 * b.open_s, b.close_peak_1_s / b.open_peak_1_s)
@@ -74,19 +74,19 @@ def saccade_blinks(run: GazeTrace) -> Floats:
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of lids."""
-    seen, asked = shapes(run.blinks), shapes(run.asked_blinks)
+    seen, asked = blink_shapes(run.blinks), blink_shapes(run.asked_blinks)
     large = evoked_blinks(run)
     large = large[large[:, 0] >= _EVOKING_DEG]
     partial = np.array([float(blink.depth < _SHUT) for blink in run.blinks])
     shape = [
-        MeasuredValue(key, seen[:, column], median, figure(median, asked[:, column]))
+        MeasuredValue(key, seen[:, column], median, measured_value(median, asked[:, column]))
         for column, key in enumerate(("blink_close", "blink_hold", "blink_open", "blink_ratio"))
     ]
     asked_rate = 60.0 * len(run.asked_blinks) / run.seconds if run.seconds else nan
     return [
         MeasuredValue("blink_rate", _counts(run), _per_minute, asked_rate, len(run.blinks)),
         MeasuredValue("blink_rate_talk", _counts(run), _per_minute, asked_rate, len(run.blinks)),
-        MeasuredValue("blink_cv", intervals(run), spread_over_mean),
+        MeasuredValue("blink_cv", blink_intervals(run), spread_over_mean),
         *shape,
         MeasuredValue("evoked", large[:, 1], mean),
         MeasuredValue("blink_partial", partial, mean),

@@ -22,23 +22,23 @@ from gazerig.features.lab.report.page import (
     RunHeader,
     TextLine,
     banner,
+    finding_line,
     left_out,
-    line_of,
     render,
     with_unit,
     write_all,
 )
-from gazerig.features.lab.report.plotting import COLOURS, Shown
-from gazerig.features.lab.report.report import Progress, draw_figures, measure_run, read
+from gazerig.features.lab.report.plotting import COLOURS, ShownRun
+from gazerig.features.lab.report.report import Progress, draw_figures, measure_run, read_run
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
     MeasureResult,
     bootstrap,
     correct_p_values,
-    figure,
-    figures,
+    format_number,
     judge,
-    number,
+    measured_value,
+    measured_values,
     unbiased_interval,
 )
 from gazerig.robot.analysis.human_norms import BY_KEY, GROUPS
@@ -98,12 +98,12 @@ def compare(
     Raises:
         SetupError: a file cannot be written, or a run is empty.
     """
-    runs = [read(each, about, progress) for each, about in zip(ticks, abouts, strict=True)]
+    runs = [read_run(each, about, progress) for each, about in zip(ticks, abouts, strict=True)]
     progress(COMPARING, 0.0)
-    differences = differences_of(measure_run(runs[0]), measure_run(runs[1]))
+    differences = measure_differences(measure_run(runs[0]), measure_run(runs[1]))
     progress(COMPARING, 1.0)
     shown = [
-        Shown(about.name, run, colour, about.model)
+        ShownRun(about.name, run, colour, about.model)
         for about, run, colour in zip(abouts, runs, COLOURS, strict=True)
     ]
     figures = draw_figures(shown, progress)
@@ -112,7 +112,7 @@ def compare(
     return Comparison(differences, out, *written, mixed_basis_warning(abouts, runs))
 
 
-def differences_of(
+def measure_differences(
     a: Sequence[MeasuredValue], b: Sequence[MeasuredValue]
 ) -> tuple[MeasureDifference, ...]:
     """Compare the measures that both runs have."""
@@ -120,8 +120,8 @@ def differences_of(
     pairs = [(m, theirs[m.key]) for m in a if m.key in theirs]
     enough = {m.key for m, n in pairs if min(m.events, n.events) >= BY_KEY[m.key].min_events}
     rng = np.random.default_rng(_SEED)
-    chances = {m.key: chance(m, n, rng) for m, n in pairs if m.key in enough}
-    shapes = {m.key: chance_of_shape(m, n) for m, n in pairs if m.key in enough}
+    chances = {m.key: permutation_p_value(m, n, rng) for m, n in pairs if m.key in enough}
+    shapes = {m.key: shape_p_value(m, n) for m, n in pairs if m.key in enough}
     known = {k: p for k, p in shapes.items() if isfinite(p)}
     both = correct_p_values({**chances, **{f"{k} shape": p for k, p in known.items()}})
     out = []
@@ -142,21 +142,21 @@ def differences_of(
     return tuple(out)
 
 
-def chance(a: MeasuredValue, b: MeasuredValue, rng: np.random.Generator) -> float:
+def permutation_p_value(a: MeasuredValue, b: MeasuredValue, rng: np.random.Generator) -> float:
     """Return the p value of the difference of two figures by a permutation test."""
     rows, n = np.concatenate([a.rows, b.rows]), len(a.rows)
-    seen = abs(figure(b.of, b.rows) - figure(a.of, a.rows))
+    seen = abs(measured_value(b.of, b.rows) - measured_value(a.of, a.rows))
     as_much = drawn_count = 0
     for _ in range(0, _DRAWS, _AT_ONCE):
         orders = [rng.permutation(len(rows)) for _ in range(_AT_ONCE)]
-        first = figures(a.of, rows, [order[:n] for order in orders])
-        dealt = abs(figures(a.of, rows, [order[n:] for order in orders]) - first)
+        first = measured_values(a.of, rows, [order[:n] for order in orders])
+        dealt = abs(measured_values(a.of, rows, [order[n:] for order in orders]) - first)
         drawn_count += int(np.isfinite(dealt).sum())
         as_much += int((dealt >= seen - 1e-12).sum())
     return (as_much + 1.0) / (drawn_count + 1.0)
 
 
-def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
+def shape_p_value(a: MeasuredValue, b: MeasuredValue) -> float:
     """Return the Kolmogorov-Smirnov p value of two distributions, nan for rows without one."""
     if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
         return nan
@@ -200,22 +200,22 @@ _CLASSES = {"more than chance": "more", "may be chance": "same", "too few events
 def _row(difference: MeasureDifference, abouts: tuple[RunHeader, RunHeader]) -> ComparedRow:
     a, b = difference.a, difference.b
     known = isfinite(difference.difference)
-    chances = [f"p {_p(difference.chance)}"] if known else []
+    chances = [f"p {_p_text(difference.chance)}"] if known else []
     if isfinite(difference.chance_shape):
-        chances.append(f"distribution p {_p(difference.chance_shape)}")
+        chances.append(f"distribution p {_p_text(difference.chance_shape)}")
     return ComparedRow(
-        line_of(a, abouts[0].styles),
-        line_of(b, abouts[1].styles),
+        finding_line(a, abouts[0].styles),
+        finding_line(b, abouts[1].styles),
         f"{a.measured.events} and {b.measured.events}",
         with_unit(difference.difference, a.band.unit) if known else "",
-        f"{number(difference.low95)} to {number(difference.high95)}" if known else "",
+        f"{format_number(difference.low95)} to {format_number(difference.high95)}" if known else "",
         "; ".join(chances),
         difference.word,
         _CLASSES[difference.word],
     )
 
 
-def _p(chance: float) -> str:
+def _p_text(chance: float) -> str:
     return "< .001" if chance < 0.001 else f"{chance:.3f}"
 
 

@@ -18,7 +18,7 @@ def on_face(run: GazeTrace) -> NDArray[np.bool_]:
     return inside
 
 
-def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
+def gaze_bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
     """Return (n, 3) start, end, and whether the run cut it off, of each time with a true mask."""
     t = run.column("t")
     if not len(t):
@@ -36,21 +36,21 @@ def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
     return np.asarray(rows[rows[:, 1] - rows[:, 0] >= BRIDGED_S])
 
 
-def looks(run: GazeTrace) -> Floats:
+def face_looks(run: GazeTrace) -> Floats:
     """Return the times of looks at a face, including cut ones."""
-    return bouts(run, on_face(run))
+    return gaze_bouts(run, on_face(run))
 
 
-def mutual(run: GazeTrace) -> Floats:
+def mutual_looks(run: GazeTrace) -> Floats:
     """Return the times in which both faces are turned to each other."""
-    return bouts(run, on_face(run) & (run.column("face_off") < _FACING_DEG))
+    return gaze_bouts(run, on_face(run) & (run.column("face_off") < _FACING_DEG))
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of looks at people."""
-    seen = looks(run)
+    seen = face_looks(run)
     whole = _lengths(seen[seen[:, 2] == 0.0])
-    both = mutual(run)
+    both = mutual_looks(run)
     away = seen[1:, 0] - seen[:-1, 1]
     pairs = np.column_stack([_lengths(seen)[:-1], away])
     return [

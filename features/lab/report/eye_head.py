@@ -42,7 +42,7 @@ class Shift(NamedTuple):
     head_peak_deg_s: float
 
 
-def rate(t_s: Floats, x: Floats, half: int = 4) -> Floats:
+def angular_rates(t_s: Floats, x: Floats, half: int = 4) -> Floats:
     """Return a speed by differences over 2 x ``half`` samples, 0 at the ends."""
     out = np.zeros_like(x)
     if len(x) > 2 * half:
@@ -54,7 +54,7 @@ def rate(t_s: Floats, x: Floats, half: int = 4) -> Floats:
 def gaze_shifts(run: GazeTrace) -> list[Shift]:
     """Return the shifts that began with the head at rest."""
     t, head, goal = run.column("t"), run.column("head_yaw"), run.column("target_yaw")
-    speed, moves = rate(t, head), np.abs(run.column("target_yaw_rate"))
+    speed, moves = angular_rates(t, head), np.abs(run.column("target_yaw_rate"))
     large = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG and s.commanded is not None]
     out = []
     for at, saccade in enumerate(large):
@@ -82,7 +82,9 @@ def gaze_shifts(run: GazeTrace) -> list[Shift]:
     return out
 
 
-def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: float) -> list[slice]:
+def stable_stretches(
+    mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: float
+) -> list[slice]:
     """Return the runs of rows with a true ``mask`` and an unchanged target."""
     edges = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0))
     out = []
@@ -94,7 +96,7 @@ def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: floa
     return out
 
 
-def vor(run: GazeTrace) -> Floats:
+def vor_gains(run: GazeTrace) -> Floats:
     """Return (n, 2) gain of the eyes against the head and the head's speed, one row a stretch.
 
     The required eye motion is the target's motion seen from the head, less the head's: a near
@@ -104,13 +106,15 @@ def vor(run: GazeTrace) -> Floats:
     if len(t) < 20:
         return np.zeros((0, 2))
     names = ("gaze_yaw", "gaze_pitch", "target_yaw", "target_pitch", "head_yaw", "head_pitch")
-    gaze_y, gaze_p, at_y, at_p, head_y, head_p = (rate(t, run.column(name)) for name in names)
+    gaze_y, gaze_p, at_y, at_p, head_y, head_p = (
+        angular_rates(t, run.column(name)) for name in names
+    )
     still = np.hypot(run.column("target_yaw_rate"), run.column("target_pitch_rate"))
     mask = run.slow() & (still < _STILL_TARGET_DEG_S) & (np.hypot(head_y, head_p) > _HEAD_DEG_S)
     # If the eyes cannot follow a fast head, that is part of the shift, short of the target.
     mask &= run.column("off_left") < 3.0
     rows = []
-    for part in stretches(mask, t, run.column("shift"), _STRETCH_S):
+    for part in stable_stretches(mask, t, run.column("shift"), _STRETCH_S):
         inner = slice(part.start + 4, part.stop - 4)
         if inner.stop - inner.start < 4:
             continue
@@ -124,7 +128,7 @@ def vor(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
-def rolls(run: GazeTrace) -> Floats:
+def head_rolls(run: GazeTrace) -> Floats:
     """Return (n,) the roll of the head in each fixation of a target to the side, in deg."""
     roll, aside = np.abs(run.column("head_roll")), np.abs(run.column("target_yaw"))
     parts = [run.between(f.start_s, f.end_s) for f in run.fixations]
@@ -148,8 +152,8 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("head_share", large[:, 1] - human.mean_head_deg(large[:, 0]), median),
         MeasuredValue("head_after", after[np.isfinite(after)], median),
         MeasuredValue("head_peak", turns[:, 1] / usual, median),
-        MeasuredValue("head_roll", rolls(run), median),
-        MeasuredValue("vor", vor(run)[:, 0], median),
+        MeasuredValue("head_roll", head_rolls(run), median),
+        MeasuredValue("vor", vor_gains(run)[:, 0], median),
     ]
 
 

@@ -42,7 +42,7 @@ class Visit(NamedTuple):
     end_s: float
 
 
-def visits(run: GazeTrace) -> list[Visit]:
+def part_visits(run: GazeTrace) -> list[Visit]:
     """Return the visits to parts in their order."""
     out: list[Visit] = []
     for f in run.fixations:
@@ -56,9 +56,9 @@ def visits(run: GazeTrace) -> list[Visit]:
     return out
 
 
-def shifts(run: GazeTrace) -> Floats:
+def part_shifts(run: GazeTrace) -> Floats:
     """Return (n, 2) from and to of shifts between parts, as indices of PARTS."""
-    seen = visits(run)
+    seen = part_visits(run)
     rows = [
         (a.part, b.part)
         for a, b in zip(seen, seen[1:], strict=False)
@@ -74,13 +74,13 @@ def count_shifts(rows: Floats) -> Floats:
     return out
 
 
-def on_parts(run: GazeTrace) -> Floats:
+def fixations_on_parts(run: GazeTrace) -> Floats:
     """Return (n, 2) part and seconds of every fixation on a part."""
     rows = [(PARTS.index(f.part), f.duration_s) for f in run.fixations if f.part is not None]
     return np.array(rows, dtype=float).reshape(-1, 2)
 
 
-def share(rows: Floats) -> Floats:
+def part_shares(rows: Floats) -> Floats:
     """Return the share of time on each part, (8,)."""
     time = np.bincount(rows[:, 0].astype(int), weights=rows[:, 1], minlength=N)
     return np.asarray(time / time.sum())
@@ -97,7 +97,7 @@ def human_share() -> Floats:
     return out
 
 
-def points(run: GazeTrace) -> Floats:
+def face_points(run: GazeTrace) -> Floats:
     """Return (n, 3) y and z on the face in metres, and seconds, of fixations with a face as target.
 
     The fixations may miss the face.
@@ -112,7 +112,7 @@ def points(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 3)
 
 
-def density(rows: Floats) -> Floats:
+def gaze_density(rows: Floats) -> Floats:
     """Spread (n, 3) y, z, seconds over the grid: (rows z, columns y)."""
     z, y = _cells(rows[:, 1], _Z_M), _cells(rows[:, 0], _Y_M)
     on_grid = (z >= 0) & (z < len(_Z_M)) & (y >= 0) & (y < len(_Y_M))
@@ -125,14 +125,14 @@ def density(rows: Floats) -> Floats:
 def expected_density() -> Floats:
     """Return the density of people's share of time on the parts; computed once."""
     places = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
-    out = density(np.column_stack([places, human_share()]))
+    out = gaze_density(np.column_stack([places, human_share()]))
     out.setflags(write=False)
     return out
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of the gaze on faces."""
-    parts, moves, seen = on_parts(run), shifts(run), visits(run)
+    parts, moves, seen = fixations_on_parts(run), part_shifts(run), part_visits(run)
     on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
     never = human.transition_matrix() == 0.0
     forbidden = never[moves[:, 0].astype(int), moves[:, 1].astype(int)].astype(float)
@@ -140,7 +140,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     meant = [
         (float(f.part is not None), f.duration_s) for f in run.fixations if f.target_kind == "face"
     ]
-    rows = axes(run)
+    rows = map_axes(run)
     vergence = rows[:, 6]
     good = (vergence >= -2.5) & (vergence <= 4.5)
     within = np.maximum(rows[:, 4], rows[:, 5]) <= 0.5 * human.CONE_DEG
@@ -151,7 +151,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("visit", lengths, mean),
         MeasuredValue("never_taken", forbidden, mean),
         MeasuredValue("transitions", moves, _transition_difference),
-        MeasuredValue("heat", points(run), _heat_correlation),
+        MeasuredValue("heat", face_points(run), _heat_correlation),
         MeasuredValue("left_mm", np.hypot(rows[:, 0], rows[:, 1]), median),
         MeasuredValue("right_mm", np.hypot(rows[:, 2], rows[:, 3]), median),
         MeasuredValue("in_cone", within.astype(float), mean),
@@ -160,7 +160,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     ]
 
 
-def axes(run: GazeTrace) -> Floats:
+def map_axes(run: GazeTrace) -> Floats:
     """Return (n, 7) medians of fixations on a face.
 
     Columns: miss distance of the left, then of the right pupil axis from the target point (y, z, in
@@ -178,7 +178,7 @@ def axes(run: GazeTrace) -> Floats:
 
 def _share_difference(rows: Floats) -> float:
     """Return half the sum of the differences from people's shares: 0 equal, 1 disjoint."""
-    return float(0.5 * np.abs(share(rows) - human_share()).sum())
+    return float(0.5 * np.abs(part_shares(rows) - human_share()).sum())
 
 
 def _transition_difference(rows: Floats) -> float:
@@ -197,7 +197,7 @@ def _weighted_mean(rows: Floats) -> float:
 
 def _heat_correlation(rows: Floats) -> float:
     """Return the correlation of the heat map with the heat map expected of people."""
-    ours = density(rows).ravel()
+    ours = gaze_density(rows).ravel()
     if np.ptp(ours) == 0.0:  # no time on the face
         return 0.0
     return float(np.corrcoef(ours, expected_density().ravel())[0, 1])

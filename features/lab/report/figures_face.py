@@ -15,10 +15,10 @@ from gazerig.features.lab.report.plotting import (
     Drawing,
     Ellipse,
     Figure,
-    Shown,
-    label,
-    legend,
-    nothing,
+    ShownRun,
+    draw_legend,
+    draw_no_data,
+    label_axes,
 )
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
@@ -29,7 +29,7 @@ _NAMES = [PART_NAMES[part] for part in PARTS]
 _NONE = "no fixation on a face part"
 
 
-def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
+def _time_share(figure: Figure, runs: Sequence[ShownRun]) -> None:
     shares, lengths = figure.subplots(1, 2)
     places = np.arange(len(PARTS))
     wide = 0.8 / (len(runs) + 1)
@@ -38,14 +38,14 @@ def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
     lengths.bar(places, human.mean_visit_s(steps, human.DWELL_MEAN_S), wide, color=HUMAN)
     for n, shown in enumerate(runs, start=1):
         at = places + n * wide
-        parts = face.on_parts(shown.run)
+        parts = face.fixations_on_parts(shown.run)
         if len(parts):
-            shares.bar(at, face.share(parts), wide, color=shown.colour, label=shown.name)
+            shares.bar(at, face.part_shares(parts), wide, color=shown.colour, label=shown.name)
         if shown.model is not None:
             due = shown.model.share(np.random.default_rng(7))
             shares.plot(at, due, "_", color="black", ms=9,
                         label="as the model plans" if n == 1 else None)  # fmt: skip
-        seen = face.visits(shown.run)
+        seen = face.part_visits(shown.run)
         each = [[v.end_s - v.start_s for v in seen if v.part == p] for p in range(len(PARTS))]
         means = [float(np.mean(e)) if e else 0.0 for e in each]
         errors = [float(np.std(e) / np.sqrt(len(e))) if len(e) > 1 else 0.0 for e in each]
@@ -54,12 +54,12 @@ def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
     for axes in (shares, lengths):
         axes.set_xticks(places + 0.5 * wide * len(runs), _NAMES, rotation=38, ha="right")
         axes.grid(axis="x", visible=False)
-    label(shares, "", "share of the time on parts", "time on each part")
-    label(lengths, "", "mean visit in s (bar: standard error)", "length of a visit")
-    legend(shares, "upper left")
+    label_axes(shares, "", "share of the time on parts", "time on each part")
+    label_axes(lengths, "", "mean visit in s (bar: standard error)", "length of a visit")
+    draw_legend(shares, "upper left")
 
 
-def _dwell(figure: Figure, runs: Sequence[Shown]) -> None:
+def _dwell(figure: Figure, runs: Sequence[ShownRun]) -> None:
     """Draw the distribution of visits to each part, with the law of table 1."""
     panels = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
     rng = np.random.default_rng(7)
@@ -72,7 +72,7 @@ def _dwell(figure: Figure, runs: Sequence[Shown]) -> None:
                 asked = shown.model.visits(part, 2000, rng)
                 axes.plot(grid, _below(asked, grid), color=shown.colour, lw=1.0, ls=":",
                           label=f"{shown.name}, its model")  # fmt: skip
-            lengths = np.array([v.end_s - v.start_s for v in face.visits(shown.run)
+            lengths = np.array([v.end_s - v.start_s for v in face.part_visits(shown.run)
                                 if v.part == part])  # fmt: skip
             if len(lengths):
                 axes.plot(grid, _below(lengths, grid), color=shown.colour, lw=1.4,
@@ -95,14 +95,14 @@ def _below(values: Floats, grid: Floats) -> Floats:
     return np.asarray(np.searchsorted(np.sort(values), grid, side="right") / len(values))
 
 
-def _transitions(figure: Figure, runs: Sequence[Shown]) -> None:
+def _transitions(figure: Figure, runs: Sequence[ShownRun]) -> None:
     panels = figure.subplots(1, 1 + len(runs))
     theirs = human.visit_matrix(human.transition_matrix())
     _matrix(panels[0], theirs, "Nakamoto & Tsuruno")
     for axes, shown in zip(panels[1:], runs, strict=True):
-        moves = face.shifts(shown.run)
+        moves = face.part_shifts(shown.run)
         if not len(moves):
-            nothing(axes, "no shift between parts")
+            draw_no_data(axes, "no shift between parts")
             continue
         counts = face.count_shifts(moves)
         total = counts.sum(axis=1, keepdims=True)
@@ -122,21 +122,21 @@ def _matrix(axes: Axes, values: Floats, title: str, theirs: Floats | None = None
             ink = "#c92a2a" if wrong else "white" if value > 0.42 else INK
             axes.text(column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=7.5,
                       color=ink)  # fmt: skip
-    label(axes, "to", "from", title)
+    label_axes(axes, "to", "from", title)
 
 
-def _heat(figure: Figure, runs: Sequence[Shown]) -> None:
+def _heat(figure: Figure, runs: Sequence[ShownRun]) -> None:
     panels = figure.subplots(1, 1 + len(runs))
-    _map(panels[0], face.expected_density(), "expected of people")
+    _draw_map(panels[0], face.expected_density(), "expected of people")
     for axes, shown in zip(panels[1:], runs, strict=True):
-        points = face.points(shown.run)
+        points = face.face_points(shown.run)
         if len(points):
-            _map(axes, face.density(points), f"{shown.name} ({points[:, 2].sum():.0f} s)")
+            _draw_map(axes, face.gaze_density(points), f"{shown.name} ({points[:, 2].sum():.0f} s)")
         else:
-            nothing(axes, "no gaze on a face")
+            draw_no_data(axes, "no gaze on a face")
 
 
-def _map(axes: Axes, density: Floats, title: str) -> None:
+def _draw_map(axes: Axes, density: Floats, title: str) -> None:
     y, z = face.GRID_M
     left, top = canvas_pixels(np.array([[y[0], z[-1]]]))[0]
     right, bottom = canvas_pixels(np.array([[y[-1], z[0]]]))[0]
@@ -150,15 +150,15 @@ def _map(axes: Axes, density: Floats, title: str) -> None:
     axes.set_title(title, loc="left")
 
 
-def _pupils(figure: Figure, runs: Sequence[Shown]) -> None:
+def _pupils(figure: Figure, runs: Sequence[ShownRun]) -> None:
     panels = figure.subplots(1, 2 * len(runs), sharex=True, sharey=True, squeeze=False)[0]
     for n, shown in enumerate(runs):
-        rows = face.axes(shown.run)
+        rows = face.map_axes(shown.run)
         distance = float(np.nanmedian(shown.run.column("target_m"))) if len(rows) else 1.0
         for side, axes in enumerate(panels[2 * n : 2 * n + 2]):
             name = ("left", "right")[side]
             title = f"{name} eye" if len(runs) == 1 else f"{shown.name}: {name} eye"
-            label(axes, "mm to the person's left", "mm up" if not side else "", title)
+            label_axes(axes, "mm to the person's left", "mm up" if not side else "", title)
             for deg, text in ((1.0, "1 deg"), (0.5 * human.CONE_DEG, "cone of direct gaze")):
                 radius = 1e3 * distance * np.tan(np.radians(deg))
                 axes.add_patch(Circle((0, 0), radius, fill=False, ec=HUMAN, lw=1.0))
@@ -187,22 +187,22 @@ def _scatter(axes: Axes, points: Floats, colour: str) -> None:
               fontsize=8.5)  # fmt: skip
 
 
-def _vergence(figure: Figure, runs: Sequence[Shown]) -> None:
+def _vergence(figure: Figure, runs: Sequence[ShownRun]) -> None:
     axes = figure.subplots()
     axes.axvspan(-2.5, 4.5, color=HUMAN_FILL, lw=0, label="passes for a direct gaze")
     axes.axvline(0.0, color=HUMAN, lw=1.0)
     bins = np.arange(-3.0, 5.01, 0.1).tolist()
     for shown in runs:
-        rows = face.axes(shown.run)
+        rows = face.map_axes(shown.run)
         if not len(rows):
-            nothing(axes, _NONE)
+            draw_no_data(axes, _NONE)
             continue
         weights = np.full(len(rows), 1.0 / len(rows))
         axes.hist(np.clip(rows[:, 6], -3.0, 5.0), bins, weights=weights, color=shown.colour,
                   alpha=0.75, label=f"{shown.name} ({len(rows)})")  # fmt: skip
-    label(axes, "vergence error at the face's distance, deg (+ nearer)",
+    label_axes(axes, "vergence error at the face's distance, deg (+ nearer)",
           "share of fixations")  # fmt: skip
-    legend(axes, "upper right")
+    draw_legend(axes, "upper right")
 
 
 DRAWINGS = (

@@ -11,16 +11,16 @@ from gazerig.features.lab.report.plotting import (
     HUMAN_FILL,
     Drawing,
     Figure,
-    Shown,
-    label,
-    legend,
-    nothing,
+    ShownRun,
+    draw_legend,
+    draw_no_data,
+    label_axes,
 )
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.human_norms import FOLLOWING, HEAD
 
 
-def _contribution(figure: Figure, runs: Sequence[Shown]) -> None:
+def _contribution(figure: Figure, runs: Sequence[ShownRun]) -> None:
     amount, latency = figure.subplots(1, 2)
     aside = np.linspace(0.0, 80.0, 90)
     free = human.STAHL_FREE_DEG
@@ -42,27 +42,29 @@ def _contribution(figure: Figure, runs: Sequence[Shown]) -> None:
     amount.set_ylim(-10.0, 80.0)
     latency.set_xlim(0.0, 80.0)
     latency.set_ylim(-200.0, 550.0)
-    label(amount, "gaze shift from where the head pointed, deg", "head movement in 0.9 s, deg",
+    label_axes(amount, "gaze shift from where the head pointed, deg", "head movement in 0.9 s, deg",
           "the head's part")  # fmt: skip
-    label(latency, "gaze shift from where the head pointed, deg", "head after eyes, ms",
+    label_axes(latency, "gaze shift from where the head pointed, deg", "head after eyes, ms",
           "start of the head")  # fmt: skip
-    legend(amount, "upper left")
+    draw_legend(amount, "upper left")
 
 
-def _vor(figure: Figure, runs: Sequence[Shown]) -> None:
+def _vor(figure: Figure, runs: Sequence[ShownRun]) -> None:
     axes = figure.subplots()
     axes.axhspan(0.85, 1.2, color=HUMAN_FILL, lw=0, zorder=0, label="healthy people")
     axes.axhline(1.0, color=HUMAN, lw=1.0)
     for shown in runs:
-        rows = eye_head.vor(shown.run)
+        rows = eye_head.vor_gains(shown.run)
         axes.scatter(rows[:, 1], rows[:, 0], s=18, alpha=0.7, lw=0, color=shown.colour,
                      label=f"{shown.name} ({len(rows)} stretches)")  # fmt: skip
     axes.set_ylim(0.0, 1.8)
-    label(axes, "mean speed of the head in a stretch, deg/s", "gain of the eyes against the head")
-    legend(axes, "lower right", 3)
+    label_axes(
+        axes, "mean speed of the head in a stretch, deg/s", "gain of the eyes against the head"
+    )
+    draw_legend(axes, "lower right", 3)
 
 
-def _following(figure: Figure, runs: Sequence[Shown]) -> None:
+def _following(figure: Figure, runs: Sequence[ShownRun]) -> None:
     gains, response, phases = figure.subplots(1, 3)
     gains.axhspan(0.85, 1.05, color=HUMAN_FILL, lw=0, zorder=0)
     gains.axhline(0.95, color=HUMAN, lw=1.2)
@@ -74,7 +76,7 @@ def _following(figure: Figure, runs: Sequence[Shown]) -> None:
         rows = following.pursuit_stretches(shown.run)
         gains.scatter(rows[:, 0], rows[:, 1], s=14, alpha=0.65, lw=0, color=shown.colour,
                       label=f"{shown.name} ({len(rows)})")  # fmt: skip
-        bode = following.response(shown.run)
+        bode = following.pursuit_response(shown.run)
         some = some or bool(len(bode))
         response.plot(bode[:, 0], bode[:, 1], "o-", ms=4, lw=1.0, color=shown.colour)
         phases.plot(bode[:, 0], bode[:, 2], "o-", ms=4, lw=1.0, color=shown.colour)
@@ -83,13 +85,13 @@ def _following(figure: Figure, runs: Sequence[Shown]) -> None:
     response.set_xlim(0.05, 1.0)
     phases.set_xlim(0.05, 1.0)
     phases.set_ylim(-120.0, 60.0)
-    label(gains, "target's speed, deg/s", "gain", "gain of stretches")
-    label(response, "frequency, Hz", "gain", "gain")
-    label(phases, "frequency, Hz", "phase, deg (- behind)", "phase")
-    legend(gains, "lower right")
+    label_axes(gains, "target's speed, deg/s", "gain", "gain of stretches")
+    label_axes(response, "frequency, Hz", "gain", "gain")
+    label_axes(phases, "frequency, Hz", "phase, deg (- behind)", "phase")
+    draw_legend(gains, "lower right")
     if not some:
-        nothing(response, "no coherent frequency")
-        nothing(phases, "")
+        draw_no_data(response, "no coherent frequency")
+        draw_no_data(phases, "")
 
 
 DRAWINGS = (

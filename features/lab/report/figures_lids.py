@@ -12,11 +12,11 @@ from gazerig.features.lab.report.plotting import (
     Axes,
     Drawing,
     Figure,
-    Shown,
+    ShownRun,
     basis_text,
-    label,
-    legend,
-    nothing,
+    draw_legend,
+    draw_no_data,
+    label_axes,
 )
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.human_norms import LIDS, SOCIAL
@@ -25,12 +25,12 @@ _SHOWN_S = np.arange(-0.1, 0.5, 0.005)
 _PHASES = (("closing", 60.0, 100.0), ("shut", 20.0, 60.0), ("opening", 130.0, 250.0))
 
 
-def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
+def _shape(figure: Figure, runs: Sequence[ShownRun]) -> None:
     trace, phases = figure.subplots(1, 2)
     for shown in runs:
         mean = _mean_blink(shown)
         if mean is None:
-            nothing(trace, "no blink")
+            draw_no_data(trace, "no blink")
             continue
         trace.fill_between(1e3 * _SHOWN_S, *np.percentile(mean, (10, 90), axis=0), lw=0,
                            color=shown.colour, alpha=0.18)  # fmt: skip
@@ -44,8 +44,8 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
         phases.barh(row, high - low, 0.75, left=low, color=HUMAN_FILL,
                     label="people" if row == 0 else None)  # fmt: skip
         for n, shown in enumerate(runs):
-            seen = blinks.shapes(shown.run.blinks)[:, row]
-            asked = blinks.shapes(shown.run.asked_blinks)[:, row]
+            seen = blinks.blink_shapes(shown.run.blinks)[:, row]
+            asked = blinks.blink_shapes(shown.run.asked_blinks)[:, row]
             at = row + 0.16 * (n - 0.5 * (len(runs) - 1))
             if len(seen):
                 low10, mid, high90 = np.percentile(seen, (10, 50, 90))
@@ -58,19 +58,19 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
                             label="as commanded" if row == n == 0 else None)  # fmt: skip
     phases.set_yticks(range(3), [name for name, _, _ in _PHASES])
     phases.invert_yaxis()
-    label(
+    label_axes(
         trace,
         "time from the blink's beginning, ms",
         "lid opening",
         f"lids, {basis_text(runs, LIDS)}",
     )
-    label(phases, "ms", "", "phases")
-    legend(trace, "lower right")
+    label_axes(phases, "ms", "", "phases")
+    draw_legend(trace, "lower right")
     phases.set_xlim(0.0, None)
-    legend(phases, "upper right")
+    draw_legend(phases, "upper right")
 
 
-def _mean_blink(shown: Shown, column: str = "lid") -> np.ndarray | None:
+def _mean_blink(shown: ShownRun, column: str = "lid") -> np.ndarray | None:
     """Return the lid openings of every blink on one time axis, (n, times)."""
     t, lid = shown.run.column("t"), shown.run.column(column)
     inside = [
@@ -81,11 +81,11 @@ def _mean_blink(shown: Shown, column: str = "lid") -> np.ndarray | None:
     return np.array([np.interp(onset + _SHOWN_S, t, lid) for onset in inside])
 
 
-def _when(figure: Figure, runs: Sequence[Shown]) -> None:
+def _when(figure: Figure, runs: Sequence[ShownRun]) -> None:
     gaps, evoked = figure.subplots(1, 2)
     bins = np.arange(0.0, 15.1, 0.75).tolist()
     for shown in runs:
-        apart = blinks.intervals(shown.run)
+        apart = blinks.blink_intervals(shown.run)
         if len(apart):
             weights = np.full(len(apart), 1.0 / len(apart))
             gaps.hist(np.minimum(apart, 15.0), bins, weights=weights, histtype="step", lw=1.6,
@@ -103,18 +103,20 @@ def _when(figure: Figure, runs: Sequence[Shown]) -> None:
         a, human.evoked_blink_probability(a), color=HUMAN, lw=1.5, label="Evinger et al. 1994"
     )
     evoked.set_ylim(-0.03, 1.06)
-    label(gaps, "time between blinks, s (15 and more at the end)", "share", "intervals")
-    label(evoked, "gaze shift, deg (number: saccades)", "share with a blink", "with gaze shifts")
-    legend(gaps, "upper right")
-    legend(evoked, "lower right")
+    label_axes(gaps, "time between blinks, s (15 and more at the end)", "share", "intervals")
+    label_axes(
+        evoked, "gaze shift, deg (number: saccades)", "share with a blink", "with gaze shifts"
+    )
+    draw_legend(gaps, "upper right")
+    draw_legend(evoked, "lower right")
 
 
-def _looks(figure: Figure, runs: Sequence[Shown]) -> None:
+def _looks(figure: Figure, runs: Sequence[ShownRun]) -> None:
     *strips, lengths = figure.subplots(len(runs) + 1, 1,
                                        height_ratios=[0.5] * len(runs) + [1.0])  # fmt: skip
     bins = np.geomspace(0.15, 60.0, 30).tolist()
     for axes, shown in zip(strips, runs, strict=True):
-        looks, both = social.looks(shown.run), social.mutual(shown.run)
+        looks, both = social.face_looks(shown.run), social.mutual_looks(shown.run)
         start = float(shown.run.column("t")[0]) if len(shown.run.rows) else 0.0
         _strip(axes, looks, start, 0, shown.colour)
         _strip(axes, both, start, 1, "#2b8a5a")
@@ -122,7 +124,7 @@ def _looks(figure: Figure, runs: Sequence[Shown]) -> None:
         axes.set_ylim(-0.5, 1.5)
         axes.set_xlim(0.0, max(1.0, shown.run.seconds))
         axes.grid(False)
-        label(axes, "", "", shown.name)
+        label_axes(axes, "", "", shown.name)
         if len(looks):
             each = looks[:, 1] - looks[:, 0]
             lengths.hist(np.clip(each, 0.15, 60.0), bins, histtype="step", lw=1.6,
@@ -140,9 +142,9 @@ def _looks(figure: Figure, runs: Sequence[Shown]) -> None:
     lengths.set_xticks([0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.2", "0.5", "1", "2", "5", "10", "20",
                        "50"])  # fmt: skip
     lengths.minorticks_off()
-    label(lengths, "length of a look in s", "looks")
+    label_axes(lengths, "length of a look in s", "looks")
     lengths.set_ylim(0.0, 1.5 * lengths.get_ylim()[1])
-    legend(lengths, "upper left", 2)
+    draw_legend(lengths, "upper left", 2)
 
 
 def _strip(axes: Axes, bouts: np.ndarray, start_s: float, row: int, colour: str) -> None:

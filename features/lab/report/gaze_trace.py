@@ -233,7 +233,7 @@ class GazeTraceBuilder:
             self._kinds[tick.target.kind] += tick.t_s - self._last_s
         self._last_s = tick.t_s
         if not tick.stopped:
-            self._flat.extend(row_of(tick, self._mode))
+            self._flat.extend(trace_row(tick, self._mode))
             gaze = tick.gaze
             lids = lid_openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
             pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
@@ -257,7 +257,7 @@ class GazeTraceBuilder:
         )
 
 
-def row_of(tick: Tick, mode: int) -> TraceRow:
+def trace_row(tick: Tick, mode: int) -> TraceRow:
     """Return the columns of one tick."""
     pose, target, names = tick.pose, tick.target, tick.guard_result.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m

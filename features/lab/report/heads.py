@@ -6,8 +6,8 @@ from heapq import merge
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.report.plotting import COLOURS, Figure, label, png_of
-from gazerig.features.lab.report.statistics import number
+from gazerig.features.lab.report.plotting import COLOURS, Figure, draw_png, label_axes
+from gazerig.features.lab.report.statistics import format_number
 from gazerig.robot.analysis.mutual_gaze import (
     HeadPlacement,
     MutualGazeTrace,
@@ -139,7 +139,7 @@ def mutual_gaze_report(
     looks = trace.looks()
     if len(looks.t_s) < 2:
         raise SetupError(f"{names[0]} and {names[1]} have no time in common")
-    png = png_of(lambda figure: _timeline(figure, looks, names), (8.4, 2.2))
+    png = draw_png(lambda figure: _timeline(figure, looks, names), (8.4, 2.2))
     return MutualGazeReport(*names, mutual_gaze(*looks), png)
 
 
@@ -166,10 +166,10 @@ def _timeline(figure: Figure, looks: MutualLooks, names: tuple[str, str]) -> Non
     axes.set_ylim(2.5, -0.5)
     axes.set_xlim(0.0, float(looks.t_s[-1] - looks.t_s[0]))
     axes.grid(False)
-    label(axes, "s", "")
+    label_axes(axes, "s", "")
 
 
 def _text(value: object, unit: str) -> str:
     if not isinstance(value, (int, float)):
         return "none"
-    return f"{number(value)} {unit}".strip()
+    return f"{format_number(value)} {unit}".strip()

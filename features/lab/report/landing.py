@@ -56,7 +56,7 @@ def overshoots(run: GazeTrace) -> Floats:
     return np.array(rows)
 
 
-def landings(run: GazeTrace) -> Floats:
+def landing_errors(run: GazeTrace) -> Floats:
     """Return (n, 2) of saccades to targets 10 deg away and more: share of the distance, corrected.
 
     Saccades that end at the end of an eye's range are left out: the head completes them.
@@ -90,7 +90,7 @@ def landings(run: GazeTrace) -> Floats:
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of landings."""
-    landed = landings(run)
+    landed = landing_errors(run)
     return [
         MeasuredValue("overshoot", overshoots(run), median),
         MeasuredValue("landing", landed[:, 0], median),

@@ -18,7 +18,7 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.plotting import Drawing
-from gazerig.features.lab.report.statistics import MeasureResult, number
+from gazerig.features.lab.report.statistics import MeasureResult, format_number
 from gazerig.robot.analysis.human_norms import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
 
@@ -111,7 +111,7 @@ def report_page(
     sections = tuple(
         PageSection(
             group,
-            tuple(line_of(f, styles) for f in findings if f.band.group == group),
+            tuple(finding_line(f, styles) for f in findings if f.band.group == group),
             tuple(p for p in figures if p.drawing.group == group),
             left_out(run.joints, group),
             run.joints.basis(group),
@@ -179,18 +179,18 @@ def render(template: str, folder: Path = FOLDER, **values: object) -> str:
     return environment.get_template(template).render(**values)
 
 
-def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
+def finding_line(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
     """Return a finding as text."""
     band, value = finding.band, finding.value
     known = isfinite(finding.low95)
-    interval = f"{number(finding.low95)} to {number(finding.high95)}" if known else ""
+    interval = f"{format_number(finding.low95)} to {format_number(finding.high95)}" if known else ""
     asked = finding.measured.asked
     notes = tuple(text for style, text in band.notes if style in styles)
     return TextLine(
         band.title,
         with_unit(value, band.unit) if isfinite(value) else "nothing found",
         interval,
-        number(asked) if isfinite(asked) else "",
+        format_number(asked) if isfinite(asked) else "",
         band_text(band),
         f"{finding.measured.events} of {band.min_events}"
         if finding.verdict == "too few events"
@@ -199,11 +199,11 @@ def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
         _CLASSES[finding.verdict],
         band.source,
         notes if finding.verdict in ("outside", "uncertain") else (),
-        gauge(finding) if known else None,
+        make_gauge(finding) if known else None,
     )
 
 
-def gauge(finding: MeasureResult) -> Gauge:
+def make_gauge(finding: MeasureResult) -> Gauge:
     """Return band and value on one scale; a distant value is at the end of the scale."""
     band = finding.band
     margin = 0.75 * (band.high - band.low)
@@ -218,12 +218,12 @@ def gauge(finding: MeasureResult) -> Gauge:
 
 def band_text(band: NormBand) -> str:
     """Return a band as text."""
-    return f"{number(band.low)} to {with_unit(band.high, band.unit)}"
+    return f"{format_number(band.low)} to {with_unit(band.high, band.unit)}"
 
 
 def with_unit(value: float, unit: str) -> str:
     """Return a number with its unit; shares have none."""
-    return number(value) if unit in ("", "share") else f"{number(value)} {unit}"
+    return format_number(value) if unit in ("", "share") else f"{format_number(value)} {unit}"
 
 
 def numbers_file(out: Path) -> Path:
@@ -238,7 +238,7 @@ _MARKS = {".json": b'[\n {\n  "key": ', ".png": b"Matplotlib"}
 _HEAD_BYTES = 4096
 
 
-def files_of(out: Path, figures: Collection[str]) -> tuple[Path, ...]:
+def report_files(out: Path, figures: Collection[str]) -> tuple[Path, ...]:
     """Return the page, its numbers, and its figures by their keys."""
     folder = out.with_name(f"{out.stem}_figures")
     return (out, numbers_file(out), *(folder / f"{key}.png" for key in figures))
@@ -280,7 +280,7 @@ def write_all(
     Raises:
         SetupError: something already exists or cannot be written.
     """
-    _, data, *paths = files = files_of(out, [figure.drawing.key for figure in figures])
+    _, data, *paths = files = report_files(out, [figure.drawing.key for figure in figures])
     refuse_foreign(files, force)
     make_folder(out.with_name(f"{out.stem}_figures"))
     for path, figure in zip(paths, figures, strict=True):

@@ -46,7 +46,7 @@ _LAYOUT: Literal["constrained"] | None = "constrained"
 _Corner = Literal["upper left", "upper right", "lower right", "center right"]
 
 
-class Shown(NamedTuple):
+class ShownRun(NamedTuple):
     """A run in figures; model: the walk over faces of its rig."""
 
     name: str
@@ -65,21 +65,21 @@ class Drawing(NamedTuple):
     group: str
     title: str
     caption: str
-    draw: Callable[[Figure, Sequence[Shown]], None]
+    draw: Callable[[Figure, Sequence[ShownRun]], None]
     size_in: tuple[float, float] = (8.4, 3.8)
 
 
-def basis_text(runs: Sequence[Shown], group: str) -> str:
+def basis_text(runs: Sequence[ShownRun], group: str) -> str:
     """Return the basis of several runs together, e.g. "measured or estimated"."""
     return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
 
 
-def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
+def drawing_png(drawing: Drawing, runs: Sequence[ShownRun]) -> bytes:
     """Draw a figure of one run, or of two for comparison."""
-    return png_of(lambda figure: drawing.draw(figure, runs), drawing.size_in)
+    return draw_png(lambda figure: drawing.draw(figure, runs), drawing.size_in)
 
 
-def png_of(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
+def draw_png(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
     """Return a PNG of a function's drawing in an empty figure, in the style of all figures."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size_in, dpi=_DPI, layout=_LAYOUT)
@@ -91,7 +91,7 @@ def png_of(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> byte
     return out.getvalue()
 
 
-def nothing(axes: Axes, what: str) -> None:
+def draw_no_data(axes: Axes, what: str) -> None:
     """Write a text in place of a figure without data."""
     axes.set_xticks([])
     axes.set_yticks([])
@@ -99,13 +99,13 @@ def nothing(axes: Axes, what: str) -> None:
     axes.text(0.5, 0.5, what, ha="center", va="center", transform=axes.transAxes, color=HUMAN)
 
 
-def legend(axes: Axes, where: _Corner, columns: int = 1) -> None:
+def draw_legend(axes: Axes, where: _Corner, columns: int = 1) -> None:
     """Add a legend if anything has a label."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc=where, ncols=columns, markerscale=1.4)
 
 
-def label(axes: Axes, x: str, y: str, title: str = "") -> None:
+def label_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
     """Set the labels of the axes and the title."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)

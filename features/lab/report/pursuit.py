@@ -5,7 +5,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.report.eye_head import rate, stretches
+from gazerig.features.lab.report.eye_head import angular_rates, stable_stretches
 from gazerig.features.lab.report.gaze_trace import PHASES, GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, longest, median
 from gazerig.gaze.types import Floats
@@ -22,12 +22,14 @@ def pursuit_stretches(run: GazeTrace) -> Floats:
     if len(t) < 20:
         return np.zeros((0, 3))
     at = run.columns("target_yaw_rate", "target_pitch_rate")
-    gaze = np.column_stack([rate(t, run.column("gaze_yaw")), rate(t, run.column("gaze_pitch"))])
+    gaze = np.column_stack(
+        [angular_rates(t, run.column("gaze_yaw")), angular_rates(t, run.column("gaze_pitch"))]
+    )
     error = run.columns("target_yaw", "target_pitch") - run.columns("gaze_yaw", "gaze_pitch")
     speed = np.hypot(at[:, 0], at[:, 1])
     mask = run.slow(0.02, 0.06) & (speed > SLOWEST_DEG_S) & (speed < FASTEST_DEG_S)
     rows = []
-    for part in stretches(mask, t, run.column("shift"), _STRETCH_S):
+    for part in stable_stretches(mask, t, run.column("shift"), _STRETCH_S):
         power = float((at[part] ** 2).sum())
         gain = float((gaze[part] * at[part]).sum()) / power
         lag = float((error[part] * at[part]).sum()) / power
@@ -35,7 +37,7 @@ def pursuit_stretches(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 3)
 
 
-def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
+def speed_spectra(run: GazeTrace) -> tuple[Floats, Floats]:
     """Return frequencies (k,) in Hz, and (n, 4 k) spectra of both sideways speeds, by window.
 
     Columns: cross spectrum of target and slow gaze, real and imaginary, power of the target, power
@@ -47,7 +49,7 @@ def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
     if len(t) < max(20, 2 * window) or clear.sum() < window:
         return np.zeros(0), np.zeros((0, 0))
     even = np.arange(t[0], t[-1], 1.0 / rate_hz)
-    gaze = np.interp(even, t[clear], rate(t, run.column("gaze_yaw"))[clear])
+    gaze = np.interp(even, t[clear], angular_rates(t, run.column("gaze_yaw"))[clear])
     target = np.interp(even, t, run.column("target_yaw_rate"))
     every_hz = np.arange(window // 2 + 1, dtype=np.float64) * (rate_hz / window)
     here = (every_hz >= _LOWEST_HZ) & (every_hz <= _HIGHEST_HZ)
@@ -63,12 +65,12 @@ def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
     return every_hz[here], whole
 
 
-def response(run: GazeTrace) -> Floats:
+def pursuit_response(run: GazeTrace) -> Floats:
     """Return (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
 
     Only coherent frequencies are returned: a frequency without target motion has no response.
     """
-    f, rows = spectra(run)
+    f, rows = speed_spectra(run)
     if not len(rows):
         return np.zeros((0, 3))
     transfer, coherent = _transfer(rows)
@@ -96,13 +98,15 @@ def smooth_speeds(run: GazeTrace) -> Floats:
     t = run.column("t")
     if len(t) < 20:
         return np.zeros(0)
-    speed = np.hypot(rate(t, run.column("gaze_yaw")), rate(t, run.column("gaze_pitch")))
+    speed = np.hypot(
+        angular_rates(t, run.column("gaze_yaw")), angular_rates(t, run.column("gaze_pitch"))
+    )
     mask = run.slow(0.03, 0.08) & (run.column("phase") == PHASES.index("pursue"))
     flying = np.flatnonzero(run.column("phase") == PHASES.index("saccade"))
     since = np.searchsorted(flying, np.arange(len(t)), side="right") - 1
     # Plans reach the joints later, and the speed criterion misses small saccades.
     mask &= (since < 0) | (t - t[flying[np.maximum(since, 0)]] > 0.08) if len(flying) else True
-    parts = stretches(mask, t, run.column("shift"), _STRETCH_S)
+    parts = stable_stretches(mask, t, run.column("shift"), _STRETCH_S)
     return np.array([speed[part].max() for part in parts])
 
 
@@ -112,6 +116,8 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     return [
         MeasuredValue("pursuit_gain", rows[:, 1], median),
         MeasuredValue("pursuit_lag", rows[:, 2], median),
-        MeasuredValue("pursuit_most", spectra(run)[1], highest_gain, count=len(response(run))),
+        MeasuredValue(
+            "pursuit_most", speed_spectra(run)[1], highest_gain, count=len(pursuit_response(run))
+        ),
         MeasuredValue("smooth_peak", smooth, longest),
     ]

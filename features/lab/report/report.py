@@ -23,7 +23,7 @@ from gazerig.features.lab.report import (
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.page import Figure, RunHeader, report_page, write_all
-from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, basis_text, png
+from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, basis_text, drawing_png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
 from gazerig.robot.analysis.human_norms import BY_KEY, band_applies
 from gazerig.robot.control.tick import Tick
@@ -53,7 +53,7 @@ class Report(NamedTuple):
     data: Path
 
 
-def report_of(
+def make_report(
     run: GazeTrace,
     about: RunHeader,
     out: Path,
@@ -70,15 +70,15 @@ def report_of(
     Raises:
         SetupError: a file cannot be written.
     """
-    findings = findings_of(run)
-    figures = draw_figures([Shown(about.name, run, COLOURS[0], about.model)], progress)
+    findings = judge_run(run)
+    figures = draw_figures([ShownRun(about.name, run, COLOURS[0], about.model)], progress)
     page = report_page(about, run, findings, figures, gaze)
     numbers = [_numbers(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
     written = write_all(out, page, figures, numbers, force)
     return Report(findings, out, *written)
 
 
-def read(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTrace:
+def read_run(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTrace:
     """Gather a run in one pass.
 
     Raises:
@@ -113,12 +113,12 @@ def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
     )
 
 
-def findings_of(run: GazeTrace) -> tuple[MeasureResult, ...]:
+def judge_run(run: GazeTrace) -> tuple[MeasureResult, ...]:
     """Measure a run and compare it with the bands."""
     return tuple(judge(m, BY_KEY[m.key]) for m in measure_run(run))
 
 
-def draw_figures(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...]:
+def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[Figure, ...]:
     """Draw every figure of one run, or of two runs together; skip runs without its joints."""
     figures = []
     for count, drawing in enumerate(DRAWINGS):
@@ -127,7 +127,7 @@ def draw_figures(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...
         if able:
             basis = basis_text(able, drawing.group)
             caption = drawing.caption.replace("{measured}", basis)
-            figures.append(Figure(drawing, png(drawing, able), caption))
+            figures.append(Figure(drawing, drawing_png(drawing, able), caption))
     progress(DRAWING, 1.0)
     return tuple(figures)
 

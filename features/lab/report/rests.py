@@ -83,7 +83,7 @@ def _events_per_piece(run: GazeTrace, onsets_s: Floats, here: np.ndarray) -> Flo
     return np.asarray(rows[rows[:, 1] > 0.0])
 
 
-def per_second(rows: Floats) -> float:
+def rate_per_second(rows: Floats) -> float:
     """Return events a second of (n, 2) events and seconds."""
     return float(rows[:, 0].sum() / rows[:, 1].sum())
 
@@ -94,6 +94,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     return [
         MeasuredValue("short_rests", (rests < SHORT_S).astype(float), mean),
         MeasuredValue("rest_spike", rests, largest_slot_excess),
-        MeasuredValue("refixations", small, per_second, count=round(small[:, 1].sum())),
-        MeasuredValue("idle_rate", idle, per_second, count=round(idle[:, 1].sum())),
+        MeasuredValue("refixations", small, rate_per_second, count=round(small[:, 1].sum())),
+        MeasuredValue("idle_rate", idle, rate_per_second, count=round(idle[:, 1].sum())),
     ]

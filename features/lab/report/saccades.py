@@ -7,8 +7,8 @@ import numpy as np
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
-    figure,
     mean,
+    measured_value,
     median,
     one_over_mean,
 )
@@ -25,7 +25,7 @@ EXPRESS_MS = 120.0
 """Faster reactions are express saccades."""
 
 
-def table(run: GazeTrace) -> Floats:
+def saccade_table(run: GazeTrace) -> Floats:
     """Return (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
 
     Only commanded saccades count: a servo that swings back makes none.
@@ -38,7 +38,7 @@ def table(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def commanded_table(run: GazeTrace) -> Floats:
+def commanded_saccade_table(run: GazeTrace) -> Floats:
     """Return (n, 3) amplitude in deg, duration in ms and peak in deg/s as commanded."""
     asked = [s.commanded for s in run.saccades if s.commanded is not None]
     rows = [(c.amplitude_deg, 1e3 * c.duration_s, c.peak_deg_s) for c in asked]
@@ -48,7 +48,7 @@ def commanded_table(run: GazeTrace) -> Floats:
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of saccades."""
-    seen, asked = table(run), commanded_table(run)
+    seen, asked = saccade_table(run), commanded_saccade_table(run)
     every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
     unasked = np.array([s.commanded is None for s in every], dtype=float)
     onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
@@ -109,7 +109,7 @@ def _share_inside(
         fits = (a[:, column] >= lower(a[:, 0])) & (a[:, column] <= upper(a[:, 0]))
         return fits.astype(float)
 
-    return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
+    return MeasuredValue(key, inside(seen), mean, measured_value(mean, inside(asked)))
 
 
 def rest_errors(run: GazeTrace) -> Floats:

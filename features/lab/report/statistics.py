@@ -70,13 +70,13 @@ def judge(measured: MeasuredValue, band: NormBand) -> MeasureResult:
     result = judge_without_interval(measured, band)
     if result.verdict == "too few events":
         return result
-    low, high = interval(measured)
+    low, high = confidence_interval(measured)
     reaches = low <= band.high and high >= band.low
     verdict = "uncertain" if result.verdict == "outside" and reaches else result.verdict
     return result._replace(low95=low, high95=high, verdict=verdict)
 
 
-def interval(measured: MeasuredValue) -> tuple[float, float]:
+def confidence_interval(measured: MeasuredValue) -> tuple[float, float]:
     """Return the 95 % interval of a figure, (nan, nan) for an extreme, which has no chance.
 
     Shares have the score interval of Wilson (1927), which is valid for few events too; all others
@@ -93,7 +93,9 @@ def interval(measured: MeasuredValue) -> tuple[float, float]:
         half = _Z95 * sqrt(share * (1.0 - share) / n + 0.25 * z2 / n**2) / (1.0 + z2 / n)
         # Rounding must not exclude the share itself.
         return min(share, middle - half), max(share, middle + half)
-    return unbiased_interval(bootstrap(measured, np.random.default_rng(_SEED)), figure(of, rows))
+    return unbiased_interval(
+        bootstrap(measured, np.random.default_rng(_SEED)), measured_value(of, rows)
+    )
 
 
 def unbiased_interval(spread: Floats, value: float) -> tuple[float, float]:
@@ -107,7 +109,7 @@ def unbiased_interval(spread: Floats, value: float) -> tuple[float, float]:
 
 def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureResult:
     """Compare a figure with its pass band, without an interval; too few events do not pass."""
-    value = figure(measured.of, measured.rows)
+    value = measured_value(measured.of, measured.rows)
     verdict: VerdictWord = "outside"
     if measured.events < band.min_events or not isfinite(value):
         verdict = "too few events"
@@ -119,19 +121,19 @@ def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureRe
 def bootstrap(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
     """Return the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
     rows, n = measured.rows, len(measured.rows)
-    values = figures(measured.of, rows, (rng.integers(0, n, n) for _ in range(draws)))
+    values = measured_values(measured.of, rows, (rng.integers(0, n, n) for _ in range(draws)))
     found = values[np.isfinite(values)]
     return found if len(found) else np.array([nan])
 
 
-def figure(of: Statistic, rows: Floats) -> float:
+def measured_value(of: Statistic, rows: Floats) -> float:
     """Return the figure of rows, nan without rows."""
     if not len(rows):
         return nan
     return float(of(rows))
 
 
-def figures(of: Statistic, rows: Floats, samples: Iterable[Indices]) -> Floats:
+def measured_values(of: Statistic, rows: Floats, samples: Iterable[Indices]) -> Floats:
     """Return the figure of each sample of the rows.
 
     Statistics with an axis in NumPy are evaluated for many samples at once.
@@ -143,7 +145,7 @@ def figures(of: Statistic, rows: Floats, samples: Iterable[Indices]) -> Floats:
     """
     along = _ALONG.get(of) if rows.ndim == 1 else None
     if along is None or not len(rows):
-        return np.array([figure(of, rows[sample]) for sample in samples])
+        return np.array([measured_value(of, rows[sample]) for sample in samples])
     waiting, found = iter(samples), [np.empty(0)]
     while some := list(islice(waiting, max(1, _AT_ONCE // len(rows)))):
         found.append(along(rows[np.array(some)]))
@@ -191,7 +193,7 @@ _ALONG: Mapping[Statistic, Callable[[Floats], Floats]] = {
 """Versions of the statistics for many samples at once, (samples, n) -> (samples,)."""
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Return a number with a useful number of digits."""
     size = abs(value)
     if size >= 100.0:

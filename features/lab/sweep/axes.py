@@ -95,7 +95,7 @@ def _freeze(value: Value) -> Value:
     return tuple(map(_freeze, value)) if isinstance(value, list | tuple) else value
 
 
-def axes_of(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]) -> list[Axis]:
+def make_axes(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]) -> list[Axis]:
     """Return the axes of ``--set KEY=VALUES`` options.
 
     Args:
@@ -210,7 +210,7 @@ def grid(axes: Sequence[Axis]) -> list[Point]:
     return [dict(zip(keys, row, strict=True)) for row in product(*(a.values for a in axes))]
 
 
-def one_by_one(axes: Sequence[Axis]) -> list[Point]:
+def vary_one_by_one(axes: Sequence[Axis]) -> list[Point]:
     """Return the rig's own values, and each level with the rig's own values of all other axes."""
     return [{}, *({axis.key: value} for axis in axes for value in axis.values)]
 

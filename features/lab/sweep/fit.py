@@ -27,7 +27,7 @@ Scores = Callable[[Sequence[Point]], Sequence[float]]
 _LEAST = 8
 
 
-def search(scores: Scores, axes: Sequence[Axis], start: Point, count: int, seed: int) -> None:
+def search_best(scores: Scores, axes: Sequence[Axis], start: Point, count: int, seed: int) -> None:
     """Search for the lowest score by differential evolution (Storn & Price 1997).
 
     Begins with a Latin hypercube, and ``start`` if it is on the axes.
@@ -87,7 +87,9 @@ class SweepFit(NamedTuple):
     trials: tuple[Trial, ...]
 
 
-def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) -> SweepFit:
+def fit_settings(
+    run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int
+) -> SweepFit:
     """Search the axes for the best point.
 
     The same arguments and outcomes make the same search, so an interrupted search is repeated from
@@ -98,15 +100,15 @@ def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) 
     """
     own = run([start])[0]
     counted = counted_measures(own)
-    tried = {_key(start): trial_of(start, own, counted)}
+    tried = {_key(start): make_trial(start, own, counted)}
 
     def scores(points: Sequence[Point]) -> list[float]:
         fresh = list({_key(one): one for one in points if _key(one) not in tried}.values())
         for point, outcomes in zip(fresh, run(fresh), strict=True):
-            tried[_key(point)] = trial_of(point, outcomes, counted)
+            tried[_key(point)] = make_trial(point, outcomes, counted)
         return [tried[_key(point)].score for point in points]
 
-    search(scores, axes, start, count, seed)
+    search_best(scores, axes, start, count, seed)
     trials = tuple(tried.values())
     return SweepFit(counted, trials[0], min(trials, key=lambda trial: trial.score), trials)
 
@@ -132,7 +134,7 @@ def counted_measures(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
     return counted
 
 
-def trial_of(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]) -> Trial:
+def make_trial(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]) -> Trial:
     """Return the score of a point's runs; a failed run makes the worst possible score."""
     failed = next((one.failed for one in outcomes if one.failed), "")
     if failed:
@@ -156,7 +158,7 @@ def _key(point: Point) -> str:
 SNIPPET = "best.yaml"
 
 
-def snippet_of(options: RunOptions, point: Point) -> str:
+def yaml_snippet(options: RunOptions, point: Point) -> str:
     """Return the values of a point as YAML that ``gazerig run RIG --character FILE`` takes.
 
     A run has only one character, so the changes of the runs' own character are included.

@@ -45,7 +45,7 @@ class Outcome(NamedTuple):
     died: bool = False
 
 
-def figures_of(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Column]:
+def run_figures(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Column]:
     """Return the columns of a run, in the order of a table.
 
     A measure KEY of the report is in ``report.KEY``, its verdict in ``verdict.KEY``.
@@ -78,7 +78,7 @@ def grade(value: float, low: float, high: float) -> float:
     return widths / (widths + _HALF)
 
 
-def columns_of(outcomes: Sequence[Outcome]) -> list[str]:
+def table_columns(outcomes: Sequence[Outcome]) -> list[str]:
     """Return all columns of the runs' figures, those of the report first."""
     names = {name: None for one in outcomes for name in one.figures}
     known = [OUTSIDE, "report.pass", "report.too_few_events", DISTANCE]
@@ -106,10 +106,10 @@ SEED, FAILED = "seed", "failed"
 CSV, PARQUET = "table.csv", "table.parquet"
 
 
-def rows_of(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]:
+def table_rows(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]:
     """Return the columns (parameters, seed, failure, figures) and one row for each run."""
     keys = list({key: None for one in outcomes for key in one.point})
-    figures = columns_of(outcomes)
+    figures = table_columns(outcomes)
     rows = [
         [
             *(
@@ -131,7 +131,7 @@ def write_tables(folder: Path, outcomes: Sequence[Outcome]) -> tuple[Path, ...]:
     Raises:
         SetupError: one cannot be written.
     """
-    columns, rows = rows_of(outcomes)
+    columns, rows = table_rows(outcomes)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

@@ -12,8 +12,8 @@ from gazerig.features.lab.report.plotting import (
     INK,
     Axes,
     Figure,
-    nothing,
-    png_of,
+    draw_no_data,
+    draw_png,
 )
 from gazerig.features.lab.sweep.axes import Axis
 from gazerig.features.lab.sweep.outcome import OUTSIDE, REPORT, Outcome
@@ -65,19 +65,19 @@ def response_png(
         for panel in panels[len(each) :]:
             panel.set_visible(False)
 
-    return png_of(draw, size_in)
+    return draw_png(draw, size_in)
 
 
 def _curve(
     panel: Axes, axis: Axis, runs: Sequence[Outcome], name: str, titled: bool = True
 ) -> None:
     """Draw runs as dots, their mean over an axis as a line, and one standard deviation."""
-    at, values = positions(axis, runs), column(name, runs)
-    parts = groups(axis, at, values)
+    at, values = axis_positions(axis, runs), figure_column(name, runs)
+    parts = level_groups(axis, at, values)
     if not parts:
-        nothing(panel, "nothing found")
+        draw_no_data(panel, "nothing found")
         return
-    band = band_of(name)
+    band = norm_band(name)
     if band is not None:
         panel.axhspan(band.low, band.high, color=HUMAN_FILL, zorder=0, lw=0)
     where = [part.at for part in parts]
@@ -108,12 +108,12 @@ def _heat_map(
     counts = len(y_axis.values), len(x_axis.values)
     places = []  # index of each run's level
     for axis in axes:
-        at = positions(axis, runs)
+        at = axis_positions(axis, runs)
         if all(is_number(value) for value in axis.values):
             levels = np.array([float(str(value)) for value in axis.values])
             at = np.array([float(np.argmin(np.abs(levels - x))) for x in at])
         places.append(at)
-    values = column(name, runs)
+    values = figure_column(name, runs)
     means = np.full(counts, np.nan)
     for j in range(counts[0]):
         for i in range(counts[1]):
@@ -131,7 +131,7 @@ def _heat_map(
     _title(panel, name)
     if means.size > _ANNOTATED:
         return
-    band, middle = band_of(name), np.nanmean([np.nanmin(means), np.nanmax(means)])
+    band, middle = norm_band(name), np.nanmean([np.nanmin(means), np.nanmax(means)])
     for (j, i), value in np.ndenumerate(means):
         if not np.isfinite(value):
             continue
@@ -153,7 +153,7 @@ def _ticks(panel: Axes, axis: Axis, x: bool, indexed: bool = False) -> None:
 
 def _title(panel: Axes, name: str) -> None:
     """Set the title: the measure's title, with its unit."""
-    band = band_of(name)
+    band = norm_band(name)
     if band is None:
         text = "measures outside their bands" if name == OUTSIDE else name
     else:
@@ -182,20 +182,20 @@ def is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def positions(axis: Axis, outcomes: Sequence[Outcome]) -> Floats:
+def axis_positions(axis: Axis, outcomes: Sequence[Outcome]) -> Floats:
     """Return the position of each run on an axis: its number, or the index of its level."""
     if axis.is_range or all(is_number(value) for value in axis.values):
         return np.array([float(str(one.point[axis.key])) for one in outcomes])
     return np.array([float(axis.index(one.point[axis.key])) for one in outcomes])
 
 
-def column(name: str, outcomes: Sequence[Outcome]) -> Floats:
+def figure_column(name: str, outcomes: Sequence[Outcome]) -> Floats:
     """Return a column's figure in each run, nan if missing."""
     found = (one.figures.get(name) for one in outcomes)
     return np.array([float(x) if isinstance(x, int | float) else np.nan for x in found])
 
 
-def groups(axis: Axis, at: Floats, values: Floats) -> list[LevelGroup]:
+def level_groups(axis: Axis, at: Floats, values: Floats) -> list[LevelGroup]:
     """Return the runs by level of an axis; for a range, by parts with equally many runs."""
     known = np.isfinite(values)
     at, values = at[known], values[known]
@@ -206,17 +206,17 @@ def groups(axis: Axis, at: Floats, values: Floats) -> list[LevelGroup]:
     return [LevelGroup(float(at[part].mean()), values[part]) for part in parts if len(part)]
 
 
-def strength(axes: Sequence[Axis], outcomes: Sequence[Outcome], band: NormBand) -> float:
+def response_strength(axes: Sequence[Axis], outcomes: Sequence[Outcome], band: NormBand) -> float:
     """Return the strongest response of a measure to any parameter, 0..1.
 
     The response is the share of variance that a parameter explains, less the share that as many
     groups explain by chance (epsilon squared, Kelley 1935), times the change of the mean in widths
     of its band, at most 1.
     """
-    values = column(f"{REPORT}{band.key}", outcomes)
+    values = figure_column(f"{REPORT}{band.key}", outcomes)
     best = 0.0
     for axis in axes:
-        parts = [part.values for part in groups(axis, positions(axis, outcomes), values)]
+        parts = [part.values for part in level_groups(axis, axis_positions(axis, outcomes), values)]
         n, k = sum(map(len, parts)), len(parts)
         if k < 2 or n <= k:
             continue
@@ -231,11 +231,11 @@ def strength(axes: Sequence[Axis], outcomes: Sequence[Outcome], band: NormBand) 
 
 def most_responsive(axes: Sequence[Axis], outcomes: Sequence[Outcome], most: int) -> list[str]:
     """Return columns to show: measures outside their bands, then the strongest responses."""
-    found = {f"{REPORT}{band.key}": strength(axes, outcomes, band) for band in BANDS}
+    found = {f"{REPORT}{band.key}": response_strength(axes, outcomes, band) for band in BANDS}
     order = sorted(found, key=lambda name: -found[name])
     return [OUTSIDE, *(name for name in order if found[name] > _WEAK)][:most]
 
 
-def band_of(name: str) -> NormBand | None:
+def norm_band(name: str) -> NormBand | None:
     """Return the band of a measure's column, None for any other column."""
     return BY_KEY.get(name.removeprefix(REPORT)) if name.startswith(REPORT) else None

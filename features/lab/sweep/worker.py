@@ -19,7 +19,7 @@ from gazerig.config.save_text import params_text
 from gazerig.errors import Error
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import Point
-from gazerig.features.lab.sweep.outcome import Column, figures_of
+from gazerig.features.lab.sweep.outcome import Column, run_figures
 from gazerig.features.lab.sweep.worker_pool import Job
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
@@ -37,7 +37,7 @@ def figures_at(
         ConfigError: a rule of the rig forbids the point.
         SetupError: the run cannot be started, or ended by a fault.
     """
-    return figures_of(*simulate(apply_changes(rig, point), options, stopped))
+    return run_figures(*simulate(apply_changes(rig, point), options, stopped))
 
 
 def main() -> None:
@@ -61,13 +61,13 @@ def main() -> None:
                 raise Error(f"the files of {job.options.rig} changed while the sweep ran")
             figures = figures_at(rig, replace(job.options, seed=seed), point, stopped)
         except Exception as error:
-            failed = reason(error)
+            failed = error_text(error)
         if stopped() is not None:
             return
         print(json.dumps([number, figures, failed]), file=answers, flush=True)
 
 
-def reason(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Return the reason of a failed run as one line."""
     text = "; ".join(map(str.strip, str(error).splitlines()))
     expected = isinstance(error, Error)

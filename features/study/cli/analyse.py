@@ -48,12 +48,12 @@ def analyse(
 
 def verdicts(study: "StudyAnalysis") -> list[str]:
     """Return the verdict on each hypothesis, one per line."""
-    from gazerig.features.study.report.apa import measure_words
+    from gazerig.features.study.report.apa import measure_name
 
     lines = [f"{len(study.counted)} of {len(study.people)} participants count"]
     for one in study.decisions:
         said = one.hypothesis
-        what = f"{measure_words(one.measure)}: {said.better} > {said.than}"
+        what = f"{measure_name(one.measure)}: {said.better} > {said.than}"
         known = one.verdict != "too few"
         p = f" (corrected p = {one.corrected_p:.3g}, n = {one.n})" if known else f" (n = {one.n})"
         lines.append(f"{what}: {one.verdict}{p}")

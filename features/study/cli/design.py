@@ -81,11 +81,11 @@ def design(
         from gazerig.features.study.run.study_file import load_checked_study
 
         found = load_checked_study(study)
-        for line in summary(study, found):
+        for line in design_summary(study, found):
             print(line)
         folder = data_folder(found, data)
         written = write_preregistration(found, folder, force)
-        for note in notes(found):
+        for note in design_notes(found):
             say(f"note: {note}")
         said = "written" if written else "as it was"
         print(f"{folder / PREREGISTRATION}: {said}; sha256 {found.sha256}")
@@ -106,11 +106,13 @@ def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = Fals
     """
     import gazerig
     from gazerig.features.study.data_folder import StudyData
-    from gazerig.features.study.preregistration_text import text
+    from gazerig.features.study.preregistration_text import preregistration_text
 
     sha256, file = StudyData(folder).check(study.canonical), folder / PREREGISTRATION
     changes = {key: study.changes(None, key) for key in study.design.conditions}
-    stated = text(study.design, study.questionnaires, changes, sha256, gazerig.__version__)
+    stated = preregistration_text(
+        study.design, study.questionnaires, changes, sha256, gazerig.__version__
+    )
     if file.is_file() and file.read_text(encoding="utf-8") == stated:
         return False
     make_folder(folder)
@@ -118,7 +120,7 @@ def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = Fals
     return True
 
 
-def state(name: str, study: "LoadedStudy", folder: Path) -> None:
+def design_state(name: str, study: "LoadedStudy", folder: Path) -> None:
     """Make sure that a study is pre-registered before the first participant; report a new one.
 
     Raises:
@@ -141,14 +143,19 @@ def state(name: str, study: "LoadedStudy", folder: Path) -> None:
         )
 
 
-def summary(name: str, study: "LoadedStudy") -> list[str]:
+def design_summary(name: str, study: "LoadedStudy") -> list[str]:
     """Return a short description of a study, in lines."""
-    from gazerig.features.study.order import orders
-    from gazerig.features.study.preregistration_text import claims_of, minutes, sentence, size_words
+    from gazerig.features.study.order import participant_order
+    from gazerig.features.study.preregistration_text import (
+        claims_of,
+        hypothesis_sentence,
+        minutes,
+        size_words,
+    )
 
     design = study.design
     keys = ", ".join(design.conditions)
-    trials = len(orders(design, 1))
+    trials = len(participant_order(design, 1))
     lines = [
         f"{name}: good: {design.title!r}, {len(design.conditions)} conditions ({keys})",
         f"{design.plan.participants} participants, {trials} trials each, "
@@ -157,11 +164,14 @@ def summary(name: str, study: "LoadedStudy") -> list[str]:
     for i, (one, found) in enumerate(
         zip(design.hypotheses, claims_of(design, study.questionnaires), strict=True), 1
     ):
-        lines += [f"hypothesis {i}: {sentence(one, design)}", f"  {size_words(design, found)}"]
+        lines += [
+            f"hypothesis {i}: {hypothesis_sentence(one, design)}",
+            f"  {size_words(design, found)}",
+        ]
     return lines
 
 
-def notes(study: "LoadedStudy") -> list[str]:
+def design_notes(study: "LoadedStudy") -> list[str]:
     """Return remarks about permitted but unusual settings."""
     from gazerig.features.study.preregistration_text import claims_of
 

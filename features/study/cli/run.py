@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.cli.design import DataOption, StudyArgument, data_folder, state
+from gazerig.features.study.cli.design import DataOption, StudyArgument, data_folder, design_state
 from gazerig.robot.app.options import RunOptions, parse_camera, parse_host_port
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import is_desktop_here, open_page
@@ -75,7 +75,7 @@ def run(
             print(f"{folder.folder}: {said}")
             print(f"next: gazerig study analyse {folder.folder}")
             return
-        state(study, found, folder.folder)
+        design_state(study, found, folder.folder)
         from gazerig.features.study.run.participant import SessionPlan, run_session
         from gazerig.robot.model.clock import RealClock
 
@@ -114,9 +114,9 @@ def delete(
 ) -> None:
     """Delete all data of a participant, and the reports made of them; this cannot be undone."""
     with clear_errors():
-        from gazerig.features.study.data_folder import StudyData, code_of
+        from gazerig.features.study.data_folder import StudyData, participant_code
 
-        code = code_of(participant)
+        code = participant_code(participant)
         question = f"Delete all data of {code} in {data}? This cannot be undone."
         if not yes and not typer.confirm(question, err=True):
             raise typer.Exit(1)

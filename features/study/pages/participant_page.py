@@ -68,7 +68,7 @@ def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
                 **_place(screen),
                 "after": screen.once,
                 "may_skip": design.may_skip,
-                "instruction": _in(screen.instruction, language),
+                "instruction": _in_language(screen.instruction, language),
                 "instruction_language": language if language in screen.instruction else "en",
                 "items": [_item(str(one.number), one.item, language) for one in screen.questions],
             }
@@ -102,13 +102,13 @@ def _item(number: str, item: Item, language: str) -> Json:
         "kind": item.kind,
         "points": item.points,
         "language": spoken,
-        "text": _in(item.text, spoken),
-        "low": _in(item.low, spoken),
-        "high": _in(item.high, spoken),
+        "text": _in_language(item.text, spoken),
+        "low": _in_language(item.low, spoken),
+        "high": _in_language(item.high, spoken),
     }
 
 
-def _in(texts: Texts, language: str) -> str:
+def _in_language(texts: Texts, language: str) -> str:
     return texts.get(language, texts.get("en", ""))
 
 

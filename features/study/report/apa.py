@@ -24,33 +24,33 @@ _CORRECTIONS = {"holm": "Holm-corrected ", "bonferroni": "Bonferroni-corrected "
 _MINUS = "\N{MINUS SIGN}"
 
 
-def chance(p: float) -> Markup:
+def p_text(p: float) -> Markup:
     """Return a probability with its symbol: three decimals, or that it is below a thousandth."""
     if not isfinite(p):
         return Markup("<i>p</i> not known")
     if p < 0.001:
         return Markup("<i>p</i> &lt; .001")
-    return Markup("<i>p</i> = ") + bounded(min(p, 1.0), 3)
+    return Markup("<i>p</i> = ") + bounded_text(min(p, 1.0), 3)
 
 
-def bounded(value: float, decimals: int = 2) -> str:
+def bounded_text(value: float, decimals: int = 2) -> str:
     """Return a number that cannot exceed one, without the zero before the point."""
     text = f"{abs(value):.{decimals}f}"
     text = text[1:] if text.startswith("0.") else text
     return f"{_MINUS}{text}" if value < 0.0 and float(f"{value:.{decimals}f}") else text
 
 
-def unbounded(value: float, decimals: int = 2) -> str:
+def unbounded_text(value: float, decimals: int = 2) -> str:
     """Return a number in the usual notation."""
     text = f"{abs(value):.{decimals}f}"
     return f"{_MINUS}{text}" if value < 0.0 and float(text) else text
 
 
-def effect(size: EffectSize) -> Markup:
+def effect_text(size: EffectSize) -> Markup:
     """Return an effect with its interval, "" without one."""
     if not isfinite(size.value):
         return Markup("")
-    written = bounded if size.bounded else unbounded
+    written = bounded_text if size.bounded else unbounded_text
     name, _, below = size.symbol.partition("_")
     symbol = Markup("<i>{}</i>").format(name) + Markup("<sub>{}</sub>" if below else "").format(
         below
@@ -61,7 +61,7 @@ def effect(size: EffectSize) -> Markup:
     return found + Markup(", 95% CI [{}, {}]").format(written(size.low95), written(size.high95))
 
 
-def statistic(test: StatisticalTest) -> Markup:
+def statistic_text(test: StatisticalTest) -> Markup:
     """Return the statistic of a test with its degrees of freedom."""
     if not isfinite(test.statistic):
         return Markup("")
@@ -72,35 +72,35 @@ def statistic(test: StatisticalTest) -> Markup:
             many = Markup(", <i>N</i> = {}").format(test.n) if test.key == "chi_square" else ""
             symbol += Markup("({:.0f}{})").format(test.df, many)
     decimals = {"χ²": 2, "K": 0}.get(test.symbol, 1)
-    return Markup("{} = {}").format(symbol, unbounded(test.statistic, decimals))
+    return Markup("{} = {}").format(symbol, unbounded_text(test.statistic, decimals))
 
 
-def sentence(one: Decision, study: StudyAnalysis) -> Markup:
+def result_sentence(one: Decision, study: StudyAnalysis) -> Markup:
     """Return the result for one hypothesis as a paper reports it."""
     better, than = study.label(one.hypothesis.better), study.label(one.hypothesis.than)
-    what = measure_words(one.measure)
+    what = measure_name(one.measure)
     if one.verdict == "too few" or one.test is None:
         return Markup(
             "Too few: with <i>n</i> = {} nothing can be said of whether {} exceeds {} in {} ({})."
         ).format(one.n, better, than, what, one.too_few or "the test has no result")
-    figures = [statistic(one.test), _chances(one, study.design.plan.correction)]
-    figures += [effect(one.test.effect)]
+    figures = [statistic_text(one.test), _p_texts(one, study.design.plan.correction)]
+    figures += [effect_text(one.test.effect)]
     if one.standardised is not None:
-        figures.append(effect(one.standardised))
+        figures.append(effect_text(one.standardised))
     figures.append(Markup("<i>n</i> = {}").format(one.n))
     listed = Markup(", ").join(part for part in figures if part)
     found = _finding(one, better, than, what)
     return Markup("{} ({}), {}.").format(found, TEST_NAMES[one.test.key], listed)
 
 
-def _chances(one: Decision, correction: str) -> Markup:
+def _p_texts(one: Decision, correction: str) -> Markup:
     assert one.test is not None
-    p = chance(one.test.deciding_p)
+    p = p_text(one.test.deciding_p)
     if isfinite(one.test.exact_p):
         p += Markup(" (exact)")
     if correction == "none" or one.corrected_p == one.test.deciding_p:
         return p
-    return p + Markup(", {}{}").format(_CORRECTIONS[correction], chance(one.corrected_p))
+    return p + Markup(", {}{}").format(_CORRECTIONS[correction], p_text(one.corrected_p))
 
 
 def _finding(one: Decision, better: str, than: str, what: str) -> Markup:
@@ -114,7 +114,9 @@ def _finding(one: Decision, better: str, than: str, what: str) -> Markup:
         return Markup("{} {} {} in {} ({})").format(better, verb, than, what, share)
     symbol = "Mdn" if one.measure.kind == "item" else "M"
     first, second = one.medians if symbol == "Mdn" else one.means
-    places = (Markup("(<i>{}</i> = {})").format(symbol, plain(value)) for value in (first, second))
+    places = (
+        Markup("(<i>{}</i> = {})").format(symbol, plain_number(value)) for value in (first, second)
+    )
     verb = {"supported": "was above", "against": "was below"}.get(
         one.verdict, "did not differ significantly from"
     )
@@ -124,16 +126,16 @@ def _finding(one: Decision, better: str, than: str, what: str) -> Markup:
     assert one.test is not None
     if one.test.effect.value * (one.means[0] - one.means[1]) < 0.0:
         found += Markup("; the means, <i>M</i> = {} and {}, have the other sign").format(
-            *map(plain, one.means)
+            *map(plain_number, one.means)
         )
     return found
 
 
-def plain(value: float) -> str:
+def plain_number(value: float) -> str:
     """Return a mean or median with at most two decimals."""
-    return unbounded(value).rstrip("0").rstrip(".") if isfinite(value) else "unknown"
+    return unbounded_text(value).rstrip("0").rstrip(".") if isfinite(value) else "unknown"
 
 
-def measure_words(measure: Measure) -> str:
+def measure_name(measure: Measure) -> str:
     """Return a measure's name in words."""
     return measure.name.partition(".")[2].replace("_", " ") or measure.name.replace("_", " ")

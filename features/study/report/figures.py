@@ -12,9 +12,9 @@ from gazerig.features.lab.report.plotting import (
     Axes,
     Figure,
     Patch,
-    label,
-    nothing,
-    png_of,
+    draw_no_data,
+    draw_png,
+    label_axes,
 )
 from gazerig.features.study.analysis import MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
@@ -38,11 +38,11 @@ Colour = tuple[int, int, int]
 def shades(points: int) -> list[str]:
     """Return one colour per point, from the lowest to the highest, grey for a middle point."""
     half = points // 2
-    low, high = (_between(*ends, half) for ends in (_LOW, _HIGH))
+    low, high = (_mix_colours(*ends, half) for ends in (_LOW, _HIGH))
     return [*low, *([_MIDDLE] if points % 2 else []), *high]
 
 
-def _between(first: Colour, last: Colour, count: int) -> list[str]:
+def _mix_colours(first: Colour, last: Colour, count: int) -> list[str]:
     """Return evenly spaced colours; for a count of 1 the middle colour."""
     at = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
     mixed = np.rint(np.outer(1.0 - at, first) + np.outer(at, last)).astype(int)
@@ -68,19 +68,19 @@ def counts_png(some: Sequence[MeasureSummary], study: StudyAnalysis) -> bytes:
         for axes, one in zip(each, some, strict=True):
             _counts(axes, one, names)
             if len(some) > 1:
-                label(axes, "", "", one.measure.items[0].replace("_", " "))
+                label_axes(axes, "", "", one.measure.items[0].replace("_", " "))
         points = some[0].measure.points
-        label(each[-1], "share of answers below and above the middle (numbers: answers)", "")
+        label_axes(each[-1], "share of answers below and above the middle (numbers: answers)", "")
         patches = [Patch(color=colour, label=str(k + 1)) for k, colour in enumerate(shades(points))]
         figure.legend(handles=patches, loc="outside upper right", ncols=points)
 
-    return png_of(draw, size)
+    return draw_png(draw, size)
 
 
 def _counts(axes: Axes, one: MeasureSummary, names: list[str]) -> None:
     counts = one.counts
     if counts is None or not counts.sum():
-        nothing(axes, "no answers")
+        draw_no_data(axes, "no answers")
         return
     points = counts.shape[1]
     colours = shades(points)
@@ -105,14 +105,14 @@ def _counts(axes: Axes, one: MeasureSummary, names: list[str]) -> None:
 def paired_png(one: MeasureSummary, study: StudyAnalysis) -> bytes:
     """Draw each participant as a line over the conditions, and the means with their intervals."""
     names = [study.label(c.condition) for c in one.conditions]
-    return png_of(lambda figure: _paired(figure, one, names), (_WIDE_IN, 3.4))
+    return draw_png(lambda figure: _paired(figure, one, names), (_WIDE_IN, 3.4))
 
 
 def _paired(figure: Figure, one: MeasureSummary, names: list[str]) -> None:
     axes = figure.subplots()
     means = one.scores.means
     if not np.isfinite(means).any():
-        nothing(axes, "nothing measured")
+        draw_no_data(axes, "nothing measured")
         return
     x = np.arange(len(names))
     whole = one.measure.kind == "item"
@@ -131,14 +131,14 @@ def _paired(figure: Figure, one: MeasureSummary, names: list[str]) -> None:
     if one.measure.points:
         axes.set_ylim(0.8, one.measure.points + 0.2)
         axes.set_yticks(range(1, one.measure.points + 1))
-    label(axes, "", "mean of the scale" if one.measure.kind == "scale" else
+    label_axes(axes, "", "mean of the scale" if one.measure.kind == "scale" else
           "rating" if whole else one.measure.name.replace("_", " "))  # fmt: skip
 
 
 def forest_png(study: StudyAnalysis, names: list[str]) -> bytes:
     """Draw the effect of each hypothesis with its interval."""
     size = (_WIDE_IN, _HEAD_IN + _ROW_IN * max(1, len(names)))
-    return png_of(lambda figure: _forest(figure, study.decisions, names), size)
+    return draw_png(lambda figure: _forest(figure, study.decisions, names), size)
 
 
 def _forest(figure: Figure, found: tuple[Decision, ...], names: list[str]) -> None:
@@ -157,5 +157,5 @@ def _forest(figure: Figure, found: tuple[Decision, ...], names: list[str]) -> No
         axes.axvline(0.0, color=INK, lw=0.8)
         axes.set_yticks(range(len(names)), names)
         axes.set_ylim(len(names) - 0.5, -0.5)
-        label(axes, title, "")
+        label_axes(axes, title, "")
     bounded.set_xlim(-1.05, 1.05)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from gazerig.features.lab.report.page import render
-from gazerig.features.lab.report.statistics import number
+from gazerig.features.lab.report.statistics import format_number
 from gazerig.features.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
 from gazerig.features.study.journal import STEP_DEG
@@ -90,11 +90,11 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
     progress("drawing", 1.0)
     tests = [
         TestLine(
-            _label(one, study), apa.TEST_NAMES[test.key], test is one.test, apa.statistic(test),
-            apa.chance(test.p),
-            apa.chance(test.exact_p) if isfinite(test.exact_p) else Markup(""),
-            apa.chance(one.corrected_p) if test is one.test else Markup(""),
-            apa.effect(test.effect), test.notes,
+            _label(one, study), apa.TEST_NAMES[test.key], test is one.test, apa.statistic_text(test),
+            apa.p_text(test.p),
+            apa.p_text(test.exact_p) if isfinite(test.exact_p) else Markup(""),
+            apa.p_text(one.corrected_p) if test is one.test else Markup(""),
+            apa.effect_text(test.effect), test.notes,
         )
         for one in study.decisions
         for test in (one.test, *one.also)
@@ -117,7 +117,7 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
         checks=[(_label(one, study), one.checks) for one in study.decisions if one.checks],
         left_out=[one for one in study.people if one.left_out], rows=left_out_rows.most_common(),
         remarks=study.remarks, plan=study.design.plan, rules=_rules(study),
-        css=lambda fine: "pass" if fine else "uncertain", p=apa.chance, isfinite=isfinite,
+        css=lambda fine: "pass" if fine else "uncertain", p=apa.p_text, isfinite=isfinite,
     )  # fmt: skip
 
 
@@ -204,7 +204,7 @@ def _rules(study: StudyAnalysis) -> tuple[str, ...]:
 def _label(one: Decision, study: StudyAnalysis) -> str:
     """Return a hypothesis as a label: "looked at: walk > centre"."""
     said = one.hypothesis
-    return f"{apa.measure_words(one.measure)}: {said.better} > {said.than}"
+    return f"{apa.measure_name(one.measure)}: {said.better} > {said.than}"
 
 
 def _line(one: Decision, study: StudyAnalysis) -> HypothesisLine:
@@ -212,11 +212,13 @@ def _line(one: Decision, study: StudyAnalysis) -> HypothesisLine:
     better = study.label(said.better)
     expected = (
         f"{better[:1].upper()}{better[1:]} exceeds {study.label(said.than)} in "
-        f"{apa.measure_words(one.measure)}"
+        f"{apa.measure_name(one.measure)}"
     )
     if not said.two_sided:
         expected += " (one-sided)"
-    return HypothesisLine(expected, apa.sentence(one, study), one.verdict, _CLASSES[one.verdict])
+    return HypothesisLine(
+        expected, apa.result_sentence(one, study), one.verdict, _CLASSES[one.verdict]
+    )
 
 
 def _measure_section(one: MeasureSummary, study: StudyAnalysis) -> MeasureSection:
@@ -227,7 +229,7 @@ def _measure_section(one: MeasureSummary, study: StudyAnalysis) -> MeasureSectio
                  and m.measure.items[0] in measure.items]  # fmt: skip
         facts.append(f"mean of {len(items)} items, reversed ones turned round")
         if one.alpha is not None and isfinite(one.alpha.value):
-            facts.append(Markup("reliability {}").format(apa.effect(one.alpha)))
+            facts.append(Markup("reliability {}").format(apa.effect_text(one.alpha)))
         counted = figures.counts_png(items, study)
         drawn.append(StudyFigure("Answers to each item", counted, _COUNTS))
     elif measure.kind == "item":
@@ -235,11 +237,11 @@ def _measure_section(one: MeasureSummary, study: StudyAnalysis) -> MeasureSectio
     drawn.append(StudyFigure("Participants and means", figures.paired_png(one, study), _PAIRED))
     rows = tuple(
         (study.label(c.condition), str(c.n), _number_text(c.mean),
-         f"{number(c.low95)} to {number(c.high95)}" if isfinite(c.low95) else "",
+         f"{format_number(c.low95)} to {format_number(c.high95)}" if isfinite(c.low95) else "",
          _number_text(c.sd), _number_text(c.median))
         for c in one.conditions
     )  # fmt: skip
-    title = apa.measure_words(measure)
+    title = apa.measure_name(measure)
     return MeasureSection(title, _question_text(one, study), tuple(facts), rows, tuple(drawn))
 
 
@@ -279,5 +281,5 @@ def _choice_section(one: ChoiceSummary, study: StudyAnalysis) -> ChoiceSection:
         facts.append(f"{one.circles[0]} of {one.circles[1]} triples of conditions go in a circle")
     names = tuple(study.label(key) for key in keys)
     return ChoiceSection(
-        apa.measure_words(one.measure), _question_text(one, study), tuple(facts), names, table
+        apa.measure_name(one.measure), _question_text(one, study), tuple(facts), names, table
     )

@@ -14,7 +14,7 @@ from typing import Any
 from gazerig.features.study.analysis import StudyAnalysis
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.participation import AnswerRow, Participation
-from gazerig.features.study.report.apa import measure_words
+from gazerig.features.study.report.apa import measure_name
 from gazerig.features.study.statistics.effects import StatisticalTest
 
 ANSWERS = (
@@ -223,7 +223,7 @@ def r_script(study: StudyAnalysis) -> str:
         for one in rated
     ]
     calls += [
-        f"choices({json.dumps(measure_words(one.measure))}, {json.dumps(one.measure.questionnaire)}, "
+        f"choices({json.dumps(measure_name(one.measure))}, {json.dumps(one.measure.questionnaire)}, "
         f"{json.dumps(one.measure.items[0])}, {_vector(design.conditions)})"
         for one in study.choices
     ]

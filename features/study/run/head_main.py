@@ -10,7 +10,7 @@ import sys
 import threading
 
 from gazerig.errors import Error
-from gazerig.features.study.run.head_process import options_in
+from gazerig.features.study.run.head_process import decode_options
 from gazerig.robot.app import session
 
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
@@ -22,7 +22,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the study's program handles Ctrl-C
     for number in _ENDING:
         signal.signal(number, lambda *_: ended.append("a signal"))
-    options = options_in(sys.stdin.buffer.readline())
+    options = decode_options(sys.stdin.buffer.readline())
 
     def wait() -> None:
         while os.read(0, 4096):  # not through the buffer, whose lock the interpreter needs to exit

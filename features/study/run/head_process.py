@@ -43,7 +43,7 @@ class HeadProcess:
             self._process = child_process.start(_MODULE, stdin=PIPE, stderr=file.fileno())
         assert self._process.stdin is not None
         try:
-            self._process.stdin.write(as_line(options))
+            self._process.stdin.write(encode_options(options))
             self._process.stdin.flush()
             self.client = self._connect()
         except (OSError, HeadLost) as error:
@@ -115,14 +115,14 @@ class HeadProcess:
         raise HeadLost(f"{late}: {self.last_log_line()}")
 
 
-def as_line(options: RunOptions) -> bytes:
+def encode_options(options: RunOptions) -> bytes:
     """Return options as the line that the process reads."""
     plain = {field.name: getattr(options, field.name) for field in fields(options)}
     said = {name: str(one) if isinstance(one, Path) else one for name, one in plain.items()}
     return json.dumps(said).encode() + b"\n"
 
 
-def options_in(line: bytes) -> RunOptions:
+def decode_options(line: bytes) -> RunOptions:
     """Return the options of a line."""
     said: dict[str, Any] = json.loads(line)
     for name in _PATHS:

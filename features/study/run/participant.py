@@ -9,8 +9,8 @@ from pathlib import Path
 
 import gazerig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.data_folder import StudyData, code_of
-from gazerig.features.study.journal import Journal, Opened, WriteFailed
+from gazerig.features.study.data_folder import StudyData, participant_code
+from gazerig.features.study.journal import Journal, ParticipationOpened, WriteFailed
 from gazerig.features.study.pages.server import StudyServer
 from gazerig.features.study.participation import check_records
 from gazerig.features.study.run.head_presenter import HeadPresenter
@@ -57,14 +57,14 @@ def open_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str) 
         SetupError: the participant's data were deleted, are of another design or damaged, or a
             session is open.
     """
-    code = code_of(number)
+    code = participant_code(number)
     if code in data.deleted():
         raise SetupError(f"the data of {code} were deleted on request: take another participant")
     folder = data.participant(number)
     journal = Journal(folder)
     try:
         for one in journal.records:
-            if isinstance(one, Opened) and one.design_sha256 != sha256:
+            if isinstance(one, ParticipationOpened) and one.design_sha256 != sha256:
                 raise SetupError(
                     f"{folder} was begun with another design ({one.design_sha256[:12]}; this one "
                     f"is {sha256[:12]}): begin a new study with --data NEW_FOLDER"
@@ -102,7 +102,7 @@ def run_session(
         session = StudySession(
             study.design, study.questionnaires, plan.number, data.secret(), journal.records
         )
-        code = code_of(plan.number)
+        code = participant_code(plan.number)
         if session.closed:
             raise SetupError(f"{code} has ended the session already: take another participant")
         journal.write((session.opened(code, sha256, gazerig.__version__, utc_now()),))

@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta
 
 import gazerig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.data_folder import StudyData, code_of
-from gazerig.features.study.journal import AnswerValue, Journal, Measured, TrialEnded
+from gazerig.features.study.data_folder import StudyData, participant_code
+from gazerig.features.study.journal import AnswerValue, Journal, TrialEnded, TrialMeasured
 from gazerig.features.study.run.participant import open_journal
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.screens import (
@@ -65,7 +65,7 @@ def _simulate(
         return (_BEGAN + timedelta(days=number, seconds=now_s[0])).isoformat(timespec="seconds")
 
     session = StudySession(study.design, study.questionnaires, number, secret)
-    code = code_of(number)
+    code = participant_code(number)
     journal.write((session.opened(code, sha256, gazerig.__version__, utc(), simulated=True),))
     run = StudyRun(code, session, journal, FilmPresenter(), lambda: now_s[0], utc)
     person = SimulatedParticipant(study.design, study.questionnaires, number, population)
@@ -96,7 +96,7 @@ def _simulate(
     if study.design.objective:
         shown = {**dict(enumerate(session.order))}
         journal.write([
-            Measured(one.trial, shown[one.trial], person.measured(one.trial, shown[one.trial]))
+            TrialMeasured(one.trial, shown[one.trial], person.measured(one.trial, shown[one.trial]))
             for one in ended
             if one.trial in shown and shown[one.trial] in study.design.conditions
         ])  # fmt: skip

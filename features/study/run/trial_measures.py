@@ -16,10 +16,10 @@ from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
 from gazerig.features.lab.report.statistics import judge
 from gazerig.features.study.journal import (
     STEP_DEG,
-    Measured,
     Record,
     TrialBegan,
     TrialEnded,
+    TrialMeasured,
 )
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.scores import GAZE_MEASURES
@@ -37,7 +37,7 @@ SWITCH_S = 0.5
 
 def measure_presentations(
     study: LoadedStudy, records: Sequence[Record], folder: Path, say: Callable[[str], None]
-) -> tuple[Measured, ...]:
+) -> tuple[TrialMeasured, ...]:
     """Return the measures of presentations that have none yet.
 
     Args:
@@ -49,7 +49,7 @@ def measure_presentations(
     began = {
         (one.trial, one.attempt, one.side): one for one in records if isinstance(one, TrialBegan)
     }
-    done = {(one.trial, one.attempt, one.side) for one in records if isinstance(one, Measured)}
+    done = {(one.trial, one.attempt, one.side) for one in records if isinstance(one, TrialMeasured)}
     wanted = [
         one
         for one in records
@@ -73,7 +73,7 @@ def measure_presentations(
         for end, ticks in zip(ends, runs, strict=True):
             condition = began[end.trial, end.attempt, end.side].condition
             values = _values(study.design.objective, ticks, end.from_s)
-            found.append(Measured(end.trial, condition, values, end.side, end.attempt))
+            found.append(TrialMeasured(end.trial, condition, values, end.side, end.attempt))
     return tuple(found)
 
 

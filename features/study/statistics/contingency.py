@@ -60,11 +60,11 @@ def chi_square(
         notes.append(f"{small} of {kept.size} expected counts are below 5: use the exact chance")
     return StatisticalTest(
         "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue),
-        exact_chance(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
+        exact_p_value(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
     )  # fmt: skip
 
 
-def exact_chance(table: Counts) -> float:
+def exact_p_value(table: Counts) -> float:
     """Return the probability of tables at least as extreme with these margins.
 
     Tables with a large chi-square are extreme. Up to 200,000 tables of two rows are all enumerated;

@@ -24,7 +24,9 @@ _AT_ONCE = 500_000
 _SEED = 20020402
 
 
-def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False) -> StatisticalTest:
+def rank_sum_test(
+    a: Floats, b: Floats, two_sided: bool = True, paired: bool = False
+) -> StatisticalTest:
     """Test whether b tends to exceed a: Wilcoxon's rank-sum, or Mann and Whitney's U.
 
     Args:
@@ -103,7 +105,7 @@ def _swap_scores(a: Floats, b: Floats) -> NDArray[np.int64]:
     return found
 
 
-def signed_rank(
+def signed_rank_test(
     differences: Floats, two_sided: bool = True, zeros: Zeros = "wilcox"
 ) -> StatisticalTest:
     """Test whether differences are centred at zero: Wilcoxon's signed-rank test.
@@ -164,7 +166,7 @@ def _all_signs(scores: NDArray[np.int64], two_sided: bool) -> float:
     return min(1.0, 2.0 * min(above, below) if two_sided else above)
 
 
-def sign(differences: Floats, two_sided: bool = True) -> StatisticalTest:
+def sign_test(differences: Floats, two_sided: bool = True) -> StatisticalTest:
     """Test whether more participants prefer one side than the other: the exact sign test.
 
     A participant counts once, regardless of the number of choices.
@@ -192,7 +194,7 @@ def sign(differences: Floats, two_sided: bool = True) -> StatisticalTest:
     return StatisticalTest("sign", "K", above, nan, p, p, least, len(d), effect, notes)
 
 
-def friedman(rows: Floats) -> StatisticalTest:
+def friedman_test(rows: Floats) -> StatisticalTest:
     """Test whether conditions differ: Friedman's test, with ties.
 
     The exact probability is that of all orders of the answers within participants, or of 9999

@@ -9,7 +9,7 @@ from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.run.run_world import mjcf_of, world_script
-from gazerig.features.world.shapes import ShapesFrom, script_shapes
+from gazerig.features.world.shapes import ShapesInFrame, script_shapes
 from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import RigFrame
 from gazerig.robot.analysis.mutual_gaze import HeadPlacement
@@ -19,7 +19,7 @@ from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.sim_mock.scenes.script import SceneScript
 
 
-def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
+def recorded_world_info(options: RunOptions, seed: int) -> WorldInfo | None:
     """Return the recording's entry for the world of a run, without its start time; None without.
 
     Raises:
@@ -47,7 +47,7 @@ def recorded_shapes(info: WorldInfo, placement: tuple[float, ...]) -> WorldShape
         raise SetupError(f"the room is not shown: {hint}")
     shapes = script_shapes(Figures(_script(info), info.seed))
     return (
-        ShapesFrom(shapes, RigFrame(*HeadPlacement.from_numbers(placement)))
+        ShapesInFrame(shapes, RigFrame(*HeadPlacement.from_numbers(placement)))
         if placement
         else shapes
     )

@@ -11,7 +11,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera
 from gazerig.features.world.other_heads import HeadInState, OtherHeads
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
-from gazerig.features.world.run.recorded_world import world_info
+from gazerig.features.world.run.recorded_world import recorded_world_info
 from gazerig.features.world.run.run_world import RunWorld, ServedRig, world_ideal_bus
 from gazerig.features.world.run.sight import RenderedWorld, world_camera
 from gazerig.features.world.shapes import shapes_of
@@ -158,4 +158,4 @@ def _info(options: RunOptions, world: RunWorld) -> WorldInfo | None:
     if options.record is None:
         return None
     people = world.spec.figures
-    return world_info(options, options.seed if people is None else people.seed)
+    return recorded_world_info(options, options.seed if people is None else people.seed)

@@ -15,7 +15,14 @@ import viser
 from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import Colour, Mesh, Painted, lathe, plain, smooth_normals
+from gazerig.robot.description.mesh import (
+    Colour,
+    Mesh,
+    Painted,
+    lathe,
+    smooth_normals,
+    uniform_colours,
+)
 from gazerig.robot.description.texture import TexturedMesh
 
 
@@ -236,7 +243,7 @@ def glow_disc(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
     alpha = np.repeat(
         (0.5 + 0.5 * np.cos(pi * radius)) ** 1.3 * inner[3], len(mesh.vertices) // rings
     )
-    colours = np.column_stack((plain(mesh, inner[:3]), alpha))
+    colours = np.column_stack((uniform_colours(mesh, inner[:3]), alpha))
     return Painted(mesh, colours, np.tile((0.0, 0.0, 1.0), (len(mesh.vertices), 1)))
 
 

@@ -15,7 +15,7 @@ from gazerig.robot.dashboard.view.glb import (
     textured_glb,
 )
 from gazerig.robot.dashboard.view.scene_node import set_pose
-from gazerig.robot.description.mesh import Painted, merged, smooth_normals
+from gazerig.robot.description.mesh import Painted, merge_meshes, smooth_normals
 from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
 
 _FINISHES: Mapping[WorldFinish, Finish] = {
@@ -86,7 +86,7 @@ def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
         else:
             files.append(part_glb(part))
     return [
-        painted_glb(merged(shapes), _FINISHES[finish]) for finish, shapes in plain.items()
+        painted_glb(merge_meshes(shapes), _FINISHES[finish]) for finish, shapes in plain.items()
     ] + files
 
 

@@ -209,7 +209,7 @@ def _measure_field(
         seen: list[Pixels] = []
         number, seen_s, size_px = 0, clock.now_s(), (0, 0)
         while len(seen) < _FACE_FRAMES:
-            refuse_stop(stopped)
+            raise_if_stopped(stopped)
             found = thread.latest(clock.now_s())
             if found is None or found.number == number:
                 if clock.now_s() - seen_s > _NO_FACE_S:
@@ -347,7 +347,7 @@ def _find_lens(
     steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
     say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
     while True:
-        refuse_stop(job.stopped)
+        raise_if_stopped(job.stopped)
         shot = eye.look()
         if shot is None or shot.number == number:
             eye.rest(0.01)
@@ -436,7 +436,7 @@ def _first_frame(job: _Job, eye: _CameraView) -> Shot:
     """Wait for a frame."""
     give_up_s = eye.now_s() + 5.0
     while eye.now_s() < give_up_s:
-        refuse_stop(job.stopped)
+        raise_if_stopped(job.stopped)
         shot = eye.look()
         if shot is not None:
             return shot
@@ -471,7 +471,7 @@ class JoggedNeck:
 
     def turn(self, head_rad: Angles3) -> None:
         """Move gently; if the guard holds it back, the measured angles count."""
-        refuse_stop(self._stopped)
+        raise_if_stopped(self._stopped)
         there = self._control.body.names
         axes = zip(NECK, head_rad, strict=True)
         goal = {name: degrees(a) for name, a in axes if name in there}
@@ -485,7 +485,7 @@ class JoggedNeck:
     def rest(self, seconds: float) -> None:
         """Hold still, and measure the head."""
         moved = self._control.hold(seconds)
-        refuse_stop(self._stopped)
+        raise_if_stopped(self._stopped)
         at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
         self._angles = (at.get(NECK[0], 0.0), at.get(NECK[1], 0.0), at.get(NECK[2], 0.0))
         if self._mock is not None:
@@ -530,7 +530,7 @@ def moving_neck(
         yield neck
 
 
-def refuse_stop(stopped: StopReason) -> None:
+def raise_if_stopped(stopped: StopReason) -> None:
     """Refuse to continue if there is a reason to stop.
 
     Raises:

@@ -19,7 +19,7 @@ from gazerig.features.bringup.calibration.face_steering import (
     PART_NAMES_TEXT,
     FaceCalibration,
     FaceSteering,
-    changes,
+    changed_places,
     initial_calibration,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
@@ -112,7 +112,7 @@ def calibrate_face(
         ).check_and_complete()
         try:
             found = _calibrate(options, loaded, lines, answers is not None, stopped)
-            values = changes(found)
+            values = changed_places(found)
             if not values:
                 say("no part was chosen: nothing to write")
                 return
@@ -270,7 +270,7 @@ def _table(rig: str, loaded: Rig, found: FaceCalibration) -> Table:
     table = Table(caption=f"places in mm out of the face, to its owner's left, up; against {rig}")
     for name in ("part", "old", "new"):
         table.add_column(name, justify="left" if name == "part" else "right", no_wrap=True)
-    for key, new in changes(found).items():
+    for key, new in changed_places(found).items():
         part = key.rpartition(".")[2]
         old = loaded.face_parts_mm.get(part)
         table.add_row(part, _numbers(old) if old is not None else "an adult's", _numbers(new))

@@ -20,7 +20,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     CalibrationRefused,
     LinkageFit,
     Value,
-    changes,
+    rig_changes,
 )
 from gazerig.features.bringup.calibration.joint_procedure import (
     calibrate_by_hand,
@@ -52,7 +52,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     refuse_unwritable,
     show_and_write,
 )
-from gazerig.features.bringup.servo_families import KINDS, kind_of
+from gazerig.features.bringup.servo_families import KINDS, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.control.interrupts import Interrupts
@@ -146,7 +146,7 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
         name
         for name in names
         if not rig.joints[name].facts.measures_position
-        or kind_of(rig.joints[name].model).set_middle is None
+        or servo_kind(rig.joints[name].model).set_middle is None
     ]
     if how.set_middle and other:
         titles = " and ".join(kind.title for kind in able)
@@ -324,7 +324,7 @@ def calibrate_joints(
             if found:
                 wanted: dict[str, Value] = {}
                 for name, made in found.items():
-                    wanted |= changes(name, loaded.joints[name], made, loaded.park_deg)
+                    wanted |= rig_changes(name, loaded.joints[name], made, loaded.park_deg)
                 show_and_write(rig, loaded, wanted, out, dry_run, person)
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
