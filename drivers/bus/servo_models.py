@@ -5,11 +5,17 @@ from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
+from gazerig.drivers.dynamixel.control_table import P_UNIT, PWM_FULL, DynamixelModel
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
-from gazerig.drivers.dynamixel.control_table import DynamixelModel
 from gazerig.drivers.errors import PluginError
+from gazerig.drivers.feetech.memory_table import (
+    FACTORY_P_GAIN,
+    P_FULL_STEPS,
+    SCS_MODELS,
+    SCS_STEPS,
+    FeetechModel,
+)
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
-from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel
 from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
 
 if TYPE_CHECKING:
@@ -36,6 +42,8 @@ class ServoModelInfo(NamedTuple):
     measures_position: whether it measures its position; if not, it has no other feedback either
     hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it has any
     stall_torque_nm: stall torque at its rated voltage; 0.2 for a small hobby servo with metal gears
+    p_gain: its P gain as delivered
+    full_steps: steps of error times P gain at which its drive is full, 0 if unknown
     """
 
     bus: BusKind
@@ -51,6 +59,18 @@ class ServoModelInfo(NamedTuple):
     highest_v: float = inf
     family: str = ""
     stall_torque_nm: float = 0.2
+    p_gain: int = 0
+    full_steps: float = 0.0
+
+    def stiffness(self, gains: tuple[int, int, int] | None) -> float:
+        """Return the share of full drive per step of error, 0 if unknown.
+
+        Args:
+            gains: P, I and D gain; None: as delivered. With an I gain no error remains.
+        """
+        if not self.full_steps or (gains is not None and gains[1]):
+            return 0.0
+        return (self.p_gain if gains is None else gains[0]) / self.full_steps
 
     def fits_bus(self, kind: str) -> bool:
         """Return whether it can be on a bus of this kind; any board moves a hobby servo."""
@@ -72,7 +92,16 @@ def _smart_servo(bus: BusKind, family: str, model: SmartModel, steps: int) -> Se
         highest_v=0.1 * model.max_voltage,
         family=family,
         stall_torque_nm=model.stall_torque_nm,
+        p_gain=model.gains[4] if isinstance(model, DynamixelModel) else FACTORY_P_GAIN,
+        full_steps=_full_steps(model),
     )
+
+
+def _full_steps(model: SmartModel) -> float:
+    """Return the steps of error times P gain at which a servo's drive is full."""
+    if isinstance(model, DynamixelModel):
+        return P_UNIT * PWM_FULL
+    return P_FULL_STEPS * model.steps_per_turn / STEPS_PER_TURN
 
 
 SERVOS: dict[str, ServoModelInfo] = {
@@ -93,7 +122,7 @@ SERVOS: dict[str, ServoModelInfo] = {
         for name, model in HOBBY.items()
     },
 }
-"""By the model name in a rig's YAML; models of a package are added when its bus is used."""
+"""Servo models by their name in a rig's YAML; those of a package are added when its bus is used."""
 
 _ALSO_MOVED: dict[BusKind, tuple[BusKind, ...]] = {}
 """Kind of a package -> other kinds whose servos it moves too."""
@@ -115,7 +144,7 @@ def add_models(
     """
     for name, model in models.items():
         if not isinstance(model, ServoModelInfo):
-            raise PluginError(f"{label}: its servo model {name!r} is no ServoModelInfo")
+            raise PluginError(f"{label}: its servo model {name!r} is not a ServoModelInfo")
         if SERVOS.get(name, model._replace(bus=kind)) != model._replace(bus=kind):
             raise PluginError(f"{label}: another servo model is already named {name!r}")
     for name in moves:

@@ -18,6 +18,8 @@ ACCELERATION_UNIT_STEPS_S2 = 214.577 / 3600.0 * STEPS_PER_TURN
 WATCHDOG_UNIT_S = 0.02
 PWM_FULL = 885
 """PWM register value for 100 %."""
+P_UNIT = 128.0
+"""P gain that adds one unit of PWM per step of position error [A: the unit of the error]."""
 
 BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 """Bit/s by the value of Baud Rate (8); the last one only on the X430."""

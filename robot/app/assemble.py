@@ -31,7 +31,7 @@ from gazerig.robot.app.gaze_models import motion_models, oculomotor, rig_kinemat
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
-from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.app.rig_description import sag_compensation, shape_of
 from gazerig.robot.app.rig_limits import animation_tables, face_parts_m, lid_spans, limits, park_rad
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
@@ -64,10 +64,10 @@ def _identity(part: T) -> T:
 
 
 class Assembly(NamedTuple):
-    """A robot with the parts that run it.
+    """A robot and the parts that run it.
 
     sent_bytes_digest: returns the SHA-256 of all bytes to the emulated bus, None for another bus
-    close: ends the processes started for it; notes: messages for the user
+    close: ends the processes started for the robot; notes: messages for the user
     live_params: holds the present rig and applies changes to the running parts
     inject_fault: executes a fault command of the emulated servos, None for real or ideal ones
     room: the surroundings of --world, None without
@@ -188,9 +188,14 @@ def assemble(
             )
         gentle_deg_s = rig.guard.soft_start_speed_deg_s
         body = Body(
-            opened.bus, rig.joints, park_rad(rig), gentle_deg_s, coupled_pairs(rig.couplings)
+            opened.bus,
+            rig.joints,
+            park_rad(rig),
+            gentle_deg_s,
+            coupled_pairs(rig.couplings),
+            None if options.bus == "ideal" else sag_compensation(rig),
         )
-        # A recorded camera was on other joints: its gyro is not fused with these.
+        # A recorded camera was mounted on other joints: its gyro is not fused with these.
         parts = _build_components(
             rig, body, kinematics, seen, sight.mount, camera, walk, random,
             GyroFusion(messages.append) if options.replay is None else None,
@@ -211,7 +216,7 @@ def assemble(
             robot.attention.close()
         opened.close()
 
-    # A shipped walk is noted only if verbose.
+    # A shipped walk is reported only if verbose.
     shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
     note = row_sums_note(walk) if options.verbose or not shipped else None
     if note is not None:

@@ -1,4 +1,4 @@
-"""Description of a rig by its YAML, with the user's own meshes."""
+"""Description of a rig from its YAML, with the user's own meshes."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -6,12 +6,14 @@ from dataclasses import replace
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_limits import lid_ends
+from gazerig.robot.control.sag import SagCompensation
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
-from gazerig.robot.description.statics import Statics
+from gazerig.robot.description.statics import NECK_JOINTS, Statics
 from gazerig.robot.model.guard_params import CollisionParams
+from gazerig.robot.model.types import order_joints
 
 
 def description_of(rig: Rig, *, looks: bool = True) -> Description:
@@ -19,7 +21,7 @@ def description_of(rig: Rig, *, looks: bool = True) -> Description:
 
     Args:
         rig: the rig.
-        looks: with the visible shapes; without them, the same mechanism is built quickly.
+        looks: Whether to include visible shapes; without them the same mechanism is built faster.
 
     Raises:
         SetupError: a mesh of its own cannot be used.
@@ -32,7 +34,7 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
 
     Args:
         rig: the rig.
-        without_lost_meshes: unusable meshes are left out, as those of a recorded rig may be
+        without_lost_meshes: Whether to omit unusable meshes, as those of a recorded rig may be
             missing.
 
     Raises:
@@ -69,11 +71,18 @@ def statics_of(rig: Rig) -> Statics:
     return Statics(description_of(rig, looks=False), rig.joints, rig.couplings)
 
 
-def collision_hints(rig: Rig) -> list[str]:
-    """Return the collisions of the rig's model within the joints' limits, a line each.
+def sag_compensation(rig: Rig) -> SagCompensation | None:
+    """Return what makes up for the sag of a rig's neck; None without a neck or by its file."""
+    if not rig.mass.sag_share or not any(name in rig.joints for name in NECK_JOINTS):
+        return None
+    return SagCompensation(statics_of(rig), order_joints(rig.joints), rig.mass.sag_share)
 
-    Collisions that its guard prevents are left out. Shoulders are those of the model, so these are
-    hints.
+
+def collision_hints(rig: Rig) -> list[str]:
+    """Return the collisions of the rig's model within the joints' limits, one line each.
+
+    Collisions that its guard prevents are omitted. The shoulders are those of the model, so these
+    are only hints.
     """
     shape = shape_of(replace(rig, meshes={}))
     return [
@@ -90,7 +99,7 @@ def _forbids_pose(pair: CollisionParams, angles_deg: Mapping[str, float]) -> boo
 
 
 def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find meshes of a rig's own that cannot be shown: key in its file, and the fault."""
+    """Find meshes of a rig that cannot be shown: their key in its file, and the fault."""
     if not rig.meshes:
         return
     made = describe(shape_of(replace(rig, meshes={})), looks=False)

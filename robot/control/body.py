@@ -8,6 +8,7 @@ from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos
+from gazerig.robot.control.sag import SagCompensation
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
 from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
 from gazerig.robot.model.types import JointAngles, JointState, order_joints
@@ -48,6 +49,7 @@ class Body:
         park_rad: As in ``servo_setups``.
         gentle_deg_s: As in ``servo_setups``.
         pairs: As in ``servo_setups``.
+        sag: Changes of the goals that make up for the weight; None: none.
     """
 
     def __init__(
@@ -57,8 +59,10 @@ class Body:
         park_rad: Mapping[str, float] | None = None,
         gentle_deg_s: float = ENTRY_DEG_S,
         pairs: Sequence[CoupledPair] = (),
+        sag: SagCompensation | None = None,
     ) -> None:
         self.bus = bus
+        self._sag, self._read_s = sag, 0.0
         self.names = order_joints(joints)
         self._pairs = tuple(pairs)
         self._coupled = CoupledServos(pairs, self.names) if pairs else None
@@ -73,14 +77,16 @@ class Body:
             position_steps=tuple(self._steps((0.0,) * len(self.names))),
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
-            torque=(True,) * len(self.names),  # it was switched on, and no servo denies it
+            torque=(True,) * len(self.names),  # it was switched on, and no servo reports otherwise
             measured=tuple([joint.facts.measures_position for joint in self._joints]),
         )
 
     def _set_joints(self, joints: tuple[JointParams, ...]) -> None:
         self._joints = joints
+        self._by_name = dict(zip(self.names, joints, strict=True))
         linkages = [joint.made() for joint in joints]
-        # All joints are computed as if every linkage were straight; then the others are corrected.
+        # All joints are computed as if every linkage were straight; the other joints are then
+        # corrected.
         lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
         self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
         self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
@@ -88,7 +94,7 @@ class Body:
     def retune(
         self, joints: Mapping[str, JointParams], gentle_deg_s: float
     ) -> dict[int, tuple[float, float]]:
-        """Apply new joint parameters; the servos are set up again when the torque comes on.
+        """Apply new joint parameters; the servos are set up again when torque is switched on.
 
         Returns:
             (factor, offset in rad) by number of each joint whose angles change: x becomes
@@ -130,6 +136,7 @@ class Body:
             BusLost: No servo has answered for too long while the torque was on. With the torque
                 off, a lost bus is no error.
         """
+        self._read_s = t_s
         try:
             feedback = self.bus.read(t_s)
         except BusLost:
@@ -166,7 +173,12 @@ class Body:
         Raises:
             ValueError: An angle is not a number, or the number of angles is wrong.
         """
-        if self._bent or self._coupled is not None or len(command_rad) != len(self._zeros):
+        if self._sag is not None:
+            steps = self._steps(command_rad)
+            for i, offset in self._sag.offsets(command_rad, self._by_name, self._read_s):
+                steps[i] += round(offset)
+            self.bus.write(steps)
+        elif self._bent or self._coupled is not None or len(command_rad) != len(self._zeros):
             self.bus.write(self._steps(command_rad))
         else:
             lines = map(add, self._zeros, map(mul, self._slopes, command_rad))
@@ -200,7 +212,7 @@ class Body:
         """Switch the torque off immediately; the bus stays open and reading continues.
 
         Raises:
-            BusLost: The port is gone; the torque is switched off when it is back.
+            BusLost: The port is gone; the torque is switched off when it reconnects.
         """
         self._torque_off = True
         self.bus.disable_torque()
@@ -212,6 +224,8 @@ class Body:
             SetupError: A servo does not answer, refuses or has latched a fault.
             BusLost: The port is gone.
         """
+        if self._sag is not None:
+            self._sag.restart()
         goals = self.bus.enable_torque()
         self._torque_off = False
         if self._coupled is not None:
@@ -225,7 +239,7 @@ class Body:
         A message is, e.g., "left_lid (servo 7): torque-off not confirmed: cut the servo power".
         """
         try:
-            with contextlib.suppress(Exception):  # nothing may keep the torque on
+            with contextlib.suppress(Exception):  # nothing may prevent switching the torque off
                 self.bus.events()  # discards earlier messages
             self._release()
             with contextlib.suppress(Exception):

@@ -8,7 +8,7 @@ with their signs (robot/model/kinematics.py).
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations, product
-from math import copysign, pi, radians
+from math import copysign, degrees, pi, radians
 from typing import NamedTuple
 
 from gazerig.gaze.angles import rotation
@@ -159,8 +159,9 @@ class _Builder:
     def _joint(
         self, name: str, axis: Vec3, of: str = "", follows: LinkageFollower | None = None
     ) -> LinkJoint:
-        limit = self._rig.joints[of or name].limit()
-        return LinkJoint(
+        own = self._rig.joints[of or name]
+        limit = own.limit()
+        joint = LinkJoint(
             name,
             axis,
             limit.low_rad,
@@ -168,6 +169,13 @@ class _Builder:
             limit.speed_rad_s,
             self._torques[of or name],
             follows,
+        )
+        if follows is not None:
+            return joint
+        return joint._replace(
+            friction_nm=own.friction_nm,
+            spring_nm_rad=degrees(own.spring_nm_deg),
+            spring_rest_rad=radians(own.spring_rest_deg),
         )
 
     def _add_neck(self) -> str:

@@ -115,6 +115,11 @@ def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
             body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
             range=numbers((joint.low_rad, joint.high_rad)),
         )  # fmt: skip
+        if joint.friction_nm:
+            element.set("frictionloss", numbers((joint.friction_nm,)))
+        if joint.spring_nm_rad:
+            element.set("stiffness", numbers((joint.spring_nm_rad,)))
+            element.set("springref", numbers((joint.spring_rest_rad,)))
         if at_rad:
             element.set("ref", numbers((at_rad,)))
     for shape in link.collisions:

@@ -5,15 +5,23 @@ from the same masses. Torques are in Nm and act on a joint in the direction of i
 joints that move together are shared by their two servos.
 """
 
-from collections.abc import Mapping
-from math import copysign, degrees, hypot, pi, sin
+from collections.abc import Collection, Mapping, Sequence
+from math import atan2, copysign, degrees, hypot, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.angles import rotate
-from gazerig.gaze.types import Floats
-from gazerig.robot.description.links import Description
+from gazerig.gaze.angles import add, compose, dot, rotate, rotate_back, scale
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.description.links import (
+    IDENTITY,
+    ORIGIN,
+    Description,
+    Inertia,
+    LinkageFollower,
+    turn_about,
+)
+from gazerig.robot.description.mass import in_parent_frame, join_inertias
 from gazerig.robot.model.coupling_params import CouplingParams, coupled_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
@@ -60,28 +68,42 @@ class Statics:
         joints: Mapping[str, JointParams],
         couplings: Mapping[str, CouplingParams],
     ) -> None:
-        self._description, self._joints = description, joints
+        self._description, self.joints = description, joints
         self._pairs = coupled_pairs(couplings)
+        self._nodes = _nodes(description, joints.keys())
+        self._stall_nm = {
+            name: one.facts.stall_torque_nm
+            * one.made().steepest
+            * 2.0
+            * pi
+            / one.facts.steps_per_turn
+            for name, one in joints.items()
+        }
 
-    def weight_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
-        """Return the torque of the weight at each joint; joints left out are at 0."""
-        return {name: torque for name, (torque, _) in self._about_axes(angles_rad).items()}
+    def of_neck(self) -> "Statics":
+        """Return the same for the joints of the neck only, computed quickly."""
+        necks = {name: self.joints[name] for name in NECK_JOINTS if name in self.joints}
+        found = Statics(self._description, necks, {})
+        found._pairs = tuple(pair for pair in self._pairs if {pair.first, pair.second} <= {*necks})
+        return found
 
     def load_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the torque of weight and spring at each joint; joints left out are at 0."""
+        weight = _weight_nm(self._nodes, angles_rad)
         return {
-            name: torque + spring_nm(self._joints[name], angles_rad.get(name, 0.0))
-            for name, torque in self.weight_nm(angles_rad).items()
+            name: weight.get(name, 0.0) + spring_nm(joint, angles_rad.get(name, 0.0))
+            for name, joint in self.joints.items()
         }
 
     def weights(self) -> dict[str, Weight]:
         """Return the weight at each joint."""
-        level = self._about_axes({})
+        level, inertias = _weight_nm(self._nodes, {}), self._inertias()
         found = {}
-        for name, (torque, inertia) in level.items():
+        for name, inertia in inertias.items():
             # About a fixed axis the torque is a sine of the angle.
-            aside = self._about_axes({name: 0.5 * pi})[name][0]
-            found[name] = Weight(hypot(torque, aside), float(np.arctan2(-torque, aside)), inertia)
+            torque = level.get(name, 0.0)
+            aside = _weight_nm(self._nodes, {name: 0.5 * pi}).get(name, 0.0)
+            found[name] = Weight(hypot(torque, aside), atan2(-torque, aside), inertia)
         return found
 
     def stall_shares(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
@@ -90,6 +112,11 @@ class Statics:
         It is signed as the joint's angle; a limit of its drive (torque_limit) reduces the stall
         torque.
         """
+        limits = {name: joint.torque_limit or 1.0 for name, joint in self.joints.items()}
+        return {name: one / limits[name] for name, one in self.drive_shares(angles_rad).items()}
+
+    def drive_shares(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
+        """Return the same as shares of the whole drive, at the rated voltage."""
         loads = self.load_nm(angles_rad)
         shafts = dict(loads)
         for first, second, coupling in self._pairs:
@@ -97,19 +124,11 @@ class Statics:
             rates = np.array(coupling.rates(at))
             shares = np.linalg.solve(rates.T, (loads[first], loads[second]))
             shafts[first], shafts[second] = shares.tolist()
-        found = {}
-        for name, torque in shafts.items():
-            joint = self._joints[name]
-            turns = joint.made().steepest * 2.0 * pi / joint.facts.steps_per_turn
-            stall = joint.facts.stall_torque_nm * (joint.torque_limit or 1.0)
-            found[name] = torque / (turns * stall)
-        return found
+        return {name: torque / self._stall_nm[name] for name, torque in shafts.items()}
 
     def friction_nm(self, name: str) -> float:
         """Return the dry friction that holds a joint without torque."""
-        joint = self._joints[name]
-        turns = joint.made().steepest * 2.0 * pi / joint.facts.steps_per_turn
-        return turns * GEAR_FRICTION * joint.facts.stall_torque_nm + joint.friction_nm
+        return GEAR_FRICTION * self._stall_nm[name] + self.joints[name].friction_nm
 
     def rest_pose(self, near_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the pose of the neck that needs no torque, as near as possible to a pose.
@@ -118,14 +137,14 @@ class Statics:
         then that end of its range.
         """
         pose = dict(near_rad)
-        necks = [name for name in NECK_JOINTS if name in self._joints]
+        necks = [name for name in NECK_JOINTS if name in self.joints]
         for name in (*necks, *necks):
             pose[name] = self._rest_rad(name, pose)
         return {name: pose[name] for name in necks}
 
     def _rest_rad(self, name: str, pose: Mapping[str, float]) -> float:
         """Return the angle at which one joint rests with the others in a pose."""
-        limit = self._joints[name].limit()
+        limit = self.joints[name].limit()
         near = min(max(pose.get(name, 0.0), limit.low_rad), limit.high_rad)
 
         def torque(angle: float) -> float:
@@ -147,7 +166,7 @@ class Statics:
 
     def limp_rad(self, name: str, pose_rad: Mapping[str, float]) -> float:
         """Return the angle at which a joint comes to rest when its servo has no torque."""
-        limit = self._joints[name].limit()
+        limit = self.joints[name].limit()
         at = pose_rad.get(name, 0.0)
         torque = self.load_nm(pose_rad)[name]
         if abs(torque) <= self.friction_nm(name):
@@ -164,41 +183,93 @@ class Statics:
         loads, shares = self.load_nm(angles_rad), self.stall_shares(angles_rad)
         return {name: (loads[name], shares[name]) for name in NECK_JOINTS if name in loads}
 
-    def _about_axes(self, angles_rad: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """Return torque of the weight and inertia about the axis of each joint of the rig."""
+    def _inertias(self) -> dict[str, float]:
+        """Return the inertia about the axis of each joint of the rig with all joints at 0."""
         description = self._description
-        angles = description.angles(tuple(angles_rad), tuple(angles_rad.values()))
-        poses = description.poses(angles)
-        carried: dict[str, list[tuple[float, Floats, Floats]]] = {}
+        poses = description.poses(description.angles((), ()))
         parents = {link.name: link.parent for link in description.links}
+        carried: dict[str, list[Inertia]] = {}
         for link in description.links:
-            if link.inertia is None:
-                continue
-            R, p = (np.array(part, float) for part in poses[link.name])
-            com = R @ link.inertia.com_m + p
-            tensor = R @ np.array(link.inertia.tensor_kg_m2) @ R.T
-            at: str | None = link.name
-            while at is not None:
-                carried.setdefault(at, []).append((link.inertia.mass_kg, com, tensor))
+            at: str | None = link.name if link.inertia is not None else None
+            while at is not None and link.inertia is not None:
+                own = in_parent_frame(link.inertia, *poses[link.name])
+                carried.setdefault(at, []).append(own)
                 at = parents[at]
-        found = dict.fromkeys(self._joints, (0.0, 0.0))
+        found = dict.fromkeys(self.joints, 0.0)
         for link in description.links:
-            joint = link.joint
-            if joint is None:
-                continue
-            follows = joint.follows
-            name, ratio = (follows.joint, follows.ratio) if follows else (joint.name, 1.0)
-            R_world, p_world = poses[link.name]
-            axis: Floats = np.array(rotate(R_world, joint.axis), float)
-            torque = inertia = 0.0
-            for kg, com, tensor in carried.get(link.name, ()):
-                off = com - np.array(p_world)
-                across = np.cross(axis, off)
-                torque -= kg * GRAVITY_M_S2 * float(across[2])
-                inertia += kg * float(across @ across) + float(axis @ tensor @ axis)
-            before = found[name]
-            found[name] = before[0] + ratio * torque, before[1] + ratio * ratio * inertia
+            if link.joint is not None and link.name in carried:
+                R, p = poses[link.name]
+                axis = np.array(rotate(R, link.joint.axis))
+                own = join_inertias(carried[link.name])
+                across = np.cross(axis, np.subtract(own.com_m, p))
+                name, ratio = link.joint.follows or LinkageFollower(link.joint.name)
+                moment = own.mass_kg * float(across @ across)
+                found[name] += ratio**2 * (moment + float(axis @ own.tensor_kg_m2 @ axis))
         return found
+
+
+class _Node(NamedTuple):
+    """Links that move as one, in the frame of the joint that turns them.
+
+    joint, ratio, axis: the rig's joint, its turn for one of that joint, and its axis
+    parent: number of the node that carries it; the first has none
+    R_parent, p_parent_m: pose in the parent with the joint at 0
+    mass_kg, moment_kg_m: mass, and mass times its centre
+    """
+
+    joint: str
+    ratio: float
+    axis: Vec3
+    parent: int
+    R_parent: Mat3
+    p_parent_m: Vec3
+    mass_kg: float = 0.0
+    moment_kg_m: Vec3 = ORIGIN
+
+
+def _nodes(description: Description, moving: Collection[str]) -> tuple[_Node, ...]:
+    """Return the links of a description as few bodies; joints that do not move are at 0."""
+    nodes = [_Node("", 0.0, ORIGIN, -1, IDENTITY, ORIGIN)]
+    at: dict[str, tuple[int, Mat3, Vec3]] = {}
+    for link in description.links:
+        number, R, p = (0, IDENTITY, ORIGIN) if link.parent is None else at[link.parent]
+        R, p = compose(R, link.R), add(p, rotate(R, link.p_m))
+        if link.joint is not None:
+            name, ratio = link.joint.follows or LinkageFollower(link.joint.name)
+            if name in moving:
+                nodes.append(_Node(name, ratio, link.joint.axis, number, R, p))
+                number, R, p = len(nodes) - 1, IDENTITY, ORIGIN
+        at[link.name] = number, R, p
+        if link.inertia is not None:
+            kg, node = link.inertia.mass_kg, nodes[number]
+            moment = scale(add(p, rotate(R, link.inertia.com_m)), kg)
+            nodes[number] = node._replace(
+                mass_kg=node.mass_kg + kg, moment_kg_m=add(node.moment_kg_m, moment)
+            )
+    return tuple(nodes)
+
+
+def _weight_nm(nodes: Sequence[_Node], angles_rad: Mapping[str, float]) -> dict[str, float]:
+    """Return the torque of the weight at each joint of some bodies."""
+    turns = [
+        compose(one.R_parent, turn_about(one.axis, one.ratio * angles_rad.get(one.joint, 0.0)))
+        for one in nodes
+    ]
+    masses = [one.mass_kg for one in nodes]
+    moments = [one.moment_kg_m for one in nodes]
+    for i in range(len(nodes) - 1, 0, -1):  # children come after their parents
+        parent, p = nodes[i].parent, nodes[i].p_parent_m
+        masses[parent] += masses[i]
+        carried = add(scale(p, masses[i]), rotate(turns[i], moments[i]))
+        moments[parent] = add(moments[parent], carried)
+    up: list[Vec3] = [(0.0, 0.0, 1.0)]
+    found: dict[str, float] = {}
+    for one, turn, (x, y, z) in zip(nodes[1:], turns[1:], moments[1:], strict=True):
+        a, b, c = rotate_back(turn, up[one.parent])
+        up.append((a, b, c))
+        torque = dot(one.axis, (y * c - z * b, z * a - x * c, x * b - y * a))
+        found[one.joint] = found.get(one.joint, 0.0) - one.ratio * GRAVITY_M_S2 * torque
+    return found
 
 
 def spring_nm(joint: JointParams, angle_rad: float) -> float:

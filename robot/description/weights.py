@@ -108,7 +108,7 @@ def mass_faults(
     own = np.array(head_inertia(params, measures, [rest]).tensor_kg_m2)
     least, middle, most = np.linalg.eigvalsh(own).tolist()
     size_m = _SIZE * measures.interocular_m
-    if wanted.inertia_kg_mm2 is None:
+    if wanted.inertia_kg_mm2 is None or wanted.inertia_fault():
         return
     if least <= 0.0 or least + middle < most * (1.0 - 1e-9):
         yield (

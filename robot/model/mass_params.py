@@ -31,17 +31,22 @@ class LinkMassParams:
         Raises:
             ValueError: It cannot; the message gives the rule.
         """
+        if fault := self.inertia_fault():
+            raise ValueError(fault)
+
+    def inertia_fault(self) -> str:
+        """Return why no body has this inertia, "" if one can have it."""
         if self.inertia_kg_mm2 is None:
-            return
+            return ""
         xx, yy, zz, xy, xz, yz = self.inertia_kg_mm2
-        least, middle, most = np.linalg.eigvalsh(
-            ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-        ).tolist()
-        if least <= 0.0 or least + middle < most * (1.0 - 1e-9):
-            raise ValueError(
-                f"no body has the principal moments of inertia {least:.4g}, {middle:.4g} and "
-                f"{most:.4g} kg mm2: all must be above 0, and no one larger than the other two together"
-            )
+        tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        least, middle, most = np.linalg.eigvalsh(tensor).tolist()
+        if least > 0.0 and least + middle >= most * (1.0 - 1e-9):
+            return ""
+        return (
+            f"no body has the principal moments of inertia {least:.4g}, {middle:.4g} and "
+            f"{most:.4g} kg mm2: all must be above 0, and no one larger than the other two together"
+        )
 
 
 @dataclass(frozen=True)
@@ -58,9 +63,11 @@ class CounterweightParams:
 
 @dataclass(frozen=True)
 class MassParams:
-    """Masses of the links."""
+    """Masses of the links, and what is done about them."""
 
     # fmt: off
+    sag_share: Annotated[float, Bounds(0, 1.5),
+        "share of the neck's sag under its weight that is added to the servos' goals; 0: none"] = 1.0
     density_kg_m3: Annotated[float, Bounds(50, 20_000),
         "density of printed parts with their usual share of air, for masses that are not given"] = 1050.0
     head: Annotated[LinkMassParams,

@@ -1,0 +1,164 @@
+"""Masses of a rig: torques of its weight, rules of its keys, and a neck that does not sag."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import degrees, radians
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from described_rigs import shipped
+from emulated_rig import EmulatedRig
+
+from gazerig.config.load import ConfigError, shipped_path
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.bus_wiring import rig_bus
+from gazerig.robot.app.rig_description import description_of, sag_compensation, statics_of
+from gazerig.robot.app.rig_limits import park_rad
+from gazerig.robot.control.body import Body
+from gazerig.robot.description.mjcf import mjcf
+from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
+
+REAL = MassParams(head=LinkMassParams(com_mm=(40.0, 0.0, 30.0)))
+"""A realistic skull and jaw."""
+
+
+def heavy(name: str, mass: MassParams = REAL) -> Rig:
+    return replace(shipped(name), mass=mass)
+
+
+def with_joint(rig: Rig, name: str, **changes: Any) -> Rig:
+    return replace(rig, joints={**rig.joints, name: replace(rig.joints[name], **changes)})
+
+
+def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
+    description = description_of(rig, looks=False)
+    model = mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
+    data = mujoco.MjData(model)
+    for name, angle in description.angles(tuple(angles), tuple(angles.values())).items():
+        data.qpos[model.joint(name).qposadr[0]] = angle
+    mujoco.mj_forward(model, data)
+    found = dict.fromkeys(rig.joints, 0.0)
+    for joint in description.joints:
+        name = joint.follows.joint if joint.follows else joint.name
+        at = model.joint(joint.name).dofadr[0]
+        found[name] += data.qfrc_passive[at] - data.qfrc_bias[at]
+    return found
+
+
+@pytest.mark.parametrize("name", ["desk", "feetech", "expressive"])
+def test_torques_are_those_of_mujoco(name: str) -> None:
+    rng = np.random.default_rng(4)
+    weights = {"back": CounterweightParams(0.2, (-60.0, 5.0, 20.0))}
+    rig = heavy(name, replace(REAL, counterweights=weights))
+    rig = with_joint(rig, "neck_pitch", spring_nm_deg=0.01, spring_rest_deg=12.0)
+    statics = statics_of(rig)
+    for _ in range(5):
+        angles = {
+            name: rng.uniform(radians(joint.min_deg), radians(joint.max_deg))
+            for name, joint in rig.joints.items()
+        }
+        expected = mujoco_loads_nm(rig, angles)
+        assert statics.load_nm(angles) == pytest.approx(expected, abs=1e-9)
+        neck = {name: angle for name, angle in angles.items() if "neck" in name}
+        quick = statics.of_neck().load_nm(neck)
+        assert quick == pytest.approx({n: statics.load_nm(neck)[n] for n in quick}, abs=1e-12)
+
+
+def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
+    rest = statics_of(shipped("desk")).rest_pose({})
+    assert degrees(rest["neck_pitch"]) == pytest.approx(-10.8, abs=0.1)
+    statics = statics_of(heavy("desk"))
+    assert statics.rest_pose({})["neck_pitch"] == radians(-35.0)
+    assert statics.limp_rad("neck_pitch", {"neck_pitch": radians(-12.0)}) == radians(-35.0)
+    sprung = with_joint(heavy("desk"), "neck_pitch", spring_nm_deg=0.02, spring_rest_deg=12.0)
+    loads = statics_of(sprung).load_nm(statics_of(sprung).rest_pose({}))
+    assert loads["neck_pitch"] == pytest.approx(0.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("lines", "key", "rule"),
+    [
+        ("head: {mass_kg: -1}", "mass.head.mass_kg", "below"),
+        ("head: {mass_kg: 0.02}", "mass.head.mass_kg", "weigh 0.029"),
+        ("head: {com_mm: [200, 0, 30]}", "mass.head.com_mm", "outside the head"),
+        ("head: {inertia_kg_mm2: [1, 1, 3, 0, 0, 0]}", "mass.head", "larger than the other two"),
+        ("head: {inertia_kg_mm2: [-1, 1, 1, 0, 0, 0]}", "mass.head", "must be above 0"),
+        ("head: {inertia_kg_mm2: [2, 2, 2, 0, 0, 0]}", "mass.head.inertia_kg_mm2", "less than"),
+        ("head: {inertia_kg_mm2: [9e4, 9e4, 9e4, 0, 0, 0]}", "mass.head.inertia_kg_mm2", "at most"),
+        ("links: {lefteye: {mass_kg: 1}}", "mass.links.lefteye", "did you mean left_eye"),
+        ("links: {head: {mass_kg: 1}}", "mass.links.head", "under mass.head"),
+        ("counterweights: {a: {mass_kg: 1, position_mm: [0, 0, 0], link: x}}",
+         "mass.counterweights.a.link", "no link of that name"),
+    ],
+)  # fmt: skip
+def test_impossible_masses_are_refused(lines: str, key: str, rule: str, tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    text = shipped_path("rigs", "desk").read_text(encoding="utf-8")
+    file.write_text(text + f"\nmass:\n  {lines}\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_rig(str(file))
+    (fault,) = caught.value.faults
+    assert (fault.key, fault.line is not None) == (key, True)
+    assert rule in fault.rule, fault
+
+
+class Neck:
+    """A neck's pitch on emulated servos, with all other joints at 0."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.emulated = EmulatedRig(rig)
+        sag = sag_compensation(rig)
+        bus = rig_bus(rig, self.emulated.ports)
+        self.body = Body(bus, rig.joints, park_rad(rig), sag=sag)
+        self.at = self.body.names.index("neck_pitch")
+        self.goal = list(self.body.start())
+        self.t_s = 0.0
+
+    def hold(self, angle_deg: float, for_s: float) -> list[float]:
+        """Turn to an angle at 40 deg/s, hold it, and return the errors in degrees."""
+        errors, end_s = [], self.t_s + for_s
+        while self.t_s < end_s:
+            off = radians(angle_deg) - self.goal[self.at]
+            step = radians(0.4)
+            self.goal[self.at] += min(max(off, -step), step)
+            self.body.write(tuple(self.goal))
+            self.t_s += 0.01
+            self.emulated.clock.sleep_until(self.t_s)
+            state = self.body.read(self.t_s)
+            errors.append(degrees(state.position_rad[self.at] - self.goal[self.at]))
+        return errors
+
+
+@pytest.mark.parametrize("name", ["desk", "feetech", "expressive", "nine_xl330"])
+def test_a_heavy_head_does_not_sag(name: str) -> None:
+    rig = heavy(name)
+    plain = Neck(replace(rig, mass=replace(REAL, sag_share=0.0)))
+    made_up = Neck(rig)
+    for angle in (0.0, 20.0, -20.0):
+        before, after = plain.hold(angle, 3.0)[-1], made_up.hold(angle, 3.0)[-1]
+        assert before < -0.35 and abs(after) < 0.25, (angle, before, after)
+
+
+def test_sag_is_made_up_for_without_a_jump_and_within_the_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    neck = Neck(heavy("desk"))
+    goals: list[int] = []
+    write = neck.body.bus.write
+
+    def note(steps: Sequence[int]) -> None:
+        goals.append(steps[neck.at])
+        write(steps)
+
+    monkeypatch.setattr(neck.body.bus, "write", note)
+    joint = neck.emulated.rig.joints["neck_pitch"]
+    goals.append(round(joint.steps(neck.goal[neck.at])))
+    neck.hold(degrees(neck.goal[neck.at]), 2.0)
+    assert max(abs(b - a) for a, b in zip(goals, goals[1:], strict=False)) <= 1
+    assert abs(goals[-1] - goals[0]) > 10
+    # At the end of the range nothing is left to make up with: the bus clips the goal.
+    assert neck.hold(35.0, 3.0)[-1] < -0.3
+    assert neck.emulated.where()["neck_pitch"] <= 35.0
