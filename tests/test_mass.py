@@ -14,9 +14,12 @@ from emulated_rig import EmulatedRig
 
 from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import rig_bus
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of, sag_compensation, statics_of
 from gazerig.robot.app.rig_limits import park_rad
+from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
 from gazerig.robot.control.body import Body
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
@@ -162,3 +165,30 @@ def test_sag_is_made_up_for_without_a_jump_and_within_the_limits(
     # At the end of the range nothing is left to make up with: the bus clips the goal.
     assert neck.hold(35.0, 3.0)[-1] < -0.3
     assert neck.emulated.where()["neck_pitch"] <= 35.0
+
+
+def test_what_a_neck_holds_is_reported_with_its_heat() -> None:
+    well = {(one.level, one.joint) for one in weight_findings(shipped("desk"))}
+    assert well == {("note", "neck_pitch"), ("note", "neck_roll"), ("ok", "neck_pitch")}
+    assert list(weight_findings(shipped("maker"))) == []
+    pitch, _, parked = weight_findings(heavy("desk"))
+    assert "level with 25% of its stall torque (0.46 A)" in pitch.what and pitch.level == "note"
+    assert parked.what == "parked at -12 deg it sinks to -35 deg when its torque goes off"
+    twice = MassParams(head=LinkMassParams(1.2, (40.0, 0.0, 30.0)))
+    strong = next(iter(weight_findings(heavy("desk", twice))))
+    assert strong.level == "warn" and "counterweights" in strong.cure
+    assert "63% of its stall" in strong.what and "90 degC" in strong.what
+
+
+def test_a_head_that_would_sink_is_parked_where_it_rests() -> None:
+    assert rest_park_deg(shipped("desk")) == shipped("desk").park_deg
+    rig = heavy("desk")
+    made = assemble(rig, RunOptions(rig="desk", mock=True, fast=True, scene="visitor"))
+    try:
+        assert made.notes[-1].startswith("parks neck_pitch at -35 deg")
+        at = rig.names.index("neck_pitch")
+        made.robot.start(made.clock)
+        assert made.robot.park(made.park_rad, made.clock, made.loop)
+        assert degrees(made.robot.body.read(made.clock.now_s()).position_rad[at]) < -32.5
+    finally:
+        made.close()

@@ -42,6 +42,7 @@ class ServoModelInfo(NamedTuple):
     measures_position: whether it measures its position; if not, it has no other feedback either
     hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it has any
     stall_torque_nm: stall torque at its rated voltage; 0.2 for a small hobby servo with metal gears
+    stall_current_a: at that torque, 0 if unknown
     p_gain: its P gain as delivered
     full_steps: steps of error times P gain at which its drive is full, 0 if unknown
     """
@@ -59,6 +60,7 @@ class ServoModelInfo(NamedTuple):
     highest_v: float = inf
     family: str = ""
     stall_torque_nm: float = 0.2
+    stall_current_a: float = 0.0
     p_gain: int = 0
     full_steps: float = 0.0
 
@@ -92,6 +94,7 @@ def _smart_servo(bus: BusKind, family: str, model: SmartModel, steps: int) -> Se
         highest_v=0.1 * model.max_voltage,
         family=family,
         stall_torque_nm=model.stall_torque_nm,
+        stall_current_a=model.stall_current_a,
         p_gain=model.gains[4] if isinstance(model, DynamixelModel) else FACTORY_P_GAIN,
         full_steps=_full_steps(model),
     )

@@ -33,6 +33,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_description import sag_compensation, shape_of
 from gazerig.robot.app.rig_limits import animation_tables, face_parts_m, lid_spans, limits, park_rad
+from gazerig.robot.app.rig_weight import park_note
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
@@ -206,7 +207,7 @@ def assemble(
         live = LiveParams(parts, rig, placement)
         robot = _build_robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
         if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
-            robot.let_move(TickClockOpponent(scene.opponent, room.start_s))
+            robot.set_opponent(TickClockOpponent(scene.opponent, room.start_s))
     except BaseException:
         opened.close()
         raise
@@ -221,6 +222,8 @@ def assemble(
     note = row_sums_note(walk) if options.verbose or not shipped else None
     if note is not None:
         notes = (*notes, note)
+    if (parks := park_note(rig)) is not None:
+        notes = (*notes, parks)
     return Assembly(
         robot, clock, sight.mount, sight.poses, scene, opened.sent_bytes_digest, close, notes, live,
         opened.inject_fault, room,
@@ -262,7 +265,13 @@ def _build_components(
     animation = Animation(further_joints(rig.joints), animation_tables(rig))
     return Components(
         body=body,
-        guard=Guard(rig.guard, limits(rig.joints), body.names, body.reach, 1.0 / rig.loop.rate_hz),
+        guard=Guard(
+            rig.guard,
+            limits(rig.joints),
+            body.names,
+            body.configured_limits,
+            1.0 / rig.loop.rate_hz,
+        ),
         kinematics=kinematics,
         camera=seen,
         mount=mount,
@@ -274,7 +283,7 @@ def _build_components(
             placed.lens,
             depth_at,
             gyro,
-            kinematics.own_parts,
+            kinematics.body_volumes,
         ),
         tracker=tracker,
         attention=Attention(
@@ -320,7 +329,7 @@ def _build_robot(
     messages: list[str],
 ) -> Robot:
     chooser = target_chooser(rig, parts.attention, messages.append, simulated)
-    chooser = substitutes.program.choose(chooser, messages.append, simulated)
+    chooser = substitutes.program.make_chooser(chooser, messages.append, simulated)
     return Robot(
         substitutes.body(parts.body),
         parts.kinematics,

@@ -1,4 +1,4 @@
-"""Application of a rig's parameters to the running parts, between two ticks, without a jump.
+"""Application of changed parameters to the running parts, between two ticks and without a jump.
 
 Each part has a ``retune`` that takes its parameters and keeps its state. Only parts whose
 parameters differ are changed. A parameter that cannot change during a run (see
@@ -38,8 +38,8 @@ from gazerig.robot.app.rig_limits import (
     lid_ends,
     lid_spans,
     limits,
-    park_pose,
 )
+from gazerig.robot.app.rig_weight import rest_park_pose
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Tune, Value
@@ -92,7 +92,7 @@ class CameraPlacement(NamedTuple):
 class _PreparedChange(NamedTuple):
     """A rig that was checked before it is applied.
 
-    changes: differences from ``base``; walk: of its scanpath, None if unchanged
+    changes: differences from ``base``; walk: scanpath of the rig, None if unchanged
     """
 
     changes: tuple[tuple[str, Value], ...]
@@ -105,13 +105,13 @@ _ALIKE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "saccade", "pursuit",
     "breathing", "sway", "lids",
 )  # fmt: skip
-"""Sections of the gaze whose part of the same name needs only its own parameters."""
+"""Sections of the gaze parameters whose part of the same name needs no other parameters."""
 
 
 class LiveParams:
     """Applies changes to the parts of a robot; a gazerig.robot.control.loop.Robot's ``tune``.
 
-    rig: the present one
+    rig: the present rig
     """
 
     def __init__(self, parts: Components, rig: Rig, placed: CameraPlacement) -> None:
@@ -131,7 +131,7 @@ class LiveParams:
     @property
     def park_rad(self) -> JointAngles:
         """Return the pose for parking, before torque is switched off."""
-        return park_pose(self.rig)
+        return rest_park_pose(self.rig)
 
     @property
     def camera(self) -> CameraParams:
@@ -144,9 +144,9 @@ class LiveParams:
         return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
-        """Return the command that changes one rig into another, checked one; for any thread.
+        """Return the command that changes one rig into another, which is checked; for any thread.
 
-        Its tick then need not check it. base: the present rig when the command arrives
+        The tick that applies it need not check it. base: the present rig when the command arrives
 
         Raises:
             gazerig.config.load.ConfigError: the walk that the rig names is invalid.
@@ -198,9 +198,9 @@ class LiveParams:
         if (new.joints, new.guard) != (old.joints, old.guard):
             said = self._apply_joints(old, new)
         if bends or new.ranges != old.ranges:
-            parts.guard.go_gently()  # desired angles jump
+            parts.guard.start_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
-            parts.guard.pace(1.0 / new.loop.rate_hz)
+            parts.guard.set_period(1.0 / new.loop.rate_hz)
         if new.tracks != old.tracks:
             parts.tracker.retune(new.tracks)
         placed, was_placed = self._placed.camera(new), self._placed.camera(old)
@@ -214,14 +214,14 @@ class LiveParams:
     def _apply_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
         """Apply joint limits to body and guard; the guard gets the present angles of the joints.
 
-        Returns the changes that wait for the next setup of the servos.
+        Returns the changes that are applied at the next setup of the servos.
         """
         parts, joints, before = self.parts, self._keep_servos(new), self._keep_servos(old)
         gentle_deg_s = new.guard.soft_start_speed_deg_s
         others = (joints, gentle_deg_s) != (before, old.guard.soft_start_speed_deg_s)
         if others:
             for i, (factor, offset_rad) in parts.body.retune(joints, gentle_deg_s).items():
-                parts.guard.recount(i, factor, offset_rad)
+                parts.guard.rescale_joint(i, factor, offset_rad)
         if new.guard != old.guard or limits(joints) != limits(before):
             parts.guard.retune(new.guard, limits(joints))
         if not others:
@@ -229,7 +229,7 @@ class LiveParams:
         more = [
             name
             for name, desired, most in zip(
-                parts.body.names, limits(joints), parts.body.reach(), strict=True
+                parts.body.names, limits(joints), parts.body.configured_limits(), strict=True
             )
             if desired.low_rad < most.low_rad - 1e-6
             or desired.high_rad > most.high_rad + 1e-6
@@ -237,10 +237,10 @@ class LiveParams:
         ]
         if not more:
             return ()
-        return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
+        return (f"{', '.join(more)}: the full range and speed apply after a stop and a resume",)
 
     def _keep_servos(self, rig: Rig) -> dict[str, JointParams]:
-        """Return the joints with the servos that the bus was opened with."""
+        """Return the joints with the servos for which the bus was opened."""
         return {
             name: _keep_servo_of(rig.joints[name], first, name in self._coupled)
             for name, first in self._started.joints.items()
@@ -248,15 +248,15 @@ class LiveParams:
 
 
 _OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "transmission_points", "servo_speed_deg_s")
-"""Fields of a joint that stay as at the opening of the bus."""
+"""Fields of a joint that cannot change after the bus was opened."""
 
 
 _OF_A_PAIR = ("sign", "ratio", "zero_step")
-"""Further fields that stay if two servos move two joints together."""
+"""Further fields that cannot change if two servos move two joints together."""
 
 
 def _keep_servo_of(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
-    """Return a joint with the servo of another; the same object if it has that already."""
+    """Return a joint with the servo of another; the same object if it is unchanged."""
     keys = (*_OF_THE_SERVO, *_OF_A_PAIR) if coupled else _OF_THE_SERVO
     kept = {key: getattr(first, key) for key in keys}
     if all(getattr(joint, key) == value for key, value in kept.items()):

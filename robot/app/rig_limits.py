@@ -10,20 +10,15 @@ from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
-from gazerig.robot.model.types import JointAngles, further_joints, order_joints
+from gazerig.robot.model.types import further_joints, order_joints
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
-"""Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
+"""Limits of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
 
 
 def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
     """Return the joints' limits, in the order of ``order_joints``."""
     return tuple(joints[name].limit() for name in order_joints(joints))
-
-
-def park_pose(rig: Rig) -> JointAngles:
-    """Return the pose for parking, before torque is switched off."""
-    return tuple(radians(rig.park_deg.get(name, 0.0)) for name in order_joints(rig.joints))
 
 
 def face_parts_m(rig: Rig) -> dict[str, Vec3]:
@@ -76,7 +71,7 @@ def _eye_ranges(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
 
 
 def _eye_joint(rig: Rig, side: str, axis: str) -> str:
-    """Name the joint that turns an eye: its own, or that of both."""
+    """Return the name of the joint that turns an eye: its own, or that of both eyes."""
     own = f"{side}_eye_{axis}"
     return own if own in rig.joints else f"eyes_{axis}"
 
@@ -90,7 +85,7 @@ def _joint_range(rig: Rig, name: str, most_deg: float) -> Angles2:
 
 
 def park_rad(rig: Rig) -> dict[str, float]:
-    """Return the parking pose by joint; joints left out go to 0."""
+    """Return the parking pose by joint; omitted joints go to 0."""
     return {name: radians(angle) for name, angle in rig.park_deg.items()}
 
 
@@ -108,8 +103,8 @@ def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
     and the shut lid stays: blinks still shut it.
 
     Args:
-        rig: its joints and the ends of its lids.
-        offsets_deg: joint -> angle; no eyes.
+        rig: Defines its joints and the ends of its lids.
+        offsets_deg: Angles by joint, without eyes.
     """
     offsets = {name: radians(angle) for name, angle in offsets_deg.items()}
     spans = lid_spans(rig)

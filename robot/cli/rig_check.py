@@ -1,4 +1,4 @@
-"""The commands check and schema: files alone, of rigs and of studies."""
+"""Commands check and schema, for files of rigs and studies; no hardware is used."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         say(check_line(rig))
-        for line in collision_lines(rig):
+        for line in (*collision_lines(rig), *weight_lines(rig)):
             say(line)
 
 
@@ -26,21 +26,21 @@ def check_line(rig: str) -> str:
     """Load a rig and return one line of success.
 
     Raises:
-        ConfigError: with every fault of its files.
+        ConfigError: lists every fault of its files.
     """
     from gazerig.config.rig import Rig
     from gazerig.config.schema import load_rig
     from gazerig.robot.app.rig_description import mesh_faults
 
     found: Rig = load_rig(rig, further=[mesh_faults])
-    return f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
+    return f"{rig}: valid: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
 
 
 def collision_lines(rig: str) -> list[str]:
-    """Return where parts of a good rig's model meet within the joints' limits.
+    """Return collisions between parts of a valid rig's model within the joints' limits.
 
     Raises:
-        ConfigError: the rig is not good.
+        ConfigError: the rig is invalid.
     """
     from gazerig.config.schema import load_rig
     from gazerig.robot.app.rig_description import collision_hints
@@ -48,9 +48,23 @@ def collision_lines(rig: str) -> list[str]:
     return [f"{rig}: in its model, at {hint}" for hint in collision_hints(load_rig(rig))]
 
 
+def weight_lines(rig: str) -> list[str]:
+    """Return what the neck of a good rig holds at rest.
+
+    Raises:
+        ConfigError: the rig is not good.
+    """
+    from gazerig.config.schema import load_rig
+    from gazerig.robot.app.rig_weight import weight_findings
+
+    return [f"{rig}: {finding}" for finding in weight_findings(load_rig(rig))]
+
+
 @app.command()
 def schema(
-    out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
+    out: Annotated[
+        Path | None, typer.Argument(help="File to write; default: standard output.")
+    ] = None,
     of: Annotated[
         str,
         typer.Option(

@@ -72,11 +72,11 @@ class Statics:
         self._pairs = coupled_pairs(couplings)
         self._nodes = _nodes(description, joints.keys())
         self._stall_nm = {
-            name: one.facts.stall_torque_nm
-            * one.made().steepest
+            name: one.model_facts.stall_torque_nm
+            * one.make_linkage().steepest
             * 2.0
             * pi
-            / one.facts.steps_per_turn
+            / one.model_facts.steps_per_turn
             for name, one in joints.items()
         }
 
@@ -178,11 +178,6 @@ class Statics:
                 return at
         return limit.high_rad if torque > 0.0 else limit.low_rad
 
-    def holding(self, angles_rad: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """Return torque and share of stall of the neck's servos in a pose."""
-        loads, shares = self.load_nm(angles_rad), self.stall_shares(angles_rad)
-        return {name: (loads[name], shares[name]) for name in NECK_JOINTS if name in loads}
-
     def _inertias(self) -> dict[str, float]:
         """Return the inertia about the axis of each joint of the rig with all joints at 0."""
         description = self._description
@@ -208,7 +203,7 @@ class Statics:
         return found
 
 
-class _Node(NamedTuple):
+class _MovingBody(NamedTuple):
     """Links that move as one, in the frame of the joint that turns them.
 
     joint, ratio, axis: the rig's joint, its turn for one of that joint, and its axis
@@ -227,9 +222,9 @@ class _Node(NamedTuple):
     moment_kg_m: Vec3 = ORIGIN
 
 
-def _nodes(description: Description, moving: Collection[str]) -> tuple[_Node, ...]:
+def _nodes(description: Description, moving: Collection[str]) -> tuple[_MovingBody, ...]:
     """Return the links of a description as few bodies; joints that do not move are at 0."""
-    nodes = [_Node("", 0.0, ORIGIN, -1, IDENTITY, ORIGIN)]
+    nodes = [_MovingBody("", 0.0, ORIGIN, -1, IDENTITY, ORIGIN)]
     at: dict[str, tuple[int, Mat3, Vec3]] = {}
     for link in description.links:
         number, R, p = (0, IDENTITY, ORIGIN) if link.parent is None else at[link.parent]
@@ -237,7 +232,7 @@ def _nodes(description: Description, moving: Collection[str]) -> tuple[_Node, ..
         if link.joint is not None:
             name, ratio = link.joint.follows or LinkageFollower(link.joint.name)
             if name in moving:
-                nodes.append(_Node(name, ratio, link.joint.axis, number, R, p))
+                nodes.append(_MovingBody(name, ratio, link.joint.axis, number, R, p))
                 number, R, p = len(nodes) - 1, IDENTITY, ORIGIN
         at[link.name] = number, R, p
         if link.inertia is not None:
@@ -249,7 +244,7 @@ def _nodes(description: Description, moving: Collection[str]) -> tuple[_Node, ..
     return tuple(nodes)
 
 
-def _weight_nm(nodes: Sequence[_Node], angles_rad: Mapping[str, float]) -> dict[str, float]:
+def _weight_nm(nodes: Sequence[_MovingBody], angles_rad: Mapping[str, float]) -> dict[str, float]:
     """Return the torque of the weight at each joint of some bodies."""
     turns = [
         compose(one.R_parent, turn_about(one.axis, one.ratio * angles_rad.get(one.joint, 0.0)))

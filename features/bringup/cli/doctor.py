@@ -1,7 +1,7 @@
 """The command ``gazerig doctor``: examines every bus of a rig, and applies safe fixes."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Annotated
 
@@ -33,6 +33,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
     BOARD,
     Diagnostic,
     Fix,
+    Level,
     finding_json,
     group_findings,
     summarize,
@@ -41,6 +42,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_families import servo_kind
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
+from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
 from gazerig.robot.model.clock import RealClock
 
@@ -85,6 +87,7 @@ def doctor(
             progress(f"looking through webcam {camera} for {LOOK_S:g} s")
             source = Webcam(camera, model.webcam)
             eyes += examine_camera(source, model.camera, model.detector, RealClock().now_s)
+        eyes += [Diagnostic(*one) for one in _weight_rows(model)]
         show_findings(eyes, tell)
         if as_json:
             rows = [finding_json(one, bus) for bus, some in findings.items() for one in some]
@@ -101,6 +104,12 @@ def examine_detector(params: FaceDetectorParams) -> Diagnostic:
     """Return what finds faces and people, and what brings what is missing."""
     text, cure = detector_status(params)
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
+
+
+def _weight_rows(rig: Rig) -> Iterator[tuple[Level, str, str, str]]:
+    """Return level, fact, joint and remedy of the findings about the weight on a neck."""
+    for level, joint, what, cure in weight_findings(rig):
+        yield level, what, joint, cure
 
 
 def _examine_buses(

@@ -10,6 +10,7 @@ from gazerig.features.bringup.manual_control import JogParams, ManualControl, St
 from gazerig.features.bringup.servo_families import KINDS
 from gazerig.robot.app.bus_wiring import bus_names, can_be_released, guarded_rig_bus, has_watchdog
 from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.app.rig_weight import rest_park_deg
 from gazerig.robot.cli.terminal import FAULT, say
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.interrupts import Interrupts
@@ -53,7 +54,7 @@ def holding_rig(
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / params.rate_hz)
     control = ManualControl(body, guard, RealClock(), params, stopped, watch)
     with PowerDown(
-        (lambda again: park_slowly(control, rig.park_deg, again)) if park else None,
+        (lambda again: park_slowly(control, rest_park_deg(rig), again)) if park else None,
         control.stop,
         say,
         interrupts,
@@ -68,7 +69,7 @@ def holding_rig(
 
 def holding_text(rig: Rig) -> str:
     """Return the behaviour of the servos once the torque is on."""
-    measured_joints = [name for name in rig.names if rig.joints[name].facts.measures_position]
+    measured_joints = [name for name in rig.names if rig.joints[name].model_facts.measures_position]
     without_feedback = len(rig.names) - len(measured_joints)
     if not without_feedback:
         return f"torque on: {len(measured_joints)} servos hold where they are"
