@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -231,6 +232,12 @@ def acceptable(knob: Parameter, base: Rig, dice: np.random.Generator, walk: str)
 
 
 # What a running head does with a changed range, zero, rate or detector
+
+
+def test_a_running_head_keeps_its_joints() -> None:
+    joints = {name: joint for name, joint in RIG.joints.items() if name != "neck_roll"}
+    with pytest.raises(ConfigError, match="joints: neck_roll: a running head keeps its joints"):
+        started().made.live_params.prepare(RIG, replace(RIG, joints=joints))
 
 
 def test_a_tune_of_nothing_different_touches_nothing() -> None:

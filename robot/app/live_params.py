@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from gazerig.config.faults import ConfigError
+from gazerig.config.faults import ConfigError, ConfigFault
 from gazerig.config.parameters import apply_changes, differences, start_note
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
@@ -265,7 +265,14 @@ def _keep_servo_of(joint: JointParams, first: JointParams, coupled: bool) -> Joi
 
 
 def _prepare_change(command: Tune, base: Rig, rig: Rig) -> _PreparedChange:
-    """Build a checked change, with a new face walk if that has changed."""
+    """Build a checked change, with a new face walk if that has changed.
+
+    Raises:
+        ConfigError: a joint is gone, or the walk is invalid.
+    """
+    if gone := ", ".join(base.joints.keys() - rig.joints.keys()):
+        rule = f"{gone}: a running head keeps its joints: end it, then start it with this file"
+        raise ConfigError([ConfigFault("", None, "joints", "", rule)])
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
     return _PreparedChange(command.changes, base, rig, walk)
