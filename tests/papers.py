@@ -51,7 +51,7 @@ def each_of_papers(values: str) -> Any:
 def written_commands() -> dict[str, str]:
     """Return each command in a block, without what follows a #, and its paper."""
     found: dict[str, str] = {}
-    for block in blocks("sh", "console", ""):
+    for block in blocks("sh", "bash", "console", ""):
         for line in block.text.splitlines():
             match = re.match(r"(?:\$ )?(?:\.venv/bin/|uv run )?gazerig (.*)", line)
             if match:

@@ -1,0 +1,129 @@
+"""Commands of README and docs that need a head that runs, servos, or a recording."""
+
+import re
+import shlex
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from command_line import GAZERIG, invoked
+from features_there import needs_all_features
+from papers import COMMANDS, blocks
+from shown_page import wait_for
+
+import gazerig
+from gazerig.config.load import shipped_path
+from gazerig.robot.model import commands
+
+pytestmark = [needs_all_features, pytest.mark.usefixtures("simulated_wires")]
+
+TO_A_HEAD = [w for w in COMMANDS if re.match(r"(ctl|stop)\b", w) and " fault " not in w]
+TO_SERVOS = [
+    w
+    for w in COMMANDS
+    if re.match(r"(jog|look-at|home|monitor|reboot|doctor|scan)\b", w)
+    and not re.search(r"--mock|--port|myhead", w)
+]
+ON_A_RECORDING = [w for w in COMMANDS if re.match(r"export|replay .*--rerun", w)]
+ENDLESS = [w for w in COMMANDS if w.startswith("emulate ")]
+LIVE = {*TO_A_HEAD, *TO_SERVOS, *ON_A_RECORDING, *ENDLESS}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with its own sockets, in which the commands are typed."""
+    folder = tmp_path_factory.mktemp("live")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        patch.setattr(commands, "MIN_HOLD_S", 0.0)
+        patch.setattr(commands, "MIN_RESUME_GAP_S", 0.0)
+        patch.chdir(folder)
+        yield folder
+
+
+def copy(rig: str, to: Path, more: str = "") -> None:
+    """Write a rig of ours under a name of the papers."""
+    to.write_text(shipped_path("rigs", rig).read_text(encoding="utf-8") + more, encoding="utf-8")
+
+
+def works(words: str, answers: str = "") -> str:
+    """Type a command that ends by itself; return what it wrote."""
+    done = invoked(*shlex.split(words), answers=answers)
+    assert done.code == 0, f"{words}: {done.out}{done.err}"
+    return done.out + done.err
+
+
+def works_until_ctrl_c(words: str, first: str) -> None:
+    """Type a command that goes on, and press Ctrl-C once it has written ``first``."""
+    process = subprocess.Popen(
+        [*GAZERIG, *shlex.split(words)],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        written = ""
+        while first not in written:
+            line = process.stdout.readline()
+            assert line, written
+            written += line
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) in (0, 130)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.slow
+def test_commands_to_a_running_head_work(folder: Path) -> None:
+    """Of one head for all: the expressive one with the gesture of the tutorial."""
+    [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
+    (folder / "agree.yaml").write_text(agree, encoding="utf-8")
+    copy("expressive", folder / "head.yaml", "\ngesture_files: [agree.yaml]\n")
+    with gazerig.open("head.yaml", mock=True, scene="face-to-face", say=lambda line: None):
+        for words in TO_A_HEAD:
+            _works_on_a_head(words)
+
+
+def _works_on_a_head(words: str) -> None:
+    if words == "ctl resume":
+        works("stop")
+        assert "no hand" in works(words, answers="y\n")
+    elif re.match(r"ctl look (?!.*--stay)", words):
+        if "person" in words:
+            wait_for(lambda: invoked(*words.split(), "--stay").code == 0, "somebody to be seen")
+        works_until_ctrl_c(words, "Ctrl-C")
+    else:
+        works(words)
+    if words == "stop":
+        works("ctl resume --confirm")
+    works("ctl look free")
+    works("ctl revert")
+
+
+@pytest.mark.parametrize("words", TO_SERVOS)
+def test_a_command_to_servos_works(words: str, folder: Path) -> None:
+    """With emulated ones instead of those on a port."""
+    copy("maker" if COMMANDS[words] == "start.md" else "desk", folder / "myrig.yaml")
+    works(f"{words} --mock" + " --once" * (words == "monitor"), answers="y\n")
+
+
+@pytest.fixture(scope="module")
+def recording(folder: Path) -> Path:
+    """A recording under the name that papers give theirs."""
+    copy("desk", folder / "my.yaml")
+    works("run my.yaml --mock --fast --seconds 5 --scene face-to-face --record evening.mcap")
+    return folder
+
+
+@pytest.mark.parametrize("words", ON_A_RECORDING)
+def test_a_command_on_a_recording_works(words: str, recording: Path) -> None:
+    works(words)
+
+
+@pytest.mark.pty
+@pytest.mark.parametrize("words", ENDLESS)
+def test_a_command_that_runs_until_it_is_ended_works(words: str, folder: Path) -> None:
+    copy("desk", folder / "my.yaml")
+    works_until_ctrl_c(words.replace("/tmp/", f"{folder}/"), "/")
