@@ -1,4 +1,4 @@
-"""Errors of the drivers, grouped by what the caller can do about them."""
+"""Errors of the drivers, grouped by the caller's possible reaction."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,11 +10,11 @@ _CLONE = Path(__file__).resolve().parents[1]
 
 
 class DriverError(Error):
-    """Base; the message is one line that names the thing and the remedy."""
+    """Base; the message is one line that names the faulty part and the remedy."""
 
 
 class SetupError(DriverError):
-    """A person must change something before a start can succeed."""
+    """The user must change something before a start can succeed."""
 
 
 class PortError(SetupError):

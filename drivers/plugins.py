@@ -285,7 +285,7 @@ def name_conflicts(group: str) -> tuple[str, ...]:
     for one in registrations(group):
         first = owner.setdefault(one.name, one)
         if first is not one:
-            lines.append(f"{one.label} is left out: {first.maker} has that name")
+            lines.append(f"{one.label} is ignored: {first.maker} already uses that name")
     return tuple(lines)
 
 
@@ -359,13 +359,13 @@ def folder_of(found: Registration) -> Path:
     """Return the folder of YAML files that a part of gestures or rigs names.
 
     Raises:
-        PluginError: it cannot be imported or is no folder.
+        PluginError: it cannot be imported or is not a folder.
     """
     part = found.load()
     places = list(getattr(part, "__path__", ())) or [part]
     if isinstance(places[0], str | Path) and (folder := Path(places[0])).is_dir():
         return folder
-    raise PluginError(f"{found.label} is no folder: name a folder of YAML files, or its package")
+    raise PluginError(f"{found.label} is not a folder: name a folder of YAML files, or its package")
 
 
 def create(group: str, name: str, part: Plugin, params: Any) -> Any:
@@ -381,7 +381,7 @@ def create(group: str, name: str, part: Plugin, params: Any) -> Any:
         raise
     except Exception as error:
         raise PluginError(
-            f"{find(group, name).label} cannot be made: {describe_error(error)}"
+            f"{find(group, name).label} cannot be created: {describe_error(error)}"
         ) from error
 
 

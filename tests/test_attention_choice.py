@@ -48,7 +48,7 @@ def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
 
 @pytest.mark.parametrize(
     ("look_at", "point", "rule"),
-    [("id:x", None, "names no id"), ("id:", None, "names no id"), ("point", None, "go together"),
+    [("id:x", None, "does not name an id"), ("id:", None, "does not name an id"), ("point", None, "go together"),
      ("face", (1.0, 0.0, 0.0), "go together")],
 )  # fmt: skip
 def test_a_rule_says_one_thing(

@@ -62,7 +62,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     assert camera.latest(0.0) is None
     before_s = time.monotonic()
     camera.open()
-    with pytest.raises(CameraError, match="runs already"):
+    with pytest.raises(CameraError, match="is already running"):
         camera.open()
     numbers = set()
     wait_for(lambda: camera.frames >= 5)

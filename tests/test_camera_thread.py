@@ -154,7 +154,7 @@ def test_close_ends_the_thread_and_frees_the_source(source, camera):
 
 def test_open_again_starts_anew(source, camera):
     feed(source, camera, 3)
-    with pytest.raises(CameraError, match="runs already"):
+    with pytest.raises(CameraError, match="is already running"):
         camera.open()
     camera.close()
     camera.open()

@@ -273,7 +273,7 @@ def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept():
         return real(address, data)
 
     rig.chain[1].write = deaf_to_goals
-    with pytest.raises(ServoMissing, match="goal_position is not taken .servo 1: 2400."):
+    with pytest.raises(ServoMissing, match="goal_position is not accepted .servo 1: 2400."):
         rig.bus.enable_torque()
     assert len(refused) == 3
     assert rig.chain[1].shaft.x == 2400

@@ -108,7 +108,7 @@ def test_the_file_of_a_killed_rig_is_removed(listener: socket_io.Listener, tmp_p
 
 def test_a_real_port_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial_port, "termios", None)
-    with pytest.raises(PortError, match="COM3: real servos need Linux; here there is --mock"):
+    with pytest.raises(PortError, match="COM3: real servos need Linux; use --mock here"):
         serial_port.BlockingPort("COM3").setBaudRate(57600)
 
 

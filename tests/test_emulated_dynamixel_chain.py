@@ -397,7 +397,7 @@ def test_a_secondary_id_that_nobody_has_is_obeyed_in_silence():
 
 
 def test_a_baud_rate_that_a_model_lacks_is_refused():
-    with pytest.raises(ValueError, match="baud 4500000: xl330-m288 knows 9600, 57600"):
+    with pytest.raises(ValueError, match="baud 4500000: xl330-m288 supports 9600, 57600"):
         DynamixelBench((1, "xl330-m288"), baud=4_500_000)
 
 

@@ -112,7 +112,7 @@ def test_its_own_baud_rates():
         (1, 0, b"")
     ]
     assert bench.chain.receive(FeetechBench.instruction(1, PING), 38_400) == b""
-    with pytest.raises(ValueError, match="baud 76800: scs0009 knows 1000000"):
+    with pytest.raises(ValueError, match="baud 76800: scs0009 supports 1000000"):
         ScsBench(baud=76_800)
 
 

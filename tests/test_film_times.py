@@ -63,7 +63,7 @@ def test_uneven_film_runs_by_the_times_of_its_pictures(folder):
         assert film.number_at(film.due_s(k + 1)) == k + 1
         assert round(float(film.image(k + 1).mean()) / 12.0) == k
     (reported,) = film.events()
-    assert reported.startswith("uneven.mkv: the film's frames come unevenly")
+    assert reported.startswith("uneven.mkv: the film's frames are unevenly spaced")
     assert film.events() == ()
     # The last picture stays for the usual time; then the film starts again.
     assert film.due_s(21) == pytest.approx(44 / 30.0, abs=0.003)

@@ -42,7 +42,7 @@ def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():
     assert "0.20 s" in lateness.cause(9.0)
     starved = HostLateness()
     starved.record_late_answer(3.0)
-    assert "the emulator stood still" in starved.cause(3.5)
+    assert "the emulator was suspended" in starved.cause(3.5)
     assert starved.cause(3.0 + 2 * AFTERMATH_S) == ""
 
 
@@ -137,7 +137,7 @@ def test_servos_that_stood_still_for_a_while_are_no_bad_plug(kind, seconds):
     outcome = noisy.run("clear", 0.0, 500)
     about = [text for text in outcome.said if "answer" in text or "check" in text]
     assert len(about) == 1, about
-    assert "emulator stood still" in about[0]
+    assert "emulator was suspended" in about[0]
     assert outcome.wrong == 0
 
 

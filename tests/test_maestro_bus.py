@@ -531,7 +531,7 @@ def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
 def test_a_running_script_is_stopped_at_engage(bench):
     bench.board.faults.command("script on")
     bench.bus.enable_torque()
-    assert "the board ran a script of its own: stopped" in bench.bus.events()
+    assert "the board was running its own script: stopped" in bench.bus.events()
     assert bench.raw("AE") != b"\0"
 
 

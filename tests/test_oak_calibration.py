@@ -86,7 +86,7 @@ def test_stereo_cameras_gyro_and_focus_are_read():
 
 
 def test_memory_without_a_lens_is_told():
-    with pytest.raises(CameraError, match=r"does not hold the lens.*printed board"):
+    with pytest.raises(CameraError, match=r"does not contain the lens.*printed board"):
         found(colour=False)
 
 
@@ -198,7 +198,7 @@ def stood_in(camera):
         (("--oak-calibration", "x.json"), "add --what lens"),
         (("--oak-calibration", "nope.json", "--what", "lens"), "no calibration at nope.json"),
         (("--oak-calibration", "WRONG", "--what", "lens"), "is no calibration of an OAK camera"),
-        (("--oak-calibration", "EMPTY", "--what", "lens"), "does not hold the lens"),
+        (("--oak-calibration", "EMPTY", "--what", "lens"), "does not contain the lens"),
     ],
 )
 def test_what_cannot_be_is_said(rig_file, tmp_path, words, says):

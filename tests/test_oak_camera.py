@@ -248,7 +248,7 @@ def test_face_model_must_be_an_archive(dai, tmp_path):
         read_archive(dai, str(tmp_path / "nope.tar.xz"))
     bad = tmp_path / "bad.tar.xz"
     bad.write_text("this is no archive")
-    with pytest.raises(CameraError, match="is no NNArchive"):
+    with pytest.raises(CameraError, match="is not an NNArchive"):
         read_archive(dai, str(bad))
 
 
@@ -313,7 +313,7 @@ def test_every_way_against_flicker_is_one_of_depthais(dai, name):
         ("focus: 256", "255"),
         ("focus: near", "focus"),
         ("anti_flicker: 55hz", "50hz"),
-        ("width_px: 650", "width_px is a multiple of 16"),
+        ("width_px: 650", "width_px must be a multiple of 16"),
         ("height_px: 401", "height_px of 2"),
         ("imu_rotation_deg: [0, 0, 181]", "180"),
         ("imu_rotation_deg: [0, 0]", "imu_rotation_deg"),

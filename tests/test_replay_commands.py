@@ -64,7 +64,7 @@ def test_a_replay_serves_a_page_and_ends(recorded: Path) -> None:
 def test_a_rerun_says_that_all_is_the_same(recorded: Path) -> None:
     code, words = said("replay", recorded, "--rerun")
     assert code == 0 and "joints recorded: " in words and "run again" in words
-    reported = re.search(r"(\d+) of (\d+) ticks are the same to the bit", words)
+    reported = re.search(r"(\d+) of (\d+) ticks are bit-identical", words)
     assert reported is not None and reported[1] == reported[2] and int(reported[1]) > 350
 
 

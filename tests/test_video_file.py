@@ -193,7 +193,7 @@ def test_film_cut_short(tmp_path, film_file, part):
 
 def test_film_cut_to_its_header(tmp_path, film_file):
     (tmp_path / "cut.avi").write_bytes(film_file.read_bytes()[:1000])
-    assert "no readable film or image" in refusal(tmp_path / "cut.avi")
+    assert "not a readable film or image" in refusal(tmp_path / "cut.avi")
 
 
 def test_picture_cut_short(tmp_path):
@@ -207,7 +207,7 @@ def test_picture_cut_short(tmp_path):
 def test_file_without_rights(film_file, tmp_path):
     (tmp_path / "secret.avi").write_bytes(film_file.read_bytes())
     (tmp_path / "secret.avi").chmod(0)
-    assert "check its rights" in refusal(tmp_path / "secret.avi")
+    assert "check its permissions" in refusal(tmp_path / "secret.avi")
 
 
 def test_film_that_vanishes_is_noticed_at_its_end(tmp_path):

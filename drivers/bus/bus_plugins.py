@@ -1,4 +1,4 @@
-"""Our kinds of servo buses, registered as a package registers its own."""
+"""Our kinds of servo buses, registered like those of other packages."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""A servo bus of another package: its results are checked, its errors become one named line."""
+"""Checked servo bus of another package; each error becomes one line that names the bus."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -18,7 +18,9 @@ _COLUMNS = 10  # of Feedback, all but the indices of the missing
 _NUMBERS = 4  # the first of them are numbers that must be finite
 
 _USUAL_S, _BLOCKED_S = 2.0, 0.2
-"""Longest wait for a call, real seconds; the second while an earlier call has not returned."""
+"""Longest wait for a call, real seconds; the second value applies while an earlier call has not
+returned.
+"""
 _LONGEST_S: Mapping[str, float] = {"open": 60.0, "enable_torque": 20.0, "disable_torque": 10.0}
 """Calls that may take longer."""
 
@@ -168,7 +170,7 @@ class CheckedBus:
         """
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
-            raise ValueError("other servos need another bus: ids and models must stay")
+            raise ValueError("ids and models must not change: create another bus for other servos")
         outcome = self._call_in_order(lambda: self._bus.retune(setups), "retune")
         if outcome is not None and outcome.error is not None:
             raise outcome.error

@@ -71,11 +71,11 @@ class LimitRecovery:
         return tuple(self.places)
 
     def begin(self, ids: Iterable[int]) -> None:
-        """Move these servos inside, and no others."""
+        """Start recovery of these servos; earlier ones are no longer included."""
         self.places = dict.fromkeys(ids)
 
     def add_if_outside(self, servo_id: int, steps: int) -> None:
-        """Move a servo inside if it is outside."""
+        """Start recovery of a servo if it is outside its limits."""
         if self._is_outside(servo_id, steps):
             self.places[servo_id] = None
 
@@ -84,7 +84,7 @@ class LimitRecovery:
         self.places.clear()
 
     def has_arrived(self, servo_id: int, steps: float, now_s: float) -> bool:
-        """Return whether such a servo, now at ``steps``, has reached its limits."""
+        """Return whether a recovering servo, now at ``steps``, has reached its limits."""
         if not self._is_outside(servo_id, steps, NEAR_STEPS):
             return True
         before = self.places[servo_id]

@@ -69,7 +69,9 @@ class MultiBus:
         self._timers = [_PollTimer() for _ in self._shares]
         places = sorted(place for share in shares for place in share.servo_indices)
         if places != list(range(len(places))):
-            raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
+            raise ValueError(
+                f"buses cover the indices {places}: each index from 0 on must occur once"
+            )
         self._count = len(places)
         given = [place for share in shares for place in share.servo_indices]
         order = sorted(range(len(given)), key=given.__getitem__)
@@ -154,7 +156,7 @@ class MultiBus:
         if len(goals_steps) != self._count:
             raise ValueError(f"{len(goals_steps)} goals for {self._count} servos")
         for goal in goals_steps:
-            if goal != goal:  # before any bus has sent its own
+            if goal != goal:  # checked before any bus sends its goals
                 raise ValueError(
                     "a goal is not a number: every goal must be a whole number of steps"
                 )
@@ -176,7 +178,7 @@ class MultiBus:
             ValueError: the servos are not the same.
         """
         if len(setups) != self._count:
-            raise ValueError("other servos need another bus: ids and models must stay")
+            raise ValueError("ids and models must not change: create another bus for other servos")
         for _, bus, places in self._shares:
             bus.retune([setups[place] for place in places])
 

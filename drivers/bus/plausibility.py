@@ -1,9 +1,10 @@
-"""Plausibility check of positions: what a joint can have reached, and what noise has produced.
+"""Plausibility check that separates real positions of a joint from those damaged by noise.
 
 The checksum of an answer misses some damage: a sum of one byte misses one in 256 damaged answers, a
 CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its motor can turn
-it, so a position farther away is not returned as fresh. A joint that really is elsewhere - pushed
-by hand, restarted, off by a turn - reports that position repeatedly and is then believed.
+it, so a position farther away is not returned as fresh. A joint that is at another position because
+it was pushed by hand, was restarted or is off by a turn reports that position repeatedly. It is
+believed after several answers.
 """
 
 from collections.abc import Sequence
@@ -12,16 +13,16 @@ from operator import sub
 from typing import Any
 
 SLACK_STEPS = 64
-"""Distance that two answers may always have, whatever the time between them: play and jitter."""
+"""Difference allowed between two answers at any time interval: play and jitter."""
 
 LATE_S = 0.01
 """Longest time between the moment a servo answers and the moment the answer is read."""
 
 MARGIN = 1.5
-"""Ratio by which a joint may exceed the no-load speed of its motor: it is pushed, or it falls."""
+"""Factor by which a joint may exceed the no-load speed of its motor, when pushed or falling."""
 
 AGREEING = 3
-"""Number of consecutive answers that agree and are then believed wherever they are."""
+"""Number of consecutive agreeing answers after which any position is believed."""
 
 DISTURBED_S = 5.0
 """Time after a damaged answer during which the line counts as disturbed."""
@@ -51,7 +52,7 @@ class Plausibility:
         self.forget()
 
     def forget(self) -> None:
-        """Believe the next positions whatever they are, as after a lost port."""
+        """Accept the next positions without a check, for example after a lost port."""
         count = len(self._fastest)
         self._last: Sequence[Any] = [None] * count
         self._at_s = [0.0] * count
@@ -59,7 +60,7 @@ class Plausibility:
         self._whole_s = float("nan")
 
     def record(self, slot: int, position: int, at_s: float) -> None:
-        """Record a position of a servo that comes from another source than its cyclic answer."""
+        """Record a position of a servo from another source than its cyclic answer."""
         last = self._last = list(self._last)
         if not isnan(self._whole_s):
             self._at_s = [self._whole_s] * len(last)

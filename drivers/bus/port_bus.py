@@ -94,7 +94,7 @@ class PortBus(ABC):
         """
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
-            raise ValueError("other servos need another bus: ids and models must stay")
+            raise ValueError("ids and models must not change: create another bus for other servos")
         self._check_setups(setups)
         self._target_setups = tuple(setups)
 

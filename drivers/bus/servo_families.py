@@ -7,9 +7,9 @@ from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_bus.family import Family
 
 FAMILIES: dict[str, Family] = {one.name: one for one in (DYNAMIXEL, FEETECH, FEETECH_SCS)}
-"""By name."""
+"""Families by name."""
 
 FAMILY_OF: dict[str, Family] = {
     model: FAMILIES[facts.family] for model, facts in SERVOS.items() if facts.family
 }
-"""By the model name in a rig's YAML."""
+"""Families by the model name in a rig's YAML."""

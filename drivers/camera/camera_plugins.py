@@ -1,4 +1,4 @@
-"""Our kinds of cameras, registered like those of packages, and creation of sources by name.
+"""Our kinds of cameras, registered like those of other packages, and creation of sources by name.
 
 OpenCV and depthai are large, so the control loop's process only names the source.
 """
@@ -44,7 +44,7 @@ def create_camera_part(name: str, params: Any) -> object:
     """Create a frame source or a camera by its name.
 
     Raises:
-        SetupError: there is none, or it cannot be made.
+        SetupError: no camera has this name, or it cannot be created.
     """
     return create(CAMERA, name, load(CAMERA, name, CameraPlugin), params)
 
@@ -58,7 +58,7 @@ def create_plugin_source(name: str, params: Any) -> FrameSource:
     """Create a frame source by its name, checked frame by frame; for use in any process.
 
     Raises:
-        SetupError: there is none, or it cannot be made.
+        SetupError: no source has this name, or it cannot be created.
     """
     return CheckedSource(
         cast(FrameSource, create_camera_part(name, params)), find(CAMERA, name).label
@@ -88,7 +88,7 @@ class CheckedSource:
         """Wait for the next frame; return None if ``stop`` was set meanwhile.
 
         Raises:
-            CameraError: the source fails, or what it returns is no frame.
+            CameraError: the source fails, or returns something other than a frame.
         """
         try:
             shot = self._source.take(now_s, stop)
@@ -102,11 +102,13 @@ class CheckedSource:
             raise CameraError(f"{self._label} returned a {type(shot).__name__}, wanted a Shot")
         image = to_bgr(shot.image)
         if image is None:
-            raise CameraError(f"{self._label} returned a frame that is no image of 8 or 16 bits")
+            raise CameraError(
+                f"{self._label} returned a frame that is not an image of 8 or 16 bits"
+            )
         if not shot.captured_s <= now_s() + 1.0:  # also rejects NaN
             raise CameraError(f"{self._label} returned a frame of the time {shot.captured_s!r}")
         if shot.turn is not None and not _is_turn(shot.turn):
-            raise CameraError(f"{self._label} returned a turn of the camera that is no rotation")
+            raise CameraError(f"{self._label} returned a camera turn that is not a rotation")
         return shot._replace(image=image)
 
     def events(self) -> tuple[str, ...]:
@@ -122,7 +124,7 @@ def _is_turn(turn: object) -> bool:
     """Return whether a package's camera turn is a valid one."""
     try:
         return isinstance(turn, CameraTurn) and turn.is_rotation
-    except Exception:  # its parts may be anything
+    except Exception:  # its elements may have any type
         return False
 
 

@@ -23,7 +23,7 @@ def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
         return False  # a face without points: its consumer reports that
     x, y = sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
     if isnan(x) or isnan(y):
-        return False  # not numbers: likewise
+        return False  # not numbers: the consumer reports that too
     outside = _distance_outside_px(x, y, width_px, height_px)
     return outside > 0.0 or _is_misplaced(points, width_px, height_px)
 
@@ -40,7 +40,7 @@ def _is_misplaced(points: list[tuple[float, float]], width_px: int, height_px: i
 
 
 class OffFrameReport:
-    """Report, made once, that a detector returns such faces."""
+    """One-time report that a detector returns faces outside the frame."""
 
     def __init__(self) -> None:
         self._reported = False
@@ -91,9 +91,9 @@ class FrameAnalyzer:
         has_unknown_lens: bool = False,
     ) -> None:
         self._detector, self._motion, self._locate = detector, motion, locate
-        self._faults: dict[str, bool] = {}  # with whether each has been reported
+        self._faults: dict[str, bool] = {}  # fault -> whether it has been reported
         self._has_unknown_lens = has_unknown_lens
-        # Here, as the loop's process imports this module too, without OpenCV.
+        # Imported here because the loop's process imports this module too, without OpenCV.
         from gazerig.drivers.camera.health import CameraHealth
         from gazerig.drivers.vision.clothing import ClothingReader
         from gazerig.drivers.vision.cut_detector import CutDetector

@@ -93,7 +93,7 @@ class ClockSync:
         new = _BestFrame(device_s, difference_s)
         if bucket != self._bucket:
             self._bucket = bucket
-            self._drift = self._slope()  # of whole buckets only
+            self._drift = self._slope()  # uses only complete buckets
             self._best.append(new)
         elif self._without_drift_s(new) < self._without_drift_s(self._best[-1]):
             self._best[-1] = new
@@ -125,14 +125,14 @@ class ClockSync:
 _WINDOW = 45
 _LEAST = 15  # intervals before anything is reported
 _TOLERANCE = 0.2
-# A reader that was away for less than this part of a frame period cannot have lost a frame.
+# A reader that was busy for less than this part of a frame period cannot have lost a frame.
 _PROMPT = 0.5
 
 
 class FrameRateMonitor:
     """Monitor that measures the frame rate and reports once if it differs from the stated one.
 
-    Only intervals in which the reader was prompt count: a slow reader misses frames, which is no
+    Only intervals in which the reader was prompt count: a slow reader misses frames, which is not a
     fault of the camera.
     """
 

@@ -90,7 +90,7 @@ class JpegSlot:
         return float(self._times[(count - 1) % 2]) if count else float("-inf")
 
     def newer(self, number: int) -> Picture | None:
-        """Return the newest picture if its number is above this one, else None."""
+        """Return the newest picture if its number is above this one, otherwise None."""
         found = self._newest.read(self._copy, above=number)
         return None if found is None else Picture(found[0], *found[1])
 

@@ -16,7 +16,7 @@ LONGEST_S = 0.001
 """Longest wait for the camera in a tick; after that the loop uses the last detections."""
 
 OPEN_S, OPEN_PROCESS_S = 20.0, 70.0
-"""Longest time to open a camera, and a process that reads a camera and has its own limit."""
+"""Longest time to open a camera, and to open a process that reads a camera with its own limit."""
 
 CLOSE_S, CLOSE_PROCESS_S = 2.0, 15.0
 """Longest times to close them."""
@@ -26,7 +26,7 @@ SILENT_S = 1.0
 
 
 class GuardedCamera:
-    """A camera whose failures only stop the rig's vision; implements ``Camera``.
+    """A camera that can only stop the rig's vision by a failure; implements ``Camera``.
 
     Its results are checked: anything other than detections, or a number that is not finite, is a
     failure. After a failure there are no more frames, and the rig continues without them.
@@ -151,7 +151,7 @@ def detections_fault(found: Any) -> str:
     """Return the fault in the detections of a camera, "" for none."""
     try:
         return "" if found is None else _detections_fault(found)
-    except Exception as error:  # its attributes may be anything
+    except Exception as error:  # its attributes may have any type
         return f"detections that cannot be read ({describe_error(error)})"
 
 
@@ -163,11 +163,11 @@ def _detections_fault(found: Any) -> str:
     if not (_is_positive_int(found.width_px) and _is_positive_int(found.height_px)):
         return f"a frame of {found.width_px!r} x {found.height_px!r}"
     if found.turn is not None and not found.turn.is_rotation:
-        return "a turn of the camera that is no rotation"
+        return "a camera turn that is not a rotation"
     if not isinstance(found.faces, Sequence) or not isinstance(found.blobs, Sequence):
         raise TypeError("faces and blobs must be tuples")
     if not all(isinstance(line, str) for line in found.conditions):
-        return f"conditions that are no lines of text: {found.conditions!r}"
+        return f"conditions that are not lines of text: {found.conditions!r}"
     for person in found.people:
         if not (all(map(_is_finite, (*person.head_px, person.trunk_px))) and person.trunk_px > 0.0):
             return f"a person at {person.head_px!r} of {person.trunk_px!r} px"

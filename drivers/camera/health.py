@@ -172,7 +172,7 @@ class HealthModel:
         if picture.brightness < _BLACK:
             return "the picture is black: uncover the lens, switch on a light"
         return (
-            "the picture is too dark: switch on a light before the person, "
+            "the picture is too dark: switch on a light in front of the person, "
             "or set webcam.exposure_ms and webcam.gain higher"
         )
 
@@ -386,7 +386,7 @@ def roll_deg(face: DetectedFace) -> float:
 
 
 def picture_stats(image: NDArray[Any]) -> PictureStats | None:
-    """Return statistics of a frame; None if it is no 8-bit picture."""
+    """Return statistics of a frame; None if it is not an 8-bit picture."""
     if not _is_picture(image):
         return None
     green = _limit_width(image[..., 1], _WIDTH_PX)
@@ -396,7 +396,7 @@ def picture_stats(image: NDArray[Any]) -> PictureStats | None:
 
 def _edge_px(grey: NDArray[Any]) -> float | None:
     """Return the width of the sharper edges, None if there are too few."""
-    smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # removes noise, which is no edge
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # removes noise, which has no edges
     half = _WINDOW_PX // 2
     window, middles = np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8), slice(half, None, half)
     across = cv2.convertScaleAbs(cv2.Sobel(smooth, cv2.CV_16S, 1, 0, ksize=1))

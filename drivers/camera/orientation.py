@@ -1,8 +1,8 @@
 """Correction of frames of a camera that is mounted sideways or upside down, or is mirrored.
 
 Every frame is turned upright on arrival, with its data: depth, lens, faces found by the camera
-itself, and gyro. So no other code needs to know how the camera is mounted. Turning takes .03 to .1
-ms at 640 x 480 and .2 to .9 ms at 1920 x 1080.
+itself, and gyro. So no other code depends on the mount of the camera. Turning takes .03 to .1 ms at
+640 x 480 and .2 to .9 ms at 1920 x 1080.
 """
 
 import threading

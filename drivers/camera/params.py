@@ -17,7 +17,7 @@ class CameraRecoveryParams:
     retry_ms: Annotated[float, Bounds(1, 60000), "delay before a lost camera is opened again; it doubles with each attempt"] = 250.0
     longest_retry_ms: Annotated[float, Bounds(1, 60000), "longest delay between two attempts"] = 2000.0
     give_up_s: Annotated[float, Bounds(0, 86400),
-        "the run ends when a lost camera has not come back for this long; 0 ends it at once"] = 60.0
+        "a run ends when a lost camera has not reconnected for this long; 0: immediately"] = 60.0
     silent_s: Annotated[float, Bounds(0.1, 60),
         "a camera is considered lost after this long without a new frame (or 5 frame periods, if longer)"] = 1.0
     restart_s: Annotated[float, Bounds(0.1, 600),
@@ -38,10 +38,10 @@ class WebcamParams:
     format: Annotated[Literal["mjpg", "yuyv"],
         "mjpg: compressed, which USB 2 carries at full size and rate; yuyv: not compressed"] = "mjpg"
     exposure_ms: Annotated[float | None, Bounds(0.1, 1000),
-        "exposure: short ones blur less while the head turns, and need more light; null: automatic"] = None
-    gain: Annotated[int | None, Bounds(0, 65535), "gain in the camera's own units; null: as the camera does by itself"] = None
+        "exposure time: shorter ones blur less while the head turns but need more light; null: automatic"] = None
+    gain: Annotated[int | None, Bounds(0, 65535), "gain in the camera's own units; null: automatic"] = None
     anti_flicker: Annotated[Literal["default", "off", "50hz", "60hz", "auto"],
-        "exposures of whole periods of the mains, against stripes under lamps; default: as the camera does by itself"] = "default"
+        "exposure times that are whole periods of the mains, to avoid stripes under lamps; default: chosen by the camera"] = "default"
     focus: Annotated[int | None, Bounds(0, 65535),
-        "position of the lens in the camera's own units, held fixed; null: autofocus"] = None
+        "fixed position of the lens in the camera's own units; null: autofocus"] = None
     # fmt: on

@@ -41,7 +41,7 @@ class Intrinsics:
         if not (self.fx_px > 0.0 and self.fy_px > 0.0):
             raise ValueError(f"focal lengths must be above 0, not {self.fx_px}, {self.fy_px}")
         if len(self.distortion) != 5 or not all(map(isfinite, self.distortion)):
-            raise ValueError(f"distortion is five finite numbers, not {self.distortion}")
+            raise ValueError(f"distortion must be five finite numbers, not {self.distortion}")
 
     @property
     def has_distortion(self) -> bool:

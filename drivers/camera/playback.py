@@ -21,7 +21,7 @@ from gazerig.drivers.files.file_input import MAGIC, open_mcap
 
 _HEAD = 9  # bytes of a record before its content: kind and length
 _LARGEST = 1 << 30  # bytes of a message; more is damage
-_CURE = "make one with gazerig record-camera; films go to --video"
+_CURE = "make one with gazerig record-camera; use --video for films"
 _FIXED = 22  # bytes of a message before its data
 
 
@@ -49,7 +49,7 @@ class Recording:
         """Open the file and index its frames.
 
         Raises:
-            CameraError: it is absent, no recording, or contains no frame.
+            CameraError: it is absent, is not a recording, or contains no frame.
         """
         self._path = path
         self._file = open_mcap(path, CameraError, _CURE)
@@ -62,7 +62,7 @@ class Recording:
             raise
         if not self._frames:
             self._file.close()
-            raise CameraError(f"{path} holds no frame: record it again")
+            raise CameraError(f"{path} contains no frame: record it again")
         first = self._frames[0].stamp_ns
         self.times_s = tuple((p.stamp_ns - first) / 1e9 for p in self._frames)
         self.note = (
@@ -125,7 +125,7 @@ class Recording:
                         profile = Header.read(self._content(place, place.length)).profile
                         if profile != fmt.PROFILE:
                             raise CameraError(
-                                f"{self._path} is no camera recording of gazerig (its profile is "
+                                f"{self._path} is not a camera recording of gazerig (its profile is "
                                 f"{profile!r}): make one with gazerig record-camera"
                             )
                     else:
@@ -183,7 +183,7 @@ class CameraReplay:
         """Open the file, or open it again at film time 0.
 
         Raises:
-            CameraError: it is absent, no recording, or contains no frame.
+            CameraError: it is absent, is not a recording, or contains no frame.
         """
         self.close()
         self._recording = Recording(self._path)

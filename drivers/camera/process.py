@@ -74,7 +74,7 @@ class FrameWatchdog:
         self._last_s = now_s
 
     def verdict(self, now_s: float) -> Silence:
-        """Return "lost" if no frame came for too long, "hung" if none will come."""
+        """Return "lost" if no frame has arrived for too long, "hung" if none is expected."""
         silent_s = now_s - self._last_s
         if self._first:
             return "hung" if silent_s >= FIRST_FRAME_S else ""
@@ -146,7 +146,7 @@ class CameraProcess:
         self._starts = self._before
         self._lost_s: float | None = None
         self._back_s = 0.0
-        self._losses = 0  # without a stable period between them
+        self._losses = 0  # losses without a stable period between them
         self._owes_back = False
 
     def open(self) -> None:
@@ -157,7 +157,9 @@ class CameraProcess:
             SetupError: the detector cannot be created.
         """
         if self._process is not None:
-            raise CameraError("the camera process runs already: close() it before opening it again")
+            raise CameraError(
+                "the camera process is already running: close() it before opening it again"
+            )
         self._newest, self._failure, self._motion = None, "", None
         self._closing.clear()
         self._events.clear()
@@ -205,7 +207,7 @@ class CameraProcess:
             pipe.send(Retune(detector, motion, locate))
         except (OSError, ValueError):  # it has ended, and the next one is starting
             return False
-        # For the process after this one.
+        # Kept for the process that follows this one.
         self._parts = self._parts._replace(
             detector=detector or self._parts.detector, locate=locate or self._parts.locate
         )

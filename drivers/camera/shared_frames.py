@@ -112,7 +112,7 @@ class SlotReader:
             self.close()
             name, self._name = self._name, ""
         if name:
-            with suppress(FileNotFoundError):  # the writer has done so
+            with suppress(FileNotFoundError):  # the writer has freed it already
                 memory = SharedMemory(name)
                 memory.close()
                 memory.unlink()

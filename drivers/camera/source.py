@@ -58,7 +58,7 @@ class FrameSource(Protocol):
 
 
 def to_bgr(pixels: Any) -> ImageArray | None:
-    """Return pixels of a camera or file as a read-only BGR frame; None if they are no image.
+    """Return pixels of a camera or file as a read-only BGR frame; None if they are not an image.
 
     pixels: (h, w) or (h, w, 1) grey, (h, w, 3) BGR or (h, w, 4) BGR with alpha, 8 bits, or 16 bits,
         of which the upper 8 are kept

@@ -71,7 +71,9 @@ class CameraThread:
             CameraError: the source cannot be opened, or is open already.
         """
         if self._watching is not None:
-            raise CameraError("the camera thread runs already: close() it before opening it again")
+            raise CameraError(
+                "the camera thread is already running: close() it before opening it again"
+            )
         self._events.clear()
         self._camera.open()
         self._stop.clear()

@@ -112,7 +112,7 @@ def timestamps_from_rate(
     return VideoTimestamps(
         rate_hz,
         note=f"the film states {stated_hz:g} frames a second and shows {rate_hz:.4g}: "
-        "the times of its frames count",
+        "the times of its frames are used",
     )
 
 
@@ -126,8 +126,8 @@ def timestamps_from_times(times_s: Sequence[float]) -> VideoTimestamps:
         rate_hz,
         starts,
         length_s,
-        f"the film's frames come unevenly, {rate_hz:.3g} a second in the mean: "
-        "the times of its frames count",
+        f"the film's frames are unevenly spaced, {rate_hz:.3g} a second on average: "
+        "the times of its frames are used",
     )
 
 
@@ -161,7 +161,7 @@ class VideoPacing:
 
 _STILL_RATE_HZ, _ASSUMED_RATE_HZ = 10.0, 25.0
 _RATES_HZ = (0.5, 1000.0)
-# A container may state a few frames too many without being damaged.
+# The header of an undamaged file may state a few frames too many.
 _LEAST_COMPLETE = 0.95
 _MOST_TIMES = 20_000  # frames of an uneven film whose times are read at the start
 
@@ -185,7 +185,7 @@ def open_video(path: Path) -> VideoReader:
     """Open a file as a film or a still frame.
 
     Raises:
-        CameraError: it is absent, no film or frame, empty or cut short.
+        CameraError: it is absent, is not a film or image, is empty or is cut short.
     """
     if not path.exists():
         raise CameraError(f"no film or image at {path}: check the path")
@@ -194,7 +194,9 @@ def open_video(path: Path) -> VideoReader:
     try:
         path.open("rb").close()
     except OSError as error:
-        raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
+        raise CameraError(
+            f"cannot read {path} ({error.strerror}): check its permissions"
+        ) from error
     # A GIF is a film; OpenCV's image reader would return only its first frame.
     still = path.suffix.lower() != ".gif" and cv2.haveImageReader(str(path))
     return _StillReader(path) if still else _FilmReader(path)
@@ -246,7 +248,7 @@ class _FilmReader:
         stated = usable_rate_hz(self._capture.get(cv2.CAP_PROP_FPS))
         first_s = _times_s(self._capture, SAMPLE)
         if not first_s:
-            raise CameraError(f"{path} holds no readable frame: use another file")
+            raise CameraError(f"{path} contains no readable frame: use another file")
         times = timestamps_from_rate(*stated, ascending_times(first_s))
         if times is None:
             times = timestamps_from_times(
@@ -277,7 +279,7 @@ class _FilmReader:
         _check_forward(number, max(1, self._number))
         if self._seen is None or self._seen[0] != number:
             while self._number < number:
-                # After the end comes the start; whole repeats are skipped.
+                # Reading continues at the start after the end; whole repeats are skipped.
                 if not self._capture.grab():
                     self._length, self._index = self._index, 0
                     self._rewind()
@@ -310,7 +312,7 @@ def _open_film(path: Path) -> cv2.VideoCapture:
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not capture.isOpened():
         raise CameraError(
-            f"{path} is no readable film or image (or is cut short): "
+            f"{path} is not a readable film or image (or is cut short): "
             "play it in another program, convert it to mp4 or copy it again"
         )
     return capture
@@ -329,14 +331,16 @@ def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
 def _check_forward(number: int, least: int) -> None:
     """Reject frames before the last one."""
     if number < least:
-        raise ValueError(f"films are read forward: frame {number} wanted, {least} is the least")
+        raise ValueError(
+            f"films are read forward: frame {number} requested, {least} is the first possible one"
+        )
 
 
 def _read_only_bgr(image: Any, path: Path) -> ImageArray:
     """Return a frame as a read-only BGR array."""
     pixels = to_bgr(image)
     if pixels is None:
-        raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")
+        raise CameraError(f"{path} contains pictures of an unknown kind: convert it to mp4 or png")
     return pixels
 
 
@@ -362,7 +366,7 @@ class VideoFile:
         """Open the file, or open it again at film time 0.
 
         Raises:
-            CameraError: it is absent, no film or frame, empty or cut short.
+            CameraError: it is absent, is not a film or image, is empty or is cut short.
         """
         self.close()
         self._reader = open_video(self._path)

@@ -48,7 +48,7 @@ class Webcam:
     ) -> None:
         """Set the camera and its requested settings; it uses the nearest ones that it has.
 
-        capture: opens a device file; replaced where no camera is available
+        capture: opens a device file; tests replace it
         """
         self._file = Path(f"/dev/video{device}" if isinstance(device, int) else device)
         self._params = params = params or WebcamParams()
@@ -80,8 +80,7 @@ class Webcam:
         if not self._file.exists():
             there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
             raise CameraError(
-                f"no camera at {self._file} (there is: {there or 'none'}): "
-                "plug it in or name another"
+                f"no camera at {self._file} (found: {there or 'none'}): plug it in or name another"
             )
         if not os.access(self._file, os.R_OK | os.W_OK):
             raise CameraError(
@@ -96,7 +95,7 @@ class Webcam:
         if not works:
             capture.release()
             raise CameraError(
-                f"{self._file} delivers no frame: it is no camera, or another program uses it; "
+                f"{self._file} delivers no frame: it is not a camera, or another program uses it; "
                 "close that program or name another camera"
             )
         self._capture, self._number = capture, 0
@@ -109,7 +108,7 @@ class Webcam:
         if name and name != wanted:
             self._report_once(
                 f"camera {self._file} uses {name} instead of {wanted} (webcam.format): large frames "
-                "may come slowly"
+                "may arrive slowly"
             )
         for line in apply_controls(self._file, self._params):
             self._report_once(f"camera {self._file} {line}")
@@ -137,7 +136,7 @@ class Webcam:
                 away_s = 0.0 if self._left_s is None else came_s - self._left_s
                 self._report(self._rate.update(captured_s, away_s))
                 self._left_s = now_s()
-                # Frames that arrived while the reader was away count as skipped.
+                # Frames that arrived while the reader was busy count as skipped.
                 rate_hz = self._rate.measured_hz or self._rate_hz
                 missed = away_s * rate_hz if isfinite(rate_hz) else 0.0
                 self._number += 1 + max(0, int(missed) - 1)

@@ -26,7 +26,8 @@ LONGEST_END_S = 12.0
 class CameraParts(NamedTuple):
     """Factories of the parts, called in the process that uses them; all must be picklable.
 
-    source, detector: functions without arguments; motion: likewise, or None
+    source, detector: functions without arguments; motion: also a function without arguments, or
+        None
     locate: locates detections in the camera's axes; None: the loop does
     """
 

@@ -35,7 +35,7 @@ POSITION_MODE = 0
 def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the required register values by name, in register units.
 
-    Of "phase" only the multi-turn bit is meant: it must be 0.
+    For "phase" only the multi-turn bit is required: it must be 0.
     """
     wanted = {
         "return_delay_time": 0,
@@ -67,7 +67,7 @@ _END = REGISTERS["present_current"].address + REGISTERS["present_current"].size
 def window(address: int) -> ReadWindow:
     """Return a window that ends at Present Current (69).
 
-    address: at most 56; up to 40 it includes torque and armed limits
+    address: first address, at most 56; up to 40 the window includes torque and armed limits
     """
     armed = address <= ARMED_AT
     pad = (ARMED_AT if armed else SENSED_AT) - address
@@ -167,7 +167,7 @@ FEETECH = Family(
 
 MIDDLE = STEPS_PER_TURN // 2
 NEAR_STEPS = 8
-"""Motion of the joint by a hand's tremor meanwhile."""
+"""Motion of the joint caused by a hand's tremor during the setting."""
 
 
 def set_middle(port: BusPort, family: Family, servo_id: int) -> int:

@@ -70,7 +70,7 @@ class ScsGoalWrite(GoalWrite):
 def window(address: int) -> ReadWindow:
     """Return a window that ends at Moving (66).
 
-    address: at most 56; up to 40 it includes torque
+    address: first address, at most 56; up to 40 the window includes torque
     """
     armed = address <= ARMED_AT
     pad = (ARMED_AT if armed else SENSED_AT) - address

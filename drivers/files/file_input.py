@@ -89,11 +89,11 @@ def open_mcap(path: Path, failed: Callable[[str], Exception], cure: str) -> Bina
     Args:
         path: Path of the file.
         failed: Creates the error from its message.
-        cure: Remedy if the file is no recording.
+        cure: Remedy if the file is not a recording.
 
     Raises:
-        Exception: created by ``failed``: the file is absent, no regular file, not readable or no
-            recording.
+        Exception: created by ``failed``: the file is absent, not a regular file, not readable or
+            not a recording.
     """
     if not path.exists():
         raise failed(f"no recording at {path}: check the path")
@@ -102,8 +102,8 @@ def open_mcap(path: Path, failed: Callable[[str], Exception], cure: str) -> Bina
     try:
         file = path.open("rb")
     except OSError as error:
-        raise failed(f"cannot read {path} ({error.strerror}): check its rights") from error
+        raise failed(f"cannot read {path} ({error.strerror}): check its permissions") from error
     if file.read(len(MAGIC)) != MAGIC:
         file.close()
-        raise failed(f"{path} is no recording: {cure}")
+        raise failed(f"{path} is not a recording: {cure}")
     return file

@@ -43,7 +43,7 @@ def refuse_existing(*paths: Path, force: bool = False) -> None:
                 raise SetupError(_exists_message(path))
             folder = path.parent
             if folder.exists() and not folder.is_dir():
-                raise SetupError(f"{folder} is no folder: name another file than {path}")
+                raise SetupError(f"{folder} is not a folder: name another file than {path}")
             if folder.is_dir() and not os.access(folder, os.W_OK):
                 raise SetupError(f"cannot write {path}: its folder is read-only; name another")
 
@@ -91,7 +91,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
 
 @contextlib.contextmanager
 def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
-    """Yield a text file to write to, in UTF-8 and with line ends as written.
+    """Yield a text file to write to, in UTF-8 and with unchanged line ends.
 
     Raises:
         SetupError: see ``output_file``.

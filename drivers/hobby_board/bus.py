@@ -5,7 +5,7 @@ Limits of such a board, and so of this bus:
 - Servo positions are not measured. They are estimated from goals and known speeds (``measured`` is
 False), load and current are unknown, and a stuck servo is not detected.
 - The position of a servo before its pulses begin is unknown. It moves to the first pulse at its own
-speed, whatever limit is armed.
+speed, with any armed limit.
 - No watchdog can be armed over the line: when this program dies the servos hold their last goals,
 unless the guardian process stops the pulses (gazerig.robot.guardian).
 - The board does not measure the servos' supply: a restart of a single servo is not detected.
@@ -122,7 +122,7 @@ class HobbyBoardBus(PortBus):
             self._record_loss(lost)
             return self._nothing
         if not answered:
-            # If any byte arrives the board is present, and noise spoils its answers.
+            # If any byte arrives the board is present, and noise corrupts its answers.
             silent_s = min(self._silence.silent_for_s(now_s), now_s - self._byte_s)
             if silent_s >= self._board.timing.give_up_s:
                 raise BusLost(

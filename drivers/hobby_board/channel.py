@@ -262,7 +262,7 @@ class Channel:
             self.adopt_pulse(pulse_steps)
 
     def record_pulse(self, pulse_steps: int) -> None:
-        """Record its pulse, whatever its goal is."""
+        """Record its pulse, which may differ from its goal."""
         self.on = pulse_steps > 0
         if self.on:
             self.ramp.set_pulse(pulse_steps)

@@ -45,7 +45,7 @@ class HobbyBoardParams(ABC):
         "on a slow line, but restarts are detected later."] = 0.0
     stagger_ms: Annotated[float, Bounds(0, 1000),
         "Delay between switching on the pulses of one servo and of the next; all at once could overload a weak power supply."] = 100.0
-    give_up_s: Annotated[float, Bounds(0.5, 3600), "The run ends when a lost port or board has not come back within this time."] = 60.0
+    give_up_s: Annotated[float, Bounds(0.5, 3600), "The run ends when a lost port or board has not reconnected within this time."] = 60.0
     # fmt: on
 
     @property
@@ -69,6 +69,6 @@ class HobbyBoardParams(ABC):
         least, most, decided = self.pulse_range_us()
         if not least <= low <= high <= most:
             raise ValueError(
-                f"channel {setup.id}: its range {low:g}..{high:g} us must lie within "
+                f"channel {setup.id}: its range {low:g}..{high:g} us must be within "
                 f"{least:g}..{most:g} us ({decided}): narrow the joint's range"
             )

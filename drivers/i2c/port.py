@@ -132,8 +132,8 @@ class I2cPort:
         except OSError as error:
             if error.errno == errno.EBUSY:
                 raise BusLost(
-                    f"{self.port_name}: a driver of the kernel has the chip at {address:#x}: take "
-                    "its overlay (pca9685) out of the system's configuration"
+                    f"{self.port_name}: a driver of the kernel has the chip at {address:#x}: remove "
+                    "its overlay (pca9685) from the system's configuration"
                 ) from error
             raise
         self._checked.add(address)
@@ -197,7 +197,9 @@ def open_failure_text(path: str, code: int | None) -> str:
         )
     if code in (errno.EBUSY, errno.EAGAIN):
         return f"{path} is busy: close the other program that moves servos on it"
-    return f"{path} is no I2C bus ({os.strerror(code) if code else 'unknown'}); buses here: {here}"
+    return (
+        f"{path} is not an I2C bus ({os.strerror(code) if code else 'unknown'}); buses here: {here}"
+    )
 
 
 def device_group(path: str) -> str:

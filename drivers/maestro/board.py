@@ -85,10 +85,10 @@ class MaestroBoard:
         return pulses
 
     def prepare(self, log: EventLog) -> None:
-        """Stop the board's own script if one runs: it would move servos against this program."""
+        """Stop the board's own script if one runs, as it would also move servos."""
         if self.line.ask(self.line.codec.script_status(), 1) == b"\0":
             self.line.send(self.line.codec.stop_script())
-            log.add("the board ran a script of its own: stopped")
+            log.add("the board was running its own script: stopped")
 
     def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the error register; None without an answer."""

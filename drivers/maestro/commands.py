@@ -124,7 +124,8 @@ class MaestroCodec:
             if len(run) > 1 and self.channels > MICRO:
                 widths = [goals[channel] for channel in run]
                 data = [0] * (2 * len(run))
-                # As ``split``, for all at once; a width that does not fit is not a data byte.
+                # Like ``seven_bit_bytes``, for all goals together; a width that does not fit is not
+                # a data byte.
                 data[0::2] = [width & 0x7F for width in widths]
                 data[1::2] = [width >> 7 for width in widths]
                 packet += self.command(SET_TARGETS, len(run), run[0], *data)
@@ -219,5 +220,5 @@ def accel_units(steps_s2: float | None) -> int:
 def _units(wanted: float, most: int, what: str) -> int:
     if not wanted > 0.0:
         raise ValueError(f"a {what} limit must be above 0, not {wanted}")
-    # A hair more than whole units is whole units that were divided and multiplied.
+    # A value slightly above whole units is a rounding error of an earlier conversion.
     return 0 if wanted > most else max(1, ceil(wanted - 1e-9))

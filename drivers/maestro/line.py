@@ -141,7 +141,7 @@ class MaestroLink:
 
         They are read twice, as answers have no checksum and decide the position at which a channel
         is held. The result is None without an answer, if both reads differ, or if more bytes arrive
-        than requested: after a doubled answer every pulse would be taken for the next channel's.
+        than requested: after a doubled answer every pulse would be assigned to the next channel.
         """
         first, began_s = self._pulses_once(channels), self.port.now_s()
         second = None if first is None else self._pulses_once(channels)

@@ -26,5 +26,5 @@ class MaestroParams(HobbyBoardParams):
     # fmt: on
 
     def pulse_range_us(self) -> tuple[float, float, str]:
-        """Return the shortest and longest pulse that a board can give."""
-        return 64.0, 4080.0, "what a Maestro can give"
+        """Return the shortest and longest pulse that a board can output."""
+        return 64.0, 4080.0, "the range of a Maestro"

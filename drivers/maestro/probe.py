@@ -1,4 +1,4 @@
-"""Detection of a Maestro at a port and of its command form; nothing is moved on purpose.
+"""Detection of a Maestro at a port and of its command form; nothing is moved intentionally.
 
 One state changes: a board clears its error register when it is read, so the result contains it. A
 board treats unknown commands as errors, and on an error it sends its channels home. So forms other

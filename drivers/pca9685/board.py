@@ -181,7 +181,7 @@ class Pca9685Board:
     def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read a channel's pulse and its board's mode; None without an answer.
 
-        A board that was reset sleeps and outputs no pulses, whatever its registers contain.
+        A board that was reset sleeps and outputs no pulses, with any content of its registers.
         """
         address, nth = self._places[channel.id]
         self._next_look += 1

@@ -11,7 +11,7 @@ BRIDGE_BAUD = 115_200
 """Baud rate of a bridge's serial line; the rate of an I2C bus is set in the system."""
 
 RESERVED = (0x70, *range(0x78, 0x80))
-"""All boards answer at 70 after power-up; from 78 on addresses mean something else on I2C."""
+"""All boards answer at 70 after power-up; from 78 on addresses have another meaning on I2C."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Pca9685Params(HobbyBoardParams):
             if address in RESERVED:
                 raise ValueError(f"address {address:#x} is reserved: boards have 0x40 to 0x77")
         if len(set(self.addresses)) < len(self.addresses):
-            raise ValueError("two boards have the same address: each needs one of its own")
+            raise ValueError("two boards have the same address: each needs its own")
         if self.min_pulse_us >= self.max_pulse_us:
             raise ValueError("min_pulse_us must be below max_pulse_us")
         if not self.max_pulse_us < 0.95e6 / self.frequency_hz:

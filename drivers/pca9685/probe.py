@@ -64,14 +64,14 @@ def check_board(line: I2cLine, address: int) -> None:
             )
         else:
             silence_reason = (
-                f"no PCA9685 answers at {address:#x}: has the board its logic supply (VCC, "
-                "not V+ alone)? check SDA, SCL and ground; its jumpers make the address"
+                f"no PCA9685 answers at {address:#x}: does the board have its logic supply (VCC, "
+                "not only V+)? check SDA, SCL and ground; its jumpers set the address"
             )
         raise ServoMissing(f"{where}{silence_reason}")
     first_six, outputs, prescale = found
     if not are_plausible(first_six, outputs, prescale):
         raise ServoMissing(
-            f"{where}the chip at {address:#x} is no PCA9685: another chip has this "
+            f"{where}the chip at {address:#x} is not a PCA9685: another chip has this "
             "address; close a jumper and write the new one under bus.pca9685.address"
         )
     if first_six[MODE1] & EXTCLK:

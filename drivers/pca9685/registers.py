@@ -19,7 +19,7 @@ AWAKE = AUTO_INCREMENT
 TOTEM_POLE = 0x04
 """MODE2: outputs drive high and low, and change at the stop condition, never within a pulse."""
 FULL_OFF = 0x10
-"""Bit in the high byte of OFF: no pulses, whatever ON contains (7.3.3)."""
+"""Bit in the high byte of OFF: no pulses, for any value of ON (7.3.3)."""
 OFF = bytes((0, 0, 0, FULL_OFF))
 
 SOFTWARE_RESET = 0x06

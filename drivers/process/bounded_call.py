@@ -14,7 +14,7 @@ _FIRST_END_S, _NEXT_END_S, _LONGEST_END_S = 0.2, 0.05, 2.0
 """An abandoned call is ended after the first time; then again, at an interval that doubles."""
 
 FIRST_LINE_S, _LONGEST_SILENCE_S = 1.0, 60.0
-"""A call that lasts is reported after the first time; then again, at an interval that doubles."""
+"""A running call is reported after the first time; then again, at an interval that doubles."""
 
 
 class CallEnded(SystemExit):
@@ -25,7 +25,7 @@ class OverdueSource(Protocol):
     """A source of calls that may block a thread for too long."""
 
     def overdue_call(self) -> tuple[float, str] | None:
-        """Return the time for which a call lasts [s] and a message; None if no call lasts."""
+        """Return the run time [s] of the current call and a message; None if none is late."""
 
 
 OVERDUE_SOURCES: set[OverdueSource] = set()
@@ -132,7 +132,7 @@ class BoundedCall:
             self._submit(work)
 
     def call_in_order(self, work: Callable[[], Any], longest_s: float) -> CallResult | None:
-        """Make a call after the late one before, whose result is discarded; None while one lasts.
+        """Make a call after the previous late one, whose result is discarded; None if one runs.
 
         longest_s: longest wait for each, seconds
         """
@@ -167,10 +167,10 @@ class BoundedCall:
         return call.outcome
 
     def close(self) -> None:
-        """End the thread; a call that lasts is ended without waiting, and no other begins.
+        """End the thread; a running call is ended without waiting, and no other begins.
 
         Running Python code ends with a ``CallEnded``, raised again if it is caught. A wait outside
-        Python cannot be ended: it is in ``OVERDUE_SOURCES`` while it lasts.
+        Python cannot be ended: it is in ``OVERDUE_SOURCES`` while it is running.
         """
         thread, self._thread = self._thread, None
         if thread is None:
@@ -190,7 +190,7 @@ class BoundedCall:
         """Return the time [s] for which an abandoned call has been running, and a message."""
         for_s = perf_counter() - (self._closed_s or 0.0)
         return for_s, (
-            f"{self._name} was given up {for_s:.0f} s ago and does not end: it may slow the loop "
+            f"{self._name} was abandoned {for_s:.0f} s ago and has not ended: it may slow the loop "
             "while this program runs"
         )
 

@@ -12,23 +12,24 @@ WITHIN_S = 1.0
 """Time within which late answers are counted."""
 
 BUSY = 3
-"""Number of late answers within that time that is no accident."""
+"""Number of late answers within that time from which this computer counts as busy."""
 
 SILENCE_S = 0.25
 """Silence of all servos after which a line is logged."""
 
 BLAME_S = 1.5
-"""Silence after which plugs and power are blamed: a shorter one looks the same as a stalled
-computer, which late answers identify afterwards."""
+"""Silence after which plugs and power are reported as the cause. A shorter silence looks the same
+as a stalled computer, which late answers identify afterwards.
+"""
 
 STOOD_STILL = (
-    "this computer was busy, or the emulator stood still: for {:.1f} s no answer came, then "
-    "they came late and whole; plugs and power are not to blame"
+    "this computer was busy, or the emulator was suspended: no answer for {:.1f} s, then late but "
+    "intact ones; plugs and power are not the cause"
 )
 
 
 LATE_COMPUTER = "late computer"
-"""Kind of events that servos had because this computer was late, not through a fault of theirs."""
+"""Kind of servo events that are caused by delays of this computer, not by the servos."""
 
 AFTERMATH_S = 2.0
 """Time after a delay of the computer during which it is the cause of events of servos."""
@@ -65,7 +66,7 @@ class HostLateness:
         if now_s - self._silent_until_s < AFTERMATH_S:
             return f"this computer was late: it sent nothing for {self._silent_s:.2f} s"
         if self.was_late_since(now_s - AFTERMATH_S):
-            return "this computer was busy, or the emulator stood still: answers came late"
+            return "this computer was busy, or the emulator was suspended: answers arrived late"
         return ""
 
     def forget(self) -> None:

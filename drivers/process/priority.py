@@ -1,4 +1,4 @@
-"""Processor time of the processes of a run: the control loop before all others, without privilege.
+"""Scheduling priority of the processes of a run: the control loop first, without privileges.
 
 Linux groups the processes of a session (autogroup). Niceness then only counts within a session, and
 that of the session counts among sessions, so both are lowered.
@@ -14,8 +14,9 @@ from contextlib import suppress
 from pathlib import Path
 
 SHORT_S = 0.0001
-"""Shortest time slice of Linux; a thread with a shorter slice than the others runs at once when it
-wakes up (EEVDF, since 6.12; older kernels ignore it)."""
+"""Shortest time slice of Linux; a thread with a shorter slice than the others runs immediately when
+it wakes up (EEVDF, since 6.12; older kernels ignore it).
+"""
 
 _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274}
 """Numbers of the system call, for which neither Python nor most C libraries have a function."""
@@ -23,11 +24,11 @@ _RESET_ON_FORK = 1
 _ATTRIBUTES = "=IIQiIQQQ"
 """struct sched_attr: size, policy, flags, nice, priority, runtime, deadline, period (ns)."""
 _AGAIN_S = (0.0, 0.15, 0.3)
-"""Waits before attempts: the kernel lets unprivileged users write once in a tenth of a second."""
+"""Waits before attempts: the kernel allows unprivileged users one write per 0.1 s."""
 
 
 def request_slice(slice_s: float) -> bool:
-    """Request a time slice for the calling thread; what it starts has the usual one.
+    """Request a time slice for the calling thread; threads that it starts have the usual one.
 
     A thread with a real-time priority or another niceness keeps it.
 

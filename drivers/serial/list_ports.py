@@ -201,10 +201,10 @@ def usb_id_of(device: str, ports: Sequence[SerialPort]) -> str:
 
 
 def check_exists(device: str) -> None:
-    """Check that a port of this computer is there, without opening it.
+    """Check that a port of this computer exists, without opening it.
 
     Raises:
-        PortError: it is not.
+        PortError: it does not exist.
     """
     if device.startswith("/dev/") and not Path(device).exists():
         raise PortError(open_failure_text(device, errno.ENOENT))

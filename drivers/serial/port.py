@@ -202,7 +202,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                 termios.tcflush(fd, termios.TCIFLUSH)
             sent = os.write(fd, request)
         except BlockingIOError:
-            pass  # no room
+            pass  # no space
         except (OSError, ValueError, termios.error) as error:
             raise self._lost(error) from error
         if sent < len(request):
@@ -283,7 +283,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         self.closePort()
         if termios is None:
-            raise PortError(f"{self.port_name}: real servos need Linux; here there is --mock")
+            raise PortError(f"{self.port_name}: real servos need Linux; use --mock here")
         # A port that was open is found by its adaptor's serial number.
         lasting, name = self._lasting, str(self.port_name)
         if lasting is None:

@@ -377,6 +377,6 @@ class SmartServoBus(PortBus):
         for setup in setups if self._family.single_turn else ():
             if not 0 <= setup.min_steps <= setup.max_steps < turn:
                 raise ValueError(
-                    f"{setup.label()}: {setup.min_steps}..{setup.max_steps} is no range "
+                    f"{setup.label()}: {setup.min_steps}..{setup.max_steps} is not a range "
                     f"within 0..{turn - 1} steps"
                 )

@@ -23,7 +23,7 @@ BABBLE_S = 2.0
 """Longest time to listen to a line that never falls silent."""
 
 SHARED, ANSWERS = 2, 6
-"""If ``SHARED`` of ``ANSWERS`` answers are incomplete, that is no accident."""
+"""Two servos share an id if at least ``SHARED`` of ``ANSWERS`` answers are incomplete."""
 
 _ROOM = 1 << 12
 _MOST = 1 << 13

@@ -1,8 +1,8 @@
 """Interface between the bus engine and a servo family: all differences in one value.
 
-The engine (gazerig.drivers.servo_bus) does not know any family by name. A family consists of a
-protocol file (the codec), a table file and one ``Family`` built from both; docs/servo-families.md
-explains it field by field.
+The engine (gazerig.drivers.servo_bus) does not depend on any particular family. A family consists
+of a protocol file (the codec), a table file and one ``Family`` built from both;
+docs/servo-families.md explains it field by field.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -106,7 +106,7 @@ class ServoHealth:
     ) -> None:
         """Record the silent servos; report each once after a longer silence.
 
-        lateness: late answers, which show first of all that this computer is busy
+        lateness: late answers, which mainly indicate that this computer is busy
         answered: whether any servo has answered
         """
         if not answered and out:

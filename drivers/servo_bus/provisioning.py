@@ -72,7 +72,7 @@ class Provisioning:
             differences = self.differences(ids)
             if differences:
                 named = "; ".join(
-                    f"{self._setups[servo_id].label()} does not take "
+                    f"{self._setups[servo_id].label()} does not accept "
                     f"{register_label(register.name)} {wanted}, it has {found}"
                     for servo_id, register, found, wanted in differences
                 )
@@ -89,7 +89,7 @@ class Provisioning:
             bad = [self._setups[i].label() for i, data in found.items() if data != block.data]
             if bad:
                 raise ServoMissing(
-                    f"{self._port_name}: {', '.join(bad)} does not take the indirect addresses: restart "
+                    f"{self._port_name}: {', '.join(bad)} does not accept the indirect addresses: restart "
                     "the servo power, or set indirect_block: false"
                 )
 

@@ -9,7 +9,7 @@ CALM_S = 0.25
 """Time after the last trouble beyond which no answer is late any more."""
 
 KNOWN = ("torque", "status", "acceleration", "torque_limit")
-"""Fields with known values in a healthy servo: no fault, the others as written."""
+"""Fields with known values in a healthy servo: no fault, the others as last written."""
 
 
 class Sample(NamedTuple):

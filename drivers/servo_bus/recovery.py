@@ -125,7 +125,7 @@ class Recovery:
         for servo_id in numbers:
             if numbers[servo_id] != expected[servo_id]:
                 model = self._setups[servo_id].model
-                self._health.record_fault(servo_id, f"is not {model} any more: exchanged?")
+                self._health.record_fault(servo_id, f"is no longer {model}: exchanged?")
         return tuple(i for i in ids if numbers.get(i) == expected[i])
 
     def _recoverable(self, ids: tuple[int, ...], torque: Mapping[int, int]) -> tuple[int, ...]:
@@ -188,7 +188,7 @@ class Recovery:
                     low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
                     raise ServoFault(
                         f"{self._line.label(servo_id)} is at {steps}, beyond its encoder's zero, "
-                        f"and would go the long way round into {low}..{high}: turn it into that "
+                        f"and would move into {low}..{high} in the wrong direction: turn it into that "
                         "range by hand"
                     )
         goals = [self.clip(i, p) for i, p in zip(ids, present, strict=True)]

@@ -199,7 +199,7 @@ class SyncReader:
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
             if not samples and not damaged and self._header in raw:
                 self._line.lateness.record_late_answer(now_s)  # to an earlier request
-            # Later bytes must not be taken for the next answer.
+            # Later bytes must not be mistaken for the next answer.
             line, polled = self._line, self.poll_list
             if damaged:
                 line.lateness.forget()  # noise looks like a late answer

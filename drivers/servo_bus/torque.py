@@ -109,7 +109,7 @@ def _send_until(
     _raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
     refused = ", ".join(f"{line.label(servo_id)}: {value}" for servo_id, value in left.items())
     raise ServoMissing(
-        f"{line.port.port_name}: {name} is not taken ({refused}): restart the servo power"
+        f"{line.port.port_name}: {name} is not accepted ({refused}): restart the servo power"
     )
 
 
@@ -146,7 +146,7 @@ def switch_on(
     for servo_id, was, now in zip(ids, before, read_positions(line, ids), strict=True):
         if abs(now - was) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
-                f"{line.label(servo_id)}: position jumped from {was} to {now} as the torque came on: "
+                f"{line.label(servo_id)}: position jumped from {was} to {now} when torque was switched on: "
                 f"{family.jump_cure}"
             )
     if family.goal_speed:

@@ -95,7 +95,7 @@ class Transactions:
     """A port with the time-outs of one bus; every method may raise BusLost.
 
     All reads and writes use sync read and sync write even for a single servo: an echo of such a
-    request cannot be taken for its answer.
+    request cannot be mistaken for its answer.
 
     family: family of the servos
     tx_bytes, rx_bytes: counts since creation

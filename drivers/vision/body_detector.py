@@ -106,7 +106,7 @@ def _load(file: ModelFile) -> Network | None:
         from ai_edge_litert.interpreter import Interpreter
     except ImportError as error:
         raise ModelFileError(extra_hint("ai-edge-litert", "people", error)) from error
-    with quiet_stderr():  # LiteRT greets on the terminal
+    with quiet_stderr():  # LiteRT prints a banner
         net = Interpreter(model_content=content, num_threads=1)
         net.allocate_tensors()
     (given,), (boxes, scores) = net.get_input_details(), net.get_output_details()

@@ -19,7 +19,7 @@ _SAMPLED_PX = 192
 # Correlations below which two images show two scenes. Between consecutive frames of a film they are
 # above .9 as a whole, in pans above .9 in the middle; across cuts below .3 and .72.
 _WHOLE, _MIDDLE = 0.4, 0.8
-# Contrast in grey levels below which an image shows nothing: dark, covered, blinded.
+# Contrast in grey levels below which an image has no content: dark, covered or overexposed.
 _LEAST_CONTRAST = 6.0
 _MARGIN = 4  # the middle is all but a fourth of the image on each side
 
@@ -43,7 +43,7 @@ class CutDetector:
         small = cv2.resize(np.ascontiguousarray(green), size, interpolation=cv2.INTER_AREA)
         now = np.asarray(small, np.float32)
         if now.std() < _LEAST_CONTRAST:
-            return self._scene  # later images are compared with the last one that showed something
+            return self._scene  # later images are compared with the last one with content
         before, self._before = self._before, now
         if before is not None and _correlation(before, now) < _WHOLE:
             top, left = HEIGHT // _MARGIN, WIDTH // _MARGIN

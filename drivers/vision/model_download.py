@@ -72,8 +72,8 @@ def fetch(
                 else f"put the file into {models_folder()}"
             )
             raise ModelFileError(
-                f"cannot get {first.name} from {source} ({' '.join(why.split())}). Without it "
-                f"everything else runs. By hand: {where}; it is {first.address}"
+                f"cannot get {first.name} from {source} ({' '.join(why.split())}). Everything "
+                f"else works without it. To get it by hand: {where}; its address is {first.address}"
             ) from error
         for file, data in found:
             write_file(file.path, data, force=True)

@@ -185,7 +185,7 @@ class DetectorStatus(NamedTuple):
 
 
 def detector_status(params: FaceDetectorParams) -> DetectorStatus:
-    """Return the detectors that run with these parameters, and what is missing."""
+    """Return the detectors that run with these parameters, and which are missing."""
     lacks: list[str] = []
     kind = params.kind
     if kind == "auto":

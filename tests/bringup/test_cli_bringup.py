@@ -623,7 +623,7 @@ def test_setup_of_a_maestro_finds_a_range_that_cuts_and_a_servo_on_another_chann
             # set; supply off; on again; move; it was another; move; that is it
             answers="\ny\n\ny\nn\ny\ny\n",
         )  # fmt: skip
-        assert code == 0 and "ran a script of its own: stopped" in err
+        assert code == 0 and "was running its own script: stopped" in err
         assert "and the board stays at 1900 us: set its Min to 1088 and its Max to 1936" in err
         assert "plug its servo into channel 0" in err and "done: 1 of 1" in err
         first = json.loads(command("status"))["servos"][0]

@@ -27,7 +27,7 @@ def read_archive(dai: Any, path: str) -> Any:
 
     Raises:
         CameraError: there is no such file.
-        UnusableModel: it is no archive.
+        UnusableModel: it is not an archive.
     """
     file = Path(path).expanduser()
     if not file.is_file():
@@ -36,7 +36,7 @@ def read_archive(dai: Any, path: str) -> Any:
         return dai.NNArchive(str(file))
     except (RuntimeError, ValueError) as error:
         raise UnusableModel(
-            f"{file} is no NNArchive ({' '.join(str(error).split())}): "
+            f"{file} is not an NNArchive ({' '.join(str(error).split())}): "
             + _CURE.format(chip="this camera's chip")
         ) from error
 
@@ -68,7 +68,7 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
             wrong = output_names_fault([str(output.name) for output in outputs])
             size = archive.getInputSize()
             if not wrong and (size is None or size[0] % STRIDES[-1] or size[1] % STRIDES[-1]):
-                wrong = f"its frames of {size} are no multiples of {STRIDES[-1]} px"
+                wrong = f"its frames of {size} are not multiples of {STRIDES[-1]} px"
             kind = None if wrong else "yunet"
         elif "yolo" in parsers[0].lower():
             points = heads[0].metadata.nKeypoints or 0
@@ -109,7 +109,7 @@ def supported_settings(
     if params.depth and (why := _stereo_fault(dai, device, sockets)):
         events.append(
             f"{label} measures no distances: {why}; they are estimated from the size of faces; "
-            "oak.depth: false says so in the rig"
+            "set oak.depth: false in the rig"
         )
         params = replace(params, depth=False)
     if params.face_model:
@@ -131,10 +131,10 @@ def usb2_text(params: OakParams, speed: str) -> str:
     most_hz = _USB2_BYTES_S / frame
     text = f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second"
     if most_hz >= params.rate_hz:
-        return f"{text}: enough for what is asked; a USB 3 cable and port make it sooner"
+        return f"{text}: enough for the requested frames; a USB 3 cable and port reduce the delay"
     fewer = f"oak.rate_hz {most_hz:.0f}" if most_hz >= 1.0 else "smaller frames"
     return (
-        f"{text}, and {frame * params.rate_hz / 1e6:.0f} are asked for: "
+        f"{text}, and {frame * params.rate_hz / 1e6:.0f} are requested: "
         f"use a USB 3 cable (its plug is often blue) and port, or set {fewer}"
         f"{' or oak.depth: false' if params.depth else ''}"
     )
@@ -165,7 +165,7 @@ def _gyro_fault(dai: Any, device: Any, params: OakParams) -> str:
     """Return why the gyro is not available, "" if it is."""
     imu = device.getConnectedIMU()
     if not imu or imu.upper() == "NONE":
-        return "it has no IMU; oak.gyro: false says so in the rig"
+        return "it has no IMU; set oak.gyro: false in the rig"
     if params.imu_rotation_deg is None and imu_to_camera(dai, device.readCalibration()) is None:
         return (
             "its calibration lacks the IMU's orientation: set oak.imu_rotation_deg, "

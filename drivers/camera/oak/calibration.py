@@ -19,7 +19,7 @@ _STRAIGHT: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
 _MOST_FIT_PX = 1.0
 _PRECISELY = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
 _AXES = np.eye(3)
-_NO_LENS = "the calibration of this OAK camera does not hold the lens of its colour camera"
+_NO_LENS = "the calibration of this OAK camera does not contain the lens of its colour camera"
 _BOARD = "measure it with the printed board instead (leave --oak away)"
 
 
@@ -125,7 +125,7 @@ def read_calibration(dai: Any, calibration: Any, params: OakParams) -> OakCalibr
         own, fit_px = (a, b, c, d, e), float(np.sqrt((left**2).sum(axis=0).mean()))
     if not params.undistort and not fit_px <= _MOST_FIT_PX:
         raise CameraError(
-            f"the lens of this OAK camera bends frames more than k1 k2 p1 p2 k3 can say "
+            f"the lens of this OAK camera bends frames more than k1 k2 p1 p2 k3 can describe "
             f"({fit_px:.1f} px are left): set oak.undistort: true"
         )
     distortion = _STRAIGHT if params.undistort else own

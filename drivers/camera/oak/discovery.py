@@ -26,7 +26,7 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
     wanted: device id or name (USB port, IP address); usb: the system's folder of USB devices
 
     Raises:
-        CameraError: there is none, or it cannot be used; the message contains the reason.
+        CameraError: no camera is found, or it cannot be used; the message contains the reason.
     """
     free = list(dai.Device.getAllAvailableDevices())
     for info in free:
@@ -42,19 +42,17 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
         if not wanted or wanted in (info.deviceId, info.name):
             _check_rights(dai, info)
             raise CameraError(
-                f"the OAK camera {_configuration_name(info)} is in use: end the other program that has it"
+                f"the OAK camera {_configuration_name(info)} is in use: close the program that uses it"
             )
     if wanted:
         there = ", ".join(_configuration_name(info) for info in [*free, *everything]) or "none"
-        raise CameraError(
-            f"no OAK camera {wanted!r} (there is: {there}): plug it in, or name another"
-        )
+        raise CameraError(f"no OAK camera {wanted!r} (found: {there}): plug it in, or name another")
     if _is_plugged_in(usb):
         # Some versions of the USB library do not list cameras without permission.
         raise CameraError(_RIGHTS)
     raise CameraError(
         "no OAK camera found: plug it in with a USB 3 cable, give it its power supply, "
-        "and look whether lsusb shows 03e7"
+        "and check whether lsusb lists 03e7"
     )
 
 
@@ -81,29 +79,29 @@ def _is_plugged_in(usb: Path) -> bool:
 
 
 _CURES = (
-    (("already_in_use", "already in use"), "another program uses it: end that"),
+    (("already_in_use", "already in use"), "another program uses it: close that program"),
     (
         ("insufficient_permissions", "permission"),
-        "it may not be opened: set up Luxonis' udev rule, and plug it in again",
+        "access to it is denied: set up Luxonis' udev rule, and plug it in again",
     ),
     (
         ("after booting", "device_not_found", "no available devices"),
-        "it did not come back after it was started: use a USB 3 cable straight at the computer, "
-        "not a hub, and give it its power supply",
+        "it did not reconnect after its start: use a USB 3 cable directly at the computer, "
+        "not a hub, and connect its power supply",
     ),
     (
         ("out of memory", "not enough", "cannot allocate", "insufficient", "shaves", "cmx"),
-        "more is asked than its chip holds: set smaller frames, oak.depth: false or no oak.face_model",
+        "its memory is too small for these settings: set smaller frames, oak.depth: false or no oak.face_model",
     ),
     (
         ("resolution", "sensor mode", "sensor config", "unsupported size"),
-        "its sensor has no frames of that size or rate: set oak.width_px and oak.height_px to "
+        "its sensor does not support that frame size or rate: set oak.width_px and oak.height_px to "
         "640 x 400, and oak.rate_hz to 30",
     ),
     (("host only",), "its nodes need a camera"),
 )
 """Parts of messages, in lower case -> cause and remedy."""
-_OTHERWISE = "unplug it, wait a second, plug it in again; if another program uses it, end that"
+_OTHERWISE = "unplug it, wait a second, plug it in again; if another program uses it, close it"
 
 
 def start_cure(message: str) -> str:

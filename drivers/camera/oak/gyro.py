@@ -167,7 +167,7 @@ class Gyro:
             self._asked_since_s = device_s
         newest_s = self._times[-1] if self._times else self._asked_since_s
         if device_s - max(newest_s, self._asked_since_s) > _STUCK_S:
-            self._fail("gives no readings")
+            self._fail("returns no readings")
             return None
         bias = self._bias.rad_s
         if bias is None or not self._times or not self._times[0] <= device_s <= newest_s + _AHEAD_S:

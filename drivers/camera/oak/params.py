@@ -21,16 +21,16 @@ class OakParams:
     extended_disparity: Annotated[bool, "halve the shortest measurable distance, to 35 cm on an OAK-D"] = True
     subpixel: Annotated[bool, "finer resolution of distances, noticeable beyond 2 m"] = True
     left_right_check: Annotated[bool, "discard distances on which the two stereo cameras disagree"] = True
-    undistort: Annotated[bool, "the camera straightens its frames; without, they come through its lens as it is"] = True
+    undistort: Annotated[bool, "remove the distortion of the lens on the camera; false: frames keep it"] = True
     exposure_limit_ms: Annotated[float | None, Bounds(0.1, 33),
-        "longest exposure: short ones blur less while the head turns, and need more light; null: as long as the camera likes"] = None
+        "longest exposure: shorter ones blur less while the head turns but need more light; null: chosen by the camera"] = None
     anti_flicker: Annotated[Literal["default", "off", "50hz", "60hz", "auto"],
-        "exposures of whole periods of the mains, against stripes under lamps; default: as the camera does by itself"] = "default"
-    focus: Annotated[int | None, Bounds(0, 255), "position of the lens, held fixed, larger for nearer things; null: autofocus"] = None
-    gyro: Annotated[bool, "use the camera's gyro to know how it turned"] = True
+        "exposure times that are whole periods of the mains, to avoid stripes under lamps; default: chosen by the camera"] = "default"
+    focus: Annotated[int | None, Bounds(0, 255), "fixed position of the lens, larger for nearer objects; null: autofocus"] = None
+    gyro: Annotated[bool, "measure the camera's rotation with its gyro"] = True
     imu_rotation_deg: Annotated[tuple[float, float, float] | None, Bounds(-180, 180),
         "rotation vector that takes directions from the gyro's axes to the camera's (x right, y down, z forward); "
-        "null: as the camera's own calibration says"] = None
+        "null: from the camera's own calibration"] = None
     dot_projector: Annotated[float, Bounds(0, 1),
         "brightness of the infrared dot projector of Pro models (helps on bare walls), as a share of its maximum"] = 0.0
     face_model: Annotated[str,
@@ -51,7 +51,7 @@ class OakParams:
         """
         if self.width_px % 16 or self.height_px % 2:
             raise ValueError(
-                f"frames of {self.width_px} x {self.height_px} px cannot be: width_px is a multiple "
+                f"frames of {self.width_px} x {self.height_px} px are impossible: width_px must be a multiple "
                 f"of 16 and height_px of 2, such as {self.width_px // 16 * 16} x {self.height_px // 2 * 2}"
             )
         if self.exposure_limit_ms is not None and self.exposure_limit_ms * self.rate_hz > 1e3:

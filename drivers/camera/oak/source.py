@@ -83,8 +83,8 @@ class OakSource:
         """Find the camera, start it, and check its rate.
 
         Raises:
-            CameraError: there is none, it may not be used, is busy, or is on USB 2 and that is
-                refused.
+            CameraError: no camera is found, access is denied, it is busy, or it is on USB 2, which
+                the parameters do not allow.
         """
         self.close()
         self._dai = self._load()
@@ -296,7 +296,7 @@ class OakSource:
             self._bridge = ClockSync(self._params.latency_ms / 1e3)
             jumps = 0
             self._events.append(
-                "the OAK camera's clock is not in step with the host's: arrivals less "
+                "the OAK camera's clock is not synchronised with the host's: arrival times minus "
                 f"{self._params.latency_ms:g} ms (latency_ms) are used"
             )
         host_s = self._bridge.host_s(device_s, stamped_s if self._in_step else arrived_s)

@@ -97,7 +97,7 @@ class CheckedDetector:
             wrong = f"failed ({describe_error(error)})"
         if not wrong:
             return faces
-        self._log.add(f"{self._label} {wrong}: dropped, mtcnn finds the faces")
+        self._log.add(f"{self._label} {wrong}: it is no longer used, mtcnn finds the faces")
         self._detector, self._dropped = self._ours(), True
         return self._detector.find(image)
 

@@ -19,14 +19,14 @@ class FaceDetectorParams:
     min_confidence: Annotated[float, Bounds(0.1, 1), "faces detected with a lower confidence are discarded"] = 0.7
     keep_confidence: Annotated[float, Bounds(0.05, 1), "auto: a known face is dropped when its confidence falls below this"] = 0.5
     search_every: Annotated[int, Bounds(1, 100),
-        "auto: frames from search to search of the whole frame; half of it while no face is known"] = 4
+        "auto: number of frames between two searches of the whole frame; half as many while no face is known"] = 4
     far_width_px: Annotated[int, Bounds(0, 4096),
         "auto: width of the frame in which far faces of 12 pixels are searched, tile by tile; 0: none"] = 768
     mesh_faces: Annotated[int, Bounds(0, 4),
         "number of faces, the largest first, whose pose, gaze, lids and lips a dense mesh measures; needs gazerig models fetch mesh"] = 0
     people_hz: Annotated[float, Bounds(0, 30),
-        "searches a second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0
+        "searches per second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0
     people_confidence: Annotated[float, Bounds(0.1, 1), "people detected with a lower confidence are discarded"] = 0.6
     hands_hz: Annotated[float, Bounds(0, 30),
-        "searches a second for palms of the nearest person; 0: none; needs gazerig models fetch hands and gazerig[people]"] = 5.0
+        "searches per second for palms of the nearest person; 0: none; needs gazerig models fetch hands and gazerig[people]"] = 5.0
     # fmt: on

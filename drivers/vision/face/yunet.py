@@ -52,7 +52,7 @@ class YunetNetwork:
             raise ModelFileError(f"{model_file} is damaged or another version: {_CURE}")
         weights, nothing = np.frombuffer(content, dtype=np.uint8), np.zeros(0, np.uint8)
         try:
-            # Any network loads, but only YuNet's outputs can be decoded: it is tried at once.
+            # Any network loads, but only YuNet's outputs can be decoded: it is tried immediately.
             with quiet_opencv():
                 net = cv2.FaceDetectorYN.create(
                     "onnx", weights, nothing, (64, 64), _CONFIDENCE, _SAME, _MOST

@@ -26,7 +26,7 @@ _MOST_SPLITS = 3
 # Number of patches that are examined per reported one.
 _LOOKED_AT = 3
 _SMOOTH_PX = 3
-# Relative change of brightness at the edges of a thing that is no faint shadow, and the share of
+# Relative change of brightness at the edges of a thing that is not a faint shadow, and the share of
 # the image above which less is enough: near things are large, with soft edges.
 _LEAST_CHANGE, _SMALL_SHARE = 0.13, 0.008
 _SAMPLE = 400

@@ -106,7 +106,7 @@ class EgoMotion(NamedTuple):
         noise
     noise_px: deviation of their flow from it, standard deviation along one axis
     shift_px: median motion of the image by the camera's motion
-    unforeseen_px: likewise if only the image shows it, otherwise 0
+    unforeseen_px: the same motion if only the image shows it, otherwise 0
     is_fitted: whether the image had enough texture for a fit
     """
 
@@ -126,7 +126,7 @@ def estimate_ego_motion(
 
     K: (3, 3) camera matrix
     predicted: whether ``pair`` was turned as the joints measured; otherwise the camera's motion is
-        unknown, and the motion of most points is taken for it
+        unknown, and the motion of most points is used instead
     moved_before: whether the image alone showed a motion of the camera shortly before
     """
     # Points (n, 2) of a grid with reliable flow.

@@ -118,7 +118,7 @@ class GloveDetector:
                 for one in circles[:row]
             ) or not (cut or _is_whole(mask, row, circles))
             # The number is that of the nearest earlier glove. A partly hidden glove keeps its last
-            # size, or that of its visible part; without either it is left out.
+            # size, or that of its visible part; without either it is omitted.
             x, y, radius, sure = circle
             near = [
                 (np.hypot(one.x - x, one.y - y), one)
@@ -176,7 +176,7 @@ def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
 def _circles(mask: NDArray[np.uint8], least_px: float) -> list[Circle]:
     """Return the largest circles within a mask that do not overlap: x, y, radius."""
     found: list[Circle] = []
-    # Areas beyond the edge of the image are not known to be a glove.
+    # It is unknown whether areas beyond the image's edge belong to a glove.
     within = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
     while len(found) < _MOST:
         inside = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)

@@ -50,7 +50,7 @@ def scale_down(
     level: how often it is then halved for the search, unless it becomes too small
 
     Raises:
-        ValueError: it is no 8-bit image: grey, BGR or BGR with alpha.
+        ValueError: it is not an 8-bit image: grey, BGR or BGR with alpha.
     """
     channels = image.shape[2] if image.ndim == 3 else 1
     right = image.ndim in (2, 3) and channels in (1, 3, 4) and image.size > 0

@@ -35,7 +35,7 @@ class MotionParams:
     max_blobs: Annotated[int, Bounds(1, 100), "most moving regions reported; the largest are chosen"] = 8
     confirm_frames: Annotated[int, Bounds(1, 10),
         "a moving region is reported once it has been detected in this many consecutive frames"] = 2
-    forget_ms: Annotated[float, Bounds(0, 5000), "a thing that stood still for longer gets a new id when it moves again"] = 500.0
+    forget_ms: Annotated[float, Bounds(0, 5000), "a thing that did not move for longer gets a new id when it moves again"] = 500.0
     max_gap_ms: Annotated[float, Bounds(10, 2000), "frames further apart in time than this are not compared"] = 300.0
     assumed_distance_m: Annotated[float, Bounds(0.1, 50), "distance assumed for things without a measured depth"] = 2.0
     assumed_distance_spread: Annotated[float, Bounds(0.01, 2), "standard deviation of that distance, as a share of it"] = 0.5

@@ -144,7 +144,7 @@ def segment_motion(
 def _object_change(pair: ImagePair, there: Flow | None) -> Plane:
     """Return the square of the relative change of brightness, without light, (h, w).
 
-    A shadow darkens neighbouring pixels alike; a thing has its own edges.
+    A shadow darkens neighbouring pixels equally; a thing has its own edges.
     """
     seen = _warp_older(pair.before, there)
     change: Plane = np.log((pair.now + _DARK) / (seen + _DARK)).astype(np.float32)
