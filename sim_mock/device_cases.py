@@ -1,4 +1,4 @@
-"""Configurable cases of each kind of emulated device; apart from the rest, as it loads them all."""
+"""Configurable cases of each kind of emulated device in one module that imports them all."""
 
 from collections.abc import Mapping
 

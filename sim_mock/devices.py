@@ -81,10 +81,10 @@ class MaestroLine:
 class Pca9685Line:
     """PCA9685 boards on an I2C bus behind a bridge, and their servos.
 
-    addresses: of the boards; the channels of the second begin at 16
-    oscillator_hz: of their clocks
+    addresses: addresses of the boards; the channels of the second begin at 16
+    oscillator_hz: frequencies of their clocks
     servos: servos that differ from the default, by their channel
-    baud: of the bridge's line, if it matters
+    baud: rate of the bridge's line, None if any rate works
     """
 
     addresses: tuple[int, ...] = (0x40,)
@@ -99,7 +99,7 @@ class Pca9685Line:
 class PluginLine:
     """The servos of a package's bus.
 
-    kind: of the bus
+    kind: kind of the bus
     settings: its parameters, pickled and encoded as text
     servos: in the order of the joints
     """
@@ -140,7 +140,7 @@ def build(
     Args:
         what: the device to build.
         now_s: its clock.
-        seed: of the random numbers that its faults draw.
+        seed: seed of the random numbers of its faults.
         shafts: factories of its servos' shafts; a package's device has its own.
 
     Raises:

@@ -33,7 +33,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         chain: a chain of servos, or a board; its clock is the port's clock.
         tap: receives every byte string that the host sends.
         sleep_until: advances that clock, for waiting; without it no call waits.
-        wire_time: bytes take their time on the line, and return delays apply.
+        wire_time: whether bytes take time on the line and return delays apply.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._lost = False
         self._give_up_s = 0.0
 
-    # --- what a driver's control loop uses
+    # --- methods for a driver's control loop
 
     def write(self, data: bytes) -> None:
         """Send bytes; answers wait to be read.
@@ -126,7 +126,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self._sleep_until(until_s)
         self._fetch_arrived()
 
-    # --- what the SDK uses
+    # --- methods for the SDK
 
     def setBaudRate(self, baudrate: int) -> bool:
         """Open at a baud rate; return False if neither adapters nor devices support it."""

@@ -29,9 +29,9 @@ class ServoLine:
     """The line of one device: a chain of servos, or a board.
 
     Args:
-        wire_time: bytes take time, and return delays apply.
-        turnaround_s: between the end of an instruction, or of the status before, and the
-            start of a status, in addition to the return delay.
+        wire_time: whether bytes take time on the line and return delays apply.
+        turnaround_s: time between the end of an instruction or of the previous status and the start
+            of a status, in addition to the return delay.
     """
 
     def __init__(self, device: Device, wire_time: bool = False, turnaround_s: float = 0.0) -> None:

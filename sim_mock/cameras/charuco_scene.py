@@ -1,4 +1,4 @@
-"""The board in front of an emulated head: first held by hand, then at rest.
+"""A ChArUco board in front of an emulated head: first held by hand, then at rest.
 
 The hand moves it everywhere, near and far, and tilts it to all sides, as the calibration
 requires. The camera's true lens and mount differ a little from the rig file, so that the

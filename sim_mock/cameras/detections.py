@@ -55,7 +55,7 @@ class SceneCamera:
         scene: the scene in front of it.
         mount: pose of the camera on the head.
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
-        rng: for the noise.
+        rng: random numbers of the noise.
         locate: converts detections from pixels to the camera's axes; None: no conversion.
         begins_s: start of the scene; None: at the first call of ``latest``.
     """
@@ -84,7 +84,7 @@ class SceneCamera:
 
     @property
     def start_s(self) -> float | None:
-        """Return the start of the scene; None: at the first call of ``latest`` to come."""
+        """Return the start of the scene; None if ``latest`` has not been called yet."""
         return self._start_s
 
     def open(self) -> None:

@@ -33,12 +33,12 @@ class SensorParams:
     """Fidelity of the picture to the light."""
 
     # fmt: off
-    noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the noise of reading, grey values"] = 3.0
+    noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the read-out noise, grey values"] = 3.0
     shot_noise_grey: Annotated[float, Bounds(0, 60),
-        "standard deviation of the noise of the light itself where a pixel is white; grows with the root of the light"] = 0.0
-    gain: Annotated[float, Bounds(0.05, 20), "brightness as a multiple; what gets over white is over-exposed"] = 1.0
-    gamma: Annotated[float, Bounds(0.2, 5), "exponent of grey values between 0 and 1; above 1: darker middle"] = 1.0
-    depth_noise_1_m: Annotated[float, Bounds(0, 0.2), "error of a measured distance for each metre squared, metres"] = 0.004
+        "standard deviation of the photon noise of a white pixel; it grows with the square root of the light"] = 0.0
+    gain: Annotated[float, Bounds(0.05, 20), "brightness factor; values above white are over-exposed"] = 1.0
+    gamma: Annotated[float, Bounds(0.2, 5), "exponent of grey values between 0 and 1; above 1: darker mid-tones"] = 1.0
+    depth_noise_1_m: Annotated[float, Bounds(0, 0.2), "error of a measured distance at 1 m, metres; it grows with its square"] = 0.004
     # fmt: on
 
 
@@ -98,14 +98,14 @@ class OpticsParams:
     """Exposure, read-out and sharpness."""
 
     # fmt: off
-    exposure_ms: Annotated[float, Bounds(0, 100), "how long light is collected"] = 8.0
+    exposure_ms: Annotated[float, Bounds(0, 100), "exposure time"] = 8.0
     sub_exposures: Annotated[int, Bounds(1, 32),
-        "pictures that are averaged over the exposure; 1: one, smeared by the camera's turn alone"] = 1
+        "number of pictures averaged over the exposure; 1: one picture, blurred only by the camera's turn"] = 1
     read_out_ms: Annotated[float, Bounds(0, 100),
-        "time from the first row to the last (rolling shutter); 0: all rows at once"] = 0.0
+        "time from the first row to the last (rolling shutter); 0: all rows at the same time"] = 0.0
     blur_px: Annotated[float, Bounds(0, 10),
-        "blur of the lens: standard deviation in pixels; it softens jagged edges, too"] = 0.0
-    bands: Annotated[int, Bounds(2, 64), "bands of rows that are drawn one after another for a rolling shutter"] = 8
+        "blur of the lens: standard deviation in pixels; it also softens jagged edges"] = 0.0
+    bands: Annotated[int, Bounds(2, 64), "number of row bands that are drawn separately for a rolling shutter"] = 8
     # fmt: on
 
 
@@ -162,7 +162,7 @@ def expose(
         view: draws the scene.
         params: exposure and read-out.
         t_s: time since the start of the scene, seconds.
-        lens: of the camera, for pictures of this size, with its distortion.
+        lens: lens of the camera, for pictures of this size, with its distortion.
         size_px: width and height.
         motion: pose and motion of the camera at that time.
         depth: with distances, at the middle of each row's exposure.

@@ -41,7 +41,7 @@ _BEHIND_HAND_M = 1e-3  # an arm is drawn just before its hand
 
 
 class Exposure(NamedTuple):
-    """One frame as taken.
+    """One exposed frame and the true pose of its camera.
 
     image: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without depth
     R_world_camera, p_world_camera_m: true pose of the camera
@@ -56,7 +56,7 @@ class Exposure(NamedTuple):
 
 
 FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
-"""Finds motion since the exposure before."""
+"""Finds motion since the previous exposure."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class PixelCameraParams(SensorParams, OpticsParams):
     horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
     rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
     latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
-    depth: Annotated[bool, "it measures depth, too"] = False
+    depth: Annotated[bool, "whether distances are measured too"] = False
     room_seed: Annotated[int, Bounds(0, 1 << 30)] = 0
 
 
@@ -81,11 +81,11 @@ class PixelCamera:
         mount: pose of the camera on the head.
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
         detector: finds the faces.
-        rng: for the noise.
+        rng: random numbers of the noise.
         find_motion: finds motion, in addition to the faces.
         locate: converts detections from pixels to the camera's axes; None: no conversion.
         view: draws the scene; None: flat people and things in a room.
-        lens: of the camera, for frames of its size; None: by its field of view.
+        lens: lens of the camera, for frames of its size; None: by its field of view.
         begins_s: start of the scene; None: at the first call of ``latest``.
     """
 

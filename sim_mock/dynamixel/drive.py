@@ -42,7 +42,7 @@ PWM_SLOPE_V_MS = 0.001977, 0.003955
 """Unit of PWM Slope (62) of the models for 5 V and for 12 V."""
 
 FAR_BEYOND = 2.0
-"""Above full PWM, so that the current limit decides."""
+"""Value above full PWM, so that only the current limit applies."""
 
 Get = Callable[[str], int]
 

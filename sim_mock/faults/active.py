@@ -22,7 +22,7 @@ BABBLE_MOST = 2000
 class LineFault:
     """One active fault.
 
-    servo_id: the servo whose answers it affects; None: all servos
+    servo_id: servo with the affected answers; None: all servos
     values, data: parameters of the kind (milliseconds, byte counts, ids; noise bytes)
     remaining_answers: remaining answers, until_s: end time; None: no such end
     """

@@ -83,7 +83,7 @@ class CommandTable(NamedTuple):
             return f"{self.usage(name)}: {self.verbs[name].description}"
         lines = [f"{self.usage(verb):46} {self.verbs[verb].description}" for verb in self.verbs]
         lines.append(
-            f"ID is {self.ids} or all; a fault lasts until clear, or as [..] says; set takes"
+            f"ID is {self.ids} or all; a fault lasts until clear, or as given by [..]; values of set"
         )
         lines += [f"  {case} {values}" for case, values in self.cases.items()]
         return "\n".join(lines)

@@ -77,7 +77,7 @@ class LineFaults(ABC):
 
         Args:
             kind: its name among the active faults.
-            servo_id: the servo whose answers it affects; None: all servos.
+            servo_id: servo with the affected answers; None: all servos.
             text: the description, for the reply.
             count: number of answers.
             seconds: duration.

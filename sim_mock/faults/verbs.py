@@ -156,7 +156,7 @@ def adapter_verbs() -> dict[str, Verb]:
     """Return the commands of the line and adapter as a whole."""
     return {
         "echo": Verb(switch_command("echo", "the line echoes the host"), (SWITCH,),
-                     "the host hears its own bytes", TIME),
+                     "the host receives its own bytes", TIME),
         "babble": Verb(switch_command("babble", "a broken node babbles"), (SWITCH,),
                        "a broken node sends headers and noise all the time", TIME),
         "unplug": Verb(switch_command("unplug", "unplugged"), (), "pull the adapter out", TIME),
@@ -172,7 +172,7 @@ def closing_verbs(one: Argument) -> dict[str, Verb]:
     """Return the commands of every device, which are last in its help."""
     return {
         "set": Verb(LineFaults.choose_behaviour, (Argument("CASE", any_word), Argument("VALUE", any_word)),
-                    "choose where documents and devices differ: see below"),
+                    "choose a behaviour where documents and devices differ: see below"),
         "status": Verb(LineFaults.status, (), "all servos and faults as JSON"),
         "clear": Verb(LineFaults.clear, (one._replace(optional=True),),
                       "end faults of answers and line; effects on servos stay"),

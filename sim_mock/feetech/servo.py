@@ -37,7 +37,7 @@ class FeetechQuirks(ChainQuirks):
     broadcast_ping: all answer in the order of their ids, all at the same time (the bytes mix), or
         none
     goal: a goal position written without torque waits for it, or switches the torque on; the
-        maker's own examples never switch it on and move all the same [R]
+        maker's own examples never switch it on, and the servo moves nevertheless [R]
     torque_on: when the torque is switched on, the servo follows the old goal, or the goal becomes
         the present position
     goal_time: Goal Time (44) sets the duration of a move unless it is 0, or has no effect

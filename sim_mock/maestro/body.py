@@ -72,7 +72,7 @@ class EmulatedChannel:
             self._jump_to_target()
 
     def limit(self, low: int, high: int) -> None:
-        """Set other limits of targets."""
+        """Change the limits of targets."""
         self.low, self.high = low, high
         if self.target:
             self.target = min(max(self.target, low), high)

@@ -30,7 +30,7 @@ class Settings:
     crc: whether a CRC is expected after every command except those of the Mini SSC protocol
     timeout_s: time without a valid command that is an error; 0: never
     on_error, startup: reaction of all channels; home_steps: the home position
-    baud: of uart-fixed
+    baud: rate of uart-fixed
     speed, acceleration: initial limits of every channel, in the board's units
     """
 

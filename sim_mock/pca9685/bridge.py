@@ -23,7 +23,7 @@ OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
 
 
 class _TransferPart(NamedTuple):
-    """One start of a transfer; length: of a read, None for a write."""
+    """One start of a transfer; length: length of a read, None for a write."""
 
     address: int
     data: bytes

@@ -33,8 +33,8 @@ class Chip:
     """One chip.
 
     Args:
-        oscillator_hz: of its own oscillator, which differs from the nominal 25 MHz by a few percent
-            between chips.
+        oscillator_hz: frequency of its own oscillator, which differs from the nominal 25 MHz by a
+            few percent between chips.
     """
 
     def __init__(self, oscillator_hz: float = NOMINAL_HZ) -> None:

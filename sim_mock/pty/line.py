@@ -29,11 +29,11 @@ class BusSettings:
     """Settings of one emulated bus on a terminal.
 
     device: its specification; clients at a baud rate other than its own get no answer
-    name: of this bus among several in one process; None: it is the only one
+    name: name of this bus among several in one process; None if it is the only one
     wire_time, turnaround_us: as in gazerig.sim_mock.wire
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
-    seed: of the random numbers that faults draw
+    seed: seed of the random numbers of faults
     rig: index of its rig in a world; rig_bus: its name in the rig, None: the same name
     """
 
@@ -131,7 +131,7 @@ class TerminalLine:
                 self._warned = baud
                 device = self.settings.device
                 rate = "another rate" if device.baud is None else device.baud
-                self._warn(f"a client speaks at {baud} bit/s; {device.listens} at {rate}")
+                self._warn(f"a client sends at {baud} bit/s; {device.listens} at {rate}")
         if self.line.is_busy:
             self._deliver()
         if self.device.faults.wire.has_any or self._held or self._forbidden:

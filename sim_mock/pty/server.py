@@ -40,7 +40,7 @@ class ServedSurroundings(Protocol):
 
     @property
     def commands(self) -> Collection[str]:
-        """Return the first words of its own commands."""
+        """Return the first words of the surroundings' commands."""
         ...
 
     def joints(self) -> list[dict[str, int]]:

@@ -1,8 +1,8 @@
 """A pseudo-terminal in place of a serial adapter: Linux only.
 
-The link to it keeps its name over unplugging and plugging; the terminal behind it gets a
-new number each time. The slave side stays open here, in raw mode; otherwise it would echo and
-fail between two clients.
+The link to it keeps its name when the adapter is unplugged and plugged in again; the terminal
+behind it gets a new number each time. The slave side stays open here, in raw mode; otherwise it
+would echo and fail between two clients.
 """
 
 import ctypes

@@ -54,9 +54,9 @@ _OUT_BACK_S = {
     "feint": (0.15, 0.15),
     "reach": (0.7, 0.5),
 }
-"""How long the hand of an act takes to its target, and back."""
+"""Times that the hand of an act needs to its target, and back."""
 _FREES_M = {"face": (0.05, 0.04, -0.32), "chest": (0.0, 0.10, 0.15)}
-"""How far both fists of an open guard leave their places; y is to the fist's own side."""
+"""Displacement of both fists in an open guard; y is to the fist's own side."""
 _PERSON_ACTS = ("walk", "step", "look_at", "glance", "speak", "wave")
 _BOXER_ACTS = (*_PERSON_ACTS, "punch", "feint", "open_guard")
 _THING_ACTS = {"pinwheel": ("spin",), "hand": ("reach",)}
@@ -113,7 +113,7 @@ class FacesScene:
         )
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the fists, then the script's things; a hand is there while it reaches."""
+        """Return the fists, then the script's things; a hand is included while it reaches."""
         phase_s = t_s % self.round_s
         found = [
             Thing(
@@ -180,7 +180,7 @@ class FacesScene:
         return here
 
     def reach_times_s(self, one: TimedAct) -> tuple[float, float]:
-        """Return how long a hand takes to its target, and back."""
+        """Return the times that a hand needs to its target, and back."""
         return _OUT_BACK_S[one.act.do]
 
     def is_before_head(self, p_m: Vec3) -> bool:
@@ -349,7 +349,7 @@ def _yaw_pitch(way: Vec3) -> Angles2:
 def faults(script: SceneScript) -> Iterator[Fault]:
     """Yield the faults of a script that ``--scene`` cannot play, each with its key."""
     if script.room != "none":
-        yield "room", "a scene has none: play it with --world, or write room: none"
+        yield "room", "--scene cannot have any: use --world, or write room: none"
         return
     if script.heads:
         yield "heads", "other heads need a room"
@@ -373,7 +373,7 @@ def faults(script: SceneScript) -> Iterator[Fault]:
             yield (
                 f"people.{name}.acts",
                 f"the round ends at {at}, looking at {looks_at}, with a glance of {glance} deg; "
-                f"let it end as it began: at {person.start}, looking at {person.looks_at}",
+                f"it must end as it began: at {person.start}, looking at {person.looks_at}",
             )
     for name, thing in script.things.items():
         yield from overlap_faults(script, f"things.{name}", _acts_of_thing(thing))
@@ -387,7 +387,7 @@ def _person_faults(script: SceneScript, name: str, person: PersonScript) -> Iter
         if act.do not in known:
             yield f"{key}.do", f"without a room a person can only {', '.join(known)}"
         elif act.do in ("walk", "step") and act.to not in script.places:
-            yield f"{key}.to", f"no place; there are {', '.join(script.places)}"
+            yield f"{key}.to", f"unknown place; known places: {', '.join(script.places)}"
         elif act.do == "punch" and act.to != HEAD:
             yield f"{key}.to", "without a room a punch goes to head"
         elif (

@@ -68,8 +68,8 @@ class Event(NamedTuple):
 class Scene(Protocol):
     """The people and things at an instant; it repeats after every round.
 
-    behaviours: those between which the robot's action planner must choose, so that a rig without a
-        rule for one can be rejected before it moves; empty if it plans nothing
+    behaviours: behaviours from which the robot's action planner must choose, so that a rig without
+        a rule for one can be rejected before it moves; empty if nothing is planned
     """
 
     name: str
@@ -105,7 +105,7 @@ def there_and_back(since_s: float, out_s: float, hold_s: float, back_s: float) -
 
 @dataclass(frozen=True)
 class ScenePicture(SceneView):
-    """Draws one scene plainly, without distances, for runs whose camera returns no images."""
+    """Draws one scene plainly, without distances, for runs with a camera that returns no images."""
 
     scene: Scene
 

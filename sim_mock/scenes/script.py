@@ -21,26 +21,26 @@ class WorldCameraParams:
     # fmt: off
     width_px: Annotated[int, Bounds(64, 1920), "width of a picture"] = 320
     height_px: Annotated[int, Bounds(48, 1200), "height of a picture"] = 240
-    rate_hz: Annotated[float, Bounds(1, 120), "pictures a second"] = 30.0
-    latency_ms: Annotated[float, Bounds(0, 500), "age of a picture when it arrives; simulated time alone"] = 60.0
-    depth: Annotated[bool, "distances are measured too, as by a stereo camera"] = False
-    depth_noise_1_m: Annotated[float, Bounds(0, 0.2), "error of a distance for each metre squared, metres"] = 0.004
-    exposure_ms: Annotated[float, Bounds(0, 100), "how long light is collected; a turning head smears the picture"] = 8.0
-    sub_exposures: Annotated[int, Bounds(1, 32), "pictures averaged over an exposure; 1: one, smeared by the turn alone"] = 1
-    read_out_ms: Annotated[float, Bounds(0, 100), "from the first row to the last (rolling shutter); 0: all at once"] = 0.0
-    bands: Annotated[int, Bounds(2, 64), "bands of rows that a rolling shutter is drawn in"] = 8
+    rate_hz: Annotated[float, Bounds(1, 120), "pictures per second"] = 30.0
+    latency_ms: Annotated[float, Bounds(0, 500), "delay from the exposure to the arrival of a picture; only in simulated time"] = 60.0
+    depth: Annotated[bool, "whether distances are measured too, as by a stereo camera"] = False
+    depth_noise_1_m: Annotated[float, Bounds(0, 0.2), "error of a distance at 1 m, metres; it grows with its square"] = 0.004
+    exposure_ms: Annotated[float, Bounds(0, 100), "exposure time; a turning head blurs the picture"] = 8.0
+    sub_exposures: Annotated[int, Bounds(1, 32), "number of pictures averaged over an exposure; 1: one, blurred only by the turn"] = 1
+    read_out_ms: Annotated[float, Bounds(0, 100), "time from the first row to the last (rolling shutter); 0: all rows at once"] = 0.0
+    bands: Annotated[int, Bounds(2, 64), "number of row bands that are drawn separately for a rolling shutter"] = 8
     blur_px: Annotated[float, Bounds(0, 10), "blur of the lens: standard deviation in pixels"] = 0.0
-    noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the noise of reading, grey values"] = 3.0
-    shot_noise_grey: Annotated[float, Bounds(0, 60), "noise of the light itself where a pixel is white, grey values"] = 0.0
-    gain: Annotated[float, Bounds(0.05, 20), "brightness as a multiple; what gets over white is over-exposed"] = 1.0
-    gamma: Annotated[float, Bounds(0.2, 5), "exponent of grey values between 0 and 1; above 1: darker middle"] = 1.0
+    noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the read-out noise, grey values"] = 3.0
+    shot_noise_grey: Annotated[float, Bounds(0, 60), "photon noise of a white pixel, grey values"] = 0.0
+    gain: Annotated[float, Bounds(0.05, 20), "brightness factor; values above white are over-exposed"] = 1.0
+    gamma: Annotated[float, Bounds(0.2, 5), "exponent of grey values between 0 and 1; above 1: darker mid-tones"] = 1.0
     shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
-    samples: Annotated[int, Bounds(0, 16), "samples a pixel against jagged edges; 0: one"] = 4
-    reflections: Annotated[bool, "shiny floors mirror what stands on them"] = False
+    samples: Annotated[int, Bounds(0, 16), "samples per pixel against jagged edges; 0: one"] = 4
+    reflections: Annotated[bool, "whether shiny floors reflect the objects on them"] = False
     # fmt: on
 
     def from_params(self, other: type) -> dict[str, Any]:
-        """Return the values of those fields that another dataclass of parameters has too."""
+        """Return the values of the fields that another dataclass of parameters also has."""
         names = {field.name for field in fields(other)} & {field.name for field in fields(self)}
         return {name: getattr(self, name) for name in names}
 
@@ -80,23 +80,23 @@ HEAD, BASE = "head", "base"
 
 @dataclass(frozen=True)
 class Act:
-    """One thing that a person or a thing does."""
+    """One action of a person or a thing."""
 
     # fmt: off
-    at_s: Annotated[float, Bounds(0, 600), "when it begins, from the beginning of the round"]
-    do: Annotated[Do, "what is done"]
-    to: Annotated[str, "where to: a place, a seat, a person, or head (the robot's)"] = ""
-    via: Annotated[tuple[str, ...], "places that a walk passes"] = ()
-    for_s: Annotated[float | None, Bounds(0.1, 600), "how long it takes; null: as long as it usually does"] = None
-    side: Annotated[Literal["left", "right"], "which hand, the person's own"] = "right"
-    ahead_m: Annotated[float, Bounds(-2, 2), "how far ahead a step goes"] = 0.0
-    left_m: Annotated[float, Bounds(-2, 2), "how far to the person's left a step goes"] = 0.0
+    at_s: Annotated[float, Bounds(0, 600), "start time, from the start of the round"]
+    do: Annotated[Do, "kind of action"]
+    to: Annotated[str, "target: a place, a seat, a person, or head (the robot's)"] = ""
+    via: Annotated[tuple[str, ...], "intermediate places of a walk"] = ()
+    for_s: Annotated[float | None, Bounds(0.1, 600), "duration; null: the usual one"] = None
+    side: Annotated[Literal["left", "right"], "the hand, from the person's own view"] = "right"
+    ahead_m: Annotated[float, Bounds(-2, 2), "length of a step forwards"] = 0.0
+    left_m: Annotated[float, Bounds(-2, 2), "length of a step to the person's left"] = 0.0
     speed_m_s: Annotated[float, Bounds(0.2, 2), "speed of a walk"] = 0.9
     thing: Annotated[str, "the thing that is passed"] = ""
-    yaw_deg: Annotated[float, Bounds(-60, 60), "how far to its left a face glances off what it looks at"] = 0.0
-    pitch_deg: Annotated[float, Bounds(-60, 60), "how far up it glances"] = 0.0
-    frees: Annotated[Literal["face", "chest"], "what an open guard leaves free"] = "face"
-    vary_s: Annotated[float, Bounds(0, 10), "how much earlier or later it begins at most, by the seed"] = 0.0
+    yaw_deg: Annotated[float, Bounds(-60, 60), "angle of a glance to the face's left, relative to its gaze target"] = 0.0
+    pitch_deg: Annotated[float, Bounds(-60, 60), "angle of a glance upwards"] = 0.0
+    frees: Annotated[Literal["face", "chest"], "part of the body that an open guard leaves uncovered"] = "face"
+    vary_s: Annotated[float, Bounds(0, 10), "largest random shift of its start, drawn from the seed"] = 0.0
     # fmt: on
 
 
@@ -113,30 +113,30 @@ class SwayScript:
 
 @dataclass(frozen=True)
 class WaveScript:
-    """How a hand without an arm waves."""
+    """Waving of a hand without an arm."""
 
     # fmt: off
-    aside_m: Annotated[float, Bounds(0, 1), "how far from the middle of the face the hand is"] = 0.25
-    swing_m: Annotated[float, Bounds(0, 0.3), "how far it swings to each side"] = 0.11
-    raise_s: Annotated[float, Bounds(0.1, 2), "how long it takes to rise"] = 0.4
+    aside_m: Annotated[float, Bounds(0, 1), "distance of the hand from the middle of the face"] = 0.25
+    swing_m: Annotated[float, Bounds(0, 0.3), "amplitude of its swing to each side"] = 0.11
+    raise_s: Annotated[float, Bounds(0.1, 2), "time that it takes to rise"] = 0.4
     smooth: Annotated[bool, "whether it rises with minimum jerk; otherwise with constant speed"] = True
     # fmt: on
 
 
 @dataclass(frozen=True)
 class PersonScript:
-    """One person: looks, stature, and the acts of a round."""
+    """One person: appearance, height, and the acts of a round."""
 
     # fmt: off
     start: Annotated[str, "the place where the round begins and ends; on a seat the person sits"]
-    look: Annotated[int, Bounds(0, 7), "which face, hair and clothes"] = 0
-    stature_m: Annotated[float, Bounds(0.9, 2.1), "height of the person who stands upright"] = 1.72
-    gloves: Annotated[bool, "wears boxing gloves"] = False
-    looks_at: Annotated[str, "what is looked at before the first look_at: a person, a place or head"] = HEAD
-    acts: Annotated[tuple[Act, ...], "what is done, in the order of time"] = ()
-    level: Annotated[bool, "without a room: the face does not pitch towards what it looks at"] = False
+    look: Annotated[int, Bounds(0, 7), "choice of face, hair and clothes"] = 0
+    stature_m: Annotated[float, Bounds(0.9, 2.1), "height of the standing person"] = 1.72
+    gloves: Annotated[bool, "whether the person wears boxing gloves"] = False
+    looks_at: Annotated[str, "gaze target before the first look_at: a person, a place or head"] = HEAD
+    acts: Annotated[tuple[Act, ...], "acts in the order of time"] = ()
+    level: Annotated[bool, "without a room: the face does not pitch towards its gaze target"] = False
     sway: Annotated[SwayScript | None, "without a room: small motion; null: none"] = None
-    wave: Annotated[WaveScript, "without a room: how it waves"] = field(default_factory=WaveScript)
+    wave: Annotated[WaveScript, "without a room: waving of the hand"] = field(default_factory=WaveScript)
     # fmt: on
 
 
@@ -146,10 +146,10 @@ class ThingScript:
 
     # fmt: off
     held_by: Annotated[str, "the person who holds it when the round begins and ends"] = ""
-    side: Annotated[Literal["left", "right"], "in which hand"] = "right"
-    kind: Annotated[Literal["cup", "ball", "pinwheel", "hand"], "what it is"] = "cup"
-    at: Annotated[str, "without a room: its place, or where a hand is before it reaches"] = ""
-    acts: Annotated[tuple[Act, ...], "without a room: when a pinwheel spins, or a hand reaches"] = ()
+    side: Annotated[Literal["left", "right"], "the hand that holds it"] = "right"
+    kind: Annotated[Literal["cup", "ball", "pinwheel", "hand"], "kind of thing"] = "cup"
+    at: Annotated[str, "without a room: its place, or the place of a hand before it reaches"] = ""
+    acts: Annotated[tuple[Act, ...], "without a room: times at which a pinwheel spins, or a hand reaches"] = ()
     # fmt: on
 
 
@@ -158,12 +158,12 @@ class ExpectedLook:
     """A time of the round in which the gaze should be on a target."""
 
     # fmt: off
-    name: Annotated[str, "what happens then"]
+    name: Annotated[str, "description of the event"]
     kind: Annotated[Literal["face", "hand", "pinwheel", "thing"], "kind of the target"]
-    start_s: Annotated[float, Bounds(0, 600), "from when on"]
+    start_s: Annotated[float, Bounds(0, 600), "start of that time"]
     end_s: Annotated[float, Bounds(0, 600), "until when"]
     at: Annotated[str, "the place of the target"]
-    within_m: Annotated[float, Bounds(0.01, 5), "how far from it the target is at most"] = 0.3
+    within_m: Annotated[float, Bounds(0.01, 5), "largest distance of the target from that place"] = 0.3
     # fmt: on
 
 
@@ -173,11 +173,13 @@ class PlaceScript:
 
     x_m: Annotated[float, Bounds(-10, 10), "distance ahead of the neck base"]
     y_m: Annotated[float, Bounds(-10, 10), "distance to the left of it"]
-    facing_deg: Annotated[float, Bounds(-180, 180), "where one who stands there faces"] = 180.0
+    facing_deg: Annotated[float, Bounds(-180, 180), "direction in which a person faces there"] = (
+        180.0
+    )
     height_m: Annotated[
         float,
         Bounds(0, 3),
-        "height above the floor of a face there, or of what is looked or pointed at",
+        "height above the floor of a face there, or of a target of looks or of pointing",
     ] = 1.3
 
 
@@ -188,8 +190,8 @@ class HeadScript:
     # fmt: off
     rig: Annotated[str, "name or file of its rig; empty: that of the first head"] = ""
     x_m: Annotated[float, Bounds(-10, 10), "distance of its neck base ahead of the first one's"] = 0.9
-    y_m: Annotated[float, Bounds(-10, 10), "distance of it to the left"] = 0.0
-    facing_deg: Annotated[float, Bounds(-180, 180), "where it faces; 180: the first head"] = 180.0
+    y_m: Annotated[float, Bounds(-10, 10), "distance of its neck base to the left of the first one's"] = 0.0
+    facing_deg: Annotated[float, Bounds(-180, 180), "direction in which it faces; 180: towards the first head"] = 180.0
     # fmt: on
 
 
@@ -198,10 +200,10 @@ class LightParams:
     """Brightness of the room."""
 
     # fmt: off
-    ambient: Annotated[float, Bounds(0, 1), "light that comes from everywhere"] = 0.5
-    window: Annotated[float, Bounds(0, 2), "light that falls in from the window's side"] = 0.44
+    ambient: Annotated[float, Bounds(0, 1), "ambient light"] = 0.5
+    window: Annotated[float, Bounds(0, 2), "light from the window's side"] = 0.44
     lamp: Annotated[float, Bounds(0, 2), "light of the lamp under the ceiling"] = 0.30
-    opposite: Annotated[float, Bounds(0, 2), "light from the first head's far side, against the window's"] = 0.0
+    opposite: Annotated[float, Bounds(0, 2), "light from the first head's far side, opposite the window"] = 0.0
     shadows: Annotated[bool, "whether the window's light casts shadows, which cost time"] = False
     # fmt: on
 
@@ -211,17 +213,17 @@ class SceneScript:
     """A room and the people in it for one round."""
 
     # fmt: off
-    people: Annotated[Mapping[str, PersonScript], "who is there, by name"]
+    people: Annotated[Mapping[str, PersonScript], "people by name"]
     room: Annotated[RoomName, "the room; none: faces and hands alone, for --scene"] = "living-room"
     round_s: Annotated[float, Bounds(2, 600), "length of a round"] = 60.0
     neck_height_m: Annotated[float, Bounds(0.3, 2.0), "height of the robot's neck base above the floor"] = 0.95
-    description: Annotated[str, "what happens, in a few words"] = ""
-    places: Annotated[Mapping[str, PlaceScript], "places of its own, besides the room's"] = field(default_factory=dict)
-    things: Annotated[Mapping[str, ThingScript], "things, such as those that are passed from hand to hand"] = field(default_factory=dict)
+    description: Annotated[str, "short description of the scene"] = ""
+    places: Annotated[Mapping[str, PlaceScript], "additional places besides the room's"] = field(default_factory=dict)
+    things: Annotated[Mapping[str, ThingScript], "things, for example objects that people hand to each other"] = field(default_factory=dict)
     heads: Annotated[Mapping[str, HeadScript], "other heads beside the first, by name"] = field(default_factory=dict)
-    light: Annotated[LightParams, "how bright it is"] = field(default_factory=LightParams)
+    light: Annotated[LightParams, "brightness of the room"] = field(default_factory=LightParams)
     camera: Annotated[WorldCameraParams, "pictures of the robot's camera"] = field(default_factory=WorldCameraParams)
-    expected: Annotated[tuple[ExpectedLook, ...] | None, "when the gaze should be where; null: as the acts suggest"] = None
+    expected: Annotated[tuple[ExpectedLook, ...] | None, "expected gaze over time; null: derived from the acts"] = None
     # fmt: on
 
 

@@ -1,4 +1,4 @@
-"""A script's acts with their true start and end times, and the looks that they draw.
+"""A script's acts with their true start and end times, and the gaze events that they cause.
 
 The acts of a person are on tracks: legs, mouth, head, eyes, left arm, right arm. Acts on one track
 follow each other; acts on different tracks may overlap.
@@ -30,7 +30,7 @@ TRACKS: Mapping[str, tuple[str, ...]] = {
     "open_guard": _ARMS,
     "gesture": _ARMS,
 }
-"""The tracks of an act; an act that is not listed is on the arm of its side."""
+"""Tracks of each act; an act that is not listed uses the arm on its side."""
 LASTS_S: Mapping[str, float] = {
     "step": 0.9,
     "turn": 1.2,
@@ -101,7 +101,7 @@ def timed_acts(
 def name_faults(
     script: SceneScript, places: Collection[str], robot: tuple[str, ...] = (HEAD,)
 ) -> Iterator[Fault]:
-    """Find names of people, places and things that are not there."""
+    """Find names of people, places and things that do not exist."""
     seats, people = ", ".join(sorted(places)), ", ".join(script.people)
     targets = {*robot, *script.people, *places}
     for name, person in script.people.items():
@@ -111,7 +111,10 @@ def name_faults(
         if person.start not in places:
             yield f"{key}.start", f"{script.room} has no place {person.start!r}; it has {seats}"
         if person.looks_at not in targets:
-            yield f"{key}.looks_at", f"no person, no place; there are head, {people}, {seats}"
+            yield (
+                f"{key}.looks_at",
+                f"not a person and not a place; there are head, {people}, {seats}",
+            )
         for i, act in enumerate(person.acts):
             for rule_key, rule in _act_faults(script, name, act, places, targets):
                 yield f"{key}.acts.{i}{rule_key}", rule
@@ -140,7 +143,10 @@ def _act_faults(
         if act.thing not in script.things:
             yield ".thing", f"none of the script's `things`: {', '.join(script.things) or 'none'}"
     elif act.to and act.to not in targets:
-        yield ".to", f"no person, no place; there are head, {', '.join(script.people)}, {there}"
+        yield (
+            ".to",
+            f"not a person and not a place; there are head, {', '.join(script.people)}, {there}",
+        )
     for place in act.via:
         if place not in places:
             yield ".via", f"{script.room} has no place {place!r}; it has {there}"
@@ -171,7 +177,7 @@ def overlap_faults(script: SceneScript, key: str, acts: tuple[TimedAct, ...]) ->
 
 
 class Players(Protocol):
-    """Where the people and things of a script are."""
+    """Positions of the people and things of a script."""
 
     def face(self, name: str, t_s: float) -> Vec3:
         """Return the tip of a nose."""
@@ -186,7 +192,7 @@ class Players(Protocol):
         ...
 
     def reach_times_s(self, one: TimedAct) -> tuple[float, float]:
-        """Return how long a hand takes to its target, and back."""
+        """Return the times that a hand needs to its target, and back."""
         ...
 
     def is_before_head(self, p_m: Vec3) -> bool:

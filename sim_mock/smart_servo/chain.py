@@ -41,7 +41,7 @@ class ServoChain(Generic[S, Q]):
         now_s: the chain's clock.
         quirks: behaviour where documents and devices differ; None: the first value of each case.
         check_baud: whether only clients at a servo's baud rate get answers, instead of all.
-        seed: of the random numbers that faults draw.
+        seed: seed of the random numbers of faults.
     """
 
     servo_type: type[S]
@@ -366,7 +366,7 @@ def build_chain(
         baud: rate of all servos, which keep their other factory settings; only clients at their
             rate get answers; None: any rate works.
         quirks: behaviour where documents and devices differ.
-        seed: of the random numbers that faults draw.
+        seed: seed of the random numbers of faults.
         make_shaft: creates the shaft of each servo.
 
     Raises:

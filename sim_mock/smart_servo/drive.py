@@ -16,9 +16,9 @@ class Drive(ABC):
     It reads the registers and never refuses a value: the servo decides which writes are permitted.
 
     Args:
-        memory: of the servo.
-        model: of the servo.
-        spec: of the servo.
+        memory: memory of the servo.
+        model: model of the servo.
+        spec: specification of the servo.
         scale: steps of the registers per step of the shaft (4096 per turn).
         make_shaft: creates its shaft.
 

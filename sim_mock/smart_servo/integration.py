@@ -86,7 +86,7 @@ HELD_SAFELY = 0.999
 """Share of the dry friction that certainly holds."""
 
 RESOLUTION = 0.5
-"""Resolution of the encoder: the I part rests within this error, in steps."""
+"""Resolution of the encoder in steps: the integrator is constant within this error."""
 
 
 class ShaftState(NamedTuple):
@@ -171,7 +171,7 @@ class ShaftMotion:
             ticks -= until - since
 
     def _advance(self, ticks: int) -> None:
-        """Advance by some milliseconds, in one map if possible, else one by one."""
+        """Advance by some milliseconds, in one map if possible, otherwise one by one."""
         loop, profile, v = self._loop, self.profile, self.v
         if self._heavy:
             built, x = self._built, self.x
@@ -279,7 +279,7 @@ class ShaftMotion:
         return True
 
     def _step(self, path: Sequence[float], before: float, kr: float) -> bool:
-        """Do the same as ``_follow``, bit by bit, while no limit is met; else return False.
+        """Do the same as ``_follow``, bit by bit, while no limit is met; otherwise return False.
 
         This happens every tick while the shaft starts, stops or reverses.
         """

@@ -118,7 +118,7 @@ class EmulatedServo(ABC):
     def advance(self, now_ms: int, fed_ms: int = 0) -> bool:
         """Advance to ``now_ms``; the last packet before was on the bus at ``fed_ms``.
 
-        Return whether it listens, which it does not during a restart.
+        Return whether it receives bytes, which it does not do during a restart.
         """
         ahead = now_ms - self._ms
         if ahead > 0:
@@ -158,7 +158,7 @@ class EmulatedServo(ABC):
                     self._check_ms += (until_ms - self._check_ms) // CHECK_MS * CHECK_MS
 
     def _check(self, checks: int = 1) -> None:
-        """Apply the protections; restart if the voltage has broken down."""
+        """Apply the protections; restart if the voltage is too low."""
         self._check_ms += CHECK_MS
         shaft, protection = self.shaft, self.protection
         before_c = protection.temperature_c
@@ -176,7 +176,7 @@ class EmulatedServo(ABC):
         self.stale_surroundings = True
 
     def restart(self) -> None:
-        """Restart by instruction or after a dip of the supply; deaf until it has restarted."""
+        """Restart by instruction or after a dip of the supply; it receives nothing meanwhile."""
         self._booted_ms = self._ms
         self._deaf_until_ms = self._ms + self.restart_ms
         self._boot()
@@ -254,7 +254,7 @@ class EmulatedServo(ABC):
         """
         if baud not in self.baud_rates:
             known = ", ".join(map(str, self.baud_rates))
-            raise ValueError(f"baud {baud}: {self.model.name} knows {known}")
+            raise ValueError(f"baud {baud}: {self.model.name} supports {known}")
         self.memory.set_permanently("baud_rate", self.baud_rates.index(baud))
         self._apply_settings()
 

@@ -58,7 +58,7 @@ def test_what_is_shipped_can_be_played(name: str) -> None:
         ("      - {at_s: 1, do: walk, to: door}\n", "chair_left", 7, "add `stand` before walk"),
         ("      - {at_s: 1, do: walk, to: front}\n", "door", 6, "began it at door; let it end"),
         ("      - {at_s: 19, do: wave}\n", "front", 7, "ends at 21.6 s, the round at 20 s"),
-        ("      - {at_s: 1, do: look_at, to: bob}\n", "front", 7, "no person, no place"),
+        ("      - {at_s: 1, do: look_at, to: bob}\n", "front", 7, "not a person and not a place"),
         (
             "      - {at_s: 1, do: wave}\n      - {at_s: 2, do: point, to: head}\n",
             "front",
