@@ -52,7 +52,7 @@ def perpendicular(v: Vec3, way: Vec3) -> Vec3:
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:
-    """Return the outer product."""
+    """Return the cross product."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -115,10 +115,10 @@ def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
 
 
 def offset_direction(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3:
-    """Return a direction moved on along its great circle, and across it.
+    """Return a direction moved further along its great circle and across it.
 
-    way: unit vector that is moved; start: unit vector at the start of the great circle
-    further_rad: beyond ``way``; aside_rad: to the left of the path as seen from outside
+    way: unit vector to move; start: unit vector at the start of the great circle
+    further_rad: angle beyond ``way``; aside_rad: angle to the left of the path as seen from outside
     """
     pole = cross(start, way)
     if norm(pole) < 1e-12:

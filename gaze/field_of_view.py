@@ -1,10 +1,10 @@
-"""Visibility of bodies (Mitake et al. 3.3.2): an eye sees a body whose centre is in its field.
+"""Visibility of bodies (Mitake et al. 3.3.2): a body is visible if its centre is in an eye's field.
 
 The paper's figure 4 shows the field's angles without numbers; the defaults are the limits of human
 perimetry. Radians and metres inside, degrees in the parameters.
 
-By the paper's rule an eye also sees a body behind another, and the robot's own moving fist. Own
-bodies are therefore excluded, and hidden ones optionally.
+By the paper's rule a body behind another one is visible too, and so is the robot's own moving fist.
+Own bodies are therefore excluded, and hidden ones optionally.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class FieldOfViewParams:
     down_deg: Annotated[float, Bounds(5, 90), "extent of the visual field downwards"] = 75.0
     occlusion: Annotated[bool,
         "a body behind another one cannot be seen; computing time grows with the square of the number of bodies"] = False
-    own_kinds: Annotated[tuple[str, ...], "kinds of bodies that are parts of the robot itself, never looked at"] = ("own",)
+    own_kinds: Annotated[tuple[str, ...], "kinds of bodies that belong to the robot itself and are never targets"] = ("own",)
     # fmt: on
 
 
@@ -60,7 +60,7 @@ class FieldOfView:
         Args:
             bodies: the bodies.
             rows: the same as plain numbers.
-            state: of head and eyes.
+            state: head and eyes.
         """
         left, right = eye_axes(state, left=True), None
         seen = []

@@ -14,7 +14,7 @@ PEAK_SPEED = 1.875
 PEAK_ACCELERATION = 5.7735
 """Its highest acceleration, 10 / sqrt 3."""
 _MOVES_AT_ONCE = 32
-"""Largest number of active moves; more goals wait, and the newest counts."""
+"""Largest number of active moves; further goals wait, and the newest is used."""
 
 Values = tuple[float, ...]
 
@@ -84,7 +84,7 @@ class MinimumJerkBlend:
 
     Args:
         start: initial values.
-        duration_s: of one move, above 0.
+        duration_s: duration of one move, above 0.
     """
 
     def __init__(self, start: Values, duration_s: float) -> None:
@@ -98,7 +98,7 @@ class MinimumJerkBlend:
 
     def move_to(self, goal: Values) -> None:
         """Move to another goal, from the next step on; as many values as at the start."""
-        if goal != self._goal:  # an equal goal keeps its tuple, which is cheap to compare
+        if goal != self._goal:  # for an equal goal the tuple is kept, which is cheap to compare
             self._goal = goal
 
     def step(self, t_s: float) -> Values:
@@ -114,7 +114,7 @@ class MinimumJerkBlend:
 
     @property
     def is_at_rest(self) -> bool:
-        """Return whether ``step`` returns the same tuple from now on, until there is a new goal."""
+        """Return whether ``step`` returns the same tuple until there is a new goal."""
         return not self._moves and self._goal == self._planned
 
     def _may_start(self, t_s: float) -> bool:

@@ -146,7 +146,7 @@ def test_a_hand_that_moves_to_one_side_does_not_wave() -> None:
 @pytest.mark.parametrize(
     ("look_at", "says"),
     [("person:wawing", 'write one of "person:nearest", "person:waving", "person:looking", "person:newest"'),
-     ("person:", "names no person"), ("persons:nearest", 'stands "id" or "person"'),
+     ("person:", "does not name a person"), ("persons:nearest", 'must be "id" or "person"'),
      ("nearest", 'write "person:nearest"'), ("waving", 'write "person:waving"')],
 )  # fmt: skip
 def test_a_wrong_word_is_refused_with_the_right_ones(

@@ -357,11 +357,11 @@ def test_what_cannot_be_trusted_is_refused() -> None:
 
     refused([], "0 fixations on the face are too few, 50 are needed")
     refused(looks[:49], "49 fixations on the face are too few")
-    refused([f._replace(part=None) for f in looks], "all 100 fixations lie outside")
-    refused([*looks[:60], looks[3]], "fixation 61 does not begin after the one before")
+    refused([f._replace(part=None) for f in looks], "all 100 fixations are outside")
+    refused([*looks[:60], looks[3]], "fixation 61 does not begin after the previous one")
     refused([f._replace(duration_s=1000.0 * f.duration_s) for f in looks], "check the units")
     refused([*looks[:60], looks[60]._replace(duration_s=float("nan"))], "fixation 61: .*finite")
-    refused([looks[0]._replace(part="NOSE"), *looks[1:]], "fixation 1: no part 'NOSE'")
+    refused([looks[0]._replace(part="NOSE"), *looks[1:]], "fixation 1: unknown part 'NOSE'")
     staring = [PartFixation("N", 0.3 * k, 0.25) for k in range(60)]
     refused(staring, "no transition starts at chin", replace(params, smoothing="none"))
     apart = [PartFixation("N", 3.0 * k, 0.25) for k in range(60)]

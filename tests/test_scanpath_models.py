@@ -81,7 +81,7 @@ def test_e41_simple_model_waits_for_arrival_and_takes_another_order() -> None:
     assert path.wander(TARGET, PERCEPT, 10.0, settled=True).part == "LE"
     assert path.wander(TARGET, PERCEPT, 10.19, settled=True).part == "LE"
     assert path.wander(TARGET, PERCEPT, 10.21, settled=True).part == "M"
-    with pytest.raises(ValueError, match="as many items"):
+    with pytest.raises(ValueError, match="the same number of items"):
         ScanpathParams(simple_order=("N",))
 
 

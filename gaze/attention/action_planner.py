@@ -1,7 +1,8 @@
 """Action planner of a boxing match: guard, attack or wait (Mitake et al. 3.2, 3.3.3).
 
 The paper takes the three behaviours from the action planner of an earlier boxing game, which it
-does not describe and which knows both bodies. This planner receives one percept after the other.
+does not describe and which has access to both bodies. This planner uses only percepts, one after
+the other.
 
 guard   A fist approaches the head directly and arrives soon. The gaze follows it until it stops.
 attack  The opponent is within reach, no fist approaches, and a place is open: no hand is near the
@@ -35,7 +36,7 @@ _STILL: Vec3 = (0.0, 0.0, 0.0)
 _SURE_SD = 2.0
 """A speed is certain if it exceeds its limit by this number of standard deviations."""
 _LONGEST_GAP_S = 0.5
-"""A longer time without a frame ends every action."""
+"""Duration without a frame after which every action ends."""
 
 
 @dataclass(frozen=True)
@@ -43,23 +44,23 @@ class ActionPlannerParams:
     """Conditions of guard and attack in a boxing match."""
 
     # fmt: off
-    enabled: Annotated[bool, "the behaviours wait, guard and attack are chosen from the percept"] = False
+    enabled: Annotated[bool, "select the behaviours wait, guard and attack from the percept"] = False
     contact_ms: Annotated[float, Bounds(0, 5000), "guard against a fist that arrives within this time; 0: never"] = 450.0
-    contact_m: Annotated[float, Bounds(0, 2), "a fist this near to the head has arrived"] = 0.3
-    closing_m_s: Annotated[float, Bounds(0, 20), "a fist that approaches more slowly than this is no punch"] = 0.8
+    contact_m: Annotated[float, Bounds(0, 2), "a fist closer to the head than this has arrived"] = 0.3
+    closing_m_s: Annotated[float, Bounds(0, 20), "a fist that approaches more slowly than this is not a punch"] = 0.8
     miss_m: Annotated[float, Bounds(0, 5),
-        "a fist that would pass the middle of the eyes farther away than this is no punch: half a head and half a fist"] = 0.2
+        "a fist that would pass the middle of the eyes farther away than this is not a punch: half a head and half a fist"] = 0.2
     reaction_ms: Annotated[float, Bounds(0, 1000),
         "a possible punch must have approached for this long, unless its speed is certain"] = 30.0
     release_ratio: Annotated[float, Bounds(1, 10),
         "guard ends when the fist fails contact_ms, closing_m_s and miss_m by more than this factor"] = 1.5
     min_guard_ms: Annotated[float, Bounds(0, 10000), "shortest time on guard"] = 300.0
-    attack_reach_m: Annotated[float, Bounds(0, 10), "an opponent whose face is farther away is not attacked; 0: no one is"] = 1.3
+    attack_reach_m: Annotated[float, Bounds(0, 10), "an opponent whose face is farther away is not attacked; 0: nobody is attacked"] = 1.3
     open_m: Annotated[float, Bounds(0, 2), "a place is open if every hand is at least this far from the line to it"] = 0.28
     opening_ms: Annotated[float, Bounds(0, 5000), "a place must have been open for this long"] = 200.0
     counter_ms: Annotated[float, Bounds(0, 5000), "for this time after a guard counter_ratio applies and opening_ms does not"] = 300.0
-    counter_ratio: Annotated[float, Bounds(0, 1), "share of open_m that is enough then"] = 0.6
-    attack_ms: Annotated[float, Bounds(50, 10000), "how long the place is looked at before the blow has landed"] = 600.0
+    counter_ratio: Annotated[float, Bounds(0, 1), "share of open_m that is sufficient during that time"] = 0.6
+    attack_ms: Annotated[float, Bounds(50, 10000), "duration of the look at the place before the blow has landed"] = 600.0
     rest_ms: Annotated[float, Bounds(0, 60000), "shortest time between the end of an attack and the next"] = 800.0
     hand_memory_ms: Annotated[float, Bounds(0, 60000), "an unseen hand keeps its last position for this long"] = 600.0
     # fmt: on
@@ -112,9 +113,9 @@ class ActionPlanner:
         """Return the next action.
 
         Args:
-            percept: a new one.
+            percept: the new percept.
             p_eye: middle of the robot's eyes.
-            t_s: now; the percept is older.
+            t_s: present time, seconds; the percept is older.
             asked: the action that the user has chosen; None: the planner decides.
         """
         if t_s - self._at_s > _LONGEST_GAP_S:
@@ -222,7 +223,7 @@ class ActionPlanner:
         if not counters and t_s - self._open[1] < par.opening_ms / 1e3 - 1e-9:
             return Plan("wait", f"no fist approaches; {best.name} opens")
         if t_s - self._attack_end_s < par.rest_ms / 1e3:
-            return Plan("wait", f"{best.name} is open, but the last attack is just over")
+            return Plan("wait", f"{best.name} is open, but the last attack has just ended")
         self._since_s, self._place = t_s, best.name
         after = " after a punch" if counters else ""
         why = f"{best.name} is open{after} ({best.clear_m:.2f} m from any hand)"

@@ -1,7 +1,7 @@
 """Competition of bottom-up and top-down attention (Mitake et al. 3.3.4).
 
 The larger amount of attention wins. Two nearly equal amounts would flicker, so the present winner
-is kept for a shortest time, and until another is clearly stronger. A permanent winner would be a
+is kept for a shortest time, and until another is clearly stronger. A permanent winner would cause a
 stare, so amounts are multiplied by the factor of habituation (gazerig.gaze.attention.habituation).
 Of the bodies that a rule selects, the one with the highest factor keeps the rule's whole constant,
 which the paper's comparison needs: so the gaze does not leave a single person by habituation, and
@@ -28,7 +28,7 @@ from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _NO_ONE: frozenset[int] = frozenset()
-_SPEED_OVER_S = 0.2  # longest interval for a speed of the head from two positions
+_SPEED_OVER_S = 0.2  # longest interval between two positions for a speed of the head
 _LONGEST_EXTRA_S = 6.0  # beyond 15 s on one face a look is a stare
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
@@ -42,7 +42,7 @@ class Attention:
         field_of_view: visibility of bodies.
         bottom_up: salience by motion.
         top_down: the rules.
-        idle: gaze without a target in sight.
+        idle: gaze without a visible target.
         rng: draws reaction times; None: every change of target is immediate.
         stay_rng: draws the additional times of looks at one of several people; None: none.
     """
@@ -103,7 +103,7 @@ class Attention:
         new = percept is not None and percept.captured_s != self._seen_s
         target = self._target
         if fresh and not new and target is not None and not self._reaction.is_waiting:
-            return target  # as decided for the frame
+            return target  # as decided for this frame
         if percept is not None and fresh and new:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
@@ -137,10 +137,10 @@ class Attention:
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
         """Return the present target with its present position, None without one.
 
-        A new winner waits for its reaction time; a present target that is gone keeps its position
-        until then.
+        A new winner waits for its reaction time; a present target that has disappeared keeps its
+        position until then.
         """
-        if percept.scene != self._scene:  # a cut: no one is at the former position
+        if percept.scene != self._scene:  # a cut: the people are no longer there
             self._scene = percept.scene
             self._memory.reset()
             self._persons.reset()
@@ -183,7 +183,7 @@ class Attention:
         if named:
             self._draw_stay(made.bodies.ids[row])
         winner = made.target(row, percept.captured_s)
-        # A change of mind waits neither for a reaction nor for the end of a fixation.
+        # A change of behaviour waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
             self._reaction.drop()
             return winner
@@ -205,7 +205,7 @@ class Attention:
         self._stay = Stay(id, extra_s)
 
     def _shows_nothing_salient(self, made: TargetComparison) -> bool:
-        """Return whether there are no bodies, or only things of low salience, for idle gaze."""
+        """Return whether there are no bodies, or only things of low salience: gaze is idle."""
         best, most = made.best, made.total[made.best]
         if most == -inf or most >= self._params.least_salience:
             return bool(most == -inf)
@@ -325,7 +325,7 @@ class Attention:
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
     def _target_row(self, made: TargetComparison) -> int | None:
-        """Return the row of the present target, None if it is gone."""
+        """Return the row of the present target, None if it has disappeared."""
         if self._identity is not None and self._identity[1] == NO_BODY:
             there = made.total[-1] > -inf and made.point_kind == self._identity[0]
             return len(made.bodies) if there else None

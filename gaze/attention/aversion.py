@@ -1,11 +1,11 @@
 """Gaze aversion: looking away from a face while talking, listening and thinking.
 
-A gaze that never leaves a face is a stare. So it alternates between MUTUAL, on the face, and AWAY,
-next to it. Durations, amplitudes and directions are those that Lee, Badler & Badler 2002 (Eyes
-Alive) measured in talking and listening people; while thinking the gaze goes mostly up, for longer
-(Andrist et al. 2014). Without a conversation two people who face each other prefer bouts of mutual
-gaze of 3.3 s (Binetti et al. 2016, n = 498); no measurement of the aversions between them is known,
-they are as short as a listener's.
+A gaze that never leaves a face is a stare. Therefore it alternates between MUTUAL, on the face, and
+AWAY, next to it. Durations, amplitudes and directions are those that Lee, Badler & Badler 2002
+(Eyes Alive) measured in talking and listening people; while thinking the gaze goes mostly up, for
+longer (Andrist et al. 2014). Without a conversation two people who face each other prefer periods
+of mutual gaze of 3.3 s (Binetti et al. 2016, n = 498); no measurement of the aversions between them
+is known, a listener's short ones are used.
 
 An aversion starts when the rest on a part of the face is over, instead of the next shift between
 parts, and goes beyond the outline of the face: a near face is wider than the published angles.
@@ -59,12 +59,12 @@ class AversionParams:
     think_away_s: Annotated[float, Bounds(0.1, 60), "thinking: mean time away"] = 3.54
     think_away_sd_s: Annotated[float, Bounds(0.1, 60), "thinking: standard deviation of the time away"] = 1.26
     longest_mutual_s: Annotated[float, Bounds(0.5, 14.9), "longest time on the face; beyond 15 s it is a stare"] = 14.5
-    min_dwell_s: Annotated[float, Bounds(0.05, 2), "shortest time on the face or away, as eyes and servos need time to get there"] = 0.2
+    min_dwell_s: Annotated[float, Bounds(0.05, 2), "shortest time on the face or away, because eyes and servos need time to move"] = 0.2
     least_deg: Annotated[float, Bounds(0, 20),
         "smallest angle of looking away; with 0, as in the published distribution, half of the looks away would still be on the "
         "face"] = 5.0
     beside_deg: Annotated[float, Bounds(0, 20),
-        "smallest angle between a look away and the outline of the face, which a near face has farther out than least_deg"] = 2.0
+        "smallest angle between a look away and the outline of the face, which for a near face is farther out than least_deg"] = 2.0
     talk_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while talking or thinking"] = 27.5
     listen_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while listening or without a conversation"] = 22.7
     think_up_share: Annotated[float, Bounds(0, 1), "share of looks away that go up while thinking; the others go in any direction"] = 0.8
@@ -136,7 +136,7 @@ class Aversion:
     def converse(self, mode: AversionMode, t_s: float) -> None:
         """Set the conversation mode: talk, listen, think or none.
 
-        A change returns the gaze to the face; thinking averts it immediately, as people do.
+        A change returns the gaze to the face. Thinking averts it immediately, as in people.
 
         Raises:
             ValueError: there is no such mode.
@@ -160,12 +160,11 @@ class Aversion:
     ) -> Target:
         """Return the target itself, or a place next to the face during an aversion.
 
-        A place next to a face has kind "away", the id of the face, the face's centre as
-        centre (the head stays with the person) and a shift number of its own; the
-        number rises on leaving and on returning. An unchanged target includes the shifts of
-        earlier aversions in its count.
+        A place next to a face has kind "away", the id of the face, the face's centre as centre (the
+        head stays with the person) and its own shift number, which increases on leaving and on
+        returning. An unchanged target includes the shifts of earlier aversions in its count.
 
-        A lost face that is looked after gets no aversion.
+        A lost face that the gaze is waiting for gets no aversion.
 
         ordered: a user has chosen the target, from which only a conversation averts the gaze
         rests_until_s: end of the rest on a part of the face, which the gaze does not leave
@@ -176,7 +175,7 @@ class Aversion:
         if face != self._face:
             self._attend(face, t_s)
         if self._until_s == inf and self._times[self._mode][0] > 0.0 and self._face is not None:
-            self._until_s = t_s + self._mutual_s()  # only now allowed to look away
+            self._until_s = t_s + self._mutual_s()  # aversion is allowed only from now on
         leaves = self._away is not None or t_s >= rests_until_s
         if self._face is not None and t_s >= self._until_s and leaves:
             self._turn(target, p_world_head_m, t_s)
@@ -194,7 +193,7 @@ class Aversion:
         return last[1]
 
     def _attend(self, face: int | None, t_s: float) -> None:
-        """Start mutual gaze with another face; end an aversion when there is none."""
+        """Start mutual gaze with another face; end an aversion if there is no face."""
         self._face = face
         self._return()
         if face is not None:

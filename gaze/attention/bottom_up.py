@@ -5,10 +5,10 @@ translation across the line of view (slide), motion along it (loom) and rotation
 has two forms, and can be switched off:
 
 literal   As printed: one gaze direction e for all bodies, no distance, metres and radians
-          added as they are. Printed with e/|e| on a projection that is only right for
+          added without conversion. Printed with e/|e| on a projection that is only right for
           |e| = 1, so e is normalised.
-retinal   As the paper's reason, the image on the retina, demands: e from the eye to each
-          body, speeds relative to the moving eye and divided by the distance, each term
+retinal   By the paper's reason, the image on the retina: e from the eye to each body,
+          speeds relative to the moving eye and divided by the distance, each term
           in units of the motion that counts as 1.
 none      No motion attracts: rules alone select targets.
 
@@ -42,7 +42,7 @@ _SETTLED_S = 0.5
 """Time after entry during which a body gets no onset of motion as well."""
 _NEAREST_M = 0.05
 _SPARE = 16
-"""Number of former bodies, beyond twice the present ones, whose states are stored."""
+"""Number of former bodies, beyond twice the present ones, with stored states."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class BottomUpParams:
     # fmt: off
     form: Annotated[Literal["retinal", "literal", "none"],
         "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights; none: neither motion nor onset "
-        "attracts"] = "retinal"
+        "attracts the gaze"] = "retinal"
     translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that gives salience 1"] = 0.5
     looming_reference_1_s: Annotated[float, Bounds(0.01, 20),
         "speed along the line of sight divided by distance that gives salience 1"] = 0.5
@@ -108,7 +108,7 @@ def saturate(slide: float, loom: float, spin: float, most: float, worth: float) 
         loom: motion along it, positive for an approach.
         spin: rotation about it.
         most: limit of the sum; inf: no limit.
-        worth: the share that counts.
+        worth: share of the sum that counts.
     """
     if most == inf:
         return worth * (slide + abs(loom) + spin)
@@ -181,7 +181,7 @@ class BottomUp:
     ) -> list[SalienceRow]:
         """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
-        It must be called without bodies, too, or the next body does not count as new.
+        It must also be called without bodies; otherwise the next body does not count as new.
 
         Args:
             rows: the bodies.
@@ -191,7 +191,7 @@ class BottomUp:
             gaze_world: gaze direction, any length; only the literal form needs it.
             seen: which bodies are in view.
             most: limit of each body's motion.
-            worth: of each body, the share of its motion that counts.
+            worth: share of each body's motion that counts.
         """
         par, states = self._params, self._states
         if par.form == "none":

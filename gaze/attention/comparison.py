@@ -18,9 +18,9 @@ class TargetComparison(NamedTuple):
     """Amounts of one decision.
 
     motion:   returns the terms of one of the n bodies
-    rule, habituation, total: (n + 1,), with the point that a rule may name after the bodies; the
-        rule's constant, the factor of habituation and of faces that look elsewhere, and the
-        compared amount, -inf without a target
+    rule, habituation, total: (n + 1,), the bodies, then the point that a rule may name; the rule's
+        constant, the factor of habituation and of faces that look elsewhere, and the compared
+        amount, -inf without a target
     best: row of the largest total
     plan: choice of the action planner and its reason, "" without one
     """
@@ -58,7 +58,8 @@ class TargetComparison(NamedTuple):
             p, v = rule_target.point_world_m, rule_target.point_world_m_s
         else:
             p, v = vec(self.bodies.p_world_m[row]), vec(self.bodies.v_world_m_s[row])
-        # The amplitude of the head follows from the amount itself; boredom moves no head.
+        # The head's amplitude follows from the unfactored amount: habituation does not turn the
+        # head.
         amount = max(first.rule, moving)
         return Target(
             p, v, captured_s, first.kind, first.id, amount, by_rule, None, 0, why,

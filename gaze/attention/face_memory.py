@@ -1,10 +1,10 @@
 """Memory of faces that have left the view, at their last positions.
 
-A camera sees less than people do, and it turns away with the head: some of several people are
-always out of its view. The gaze returns to a remembered face when no face is visible. A visible
-one is left for it after the end of a turn of talk: if nobody in view goes on, someone out of view
-may. A remembered face that the gaze does not find is forgotten. So is a face that is lost under the
-gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
+A camera has a smaller field of view than people, and it turns with the head: some of several people
+are always out of its view. The gaze returns to a remembered face when no face is visible. A visible
+one is left for it after the end of a turn of talk: if nobody in view continues, a person out of
+view may. A remembered face that the gaze does not find is forgotten. So is a face that is lost
+under the gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ import numpy as np
 from gazerig.gaze.types import Bodies, Vec3
 
 _FOUND_WITHIN_S = 0.7
-"""From the change of target: the flight of eyes and head, and the delay of the camera."""
+"""Time from the change of target: movement of eyes and head, and delay of the camera."""
 
 
 @dataclass(slots=True)
 class _RememberedFace:
-    """A face: last position and time, and start of the look for it."""
+    """A face: its last position and time, and the start of the search for it."""
 
     p_world_m: Vec3
     radius_m: float
@@ -52,9 +52,9 @@ class FaceMemory:
         With a visible face these are only those who may have begun to speak out of view.
 
         Args:
-            bodies: seen in the frame.
+            bodies: bodies in the frame.
             attended_id: the present target; -1 for none.
-            captured_s: of the frame.
+            captured_s: capture time of the frame.
             lasts_s: time for which a face is remembered.
             unseen_s: time before which such a speaker was last seen; -inf: there is none.
         """

@@ -1,9 +1,9 @@
-"""Habituation to what is attended, and inhibition of return.
+"""Habituation to the attended body, and inhibition of return.
 
 Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of the
 attended body falls, that of the others recovers, and h times the salience is compared. Without it
-the gaze stares. It belongs to an identity and outlives its absence: a person who returns
-immediately is not new. Several bodies that one rule selects share the gaze instead
+the gaze stares. It is stored per identity and continues while the body is absent: a person who
+returns immediately is not new. Several bodies that one rule selects share the gaze instead
 (gazerig.gaze.attention.shared_attention).
 
 Inhibition of return: for a moment the gaze avoids the place it has just left, as in
@@ -53,8 +53,8 @@ class Habituation:
 
     def reset(self, t_s: float) -> None:
         """Forget all habituation and the points left."""
-        # Only factors below 1 are kept: of those attended in the last 1/recovery_rate_1_s
-        # seconds, a handful however many bodies there are.
+        # Only factors below 1 are stored: those of bodies attended in the last 1/recovery_rate_1_s
+        # seconds, which are few.
         self._habituation: dict[int, float] = {}
         self._left: list[_LeftPoint] = []
         self._shared.reset(t_s)
@@ -70,7 +70,7 @@ class Habituation:
     ) -> list[float]:
         """Return the factor 0..1 of each body's salience.
 
-        attended_id: what has been looked at since the step before; -1 for nothing
+        attended_id: id of the gaze target since the previous step; -1 for none
         """
         self._advance(attended_id, t_s)
         if not self._left:
@@ -91,20 +91,22 @@ class Habituation:
     ) -> list[float]:
         """Return the factor 0..1 of each of several bodies that a rule selects.
 
-        A single one keeps 1: habituation does not make the gaze leave a rule's only body.
+        A single body keeps 1: habituation does not make the gaze leave a rule's only body.
 
         Args:
             ids: the bodies that share the gaze.
-            weights: of each; viewing times are in proportion to them.
-            attended_id: what has been looked at since the step before; -1 for nothing.
-            t_s: now.
+            weights: weight of each; viewing times are in proportion to them.
+            attended_id: id of the gaze target since the previous step; -1 for none.
+            t_s: present time, seconds.
             stays: the present look at one of them, and its additional time.
         """
         floor, rate = self._params.rule_floor, self._params.decay_rate_1_s
         if rate == 0.0 or floor == 1.0:
             return [1.0] * len(ids)
         surpluses = self._shared.step(ids, weights, attended_id, t_s)
-        extra_s = stays.extra_s if len(ids) <= _FEW else 0.0  # everyone of a crowd has turns
+        extra_s = (
+            stays.extra_s if len(ids) <= _FEW else 0.0
+        )  # in a larger group everyone gets a look
         extra = [extra_s if id == stays.id else 0.0 for id in ids]
         return [
             floor + (1.0 - floor) * exp(-rate * max(0.0, one - more))

@@ -1,20 +1,20 @@
-"""Idle gaze when there is no target: wait, search, then explore what is in view.
+"""Idle gaze without a target: wait, search, then explore the view.
 
-A person who steps out of the frame often returns immediately, and a detector has gaps; so the gaze
-first stays. Then it searches in steps: towards the side to which the person left, and around the
-place of the loss. From a far side it comes back in such steps as well. With no person found it
-explores: one to two shifts of gaze per second, as people make in front of a scene, with an
-occasional rest straight ahead.
+A person who leaves the frame often returns immediately, and a detector has gaps. So the gaze first
+stays. Then it searches in steps: towards the side to which the person left, and around the place of
+the loss. From a far side it also returns in such steps. If no person is found it explores: one to
+two shifts of gaze per second, as people make in front of a scene, with an occasional rest straight
+ahead.
 
-A glance goes to a thing in view, or to a recently seen one, or else to a plausible point. Shifts
-are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and more sideways than up or down,
-and people look more at the middle of a scene than at its edges. So a shift is drawn from the
+A glance goes to a thing in view, or to a recently seen one, or otherwise to a plausible point.
+Shifts are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and more sideways than up or
+down, and people look more at the middle of a scene than at its edges. So a shift is drawn from the
 present point and accepted by the odds of its end point.
 
-Search points and glances all have kind "search" or "glance" and each has an id of its own, -2 - n
-for the n-th since the reset, counted through both kinds: a shift is counted when kind or id
-changes, so every glance is a shift of gaze. The resting point is "rest" with id -1. Directions are
-seen from a point above the neck base at the resting height.
+Search points have the kind "search", glances the kind "glance". Each has its own id, -2 - n for the
+n-th since the reset, counted over both kinds: a shift is counted when kind or id changes, so every
+glance is a shift of gaze. The resting point is "rest" with id -1. Directions are seen from a point
+above the neck base at the resting height.
 """
 
 from collections.abc import Sequence
@@ -32,11 +32,11 @@ _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Angles2 = (0.0, 0.0)
 _TRIES = 12
 _THING_HOLDS = 1.6
-"""Duration of a glance at a thing over that at a point of the room."""
+"""Duration of a glance at a thing divided by that of a glance at a point of the room."""
 _PLACES = 16
 """Largest number of remembered things."""
 _UPRIGHT = 0.5
-"""Shifts up or down are this share of those to the side."""
+"""Size of shifts up or down as a share of those to the side."""
 _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make at most 3 to 4 per second
 
 
@@ -49,28 +49,28 @@ class IdleParams:
     rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
     rest_salience: Annotated[float, Bounds(0, 10), "salience of the resting point"] = 0.2
-    explores: Annotated[bool, "glance around while nothing is there; without it the gaze rests straight ahead"] = True
+    explores: Annotated[bool, "glance around while there is no target; otherwise the gaze rests straight ahead"] = True
     coast_ms: Annotated[float, Bounds(0, 2000),
-        "longest time for which a target is assumed to move on with its last velocity without new images"] = 200.0
+        "longest time for which a target is assumed to continue with its last velocity without new images"] = 200.0
     search_ms: Annotated[float, Bounds(0, 60000), "duration of the search for a lost target after that; 0: no search"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean duration of one fixation of the search"] = 600.0
-    search_aside_deg: Annotated[float, Bounds(0, 90), "how far the search looks towards the side to which the target left"] = 18.0
+    search_aside_deg: Annotated[float, Bounds(0, 90), "how far the search goes towards the side to which the target left"] = 18.0
     search_step_deg: Annotated[float, Bounds(1, 90),
-        "mean size of the shifts of a search, and of those back from a far side; each a third smaller to a third larger"] = 15.0
+        "mean size of the shifts of a search, and of those back from a far side; each varies by up to a third"] = 15.0
     search_spread_deg: Annotated[float, Bounds(0, 45), "standard deviation of the search points, horizontally"] = 8.0
     leaving_deg_s: Annotated[float, Bounds(0.1, 100), "a target slower than this is not considered to have left to a side"] = 4.0
     reach_deg: Annotated[float, Bounds(5, 180),
-        "farthest search direction to the side; a lost target is looked after for one step more"] = 70.0
-    rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between bouts of glances"] = 1500.0
+        "farthest search direction to the side; a lost target is followed one step farther"] = 70.0
+    rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between series of glances"] = 1500.0
     glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 750.0
-    spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of all these durations"] = 0.6
+    spread: Annotated[float, Bounds(0, 3), "standard deviation of all these durations divided by their mean"] = 0.6
     again_share: Annotated[float, Bounds(0, 0.98), "share of glances that are followed by another one without a rest"] = 0.9
     glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 13.0
     glance_least_deg: Annotated[float, Bounds(0, 90), "smallest size of such a shift"] = 2.0
-    glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side; the middle is looked at more"] = 30.0
+    glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side; the middle is more frequent"] = 30.0
     glance_pitch_deg: Annotated[float, Bounds(0, 60), "largest angle of a glance up or down"] = 12.0
     thing_share: Annotated[float, Bounds(0, 1), "share of glances at a thing in view or seen recently, if there is one"] = 0.5
-    thing_memory_s: Annotated[float, Bounds(0, 3600), "how long a place where something was seen is glanced at"] = 20.0
+    thing_memory_s: Annotated[float, Bounds(0, 3600), "time for which a place where something was seen gets glances"] = 20.0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -125,11 +125,11 @@ class Idle:
         if params.explores != before.explores and self._now.kind in ("rest", "glance"):
             self._start_rest(self._t_s)
             left_s = self._until_s - since_s
-        if self._lost:  # else the phase before this target has expired
+        if self._lost:  # otherwise the phase before this target has expired
             self._until_s = max(since_s + left_s, self._t_s)
 
     def remember(self, target: Target) -> None:
-        """Record a target that is in sight."""
+        """Record a target that is visible."""
         self._last, self._lost = target, False
         if target.id >= 0:
             self._remember_place(target.id, target.p_world_m, target.at_s)
@@ -151,10 +151,10 @@ class Idle:
             del self._seen[next(iter(self._seen))]
 
     def step(self, t_s: float, blind: bool = True) -> Target:
-        """Return the target with nothing in sight: wait, search, rest, glance.
+        """Return the target while nothing is visible: wait, search, rest or glance.
 
-        blind: no images arrive, and a lost target may have moved on; else it has left the image or
-            is hidden, near its last position
+        blind: no images arrive, and a lost target may have moved on; otherwise it has left the
+            image or is hidden near its last position
         """
         self._t_s = t_s
         if not self._lost:
@@ -215,7 +215,7 @@ class Idle:
         rel = sub(gone.p_world_m, self._eye)
         out = self._heading_yaw_pitch(rel, gone.v_world_m_s)
         share = 1.0 if first else float(rng.uniform(-0.2, 1.2))
-        # Heads keep about one height: the search for people goes sideways.
+        # People keep their heads at about the same height: the search goes sideways.
         spread = 0.0 if first and out != (0.0, 0.0) else radians(par.search_spread_deg)
         yaw, pitch = yaw_pitch(rel)
         to_yaw = yaw + share * out[0] + spread * float(rng.standard_normal())
@@ -234,7 +234,7 @@ class Idle:
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
 
     def _reachable(self, point: Vec3) -> Vec3:
-        """Return a point, brought to a step beyond the reach to the side if it is farther."""
+        """Return a point, moved to at most one step beyond the range to the side."""
         rel, par = sub(point, self._eye), self._params
         (yaw, pitch), most = yaw_pitch(rel), radians(par.reach_deg + par.search_step_deg)
         if abs(yaw) <= most:
@@ -246,7 +246,7 @@ class Idle:
         return radians(self._params.search_step_deg) * float(rng.uniform(2.0, 4.0)) / 3.0
 
     def _is_far_aside(self) -> bool:
-        """Return whether a search has ended more than a step from straight ahead."""
+        """Return whether a search has ended more than one step from straight ahead."""
         yaw = yaw_pitch(sub(self._now.p_world_m, self._eye))[0]
         return self._now.kind == SEARCH and abs(degrees(yaw)) > self._params.search_step_deg
 
@@ -323,7 +323,7 @@ class Idle:
         return _AHEAD
 
     def _look(self, kind: str, place: Angles2, distance_m: float, t_s: float, why: str) -> None:
-        """Set the target of a search or glance, with an id of its own."""
+        """Set the target of a search or glance, with a new id."""
         self._count += 1
         point = add(self._eye, scale(direction(place), distance_m))
         salience, name = self._params.rest_salience, -1 - self._count

@@ -1,6 +1,6 @@
 """Observation of an opponent in a boxing match: approaching fists and open places.
 
-Time to contact is distance over closing speed. An eye obtains it from the image alone, as the size
+Time to contact is distance over closing speed. The eye obtains it from the image alone, as the size
 of the image over the rate of its growth (Lee 1976, Perception 5, 437-459), and people time their
 hitting and catching by it (Lee, Young, Reddish, Lough & Clayton 1983, Quarterly Journal of
 Experimental Psychology 35A, 333-346). World frame, metres, seconds.
@@ -30,7 +30,7 @@ class Approach(NamedTuple):
     """Approach of a fist.
 
     away_m: distance from the eye
-    contact_s: time to contact at its present speed; inf: it does not approach
+    contact_s: time to contact at its present speed; inf if it does not approach
     miss_m: distance from the eye at which its straight line passes
     closing_sd_m_s: standard deviation of the closing speed; inf if unknown
     """
@@ -45,7 +45,7 @@ class Approach(NamedTuple):
 
 
 class SeenHand(NamedTuple):
-    """A hand of the opponent at its last position; off_m: from the face then."""
+    """A hand of the opponent at its last position; off_m: its distance from the face then."""
 
     id: int
     off_m: Vec3
@@ -103,8 +103,8 @@ def nearest_face(faces: Sequence[Face], p_eye: Vec3, within_m: float) -> Face | 
 class OpponentHands:
     """Last positions of the opponent's two hands.
 
-    A motion detector does not see a hand at rest, and it may give another number to one that moves
-    again. So the newest unseen hands are remembered, up to two hands in all.
+    A motion detector does not detect a hand at rest, and it may give another number to a hand that
+    moves again. So the newest unseen hands are remembered, up to two hands in all.
     """
 
     def __init__(self) -> None:

@@ -1,11 +1,12 @@
-"""Persons by behaviour: the nearest, those who wave or look at the head, the newest.
+"""Persons selected by behaviour: the nearest, waving ones, those who look at the head, the newest.
 
-Rules can name people by it (gazerig.gaze.attention.top_down), independent of the tracker's numbers.
+Rules can select people by these traits (gazerig.gaze.attention.top_down), independently of the
+tracker's numbers.
 
 A hand waves when its velocity across the view has changed sides twice within a little more than a
-second, faster than a hand that only gestures, at the height of the face; the person who waves is
-the one with the face nearest to it. Each further change of side of a hand at the face makes its
-motion less new: people look less and less at what repeats itself (Neo & Chua 2006).
+second, faster than a hand that only gestures, and at the height of the face; the person who waves
+is the one with the face nearest to it. Each further change of side of a hand at the face makes its
+motion less new: people look less and less at repeated motion (Neo & Chua 2006).
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,14 +25,16 @@ _WAVED_S = 1.5
 """Time for which a person counts as waving after the hand's last turn."""
 _ARM_M = 0.9
 _HELD_OUT = 0.65
-"""A hand nearer than this share of the face's distance reaches out; signs and gestures do not."""
+"""A hand nearer than this share of the face's distance reaches out; hands in signs and gestures are
+farther away.
+"""
 _RAISED_M = 0.08
 """A hand is raised if it is at most this far below the face's centre; signs are lower."""
 _GESTURES_M_S, _GESTURES_S, _GESTURES = 0.25, 2.0, 0.5
 """A person gestures whose lower hands were faster than this, in this time window, for this
 share."""
 _SANK_S = 0.3
-"""Time for which a hand counts as sinking after it did."""
+"""Time for which a hand counts as sinking after its last downward motion."""
 _HAND, _OWN = "hand", "own"
 """The robot's own body never waves."""
 _TOGETHER_S = 0.5
@@ -46,7 +49,7 @@ _GONE_S = 120.0
 class _Hand:
     """Motion of a body other than a face: its side, and the times of its changes of side.
 
-    repeats: number of changes of side soon after another, which decays as they are forgotten
+    repeats: number of changes of side soon after another one; it decays over time
     """
 
     side: float = 0.0
@@ -62,8 +65,8 @@ class Persons:
         parts: for a body that moves within a person's reach, the id of that person's face; without
             bodies that reach out towards the head or are raised to the face.
         raised: ids of bodies that move within a person's reach at the height of the face; without
-            hands of a person who gestures and does not wave, as signs reach the face, too.
-        sinking: ids of hands that move down, and of those that just did.
+            hands of a person who gestures and does not wave, as signs also reach the face.
+        sinking: ids of hands that move down or have just done so.
         speaking: ids of the people in view who speak.
     """
 
@@ -188,7 +191,7 @@ class Persons:
         The distance of a moving body is often only assumed: it is compared at the face's distance.
 
         Returns:
-            The id of that person if it is lower than the face and does not reach out, else -1.
+            The id of that person if it is lower than the face and does not reach out, otherwise -1.
         """
         away, towards = dist(place, p_eye), sub(place, p_eye)
         beside = {
@@ -247,7 +250,7 @@ class Persons:
                 factors[row] *= rhythm_ratio ** (hand.repeats - 1.0)
 
     def _forget_repeats(self, dt_s: float, recovery_s: float) -> None:
-        """Let the number of changes of side decay."""
+        """Reduce the number of changes of side over time."""
         for hand in self._hands.values():
             hand.repeats *= exp(-dt_s / recovery_s)
 
@@ -255,7 +258,7 @@ class Persons:
         return frozenset(id for id, one_s in at_s.items() if self._at_s - one_s <= lasts_s)
 
     def _drop_old(self) -> None:
-        """Drop people and hands that have not been seen for long."""
+        """Drop people and hands that have not been visible for a long time."""
         gone = [id for id, seen_s in self._seen_s.items() if self._at_s - seen_s > _GONE_S]
         for id in gone:
             del self._seen_s[id], self._came_s[id]

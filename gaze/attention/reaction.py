@@ -3,8 +3,8 @@
 People look at a new thing 150 to 250 ms after its appearance, hardly ever before 120 ms (express
 saccades), and the times are skewed: log-normal here. The time counts from the capture of the frame
 in which the new target won, so it includes the delay of the camera. A later winner takes over the
-running time, since a saccade is programmed as a time and a goal; a target that no longer wins is
-dropped. Meanwhile the gaze stays on the present target.
+running time, since a saccade is programmed as a time and a goal; a target that is no longer the
+winner is dropped. Meanwhile the gaze stays on the present target.
 
 The reaction to a fast approach is quicker, and so is that to a recently viewed face. A change of
 behaviour is the robot's own decision, not a stimulus: it has no reaction time.
@@ -36,7 +36,7 @@ class Reaction:
         self._params = params
 
     def reset(self, t_s: float) -> None:
-        """Forget the waiting target and the former ones."""
+        """Forget the pending target and the former ones."""
         self._next: Target | None = None
         self._deviation = 0.0
         self._won_s = self._free_s = t_s
@@ -50,7 +50,7 @@ class Reaction:
             self._left_s[id] = t_s
 
     def start_waiting(self, target: Target, free_s: float) -> None:
-        """Start the reaction time of a winning target, which takes over that of a waiting one.
+        """Start the reaction time of a winning target; if one is pending, continue its time.
 
         free_s: earliest time of the change
         """
@@ -60,12 +60,12 @@ class Reaction:
         self._next, self._free_s = target, free_s
 
     def drop(self) -> None:
-        """Drop the waiting target: it no longer wins."""
+        """Drop the pending target, as it is no longer the winner."""
         self._next = None
 
     @property
     def is_waiting(self) -> bool:
-        """Return whether a target waits for its reaction time."""
+        """Return whether a target is pending."""
         return self._next is not None
 
     def take_due(self, t_s: float) -> Target | None:

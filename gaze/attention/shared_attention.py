@@ -1,7 +1,8 @@
 """Shared attention: the bodies of one rule share the gaze by their weights.
 
-With habituation alone, the two or three nearest of several people would alternate for ever, as each
-recovers within a second, and a person unseen for half a minute gains no more. So every body has a
+With habituation alone, the two or three nearest of several people would alternate permanently, as
+each recovers within a second, and a person who was not looked at for half a minute gains nothing
+more. So every body has a
 surplus: its viewing time divided by its weight, minus that of the least viewed body (weighted fair
 queueing, as in process schedulers). The larger the surplus, the lower the factor. Looks then last
 longer for heavier bodies, are shorter for more bodies, and total times are in proportion to the
@@ -17,11 +18,11 @@ _FADES_S = 10.0
 _LARGEST_S = 8.0
 _KEPT_S = 60.0
 _FIRST_S = 0.1
-"""Initial surplus of a body of weight 0: the heaviest of new bodies comes first."""
+"""Initial surplus of a body of weight 0, so that the heaviest of several new bodies comes first."""
 
 
 class _Surplus(NamedTuple):
-    """A surplus in seconds, and the body's last time in the shared gaze."""
+    """A surplus in seconds, and the body's last time in the group."""
 
     surplus_s: float
     at_s: float
@@ -45,9 +46,9 @@ class SharedAttention:
 
         Args:
             ids: the bodies that share the gaze now. A new one starts without a deficit.
-            weights: of each, above 0; only their ratios matter.
+            weights: weight of each, above 0; only their ratios matter.
             attended_id: the target since the last step; -1 for none.
-            t_s: now.
+            t_s: present time, seconds.
         """
         dt_s, self._at_s = max(0.0, t_s - self._at_s), t_s
         if len(ids) <= 1:

@@ -52,19 +52,19 @@ class Rule:
     gesture: Annotated[str, "gesture that is played once when the gaze reaches the rule's target; empty: none"] = ""
     gesture_at: Annotated[str, 
         "kind of body at which it is played instead, e.g. hand; empty: that of look_at"] = ""
-    gesture_refractory_s: Annotated[float, Bounds(0, 3600), "shortest time between two of its gestures"] = 10.0
+    gesture_refractory_s: Annotated[float, Bounds(0, 3600), "shortest time between two gestures of this rule"] = 10.0
     # fmt: on
 
     def __post_init__(self) -> None:
         """Check that the fields fit each other.
 
         Raises:
-            ValueError: an id that is no number; a person by a word that is no trait; a point
-                without a place, or a place without one.
+            ValueError: an id is not a number; a person's trait is unknown; a point has no position,
+                or a position is given for another kind.
         """
         self._check_person()
         if self.look_at.startswith(_BY_ID) and not self.look_at[len(_BY_ID) :].isdecimal():
-            raise ValueError(f'look_at {self.look_at!r} names no id; write e.g. "id:7"')
+            raise ValueError(f'look_at {self.look_at!r} does not name an id; write e.g. "id:7"')
         if (self.look_at == _POINT) != (self.point_world_m is not None):
             raise ValueError("look_at: point and point_world_m go together; give both or neither")
 
@@ -80,11 +80,13 @@ class Rule:
             raise ValueError(f'look_at {self.look_at!r}: write "{_PERSON}{self.look_at}"')
         if colon and f"{prefix}:" not in (_BY_ID, _PERSON):
             raise ValueError(
-                f'look_at {self.look_at!r}: before ":" stands "id" or "person"; write e.g. "id:7" '
+                f'look_at {self.look_at!r}: the word before ":" must be "id" or "person"; write e.g. "id:7" '
                 f"or one of {traits}"
             )
         if f"{prefix}:" == _PERSON and word not in TRAITS:
-            raise ValueError(f"look_at {self.look_at!r} names no person; write one of {traits}")
+            raise ValueError(
+                f"look_at {self.look_at!r} does not name a person; write one of {traits}"
+            )
 
     @property
     def person(self) -> str | None:
@@ -119,7 +121,7 @@ class TopDownParams:
     behaviour: Annotated[str, "name of the behaviour that is active at the start"] = "wait"
     rules: Annotated[Mapping[str, Rule], "behaviour -> target and its salience"] = field(default_factory=_shipped_rules)
     stay_with_person: Annotated[float, Bounds(1, 10),
-        "the person looked at last is treated as this many times nearer than they are; larger: the gaze changes less often"] = 1.25
+        "the person looked at last counts as this many times nearer; larger: the gaze changes less often"] = 1.25
     nearness: Annotated[float, Bounds(0, 4),
         "exponent with which salience decreases with distance if several bodies match a rule; 0: distance has no effect"] = 0.5
     planner: Annotated[ActionPlannerParams, "action planner of a boxing match"] = field(default_factory=ActionPlannerParams)
@@ -137,7 +139,7 @@ class TopDownParams:
                 known = ", ".join(sorted(self.rules))
                 raise ValueError(f"behaviour {behaviour!r} has no rule; rules: {known}")
         if PLANNED in self.rules:
-            raise ValueError(f"no rule can be called {PLANNED!r}: that leaves it to the planner")
+            raise ValueError(f"no rule can be called {PLANNED!r}: that name selects the planner")
 
 
 class RuleTarget(NamedTuple):
@@ -165,8 +167,8 @@ class TopDown:
     """Top-down attention: the rules, and the present behaviour.
 
     behaviour: the present one
-    named_ids: the people with the trait that the present rule names, if it names persons; set by
-        the caller before each step
+    named_ids: the people with the trait in the present rule, if it has one; set by the caller
+        before each step
     """
 
     def __init__(self, params: TopDownParams) -> None:
@@ -176,7 +178,7 @@ class TopDown:
         self.reset(0.0)
 
     def retune(self, params: TopDownParams) -> None:
-        """Change the rules; the present behaviour stays unless its rule is gone.
+        """Change the rules; the present behaviour stays unless its rule was removed.
 
         A changed initial behaviour becomes the present one immediately. The initial behaviour
         also follows a planner that is switched off.
@@ -282,7 +284,7 @@ class TopDown:
         return RuleTarget(rows, near, self._stay_factor, None, rule.salience, self.behaviour)
 
     def _plan_target(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
-        """Return the plan's target, if the rule leaves it to the planner."""
+        """Return the plan's target, if the rule uses the planner's target."""
         plan = self._planner.plan
         if rule.look_at == GUARD_TARGET and plan.body_id in ids:
             row = ids.index(plan.body_id)

@@ -31,14 +31,14 @@ NO_TABLES = AnimationTables({}, 0.5, {})
 class Animation:
     """Sum of all motions besides gaze, as one offset per tick.
 
-    expressions, levels, gestures: take the commands
+    expressions, levels, gestures: parts that accept the commands
     """
 
     def __init__(self, joints: tuple[str, ...] = (), tables: AnimationTables = NO_TABLES) -> None:
-        """Begin at rest.
+        """Create it at rest.
 
         Args:
-            joints: the joints that gaze does not move (``gazerig.robot.model.types.further_joints``).
+            joints: from ``gazerig.robot.model.types.further_joints``.
             tables: expressions and levels.
         """
         self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))

@@ -1,6 +1,6 @@
 """Breathing: a slow sway of the neck, like that of a person at rest.
 
-Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; heads that breathe slowly while idle are judged more
+Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; people judge heads that breathe slowly while idle as more
 alive. The sway is added to the head model's angles, and the eyes compensate it, so the gaze stays
 on its target.
 """

@@ -12,8 +12,8 @@ NEUTRAL = "neutral"
 class Expressions:
     """The present expression, and the transition to it.
 
-    name, strength: of the present one; strength 1 is the expression as written, 0 none of it
-    moves: ``step`` may return another offset than the last time
+    name, strength: name and strength of the present one; 1 is the full expression, 0 none
+    moves: whether ``step`` may return another offset than last time
 
     Args:
         offsets: the expressions by name.
@@ -65,7 +65,7 @@ class Expressions:
         """Raise ValueError for an unknown expression; the message lists the known ones."""
         if name not in self._offsets:
             there = ", ".join(self.names) or "none: add a table expressions to the rig"
-            raise ValueError(f"no expression {name!r}; there is {there}")
+            raise ValueError(f"no expression {name!r}; available: {there}")
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset at a time; at rest it is the same object."""

@@ -15,11 +15,11 @@ from typing import Annotated, Literal, NamedTuple
 from gazerig.params import Bounds
 
 MIN_SPEED, MAX_SPEED = 0.1, 4.0
-"""Range of factors on the speed of a gesture as written."""
+"""Range of factors on the original speed of a gesture."""
 MAX_COUNT = 20
 """Largest number of repetitions of a gesture by one command."""
 MAX_FRAMES = 2000
-"""Largest number of frames of a gesture as written: 33 per second for a minute."""
+"""Largest number of frames of a gesture: 33 per second for a minute."""
 HEAD_TRACKS = ("head_yaw", "head_pitch", "head_roll")
 EYE_TRACKS = ("eyes_yaw", "eyes_pitch")
 LID_TRACKS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
@@ -33,27 +33,27 @@ LID_GROUPS: Mapping[str, tuple[str, ...]] = {
     "right": LID_TRACKS[1::2],
     **{name: (name,) for name in LID_TRACKS},
 }
-"""Lids that a frame may name, the general before the particular."""
+"""Lids that a frame may name, groups before single lids."""
 
 
 @dataclass(frozen=True)
 class KeyFrame:
-    """Positions at one time of a gesture; it does not move what it leaves out."""
+    """Positions at one time of a gesture; anything that is not named does not move."""
 
     # fmt: off
-    time_s: Annotated[float, Bounds(0.02, 60), "time since the beginning"]
-    head_yaw_deg: Annotated[float | None, Bounds(-90, 90), "head turned to the left of where gaze has it"] = None
-    head_pitch_deg: Annotated[float | None, Bounds(-90, 90), "head turned up from where gaze has it"] = None
-    head_roll_deg: Annotated[float | None, Bounds(-90, 90), "head tilted towards the right shoulder"] = None
+    time_s: Annotated[float, Bounds(0.02, 60), "time since the start of the gesture"]
+    head_yaw_deg: Annotated[float | None, Bounds(-90, 90), "head turn to the left, added to the gaze"] = None
+    head_pitch_deg: Annotated[float | None, Bounds(-90, 90), "head turn upwards, added to the gaze"] = None
+    head_roll_deg: Annotated[float | None, Bounds(-90, 90), "head tilt towards the right shoulder"] = None
     eyes_yaw_deg: Annotated[float | None, Bounds(-90, 90),
-        "line of sight to the left of its target; in joint space, eyes to the left in the head"] = None
+        "line of sight to the left of its target; with space joint: eyes to the left in the head"] = None
     eyes_pitch_deg: Annotated[float | None, Bounds(-90, 90),
-        "line of sight above its target; in joint space, eyes up in the head"] = None
+        "line of sight above its target; with space joint: eyes up in the head"] = None
     lids: Annotated[Mapping[str, float], Bounds(0, 3),
-        "factor on the opening of lids: all, upper, lower, left, right or a lid's joint; 0 shut, 1 as gaze has them"] = field(
+        "factor on the opening of lids: all, upper, lower, left, right or a lid's joint; 0: shut, 1: unchanged"] = field(
         default_factory=dict
     )
-    joints_deg: Annotated[Mapping[str, float], Bounds(-180, 180), "further joints by name, added to where they are"] = field(
+    joints_deg: Annotated[Mapping[str, float], Bounds(-180, 180), "offsets of further joints by name"] = field(
         default_factory=dict
     )
     # fmt: on
@@ -66,9 +66,9 @@ class KeyFrame:
         """
         unknown = [name for name in self.lids if name not in LID_GROUPS]
         if unknown:
-            raise ValueError(f"no lids {unknown[0]!r}; there is {', '.join(LID_GROUPS)}")
+            raise ValueError(f"unknown lids {unknown[0]!r}; available: {', '.join(LID_GROUPS)}")
         if not self.values():
-            raise ValueError("names nothing that moves; give e.g. head_pitch_deg")
+            raise ValueError("names no motion; give e.g. head_pitch_deg")
 
     def values(self) -> dict[str, float]:
         """Return the value of each track that the frame names: radians, and factors of lids."""
@@ -88,18 +88,18 @@ class Gesture:
 
     # fmt: off
     description: Annotated[str, "meaning of the gesture"]
-    frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; all returns to rest after the last one"]
+    frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; everything returns to rest after the last one"]
     space: Annotated[Literal["gaze", "joint"],
-        "gaze: the eyes stay on their target while the head moves; joint: they go along with the head"] = "gaze"
+        "gaze: the eyes stay on their target while the head moves; joint: they move with the head"] = "gaze"
     fit: Annotated[Literal["slow", "refuse"],
-        "if a rig cannot do it as written: slow: slower, and smaller at the end of a range; refuse: not at all"] = "refuse"
-    count: Annotated[int, Bounds(1, MAX_COUNT), "how often it is done"] = 1
+        "if a rig cannot do it: slow: play it more slowly, and smaller at the end of a range; refuse: do not play it"] = "refuse"
+    count: Annotated[int, Bounds(1, MAX_COUNT), "number of repetitions"] = 1
     loop_s: Annotated[tuple[float, float] | None, Bounds(0, 60),
-        "times of the two frames between which it repeats; null: all of it repeats"] = None
-    return_s: Annotated[float, Bounds(0.05, 10), "time in which the tracks that the last frame leaves displaced return to rest"] = 0.4
+        "times of the two frames between which it repeats; null: the whole gesture repeats"] = None
+    return_s: Annotated[float, Bounds(0.05, 10), "time in which the tracks that are displaced in the last frame return to rest"] = 0.4
     optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the gesture"] = ()
     frames_without_neck: Annotated[tuple[KeyFrame, ...],
-        "frames for rigs that lack a joint of the neck that the frames move and that is not optional"] = ()
+        "alternative frames for rigs that lack a non-optional neck joint of the gesture"] = ()
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -112,7 +112,7 @@ class Gesture:
             raise ValueError("a gesture needs at least one frame")
         most = max(len(self.frames), len(self.frames_without_neck))
         if most > MAX_FRAMES:
-            raise ValueError(f"{most} frames: a gesture has at most {MAX_FRAMES}; leave some out")
+            raise ValueError(f"{most} frames: a gesture has at most {MAX_FRAMES}; omit some")
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def rest_value(track: str) -> float:
 def frame_faults(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
     """Return the faults between frames: index of the frame, and the rule."""
     return [
-        (i + 1, f"must be later than the frame before, which is at {one.time_s:g} s")
+        (i + 1, f"must be later than the previous frame, which is at {one.time_s:g} s")
         for i, (one, other) in enumerate(pairwise(frames))
         if other.time_s <= one.time_s
     ]
@@ -158,7 +158,7 @@ def loop_fault(gesture: Gesture) -> str:
         absent = [t for t in (begin_s, end_s) if t not in times and t != 0.0]
         if absent:
             listed = ", ".join(f"{t:g}" for t in times)
-            return f"{absent[0]:g} s is the time of no frame; frames are at {listed} s"
+            return f"{absent[0]:g} s is not the time of a frame; frames are at {listed} s"
     if begin_s >= end_s:
         return f"the first time must be before the second: {begin_s:g}, {end_s:g}"
     return ""

@@ -104,7 +104,7 @@ class GestureMotion:
 
         Args:
             flat: changed in place.
-            t_s: time since the start, at the speed as written.
+            t_s: time since the start, at the original speed.
             sizes: factor of every channel.
         """
         first, rest = _FIRST_EYE, self._rests

@@ -44,7 +44,7 @@ class OffsetState(NamedTuple):
 class GesturePlayer:
     """Player of the present gesture.
 
-    moves: ``step`` may return another offset than the last time
+    moves: whether ``step`` may return another offset than last time
 
     Args:
         joints: number of joints that gaze does not move.
@@ -73,7 +73,7 @@ class GesturePlayer:
 
         Args:
             played: the next gesture; None: no gesture.
-            t_s: now.
+            t_s: present time, seconds.
             fade_s: time in which the present gesture returns to rest.
             wait_s: time until the next begins.
         """

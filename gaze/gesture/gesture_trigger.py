@@ -1,4 +1,4 @@
-"""Trigger of the present rule's gesture: once, as the gaze reaches the rule's target."""
+"""Trigger of the present rule's gesture: once, when the gaze reaches the rule's target."""
 
 from math import inf
 
@@ -28,10 +28,10 @@ class GestureTrigger:
         """Return the gesture to play now, "" for none.
 
         Args:
-            behaviour: the present one.
-            rule: of this behaviour.
-            target: of the gaze.
-            t_s: now.
+            behaviour: present behaviour.
+            rule: rule of this behaviour.
+            target: gaze target.
+            t_s: present time, seconds.
             named_ids: the people with the rule's trait, if it names persons.
         """
         if not rule.gesture:

@@ -1,4 +1,4 @@
-"""Levels: values 0..1 that a program sets many times a second, such as a jaw by loudness."""
+"""Levels: values 0..1 that a program sets many times per second, such as the opening of a jaw."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 from gazerig.params import Bounds
 
 HOLD_S = 0.5
-"""A level that was not set for this time returns to 0, as its program may be dead."""
+"""A level that was not set for this time returns to 0, as its program may have ended."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Levels:
     """All levels of a rig.
 
     lapses_s: before this time no level lapses
-    moves: ``step`` may return another offset than the last time
+    moves: whether ``step`` may return another offset than last time
 
     Args:
         ranges: offsets of each level.
@@ -119,7 +119,7 @@ class Levels:
         """Raise ValueError for an unknown level; the message lists the known ones."""
         if name not in self._levels:
             there = ", ".join(self._levels) or "none: add a table levels to the rig"
-            raise ValueError(f"no level {name!r}; there is {there}")
+            raise ValueError(f"no level {name!r}; available: {there}")
 
     def drop_lapsed(self, t_s: float) -> tuple[str, ...]:
         """Drop levels to 0 that were not set for ``HOLD_S``; return those that were above."""

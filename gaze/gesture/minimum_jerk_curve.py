@@ -22,8 +22,8 @@ class MinimumJerkCurve:
 
     Args:
         start: the value at time 0.
-        times_s: of the keys, increasing, the first above 0.
-        values: at those times.
+        times_s: times of the keys, increasing, the first above 0.
+        values: values at those times.
 
     Raises:
         ValueError: the times do not increase from 0.
@@ -136,7 +136,7 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     # Contributions of the key before, the key itself and the key behind to each key's gaps.
     before, own, behind = blocks = np.zeros((3, count, 2, 2))
     for first in range(3):
-        moved = keys[first::3]  # no two of them move the same gap
+        moved = keys[first::3]  # no two of them affect the same gap
         for of in (0, 1):
             probe = np.zeros(2 * count)
             probe[of * count + moved] = 1.0
@@ -156,13 +156,13 @@ def _solve(before: Floats, own: Floats, behind: Floats, right: Floats) -> Floats
 
     Args:
         before: (n, 2, 2) factors of the unknowns of the key before.
-        own: of its own.
-        behind: of those of the key behind.
+        own: (n, 2, 2) factors of its own unknowns.
+        behind: (n, 2, 2) factors of the unknowns of the next key.
         right: (n, 2, 1) right sides.
     """
     if len(own) == 1:
         return np.asarray(np.linalg.solve(own, right)[..., 0], dtype=np.float64)
-    if len(own) % 2 == 0:  # one more of 0, so that every second one has two neighbours
+    if len(own) % 2 == 0:  # append one equation of 0, so that every second one has two neighbours
         zero, one = np.zeros((1, 2, 2)), np.eye(2)[None]
         before, behind = np.concatenate((before, zero)), np.concatenate((behind, zero))
         own, right = np.concatenate((own, one)), np.concatenate((right, np.zeros((1, 2, 1))))

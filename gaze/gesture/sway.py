@@ -1,4 +1,4 @@
-"""Sway: the random small motion of a head that nobody can hold still.
+"""Sway: the small random motion of a head that is held still.
 
 A head at rest wanders by some tenths of a degree, more the slower: its power falls with frequency.
 Each axis is a sum of octaves, as in Perlin's noise for figures (Perlin 1995): an octave moves by
@@ -31,10 +31,10 @@ class SwayParams:
     """Size and periods."""
 
     # fmt: off
-    yaw_deg: Annotated[float, Bounds(0, 3), "standard deviation of the head's random yaw at rest; people .2 to 1.5; 0: none"] = 0.6
-    pitch_deg: Annotated[float, Bounds(0, 3), "the same of its pitch"] = 0.4
-    roll_deg: Annotated[float, Bounds(0, 3), "the same of its roll"] = 0.6
-    fastest_s: Annotated[float, Bounds(0.2, 60), "mean time of the fastest movements of the sway; shorter ones are heard from servos"] = 1.5
+    yaw_deg: Annotated[float, Bounds(0, 3), "standard deviation of the head's random yaw at rest; people: .2 to 1.5; 0: none"] = 0.6
+    pitch_deg: Annotated[float, Bounds(0, 3), "standard deviation of its pitch"] = 0.4
+    roll_deg: Annotated[float, Bounds(0, 3), "standard deviation of its roll"] = 0.6
+    fastest_s: Annotated[float, Bounds(0.2, 60), "mean time of the fastest movements of the sway; shorter ones make servos audible"] = 1.5
     slowest_s: Annotated[float, Bounds(0.2, 600), "mean time of the slowest movements"] = 24.0
     # fmt: on
 
@@ -72,13 +72,13 @@ class Sway:
         self._sizes: Angles3 = (yaw, pitch, roll)
 
     def reset(self, t_s: float) -> None:
-        """Start in the middle."""
+        """Start at the centre."""
         self._t_s = self._retuned_s = t_s
         self._before = [*self._sizes]
         self._axes = [[_Octave(period_s, t_s) for period_s in self._periods_s] for _ in _STILL]
 
     def retune(self, params: SwayParams) -> None:
-        """Change size and periods; the size glides, and changed periods start in the middle."""
+        """Change size and periods; the size changes gradually, new periods start at the centre."""
         periods, self._before = self._periods_s, [*self._sizes_at(self._t_s)]
         self._set_params(params)
         self._retuned_s = self._t_s
@@ -92,7 +92,7 @@ class Sway:
         return _STILL if self._rng is None or sizes == _STILL else self._wander(sizes, self._rng)
 
     def _sizes_at(self, t_s: float) -> Angles3:
-        """Return the size of an octave of each axis; after a retune it glides."""
+        """Return the size of an octave of each axis; after a retune it changes gradually."""
         share = min_jerk((t_s - self._retuned_s) / _GLIDE_S)
         if share >= 1.0:
             return self._sizes

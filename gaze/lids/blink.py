@@ -1,7 +1,8 @@
 """Blinks and winks: closure over time, intervals, gaze-evoked blinks, depth, double blinks.
 
 A lid closes fast, holds, and opens more slowly. Closing is about twice as fast as opening
-(VanderWerf 2003; Kwon 2013). A closing continues unchanged to its end whatever changes meanwhile.
+(VanderWerf 2003; Kwon 2013). A closing continues unchanged to its end even if parameters change
+meanwhile.
 """
 
 from math import exp, inf, log, sqrt
@@ -24,7 +25,7 @@ def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) 
     # Opening starts quickly and ends in a long tail: minimum jerk in a time that runs fast at
     # first.
     s = (since_onset_s - close_s - hold_s) / open_s
-    # The polynomial comes out above 1 by a rounding error just before its end.
+    # Just before its end the polynomial exceeds 1 by a rounding error.
     return max(0.0, 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4))
 
 
@@ -71,7 +72,7 @@ class LidClosure(NamedTuple):
         return self.depth * (1.0 - min_jerk((since_s - out_s) / back_s))
 
     def vary_durations(self, params: LidParams, rng: np.random.Generator) -> "LidClosure":
-        """Return it with durations drawn about its own."""
+        """Return it with randomly varied durations."""
         if params.duration_spread == 0.0:
             return self
         close, hold, open = np.exp(params.duration_spread * rng.standard_normal(3)).tolist()
@@ -82,7 +83,7 @@ class LidClosure(NamedTuple):
     def left_and_right(
         self, params: LidParams, rng: np.random.Generator
     ) -> "tuple[LidClosure, LidClosure]":
-        """Return it for the left and the right lids, which differ a little."""
+        """Return it for the left and the right lids, which differ slightly."""
         if params.asymmetry == 0.0:
             return self, self
         open, depth = (0.5 * params.asymmetry * rng.standard_normal(2)).tolist()
@@ -110,7 +111,7 @@ def blink_pause_s(
 ) -> float:
     """Draw the pause from the end of a blink until the next spontaneous one.
 
-    per_min: wanted rate of blinks, 1/min, 0 is never; length_s: of a blink
+    per_min: wanted rate of blinks, 1/min, 0 means never; length_s: duration of a blink
     """
     if per_min == 0.0:
         return inf
@@ -161,7 +162,7 @@ def evoked_offset_s(params: LidParams, rng: np.random.Generator) -> float:
 
 
 def blink_depth(params: LidParams, rng: np.random.Generator) -> float:
-    """Draw the depth of a blink, 1 is complete closure; of incomplete ones most are nearly so."""
+    """Draw the depth of a blink, 1 is complete; most incomplete blinks are nearly complete."""
     if rng.random() >= params.incomplete_share:
         return 1.0
     least = min(params.incomplete_least, _NEARLY_SHUT)

@@ -1,10 +1,10 @@
 """Lids: spontaneous and gaze-evoked blinks, winks, sleepiness, lids that follow the gaze.
 
 Rates and their sources: gaze.lid_params. Nakamoto & Tsuruno 3.6 print the rule of gaze-evoked
-blinks as a level, eye and head more than 20 deg apart, which would blink for ever with the head
-turned aside; here it is the event that the text before it describes. Opening 0 is shut, with upper
-and lower lid in contact; 1 is fully open. A blink moves both lids from their present openings to 0,
-so they meet at any gaze direction.
+blinks as a level, eye and head more than 20 deg apart, which would blink permanently while the head
+is turned aside; here it is the event that the preceding text describes. Opening 0 is shut, with
+upper and lower lid in contact; 1 is fully open. A blink moves both lids from their present openings
+to 0, so they meet at any gaze direction.
 """
 
 from math import degrees, inf, radians, tanh
@@ -148,14 +148,14 @@ class Lids:
         self._rest.set_sleepiness(level, self._t_s)
 
     def draw_blink_of_shift(self, shift_rad: float, onset_s: float, t_s: float) -> float:
-        """Draw the blink of a gaze shift that is about to begin; return the wait of the shift.
+        """Draw the blink of a gaze shift that is about to begin; return the delay of the shift.
 
         A blink that precedes its shift begins now at the earliest, and the shift after it.
 
         Args:
             shift_rad: size of the shift.
             onset_s: its planned start.
-            t_s: now.
+            t_s: present time, seconds.
         """
         par, blink = self._params, self._blink
         shift_deg = degrees(shift_rad)
@@ -171,8 +171,8 @@ class Lids:
     def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> LidOpenings:
         """Return the openings of the lids and whether a blink is in progress.
 
-        shift_rad: size of a gaze shift that begins in this tick, else None; an announced one has
-            its blink already
+        shift_rad: size of a gaze shift that begins in this tick, otherwise None; an announced one
+            has its blink already
         """
         self._t_s = t_s
         if self._redraw:
@@ -187,7 +187,7 @@ class Lids:
             _larger_closure(blink, _closures(wink, t_s))
             for blink, wink in zip(blinks, self._winks.values(), strict=True)
         )
-        # Closings come out at 1 and a rounding error just before they are done.
+        # Just before their end, closures exceed 1 by a rounding error.
         return LidOpenings(
             upper * max(0.0, 1.0 - left),
             upper * max(0.0, 1.0 - right),
@@ -228,7 +228,7 @@ class Lids:
             if since_s >= self._pause_after_s():
                 return True
             self._evoked_s = inf
-        # A raised rate may require the next blink before this one is over.
+        # A higher rate may require the next blink before this one has ended.
         return t_s >= self._next_s and (blink is None or not blink.is_in_progress(t_s))
 
     def _begin_blink(self, t_s: float) -> None:

@@ -1,12 +1,12 @@
-"""Eye control between gaze shifts by two papers: binocular controller, and opposite angles.
+"""Eye control between gaze shifts from two papers: binocular controller, and opposite angles.
 
 The binocular controller does pursuit, vergence and vestibulo-ocular reflex of both eyes.
 
-Zhang & Wakamatsu's controller, which Mitake et al. 3.3.5 use and the profile mitake runs; its gains
-are not public, its structure is. The sum of both eyes is controlled by a conjugate channel, their
-difference by a vergence channel with dynamics of its own. A frame gives the target's position in
-space at its exposure (efference copy), which is smoothed and compared with the present gaze, so
-that no delay remains in the loop:
+Zhang & Wakamatsu's controller, which Mitake et al. 3.3.5 and the profile mitake use; its gains are
+not public, its structure is. The sum of both eyes is controlled by a conjugate channel, their
+difference by a vergence channel with its own dynamics. A frame gives the target's position in space
+at its exposure (efference copy), which is smoothed and compared with the present gaze, so that no
+delay remains in the loop:
 
     w = d(S_f)/dt,  u_c = Gp sat(w) + Kc sat(S_f - G),  u_d = Kd (V_demand - V)
 
@@ -15,7 +15,7 @@ the eyes against the head, by the inverse of its rotation and not by opposite an
 by degrees. Directions are unit vectors in the world, so that a channel needs no axes.
 
 tests/reference has the same controller in angles of one axis, with two covered eyes and with
-feedback of the delayed error alone; both are held to the same numbers.
+feedback of the delayed error alone; both are tested against the same numbers.
 """
 
 from collections import deque
@@ -45,7 +45,7 @@ _STRAIGHT: Vec3 = (1.0, 0.0, 0.0)
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _FARTHEST_M = 100.0
 _LOST_S = 0.04
-"""A moving target without a frame for this time is out of sight until the next one."""
+"""A moving target without a frame for this time counts as not visible until the next one."""
 
 
 class MeanGaze(NamedTuple):
@@ -88,7 +88,7 @@ class SaccadeState(Protocol):
 
     @property
     def is_correction_due(self) -> bool:
-        """Return whether an error waits for a corrective saccade."""
+        """Return whether an error is pending for a corrective saccade."""
         ...
 
 
@@ -111,7 +111,7 @@ class DelayedSight:
         self._shift = -1
 
     def position_at(self, target: Target, t_s: float) -> Vec3 | None:
-        """Return the target's position at a past time; None: out of sight by then.
+        """Return the target's position at a past time; None if it was not visible at that time.
 
         A new target is known immediately, as it must have been seen to be chosen.
         """
@@ -308,7 +308,7 @@ def _mean_rotation(a: Mat3, b: Mat3) -> Mat3:
 
 
 class OppositeAngles:
-    """Eyes by the rules of Nakamoto & Tsuruno 3.4: turned in shifts, by opposite angles between.
+    """Eyes by the rules of Nakamoto & Tsuruno 3.4: shifts, and opposite angles between them.
 
     An eye turns towards its target only in a shift. Between shifts, a turn of the head by (x, y, z)
     turns it by (-x, -y, -z), the paper's vestibulo-ocular reflex. An eye whose target is beyond its

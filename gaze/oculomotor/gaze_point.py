@@ -1,6 +1,6 @@
 """The gaze point: saccades move it to a target, pursuit keeps it there.
 
-Points are in the world, in metres. Saccades land short of a far target, and scattered (Harris &
+Points are in the world, in metres. Saccades land short of a far target, and with scatter (Harris &
 Wolpert 1998).
 
 Re-fixations are small saccades within a target during a long look. People's eyes never rest for
@@ -45,14 +45,14 @@ _MIDDLE = (0.0, 0.0)
 class GazePoint:
     """Common goal of both eyes, moved from tick to tick.
 
-    point_m: in the world
+    point_m: point in the world
     saccades, fixations: counts since the reset
 
     Args:
         params: thresholds and times.
         saccade: the model of saccades.
         pursuit: the model of pursuit.
-        prediction: of the target, which ``move`` is called with.
+        prediction: prediction of the target that ``move`` receives.
         rng: random generator of endpoints and re-fixations; None: without re-fixations.
 
     Raises:
@@ -137,8 +137,8 @@ class GazePoint:
 
         Args:
             shift: its count of gaze shifts.
-            wait_s: wait of the eyes because the head goes first.
-            t_s: now.
+            wait_s: delay of the eyes because the head moves first.
+            t_s: present time, seconds.
             exact: land on it without undershoot and scatter, and rest there without re-fixations.
         """
         self._exact = exact
@@ -147,7 +147,7 @@ class GazePoint:
         self._refixations.reset()
 
     def postpone(self, wait_s: float) -> None:
-        """Let the saccade to a new target wait for longer."""
+        """Delay the saccade to a new target further."""
         self._trigger.postpone(wait_s)
 
     def move(
@@ -157,9 +157,9 @@ class GazePoint:
 
         Args:
             point: the target now, not nearer than ``nearest_m``.
-            velocity: of the target, m/s.
-            p_head: midway between the eyes.
-            t_s: now.
+            velocity: velocity of the target, m/s.
+            p_head: midpoint between the eyes.
+            t_s: present time, seconds.
             dt_s: time since the last tick.
 
         Returns:
@@ -234,7 +234,7 @@ def _offset_point(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
 
 
 _FULL_DEG, _NONE_DEG = 10.0, 5.0
-"""Saccades fall short by the whole share from the first amplitude on, not up to the second."""
+"""Saccades have the full undershoot from the first amplitude on, and none up to the second."""
 
 
 def endpoint(
@@ -259,7 +259,7 @@ _TRIES = 12
 class Refixations:
     """Successive gaze points about the middle of a target.
 
-    offset_rad: offset of the present one, to the left and up; (0, 0): the middle itself
+    offset_rad: offset of the present point, to the left and up; (0, 0): the middle itself
     """
 
     def __init__(self, params: OculomotorParams, rng: np.random.Generator | None) -> None:
@@ -280,11 +280,11 @@ class Refixations:
         self._due_s = inf
 
     def interrupt(self) -> None:
-        """Restart the rest, as the gaze has moved."""
+        """Restart the rest, because the gaze has moved."""
         self._due_s = inf
 
     def is_due(self, t_s: float, still: bool = True) -> bool:
-        """Return whether another point is chosen now; called in every tick of a rest.
+        """Return whether another point must be chosen now; call it in every tick of a rest.
 
         still: whether the target is at rest; a moving one is only followed
         """

@@ -3,18 +3,19 @@
 The head starts if the gaze point is beyond the trigger angle from the face's front, and 20 ms have
 passed since the eyes started or the target is top-down (Mitake et al. 3.3.6). ``HeadShare`` gives
 its goal, short of the target, and its roll. It moves with minimum jerk (eq 8), from the present
-position, speed and acceleration so that a new goal in flight makes no step.
+position, speed and acceleration so that a new goal during the movement causes no step.
 
 All angles of a shift are measured along the great circle from the head's direction at the start:
-the head stops short of the target as seen from there and never passes it. The paper describes eq 7
-so in words ("30 deg short of the gaze direction"); an offset measured from straight ahead would
-turn a head that comes from 60 deg past a target at 25 deg.
+the head stops short of the target as seen from there and never passes it. The paper's text
+describes eq 7 in this form ("30 deg short of the gaze direction"); with an offset measured from
+straight ahead, a head that comes from 60 deg would turn past a target at 25 deg.
 
-Equal shifts differ: slope, onset and duration scatter within bounds. The head stays where its law
-put it; when an eye has been eccentric for some random seconds, the head slowly brings it back.
-A target in sustained motion is pursued by the head too: each tick plans a minimum-jerk movement of
-.6 s to where the target will be soon. On a ramp this lags by .6 of that time, .36 s, less the .2 s
-of foresight; people's heads lag by .1 to .2 s. When the motion ends, the last plan is the brake.
+Equal shifts differ: slope, onset and duration scatter within bounds. The head stays at the position
+that its law determines. When an eye has been eccentric for a random time of some seconds, the head
+turns slowly to recentre it. A target in sustained motion is pursued by the head too: each tick
+plans a minimum-jerk movement of .6 s to where the target will be soon. On a ramp this lags by .6 of
+that time, .36 s, less the .2 s of foresight; people's heads lag by .1 to .2 s. When the motion
+ends, the last plan brings the head to rest.
 """
 
 from math import degrees, exp, hypot, radians
@@ -36,7 +37,7 @@ from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
 from gazerig.gaze.types import SEARCH, Angles2, Angles3, Target, Vec3
 
 OWN_LOOKS = ("glance", SEARCH, "rest")
-"""Kinds of targets that nothing seen has caused (gazerig.gaze.attention.idle)."""
+"""Kinds of targets that are not caused by anything visible (gazerig.gaze.attention.idle)."""
 
 _LATERAL_RAD = radians(30.0)
 _LEAST_ROLL = 0.4
@@ -50,9 +51,9 @@ def interest(params: HeadParams, salience: float) -> float:
 
 
 class HeadShare:
-    """Share of the head in gaze shifts, by the present parameters and limit of the eyes.
+    """Share of the head in gaze shifts, from the present parameters and the limit of the eyes.
 
-    trigger_rad: eccentricity from which the head joins in
+    trigger_rad: eccentricity from which the head takes part
     reach_rad: largest eccentricity of the eyes
     """
 
@@ -71,7 +72,7 @@ class HeadShare:
             self.reach_rad = self.trigger_rad
 
     def offset_rad(self, salience: float) -> float:
-        """Return how far short of the target the head stops (eq 7, sign corrected)."""
+        """Return the angle by which the head stops short of the target (eq 7, sign corrected)."""
         par = self._params
         full = radians(par.max_offset_deg) * (1.0 - interest(par, salience))
         return full if par.literal_reach else min(full, self.reach_rad)
@@ -80,7 +81,7 @@ class HeadShare:
         """Return the angle by which the head stops short of a target.
 
         Args:
-            salience: of the target.
+            salience: salience of the target.
             arc_rad: angle of the target from the head's direction at the start.
             steeper: deviation of the slope in this shift.
         """
@@ -104,25 +105,25 @@ class HeadShare:
 _NO_ROLL: Angles2 = (0.0, 0.0)
 _AHEAD: Vec3 = (1.0, 0.0, 0.0)
 _BRAKES_S = 0.12
-"""Time constant of the braking distance of a head in flight."""
+"""Time constant of the braking distance of a moving head."""
 
 _ROUNDING_RAD = 1e-6
 _ROLLS_S = 0.5
 _FIRST_S = 0.01
-"""Mean lead of the head in looks of its own, so that it is first in half of them."""
+"""Mean lead of the head in self-initiated looks, so that it is first in half of them."""
 _MOST_SD, _MOST_DURATION_SD = 2.0, 1.5
 """Bounds of the scatter, in standard deviations."""
 _PURSUES_S, _FORESEES_S = 0.6, 0.2
 """Duration of a planned movement of pursuit, and how far ahead of now its goal is."""
 _NO_DRIFT: Vec3 = (0.0, 0.0, 0.0)
 _MEAN_S = 0.8
-"""Time constant of the mean velocity: a wave of the hand has none, a walk has."""
+"""Time constant of the mean velocity, which is 0 for a waving hand but not for a walk."""
 _FASTEST = 3.0
-"""Speeds above this multiple of the threshold count as that: it is not reached within .32 s."""
+"""Factor on the threshold to which speeds are clipped, so that it is not reached within .32 s."""
 _GOES_ON = 0.3
 """Share of the threshold at which a pursuit ends."""
 _RELIEF = (0.4, 0.9)
-"""Eccentricity to which an eye is brought back, as a share of comfort_deg."""
+"""Eccentricity to which the head recentres an eye, as a share of comfort_deg."""
 _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""
 
@@ -136,7 +137,7 @@ class HeadModel:
     """Start, goal and trajectory of the head's part of a gaze shift.
 
     share: the present share of the head
-    foresees_s: how far ahead the target's direction is given for pursuit; 0: not needed
+    foresees_s: time ahead for which pursuit needs the target's direction; 0: not needed
 
     Args:
         params: constants of start, goal and motion.
@@ -194,7 +195,7 @@ class HeadModel:
     def goal_rad(self, facing_rad: Angles2, offset_rad: float, start: Vec3 = _AHEAD) -> Angles2:
         """Return the head's yaw and pitch goal: the arc to the target, shortened, in range.
 
-        An arc through the back ends at the limit next to the target: no neck turns that far.
+        An arc through the back ends at the limit nearest to the target, as no neck turns that far.
 
         Args:
             facing_rad: neck angles that would point the face straight at the target.
@@ -233,7 +234,7 @@ class HeadModel:
         return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start)
 
     def draw_lead_s(self, target: Target, eccentricity_rad: float) -> float:
-        """Return the time for which the eyes wait because the head goes first.
+        """Return the time for which the eyes wait because the head moves first.
 
         Called once for each new target: the onset of the head is drawn here.
         """
@@ -243,7 +244,7 @@ class HeadModel:
             self._lead_s += par.lead_spread_ms / 1e3 * _draw_bounded(self._rng, _MOST_SD)
             if target.kind in OWN_LOOKS:
                 self._lead_s += _FIRST_S
-            else:  # a reaction to something seen, whose time is drawn with it
+            else:  # a reaction to something visible, whose time is drawn with it
                 self._lead_s = min(self._lead_s, par.lead_ms / 1e3)
         first = target.top_down and eccentricity_rad >= self._trigger_rad(target)
         return max(0.0, self._lead_s) if first else 0.0
@@ -275,7 +276,7 @@ class HeadModel:
         if since_s >= self._lasts_s:
             return self.clip_to_range(self._goal)
         yaw, pitch, roll = self._plans
-        # A new plan in full flight may swing past its goal, but not past the neck's range.
+        # A new plan at full speed may pass its goal, but not the neck's range.
         return self.clip_to_range(
             (yaw.position(since_s), pitch.position(since_s), roll.position(since_s))
         )
@@ -299,7 +300,7 @@ class HeadModel:
             self._aside_since_s = t_s
             self._draw_variation()
             self._start = self._extrapolated_direction(t_s) if moving else self._goal_direction
-            # A reason that moved the eyes back from the target before it ends.
+            # The reason for the last movement ends when the eyes return from the target.
             self._follows, self._relieves = moving, False
         elif (
             not moving
@@ -328,13 +329,13 @@ class HeadModel:
             self._follow(target, facing, gaze, short_rad, t_s)
 
     def _trigger_rad(self, target: Target) -> float:
-        """Return the eccentricity of a target from which the head joins in."""
+        """Return the eccentricity of a target from which the head takes part."""
         if target.kind == SEARCH:
             return min(self._search_rad, self.share.trigger_rad)
         return self.share.trigger_rad
 
     def _draw_variation(self) -> None:
-        """Draw how this shift differs from equal ones, and when and how far an eye is brought back.
+        """Draw the deviations of this shift from others, and the time and amount of recentring.
 
         Deviates in standard deviations; the spreads are the present parameters'.
         """
@@ -388,7 +389,7 @@ class HeadModel:
     def _follow(
         self, target: Target, facing: Angles2, gaze: Angles2, short_rad: float, t_s: float
     ) -> None:
-        """Turn towards the target, but never away from it because its salience has fallen.
+        """Turn towards the target, but never away from it only because its salience has decreased.
 
         A person who steps aside is most salient while moving; with the larger offset of a still
         person the head would swing back from its new direction.
@@ -421,7 +422,7 @@ class HeadModel:
         return (*goal, min(max(roll, low), high))
 
     def _extrapolated_direction(self, t_s: float, ahead_s: float = 0.0) -> Vec3:
-        """Return the direction of the head, extrapolated at its present speed by a time."""
+        """Return the direction of the head, extrapolated with its present speed over a time."""
         since_s = t_s - self._planned_s
         (yaw, yaw_rate, _), (pitch, pitch_rate, _) = (p.state_at(since_s) for p in self._plans[:2])
         return direction((yaw + ahead_s * yaw_rate, pitch + ahead_s * pitch_rate))
@@ -450,11 +451,11 @@ class HeadModel:
         """Return the time of a head movement: peak speed grows with its size.
 
         Args:
-            yaw: the distance to the goal sideways, rad.
-            pitch: the same upwards.
-            yaw_rate: the present speed, rad/s; a head that is fast towards the goal would swing
-                past it with a longer duration.
-            pitch_rate: the same upwards.
+            yaw: horizontal distance to the goal, rad.
+            pitch: vertical distance to the goal, rad.
+            yaw_rate: the present speed, rad/s; with a longer duration, a head that moves fast
+                towards the goal would pass it.
+            pitch_rate: present vertical speed, rad/s.
         """
         par = self._params
         way = hypot(yaw, pitch)

@@ -21,26 +21,26 @@ class OculomotorParams:
     # fmt: off
     refixation_deg: Annotated[float, Bounds(0, 5),
         "largest re-fixation, a small saccade within the target; 0: none"] = 1.5
-    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest one; three steps of the servos and their play show"] = 0.9
+    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest re-fixation; smaller ones are hidden by servo steps and play"] = 0.9
     refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
     refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is extended by a random time of up to this"] = 700.0
     undershoot: Annotated[float, Bounds(0, 0.3),
-        "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people .05-.10"] = 0.08
+        "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people: .05-.10"] = 0.08
     endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
-        "scatter of saccade endpoints along the path, standard deviation as a share of the amplitude; people .03-.05"] = 0.04
+        "scatter of saccade endpoints along the path, standard deviation as a share of the amplitude; people: .03-.05"] = 0.04
     endpoint_scatter_across: Annotated[float, Bounds(0, 0.2),
-        "scatter of saccade endpoints across the path, standard deviation as a share of the amplitude; people .02"] = 0.02
+        "scatter of saccade endpoints across the path, standard deviation as a share of the amplitude; people: .02"] = 0.02
     saccade_deg: Annotated[float, Bounds(0.1, 30), "position error above which a saccade is made instead of smooth pursuit"] = 2.0
     smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target closer to the gaze than this gets no saccade"] = 0.3
     refractory_ms: Annotated[float, Bounds(0, 2000),
         "shortest time after a saccade before a position error alone triggers the next"] = 150.0
-    latency_ms: Annotated[float, Bounds(0, 1000), "latency from a new target to the saccade; people 200"] = 0.0
+    latency_ms: Annotated[float, Bounds(0, 1000), "latency from a new target to the saccade; people: 200"] = 0.0
     crossing_least_ms: Annotated[float, Bounds(0, 1000),
         "no catch-up saccade if pursuit will bring the eye onto the target between this time ..."] = 40.0
     crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and this time from now"] = 180.0
-    correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if saccades err"] = 1.2
-    correct_after_ms: Annotated[float, Bounds(0, 1000), "mean delay from landing to the corrective saccade; people 100 to 200"] = 155.0
-    correct_spread_ms: Annotated[float, Bounds(0, 500), "that delay varies at random by up to this, up or down"] = 45.0
+    correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if saccades have errors"] = 1.2
+    correct_after_ms: Annotated[float, Bounds(0, 1000), "mean delay from landing to the corrective saccade; people: 100 to 200"] = 155.0
+    correct_spread_ms: Annotated[float, Bounds(0, 500), "largest random deviation of that delay, up or down"] = 45.0
     min_interval_ms: Annotated[float, Bounds(0, 1000), "shortest time from the landing of a saccade to the next one"] = 100.0
     redirect_before_ms: Annotated[float, Bounds(0, 1000),
         "a new target bends the saccade in flight if it appears at least this long before its end; 1000: never"] = 70.0
@@ -49,7 +49,7 @@ class OculomotorParams:
         "longest time over which a target's position is extrapolated with its velocity"] = 120.0
     fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
     target_prediction: Annotated[PredictionModel,
-        "predicted position of a target: that in its frame, moved on with its velocity, or along its curve and its swing, "
+        "predicted position of a target: that in its frame, extrapolated with its velocity, or along its curve and its swing, "
         "which is recognised after one to two cycles"] = "periodic"
     eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
     # fmt: on
@@ -69,8 +69,8 @@ class OculomotorParams:
 class PursuitParams:
     """Model, gains, delays and limits of pursuit.
 
-    Gains and limits apply to both models; delays, reflex and fading to the binocular controller
-    alone: in gaze space no visual delay remains, and the reflex is exact.
+    Gains and limits apply to both models; delays, reflex and fading apply only to the binocular
+    controller: in gaze space no visual delay remains, and the reflex is exact.
     """
 
     # fmt: off
@@ -78,20 +78,20 @@ class PursuitParams:
         "the gaze point follows the predicted target; or the binocular controller of Zhang & Wakamatsu moves the eyes; or they turn "
         "between shifts by the opposite of the head's angles (Nakamoto & Tsuruno 3.4)"] = "gaze_space"
     gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc at which the position error is closed"] = 8.0
-    velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
+    velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye adopts; people: .95"] = 0.95
     vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
     divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv instead of Kd if the target is farther away than the gaze point"] = 3.0
-    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, closing of the error included; people 63 deg/s"] = 60.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, including the closing of the error; people: 63 deg/s"] = 60.0
     reject_deg_s: Annotated[float, Bounds(1, 1000), "a target reported as faster than this is taken as a jump and not pursued"] = 100.0
     max_error_deg: Annotated[float, Bounds(0.1, 90),
         "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0
-    delay_ms: Annotated[float, Bounds(0, 500), "binocular: delay tau_c of seeing, the age of a frame included"] = 100.0
-    smooth_ms: Annotated[float, Bounds(0.1, 500), "binocular: smoothing Tf of the direction seen"] = 40.0
-    vergence_delay_ms: Annotated[float, Bounds(0, 500), "binocular: additional delay of vergence; 60 makes 160 ms in all"] = 60.0
+    delay_ms: Annotated[float, Bounds(0, 500), "binocular: visual delay tau_c, including the age of a frame"] = 100.0
+    smooth_ms: Annotated[float, Bounds(0.1, 500), "binocular: smoothing time Tf of the observed direction"] = 40.0
+    vergence_delay_ms: Annotated[float, Bounds(0, 500), "binocular: additional delay of vergence; 60 gives a total of 160 ms"] = 60.0
     max_vergence_deg: Annotated[float, Bounds(1, 60), "binocular: largest vergence"] = 20.0
-    reflex_gain: Annotated[float, Bounds(0, 1.5), "binocular: gain of the vestibulo-ocular reflex; people .95"] = 1.0
-    reflex_delay_ms: Annotated[float, Bounds(0, 100), "binocular: delay of the reflex; people 7-10"] = 10.0
-    lost_fade_ms: Annotated[float, Bounds(1, 5000), "binocular: time constant of the eyes' speed when the target is lost"] = 300.0
+    reflex_gain: Annotated[float, Bounds(0, 1.5), "binocular: gain of the vestibulo-ocular reflex; people: .95"] = 1.0
+    reflex_delay_ms: Annotated[float, Bounds(0, 100), "binocular: delay of the reflex; people: 7-10"] = 10.0
+    lost_fade_ms: Annotated[float, Bounds(1, 5000), "binocular: decay time of the eyes' speed after the loss of the target"] = 300.0
     # fmt: on
 
 
@@ -105,12 +105,12 @@ class HeadParams:
         "fixed (align)"] = "stahl"
     eye_only_range_deg: Annotated[float, Bounds(0, 180),
         "with goal_model stahl: full width of the range of targets, about the head's direction that the eyes reach alone; "
-        "people 4 to 68"] = 35.8
+        "people: 4 to 68"] = 35.8
     head_slope: Annotated[float, Bounds(0, 1),
-        "with goal_model stahl: degrees of head for each degree beyond that range; people .61 to .93"] = 0.77
+        "with goal_model stahl: degrees of head for each degree beyond that range; people: .61 to .93"] = 0.77
     max_offset_deg: Annotated[float, Bounds(0, 90),
-        "with the other two: how far short of the target the head stops at min_salience, and the eccentricity beyond which it starts to "
-        "move; both at most the eye's limit less eye_margin_deg"] = 30.0
+        "with the other two: angle by which the head stops short of the target at min_salience, and eccentricity beyond which it starts to "
+        "move; both at most the eye's limit minus eye_margin_deg"] = 30.0
     eye_margin_deg: Annotated[float, Bounds(0, 30), "distance that the eyes keep from their limit"] = 2.0
     min_salience: Annotated[float, Bounds(0, 10), "salience A1 of the least interest: the head turns and rolls least"] = 0.2
     max_salience: Annotated[float, Bounds(0, 10), "salience A2 of the highest interest: the head turns and rolls most"] = 1.0
@@ -118,26 +118,26 @@ class HeadParams:
         "with goal_model align: 0: the head stops max_offset_deg short of the target, 1: it faces the target"] = 0.5
     literal_reach: Annotated[bool, "use max_offset_deg even if it exceeds the eyes' limit, as printed in the paper"] = False
     roll_deg: Annotated[float, Bounds(0, 20),
-        "roll of the head, ear to the side that it turns to, at the highest interest for a target 30 deg or more aside; 0: none"] = 4.0
+        "roll of the head, to the side to which it turns, at the highest interest for a target at least 30 deg aside; 0: none"] = 4.0
     slope_spread: Annotated[float, Bounds(0, 0.4),
-        "standard deviation of head_slope from one shift to the next, never more than twice that; .16 between people"] = 0.1
-    lead_ms: Annotated[float, Bounds(0, 100), "how long the head starts before the eyes, for top-down targets to which it turns"] = 0.0
+        "standard deviation of head_slope from one shift to the next, limited to twice that; between people: .16"] = 0.1
+    lead_ms: Annotated[float, Bounds(0, 100), "lead of the head before the eyes, for top-down targets to which it turns"] = 0.0
     lead_spread_ms: Annotated[float, Bounds(0, 200),
-        "standard deviation of both onsets; in looks of its own (glance, search, rest) the eyes wait for a head that is first, "
-        "as people's is in half of such shifts; in others it is never first"] = 30.0
-    start_delay_ms: Annotated[float, Bounds(0, 1000), "how long the head starts after the eyes, for bottom-up targets"] = 20.0
+        "standard deviation of both onsets; in self-initiated looks (glance, search, rest) the eyes wait for a head that is first, "
+        "as in half of people's shifts; in other shifts it is never first"] = 30.0
+    start_delay_ms: Annotated[float, Bounds(0, 1000), "delay of the head after the eyes, for bottom-up targets"] = 20.0
     base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 70.0
     duration_spread: Annotated[float, Bounds(0, 0.4),
-        "standard deviation over mean of the duration of equal head movements, never more than one and a half of that"] = 0.15
-    min_move_ms: Annotated[float, Bounds(20, 5000), "shortest duration of a head movement; otherwise small ones would be twitches"] = 300.0
+        "standard deviation over mean of the duration of equal head movements, limited to 1.5 times that"] = 0.15
+    min_move_ms: Annotated[float, Bounds(20, 5000), "shortest duration of a head movement; shorter ones would look like twitches"] = 300.0
     replan_deg: Annotated[float, Bounds(0.05, 20), "a moving head plans its movement again when the goal changes by this much"] = 1.0
     recentre_after_ms: Annotated[float, Bounds(0, 60000),
-        "after an eye has been eccentric for this long at least, the head turns slowly to bring it back"] = 3000.0
-    recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of a random time by which that is later (exponential)"] = 7000.0
-    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 10.0
-    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 12.0
+        "after an eye has been eccentric for this long at least, the head turns slowly to recentre it"] = 3000.0
+    recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of an additional random time (exponential)"] = 7000.0
+    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not recentred"] = 10.0
+    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it recentres the eyes"] = 12.0
     search_deg: Annotated[float, Bounds(0, 90),
-        "eccentricity at which the head leaves the eyes when they search for a lost person; 90: as in any shift"] = 6.0
+        "eccentricity at which the head follows the eyes in the search for a lost person; 90: as in any shift"] = 6.0
     pursue_above_deg_s: Annotated[float, Bounds(0, 100),
         "the head pursues a target whose mean velocity over the last second is above this; 0: never"] = 3.0
     # fmt: on

@@ -30,13 +30,16 @@ Sight = tuple[float, float, float, float]
 _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are practically parallel (100 m)."""
 _NEAREST_1_M = 20.0
-"""Nearness of a point at the eyes themselves (0.05 m); a nearer point has no direction."""
+"""Nearness of a point at the eyes themselves (0.05 m); the direction of a nearer point is
+undefined.
+"""
 _PEAK_SHARE = 1.2
-"""Largest peak speed of a followed swing, over the fastest pursuit: its ends compensate for the
-part cut off in its middle."""
+"""Largest peak speed of a followed swing, over the fastest pursuit: motion at its ends compensates
+for the part cut off in its middle.
+"""
 _NEAREST_M = 1.0 / _NEAREST_1_M
 _SLOW_RAD_S = radians(5.0)
-"""From no speed up to this, the gaze may outrun a target less and less to catch up with it."""
+"""Up to this speed of the target, the gaze may exceed its speed less and less to catch up."""
 
 
 class Slip(NamedTuple):
@@ -51,7 +54,7 @@ class Slip(NamedTuple):
 
 
 class EyeController(Protocol):
-    """Controller of both eyes between saccades, in place of pursuit by the gaze point."""
+    """Controller of both eyes between saccades, which replaces pursuit by the gaze point."""
 
     def reset(self) -> None:
         """Forget target, eyes and head."""
@@ -74,7 +77,7 @@ class EyeController(Protocol):
 class Pursuit:
     """Smooth pursuit of a target point by the gaze point.
 
-    controller: moves the eyes in its place; None: no controller
+    controller: moves the eyes instead; None: no controller
     """
 
     def __init__(self, params: PursuitParams) -> None:
@@ -118,7 +121,7 @@ class Pursuit:
         """Return the gaze point ``dt_s`` later; all points in the world, metres.
 
         target, v_target: the target's present position and velocity
-        eye: midway between the eyes, the origin of directions and nearness
+        eye: midpoint between the eyes, the origin of directions and nearness
         closing: whether the error of direction is closed; False leaves it to a saccade
         """
         if dt_s <= 0.0:
@@ -149,12 +152,12 @@ class Pursuit:
         gaze, now: gaze point and target as seen from ``eye``
         dt_s: above 0
         outruns: whether a gaze that is behind may be faster than the target; False leaves the rest
-            to catch-up saccades, as people do unless they know the motion
+            to catch-up saccades, as people do unless the motion is predictable
         """
         par = self._params
         (x, y, z, near), (to_x, to_y, to_z, near_now) = gaze, now
         vx, vy, vz = v_target
-        # The target one step ago, and by how much its direction has changed since.
+        # The target one step ago, and the change of its direction since then.
         was_x, was_y, was_z, near_before = line_of_sight_to(
             (target[0] - vx * dt_s, target[1] - vy * dt_s, target[2] - vz * dt_s), eye
         )
@@ -205,10 +208,10 @@ class Pursuit:
 
 
 def _limit_speed(close: Vec3, way: Vec3, least: float, dt_s: float) -> Vec3:
-    """Return the closing of an error, not faster along a target's motion than what it lacks.
+    """Return the closing of an error, along a target's motion no faster than the missing speed.
 
-    close: of this step; way: the target's motion in it; least: share of that motion which pursuit
-    leaves; a slow target is caught up with freely
+    close: closing in this step; way: the target's motion in it; least: share of that motion which
+        pursuit leaves; there is no limit for a slow target
     """
     size = norm(way)
     along = dot(close, way) / size if size > 0.0 else 0.0

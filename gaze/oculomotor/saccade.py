@@ -18,7 +18,9 @@ from gazerig.params import Bounds
 _FLANK_PEAK_ACCELERATION = 1.5396
 """Highest acceleration of half a minimum-jerk movement, times its time, over its speed."""
 _HURRY = 0.75
-"""Shortest rise over that in which the servos reach the peak of people at their acceleration."""
+"""Shortest rise divided by that in which the servos reach people's peak speed at their
+acceleration.
+"""
 _LITERAL_REST_RAD = radians(0.05)
 """Remaining distance at which a saccade of the 0.8-per-frame rule counts as landed."""
 
@@ -108,9 +110,9 @@ class HumanProfile:
     and falls like the second half. The rise has .25 of the time of rise and fall up to 10 deg and
     .11 from 38 deg on; the time at the peak follows from the ratio of peak to mean speed. A shaft
     lags most while it accelerates: on it the middle of the peak is at .45 of a saccade of 10 deg
-    and at .39 of one of 20, as in people (Collewijn et al. 1988). So short a rise costs a saccade
-    of 20 deg a tenth of its time. Servos that would lose more than that rise for longer, for .38
-    and .14 of that time at most.
+    and at .39 of one of 20, as in people (Collewijn et al. 1988). Such a short rise makes a saccade
+    of 20 deg a tenth longer. Servos that would lose more than that have a longer rise, at most .38
+    and .14 of that time.
     """
 
     def __init__(self, params: SaccadeParams) -> None:
@@ -152,7 +154,7 @@ class HumanProfile:
         # highest acceleration:
         reached = sqrt(PEAK_SPEED * A * most * share / _FLANK_PEAK_ACCELERATION)
         V = min(self._peak_rad_s(A, D), self._L, reached)
-        # Low speed or acceleration need more time than people do.
+        # Limited speed or acceleration needs more time than people's saccades.
         shortest = _FLANK_PEAK_ACCELERATION * V / (most * share)
         D = max(D, A / V + shortest * (1.0 - 1.0 / PEAK_SPEED))
         V = min(V, PEAK_SPEED * A / D)
@@ -176,7 +178,7 @@ class HumanProfile:
 
 
 class MainSequenceProfile(HumanProfile):
-    """The same with one ratio of peak to mean speed for all amplitudes."""
+    """Saccades like the human ones, with one ratio of peak to mean speed for all amplitudes."""
 
     def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:
         """Return the peak speed for an amplitude and a duration."""

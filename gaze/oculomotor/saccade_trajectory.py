@@ -53,7 +53,7 @@ class SaccadeTrajectory:
         a, b = sub(self._start, eye), sub(self.end, eye)
         near_a, near_b = 1.0 / norm(a), 1.0 / norm(b)
         # The great circle stays that of the onset and both ends' parallax is added: the plane
-        # through two nearly opposite directions would swing with the smallest parallax.
+        # through two nearly opposite directions would turn with the smallest parallax.
         way = along_great_circle(self._start_way, self._end_way, share)
         way = add(way, scale(sub(scale(a, near_a), self._start_way), 1.0 - share))
         way = add(way, scale(sub(scale(b, near_b), self._end_way), share))
@@ -68,11 +68,11 @@ class RedirectedTrajectory:
     """A saccade whose target has jumped: a second one is added to the remainder of the first.
 
     Args:
-        before: the trajectory so far.
+        before: the present trajectory.
         saccade: durations and limits.
         end: the new end, in the world.
-        eye: midway between the eyes now.
-        t_s: now.
+        eye: present midpoint between the eyes.
+        t_s: present time, seconds.
     """
 
     onset_s: float

@@ -7,7 +7,7 @@ smooth pursuit closes it (de Brouwer et al. 2002). If landings scatter, another 
 later corrects an error beyond ``correct_deg``; an exact landing has an error only if the target was
 misjudged, and pursuit closes that. No error triggers a saccade within the refractory time after the
 last, and no event within ``min_interval_ms`` after its landing. A new target early in a saccade
-redirects it; a later one waits for that interval.
+redirects it; a later one is delayed by that interval.
 """
 
 from math import inf, radians
@@ -29,7 +29,7 @@ class SaccadeTrigger:
         self.reset(0.0)
 
     def retune(self, params: OculomotorParams, errs: bool) -> None:
-        """Change thresholds and times; an event that waits for its saccade still does.
+        """Change thresholds and times; a pending event stays pending.
 
         errs: whether saccades miss their targets
         """
@@ -85,7 +85,7 @@ class SaccadeTrigger:
         return True
 
     def refixate(self, t_s: float) -> None:
-        """Ask for a small saccade to another point of the same target."""
+        """Request a small saccade to another point of the same target."""
         if self._due_s is None:
             self._due_s = t_s
 
@@ -95,7 +95,7 @@ class SaccadeTrigger:
         self._erred = None if self._errs else False
 
     def is_error_small(self, error_rad: float) -> bool:
-        """Return whether no event is pending and an error requires none: ``due`` would be False."""
+        """Return whether no event is pending and no error requires one: ``is_due`` is False."""
         return self._due_s is None and self._erred is False and error_rad <= self._saccade_rad
 
     def is_due(self, slip: Slip, t_s: float) -> bool:

@@ -38,7 +38,7 @@ _HARMONIC = 0.07
 """Largest third harmonic of a swing, as a share of it; that of a motion to and fro at one speed is
 a ninth, and a sine would be ahead of that."""
 _FASTEST_IN_S = 0.5
-"""Time of the past whose highest speed no extrapolated speed exceeds."""
+"""Past time whose highest speed limits all extrapolated speeds."""
 _FITTED_FOR_S = 0.09
 """Interval of fits to a swing, which is every third frame."""
 _SPARSE = 4
@@ -54,7 +54,7 @@ _Seen = tuple[float, float, float, float, float, float, float]
 
 
 class Sine(NamedTuple):
-    """A swing about a middle: p(t) = middle + c cos(w (t - at)) + s sin(w (t - at))."""
+    """A swing about a centre: p(t) = middle + c cos(w (t - at)) + s sin(w (t - at))."""
 
     at_s: float
     w_rad_s: float
@@ -158,11 +158,11 @@ class TargetPrediction:
             self._share = min(1.0, most_m_s / (sine.w_rad_s * sine.size_m))
 
     def displacement(self, t_s: float) -> Vec3:
-        """Return by how much the target has moved since its frame."""
+        """Return the displacement of the target since its frame."""
         return self.motion(t_s)[0]
 
     def motion(self, t_s: float) -> tuple[Vec3, Vec3]:
-        """Return by how much the target has moved since its frame, and its velocity."""
+        """Return the displacement of the target since its frame, and its velocity."""
         if self._model == "none":
             return _STILL, self._v
         age_s, known_s = max(0.0, t_s - self._at_s), self._horizon_s
@@ -231,7 +231,7 @@ class TargetPrediction:
             window_s = _IN_TURN_S[self._turn]
         else:
             if norm(sub(p, add(sine.middle, sine.offset(at_s)))) > 0.5 * sine.size_m:
-                return None  # it has stopped, or turned elsewhere
+                return None  # it has stopped, or moved in another direction
             if at_s - sine.at_s < _FITTED_FOR_S:
                 return sine
             period_s = 2.0 * pi / sine.w_rad_s
@@ -245,7 +245,7 @@ class TargetPrediction:
     def _has_moved(self, least_m: float) -> bool:
         """Return whether the target's positions span this length along any axis."""
         past = [*islice(self._past, 0, None, _SPARSE)]
-        for axis in (1, 2, 3):  # of _Seen
+        for axis in (1, 2, 3):  # indices in _Seen
             places = [seen[axis] for seen in past]
             if max(places) - min(places) >= least_m:
                 return True

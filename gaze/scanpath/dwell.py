@@ -11,11 +11,12 @@ uniform            evenly between mean - SD and mean + SD, an interval that is c
                    if SD > mean, the mean drawn is (mean + SD) / 2
 
 Rests on the parts of a face last from landing to departure, and no less than servos can show. Table
-1 of Nakamoto & Tsuruno times the gaze within the rectangle of a part, so that a visit, with
-its refixations, includes about one shift between parts. Two of the eight parts are visited for no
+1 of Nakamoto & Tsuruno times the gaze within the rectangle of a part, so that a visit, with its
+refixations, includes about one shift between parts. Two of the eight parts are visited for no
 longer than a shift and the shortest rest of people together (0.165 and 0.173 s). They get that and
-a little; the other parts give up the same total in proportion to their excess over it. So the rate
-of shifts and the mean visit stay those of the table, and no rest is cut off at a shortest one.
+a little more; the visits to the other parts become shorter by the same total, in proportion to
+their excess over it. So the rate of shifts and the mean visit stay those of the table, and no rest
+is cut off at the shortest duration.
 """
 
 from collections.abc import Callable
@@ -64,7 +65,7 @@ def _lognormal(mean_s: float, sd_s: float) -> Draw:
 
 def _gamma(mean_s: float, sd_s: float) -> Draw:
     shape, scale = (mean_s / sd_s) ** 2, sd_s**2 / mean_s
-    # A shape far below 1 can round to 0, which is no valid time.
+    # With a shape far below 1 a draw can round to 0, which is not a valid time.
     return lambda rng: max(rng.gamma(shape, scale), 1e-9)
 
 
@@ -118,12 +119,12 @@ def _tail(cut: float) -> tuple[float, float, float]:
 
 
 _LEAST_ABOVE = 0.15
-"""Least mean excess of a rest over the shortest one, as a share of it."""
+"""Smallest mean excess of a rest over the shortest one, as a share of it."""
 
 
 def stationary(matrix: Floats) -> Floats:
     """Return the share of steps that a chain spends in each of its states, (n,)."""
-    # A stay at every other step changes no share, and makes every chain converge.
+    # Staying at every other step changes no share, and makes every chain converge.
     lazy = 0.5 * (matrix + np.eye(len(matrix)))
     share = np.linalg.matrix_power(lazy, 1 << 20)[0]
     out: Floats = share / share.sum()
@@ -163,7 +164,7 @@ def rests_s(share: Floats, visit_s: Floats, shift_s: float, shortest_s: float) -
 def shift_dwell(law: str, mean_s: float, sd_s: float, shortest_s: float) -> Draw:
     """Return a dwell law that begins at a shortest time instead of at 0 and keeps the mean.
 
-    A mean that leaves nothing above the shortest time is raised by a little.
+    A mean that is not above the shortest time is increased slightly.
     """
     if shortest_s <= 0.0:
         return dwell_distribution(law, mean_s, sd_s)

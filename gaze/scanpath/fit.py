@@ -23,7 +23,7 @@ _OVERLAP_S = 0.005
 
 
 class PartFixation(NamedTuple):
-    """One look: its part, None if it was outside all parts, its start and duration."""
+    """One look: its part (None if it was outside all parts), its start and its duration."""
 
     part: str | None
     start_s: float
@@ -44,11 +44,11 @@ class FitParams:
 
     # fmt: off
     smoothing: Annotated[str, Choices(*SMOOTHINGS), "plain shares, shares after adding pseudo_count, or mean over resamples"] = "laplace"
-    pseudo_count: Annotated[float, Bounds(0.001, 10), "added to every count by laplace smoothing"] = 0.5
+    pseudo_count: Annotated[float, Bounds(0.001, 10), "number added to every count by laplace smoothing"] = 0.5
     confidence: Annotated[float, Bounds(0.5, 0.999), "level of the intervals"] = 0.95
     resamples: Annotated[int, Bounds(100, 100000), "resampled recordings"] = 1000
-    fewest: Annotated[int, Bounds(2, 100000), "fixations on the face below which nothing is fitted"] = 50
-    longest_gap_s: Annotated[float, Bounds(0.01, 60), "fixations further apart are no transition: the looks in between are unknown"] = 0.5
+    fewest: Annotated[int, Bounds(2, 100000), "smallest number of fixations on the face for a fit"] = 50
+    longest_gap_s: Annotated[float, Bounds(0.01, 60), "longest gap between the two fixations of a transition"] = 0.5
     fewest_dwells: Annotated[int, Bounds(2, 1000), "a part with fewer fixations gets mean and SD of all parts together"] = 5
     # fmt: on
 
@@ -80,7 +80,7 @@ def fit_walk(
     """Fit the walk to fixations in the order of time.
 
     Raises:
-        ValueError: the fixations cannot be trusted; the message says why.
+        ValueError: the fixations are implausible; the message contains the reason.
     """
     _refuse_untrustworthy(fixations, params)
     counts = _transitions(fixations, params.longest_gap_s)
@@ -110,19 +110,23 @@ def _refuse_untrustworthy(fixations: Sequence[PartFixation], params: FitParams) 
     end_s, start_s = float("-inf"), float("-inf")
     for number, look in enumerate(fixations, 1):
         if look.part is not None and look.part not in PARTS:
-            raise ValueError(f"fixation {number}: no part {look.part!r}; {', '.join(PARTS)}")
+            raise ValueError(
+                f"fixation {number}: unknown part {look.part!r}; parts: {', '.join(PARTS)}"
+            )
         if not isfinite(look.start_s) or not isfinite(look.duration_s) or look.duration_s <= 0.0:
             raise ValueError(f"fixation {number}: start and duration must be finite, duration > 0")
         if look.start_s <= start_s:
-            raise ValueError(f"fixation {number} does not begin after the one before: sort by time")
+            raise ValueError(
+                f"fixation {number} does not begin after the previous one: sort them by time"
+            )
         if look.start_s < end_s - _OVERLAP_S:
             raise ValueError(
-                f"fixation {number} begins before the one before ends: check the units"
+                f"fixation {number} begins before the previous one ends: check the units"
             )
         start_s, end_s = look.start_s, look.start_s + look.duration_s
     inside = sum(look.part is not None for look in fixations)
     if fixations and inside == 0:
-        raise ValueError(f"all {len(fixations)} fixations lie outside the parts of the face")
+        raise ValueError(f"all {len(fixations)} fixations are outside the parts of the face")
     if inside < params.fewest:
         raise ValueError(
             f"{inside} fixations on the face are too few, {params.fewest} are needed:"
@@ -178,14 +182,14 @@ def _refuse_dead_ends(counts: Floats) -> None:
     if stuck:
         raise ValueError(
             f"no transition starts at {', '.join(stuck)}:"
-            " record for longer or take laplace smoothing"
+            " record for longer or use laplace smoothing"
         )
 
 
 def _widen_certain_intervals(
     counts: Floats, low: Floats, high: Floats, confidence: float
 ) -> tuple[Floats, Floats]:
-    """Widen intervals of cells that resampling cannot move: seen never, or every time.
+    """Widen intervals of cells that resampling cannot change: those seen never or always.
 
     For an event not seen in n trials, p <= 1 - (1 - confidence)^(1/n) is certain to that level (the
     "rule of three" for 95 %).

@@ -61,7 +61,7 @@ class ScanpathModel(Protocol):
 
 
 class Observer(NamedTuple):
-    """What one observer's looks at a face depend on, apart from the walk.
+    """Properties of one observer that affect looks at a face, in addition to the walk.
 
     shift_m: preferred spot on a face, to its left of and above that of most people
     width_m: standard deviation of looks about it; 0: the spot has no effect
@@ -83,7 +83,7 @@ class Observer(NamedTuple):
 
 
 ANYONE = Observer()
-"""Draws from the walk as it is."""
+"""An observer who uses the walk unchanged."""
 
 
 class MarkovWalk:
@@ -113,7 +113,7 @@ class MarkovWalk:
         self.enter()
 
     def enter(self, nearest: str | None = None) -> None:
-        """Start at the start part, or at the nearest one if that is chosen and known."""
+        """Start at the first part, or at the nearest one if that is selected and known."""
         known = nearest is not None and self._enters_nearest
         self._part = self._parts.index(str(nearest)) if known else self._start
         self._face: Face | None = None
@@ -121,7 +121,7 @@ class MarkovWalk:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return the present part and the end of its dwell, None before the gaze is there."""
+        """Return the present part and the end of its dwell, None before the gaze has arrived."""
         return self._parts[self._part], self._until_s
 
     def continue_walk(self, before: ScanpathModel) -> bool:
@@ -164,7 +164,7 @@ class MarkovWalk:
                 draw, last = draw - one, following
                 if draw < 0.0:
                     break
-        return last  # rounding may leave the sum a hair above the draw
+        return last  # the sum may be slightly below the draw because of rounding
 
     def dwell_s(self, part: int) -> float:
         """Draw a dwell time of a part."""
@@ -200,7 +200,7 @@ class MarkovWalk:
 
 
 class SimpleCycle:
-    """A fixed round of parts, each held for its own time after arrival."""
+    """A fixed cycle of parts, each fixated for its own time after arrival."""
 
     def __init__(self, parts: Sequence[str], dwell_s: Sequence[float]) -> None:
         self._parts = tuple(parts)
@@ -215,7 +215,7 @@ class SimpleCycle:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return the present part and the end of its time, None before the gaze is there."""
+        """Return the present part and the end of its time, None before the gaze has arrived."""
         return self._parts[self._at], self._until_s
 
     def continue_walk(self, before: ScanpathModel) -> bool:
@@ -242,14 +242,14 @@ class SimpleCycle:
 
 
 class FaceTracking:
-    """The face centre, always; the paper takes the tip of the nose for it (4.4.2)."""
+    """Always the face centre, which in the paper is the tip of the nose (4.4.2)."""
 
     def enter(self, nearest: str | None = None) -> None:
         """Do nothing: this model has no state."""
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return the nose, for ever."""
+        """Return the nose, with no end."""
         return "N", None
 
     def continue_walk(self, before: ScanpathModel) -> bool:
@@ -266,7 +266,7 @@ class RandomAngles:
 
     Angles are uniform within +-angle_deg in yaw and in pitch about the direction from the head to
     the face, which is the head's goal. Intervals run from jump to jump; the paper prints them as
-    0-3.0 ms, shorter than one of its frames: seconds are meant.
+    0-3.0 ms, which is shorter than one of its frames, so seconds must be meant.
     """
 
     def __init__(self, angle_deg: float, longest_s: float, rng: np.random.Generator) -> None:
@@ -295,7 +295,7 @@ class RandomAngles:
         return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
-        """Return the step: new angles are drawn when the interval is over."""
+        """Return the step; new angles are drawn when the interval is over."""
         if self._until_s is None:
             self._until_s = t_s + self._interval_s()
         moved = t_s >= self._until_s

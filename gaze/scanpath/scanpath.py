@@ -4,12 +4,12 @@ The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one 
 sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of a face target is
 replaced here; the head turns to the face's centre and not to each part (3.5).
 
-A matrix holds for everyone; three things change it. Each observer has a preferred spot on faces,
-from the brows to the mouth, that stays for months (Peterson & Eckstein 2013; Mehoudar et al. 2014);
-most people's is just below the eyes. If looks have a normal distribution about it, another spot
-multiplies the looks at a part by exp(part . shift / width^2). Speech draws looks to the mouth
-(Buchan et al. 2007). Parts that are seen too close together for a shift, on a far face, are one
-look.
+A matrix describes an average observer; three effects change it. Each observer has a preferred spot
+on faces, from the brows to the mouth, that stays for months (Peterson & Eckstein 2013; Mehoudar et
+al. 2014); most people's is just below the eyes. If looks have a normal distribution about it,
+another spot multiplies the looks at a part by exp(part . shift / width^2). Speech draws looks to
+the mouth (Buchan et al. 2007). Parts that are seen too close together for a shift, on a far face,
+are one look.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target,
 from gazerig.params import Bounds, Choices
 
 _OTHER_SIDE = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
-# A measured and rounded row may miss 1 by this and still count as a row that sums to 1.
+# A measured and rounded row may differ from a sum of 1 by this much.
 _ROUNDING = 0.005
 
 
@@ -46,7 +46,7 @@ class Walk:
     order: Annotated[tuple[str, ...], "face parts in the order of rows and columns"]
     matrix: Annotated[tuple[tuple[float, ...], ...], Bounds(0, 1), "transition probabilities, rows from, columns to, as printed"]
     dwell_mean_s: Annotated[tuple[float, ...], Bounds(0.001, 60), "mean dwell per part"]
-    dwell_sd_s: Annotated[tuple[float, ...], Bounds(0, 60), "its standard deviation"]
+    dwell_sd_s: Annotated[tuple[float, ...], Bounds(0, 60), "standard deviation of the dwell per part"]
     start: Annotated[str, Choices(*PARTS), "first part"] = "FR"
     # fmt: on
 
@@ -57,14 +57,14 @@ class Walk:
             ValueError: parts, rows, columns and dwell times do not fit together.
         """
         if sorted(self.order) != sorted(PARTS):
-            raise ValueError(f"order must hold each of {', '.join(PARTS)} once")
+            raise ValueError(f"order must contain each of {', '.join(PARTS)} once")
         n = len(PARTS)
         if len(self.matrix) != n or any(len(row) != n for row in self.matrix):
             raise ValueError(f"matrix must be {n} rows of {n} numbers")
         if any(sum(row) <= 0.0 for row in self.matrix):
             raise ValueError("every row of matrix needs at least one positive number")
         if len(self.dwell_mean_s) != n or len(self.dwell_sd_s) != n:
-            raise ValueError(f"dwell_mean_s and dwell_sd_s must hold {n} numbers each")
+            raise ValueError(f"dwell_mean_s and dwell_sd_s must contain {n} numbers each")
 
     @property
     def row_sums(self) -> tuple[float, ...]:
@@ -95,17 +95,17 @@ class ScanpathParams:
         "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
     diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
         "meaning of the matrix's diagonal, the same part again: another dwell (refixation), included in the dwell of the visit "
-        "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "whole_visit"
+        "(whole_visit), or another dwell that forms one rest with the last, with the spread rest_spread (one_rest)"] = "whole_visit"
     dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
     min_dwell_ms: Annotated[float, Bounds(0, 2000),
         "shortest dwell, from landing to departure; longer ones are distributed above it, with the same mean"] = 140.0
     rest_spread: Annotated[float, Bounds(0.05, 3),
-        "with diagonal one_rest: standard deviation over mean of a rest's time beyond min_dwell_ms"] = 0.6
+        "with diagonal one_rest: standard deviation divided by mean of a rest's time beyond min_dwell_ms"] = 0.6
     shift_ms: Annotated[float, Bounds(0, 500),
         "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 44.0
     spot_height_mm: Annotated[float, Bounds(-100, 100),
-        "height of the observer's preferred spot on a face over that of most people, which is just below the eyes"] = 0.0
-    spot_left_mm: Annotated[float, Bounds(-80, 80), "the same distance towards the face's left"] = 0.0
+        "height of the observer's preferred spot on a face above that of most people, which is just below the eyes"] = 0.0
+    spot_left_mm: Annotated[float, Bounds(-80, 80), "distance of that spot from it towards the face's left"] = 0.0
     spot_width_mm: Annotated[float, Bounds(0, 1000),
         "standard deviation of the looks about that spot; smaller: the spot has more effect; 0: none"] = 60.0
     speech_mouth_ratio: Annotated[float, Bounds(0.1, 20), "factor on the looks at the mouth of a person who speaks"] = 2.5
@@ -126,7 +126,7 @@ class ScanpathParams:
         """
         if not self.simple_order or len(self.simple_order) != len(self.simple_dwell_ms):
             raise ValueError(
-                "simple_order and simple_dwell_ms must hold as many items, one or more"
+                "simple_order and simple_dwell_ms must contain the same number of items, at least one"
             )
 
 
@@ -148,7 +148,7 @@ def merge_refixations(matrix: ArrayLike) -> Floats:
 
 
 class _Replacement(NamedTuple):
-    """A replaced target, and the values that it was made of."""
+    """A replaced target, and the values from which it was made."""
 
     target: Target
     face: Face | None
@@ -196,7 +196,7 @@ class Scanpath:
     def retune(self, params: ScanpathParams, walk: Walk) -> None:
         """Change the model, walk or rate; the present part and its dwell continue.
 
-        A model that does not know that part begins with its own first look.
+        A model without that part begins with its own first look.
         """
         before, self.looks = self.looks, _model(params, walk, self._rng)
         self._last = None
@@ -232,7 +232,7 @@ class Scanpath:
             face, entered = self._find(target.id, percept)
             if face is not None and entered:
                 self.looks.enter(_nearest(face, p_world_head_m, gaze_world_m))
-                settled = False  # at the former target
+                settled = False  # it arrived at the former target
         look = None
         if face is not None:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
@@ -250,7 +250,8 @@ class Scanpath:
     def rests_until_s(self) -> float:
         """Return the end of the gaze's rest on a part of a face.
 
-        inf while it is moving there, -inf if no end is drawn or the target is no face.
+        The result is inf while it is moving there, and -inf if no end is drawn or the target is not
+        a face.
         """
         return self._rests_until_s
 
@@ -263,9 +264,9 @@ class Scanpath:
         return -inf if settled and not look.has_moved else inf
 
     def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
-        """Return the face, the last known while it is out of sight, and whether it is new.
+        """Return the face (its last known state while it is not visible), and whether it is new.
 
-        None for a person who is in sight and has turned the face away.
+        The face is None for a visible person who has turned it away.
         """
         known = self._face
         if known is not None and known.id != face_id:
@@ -314,7 +315,7 @@ def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) ->
 
 
 def observer_of(params: ScanpathParams) -> Observer:
-    """Return what changes the walk of everyone into that of one observer."""
+    """Return the properties of one observer, which change the average walk."""
     return Observer(
         (params.spot_left_mm / 1e3, params.spot_height_mm / 1e3),
         params.spot_width_mm / 1e3,
