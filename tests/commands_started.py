@@ -39,7 +39,7 @@ def status(command: Callable[[str], str], servo_id: int) -> dict[str, object]:
     return found
 
 
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 """Longest wait for each thing that is to come, on a machine that does much else."""
 
 

@@ -14,7 +14,7 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
+PATIENCE_S = 180.0  # how long a slow machine is waited for, not how long it takes
 VISER = Subprotocol(f"viser-v{viser.__version__}")
 
 # The page counts a browser as there when it has said where it looks from.

@@ -301,6 +301,7 @@ def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
 
 
 @pytest.mark.usefixtures("branched_children")
+@pytest.mark.own_timeouts  # a starved machine asks no faster than the page allows
 def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     heard: list[object] = []
     slow = threading.Event()
