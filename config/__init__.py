@@ -1,1 +1,1 @@
-"""Strict reading of YAML into frozen values; with the shipped rigs, profiles and scanpaths."""
+"""Strict reading of YAML into frozen values, and the shipped rigs, profiles and scanpaths."""

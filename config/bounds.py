@@ -1,6 +1,6 @@
-"""The declarations of a Params dataclass (gazerig.params) as a strict pydantic model.
+"""Strict pydantic models of Params dataclasses (gazerig.params).
 
-``__post_init__`` may raise ValueError where two fields contradict each other.
+``__post_init__`` may raise ValueError if two fields contradict each other.
 """
 
 import dataclasses
@@ -32,10 +32,12 @@ Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "
 
 _PLAIN: dict[object, Form] = {
     **{float: "number", int: "whole", bool: "bool", str: "text"},
-    object: "value",  # of another file's key, whose own rules it must keep
+    object: "value",  # a key of another file, which has its own rules
 }
 _LONGEST_TEXT = 400  # characters; names and paths
-_TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # left to right and back
+_TURNS = (
+    "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # directional formatting characters
+)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -45,8 +47,8 @@ class Shape:
     inner: shape of the items of a list or mapping
     params: the dataclass, for form "params"
     optional: null is allowed
-    low, high, choices, unit, description: as declared
-    length: number of items of a list, None if free
+    low, high, choices, unit, description: from the declaration
+    length: number of items of a list, None for any
     """
 
     form: Form
@@ -62,9 +64,9 @@ class Shape:
 
 
 def validate(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]:
-    """Return the frozen dataclass that plain values make, or None and every error.
+    """Return the frozen dataclass for plain values, or None with every error.
 
-    ``data`` holds dicts, tuples, str, int, float, bool and None only.
+    ``data`` consists of dicts, tuples, str, int, float, bool and None.
     """
     try:
         return typing.cast(T, _adapter(typing.cast(Any, into)).validate_python(data)), []
@@ -75,10 +77,10 @@ def validate(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]
 def fill_stand_ins(
     into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool
 ) -> T:
-    """Return the dataclass with stand-ins at the faulty paths, its own rules unchecked.
+    """Return the dataclass with placeholder values at faulty paths, without checking its rules.
 
-    A stand-in is at the low or the high end of the allowed values. Lists and
-    mappings have none: reading such a field raises AttributeError.
+    A placeholder is the lowest or the highest allowed value. Lists and mappings have none: reading
+    such a field raises AttributeError.
     """
     return typing.cast(T, _fill(Shape("params", params=into), data, (), faulty, high))
 
@@ -88,12 +90,12 @@ def model_of(params: type) -> type[BaseModel]:
     """Return the strict pydantic model of a Params dataclass.
 
     Raises:
-        TypeError: a field is declared in a way that this module does not know.
+        TypeError: the declaration of a field is not supported.
     """
     declared = {f.name: f for f in dataclasses.fields(params) if f.init}
     columns: dict[str, Any] = {}
     for name, shape in shapes_of(params).items():
-        described = shape.description  # with its unit, for an editor's hover text
+        described = shape.description  # includes the unit, for an editor's hover text
         if shape.unit:
             described = f"{described} [{shape.unit}]".strip()
         column: dict[str, Any] = {"description": described or None}
@@ -109,13 +111,13 @@ def model_of(params: type) -> type[BaseModel]:
         params.__name__,
         __config__=ConfigDict(
             strict=True,
-            defer_build=True,  # nested models are built once, within the whole
+            defer_build=True,  # nested models are built once, together with the whole model
             extra="forbid",
             validate_default=True,
             field_title_generator=lambda name, _: name,
         ),
         __module__=params.__module__,
-        # Of a dataclass without one, it is its signature.
+        # The docstring of a dataclass without one is its signature.
         __doc__="" if doc.startswith(f"{params.__name__}(") else doc.partition("\n")[0],
         **columns,
     )
@@ -124,10 +126,10 @@ def model_of(params: type) -> type[BaseModel]:
 
 @cache
 def shapes_of(params: type) -> dict[str, Shape]:
-    """Return the shape of every field of a Params dataclass, in the order declared.
+    """Return the shape of every field of a Params dataclass, in declaration order.
 
     Raises:
-        TypeError: a field is declared in a way that this module does not know.
+        TypeError: the declaration of a field is not supported.
     """
     return {
         name: _shape(declared, declared.kind, f"{params.__qualname__}.{name}")
@@ -152,7 +154,7 @@ def _shape(declared: Declaration, kind: Any, place: str) -> Shape:
 
 
 def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
-    """Read one type annotation of a declaration, its own or that of what it holds."""
+    """Read one type annotation of a declaration, or that of its items."""
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     inner = partial(_shape, declared, place=place)
     if origin in (typing.Union, types.UnionType) and len(args) == 2 and type(None) in args:
@@ -171,7 +173,7 @@ def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
         if bounds is None:
             return Shape(form)
         if form not in ("number", "whole"):
-            raise TypeError(f"{place}: Bounds are for numbers")
+            raise TypeError(f"{place}: Bounds are only allowed for numbers")
         if form == "number":
             return Shape(form, low=float(bounds.low), high=float(bounds.high))
         return Shape(form, low=int(bounds.low), high=int(bounds.high))
@@ -209,30 +211,30 @@ def _annotation(shape: Shape) -> Any:
 
 
 def _dataclass_type(params: type) -> Any:
-    """Return a dataclass as a pydantic type whose value is the dataclass itself."""
+    """Return a dataclass as a pydantic type that yields the dataclass itself."""
     return Annotated[model_of(params), WrapValidator(partial(_build, params))]
 
 
 def _printable(text: str) -> str:
-    """Refuse text that cannot be shown, written to a file or distinguished from other text."""
+    """Reject text that cannot be displayed, written to a file or distinguished from other text."""
     if len(text) > _LONGEST_TEXT:
         raise PydanticCustomError(
             "value_error", "", {"error": f"is longer than {_LONGEST_TEXT} characters; shorten it"}
         )
-    # Controls, halves of characters, ends of lines, turns of the text's direction.
+    # Control characters, surrogates, line ends, directional formatting.
     kinds = ("Cc", "Cs", "Zl", "Zp")
     strange = next((c for c in text if unicodedata.category(c) in kinds or c in _TURNS), None)
     if strange is not None:
         raise PydanticCustomError(
             "value_error",
             "",
-            {"error": f"holds U+{ord(strange):04X}, which cannot be shown; take it out"},
+            {"error": f"contains U+{ord(strange):04X}, which cannot be shown; remove it"},
         )
     return text
 
 
 def _check_exact_type(shape: Shape, value: object) -> object:
-    """Refuse 57600.0 for 57600, which Literal takes for equal."""
+    """Reject 57600.0 for 57600, which Literal accepts as equal."""
     if isinstance(value, float) and not any(isinstance(c, float) for c in shape.choices):
         raise PydanticCustomError("literal_error", "not a whole number")
     return value
@@ -240,7 +242,7 @@ def _check_exact_type(shape: Shape, value: object) -> object:
 
 def _build(params: type, value: object, validate: Callable[[object], BaseModel]) -> object:
     """Return the dataclass; its ``__post_init__`` may raise ValueError."""
-    if isinstance(value, params):  # a default made by the declaring dataclass
+    if isinstance(value, params):  # a default value from the declaring dataclass
         return value
     model = validate(value)
     return params(**{name: getattr(model, name) for name in model.model_fields_set})
@@ -253,7 +255,7 @@ def _adapter(params: type) -> TypeAdapter[Any]:
 
 
 def _is_miscount(details: ErrorDetails) -> bool:
-    """Return whether an error of length only counts the items that were right."""
+    """Return whether a length error only results from omitted faulty items."""
     return details["type"] in ("too_short", "too_long") and (
         len(details["input"]) != details["ctx"]["actual_length"]
     )
@@ -265,7 +267,7 @@ _LEFT_OUT: Any = object()
 def _fill(
     shape: Shape, data: Any, path: tuple[Step, ...], faulty: Container[tuple[Step, ...]], high: bool
 ) -> Any:
-    """Return the value at a path, all but its faulty parts from ``data``."""
+    """Return the value at a path from ``data``, except for its faulty parts."""
     if path in faulty:
         return _stand_in(shape, high)
     if data is None:
@@ -277,7 +279,7 @@ def _fill(
             for name, field in shapes_of(params).items():
                 if name in data or (*path, name) in faulty:
                     parts[name] = _fill(field, data.get(name), (*path, name), faulty, high)
-                elif set(data) - set(parts):  # an unknown key may have been meant for this one
+                elif set(data) - set(parts):  # an unknown key may be a misspelling of this one
                     parts[name] = _stand_in(field, high)
             return _without_post_init(params, parts)
         case Shape(inner=Shape() as inner):
@@ -290,7 +292,7 @@ def _fill(
 
 
 def _stand_in(shape: Shape, high: bool) -> Any:
-    """Return a value from one end of the allowed range of a place."""
+    """Return the lowest or highest allowed value of a position."""
     match shape:
         case Shape(form="number" | "whole"):
             least = shape.low if shape.low is not None else 0.0
@@ -318,7 +320,7 @@ def _default(declared: dataclasses.Field[Any]) -> Any:
 
 
 def _without_post_init(params: type, parts: Mapping[str, Any]) -> Any:
-    """Return a dataclass made without its ``__post_init__``."""
+    """Return a dataclass instance without running its ``__post_init__``."""
     made: object = object.__new__(params)
     for name, part in parts.items():
         if part is not _LEFT_OUT:

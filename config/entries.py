@@ -1,4 +1,4 @@
-"""One YAML file as entries that know their lines, with every fault of the text."""
+"""Reading of one YAML file into entries with line numbers, and all faults of its text."""
 
 import re
 from collections.abc import Callable, Collection, Sequence
@@ -21,15 +21,15 @@ from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_
 
 Scalar = str | int | float | bool | None
 
-_DEPTH = 40  # levels; a rig has about 5, a file that refers to itself has no end
-_VALUES = 20_000  # aliases of aliases grow without bound
+_DEPTH = 40  # levels; a rig has about 5, a recursive file would never end
+_VALUES = 20_000  # nested aliases would grow without limit
 _LARGEST = 1_000_000  # bytes; a rig has about 34 000
-_QUOTED = re.compile(r" *('[^']*'|\"[^\"]*\")")  # what a parser shows of the text
+_QUOTED = re.compile(r" *('[^']*'|\"[^\"]*\")")  # text quoted in a parser's message
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A value with its file and line; mappings and lists hold entries."""
+    """A value with its file and line; mappings and lists contain entries."""
 
     value: "Scalar | dict[str, Entry] | tuple[Entry, ...]"
     file: str
@@ -44,9 +44,9 @@ class Entry:
         return self.value
 
     def nearest(self, path: Sequence[Step]) -> "Entry":
-        """Return the entry at a path, or the last existing one above it.
+        """Return the entry at a path, or the deepest existing entry above it.
 
-        A key of a file may be a dotted path itself, as those of a study's parameters are.
+        A key of a file may itself be a dotted path, e.g. in a study's parameters.
         """
         entry, at = self, 0
         while at < len(path):
@@ -57,7 +57,7 @@ class Entry:
         return entry
 
     def _find_below(self, path: Sequence[Step]) -> "tuple[Entry | None, int]":
-        """Return the entry that the first steps of a path name, and how many steps they are."""
+        """Return the entry at the first steps of a path, and the number of these steps."""
         if isinstance(self.value, dict):
             for steps in range(1, len(path) + 1):
                 key = ".".join(map(str, path[:steps]))
@@ -71,10 +71,10 @@ class Entry:
 def read(
     path: Path, faults: list[ConfigFault], known: Collection[str] = ()
 ) -> tuple[str, Entry | None]:
-    """Return a file's text and its top entry, None if nothing of it can be used.
+    """Return a file's text and its top entry, None if the file is unusable.
 
-    known: keys of such a file's top level. A file with none of them is something else, and
-        nothing of it is shown: any client that may choose a character could read it.
+    known: keys of the file's top level. The content of a file with none of them is never shown, as
+        any client that may choose a character could otherwise read other files.
     """
     file, text = str(path), ""
     try:
@@ -89,61 +89,61 @@ def read(
     except RecursionError:
         faults.append(ConfigFault(file, None, "", "", _TOO_DEEP))
     except (YAMLError, ValueError, ArithmeticError, LookupError) as error:
-        # ruamel lets others out: characters past U+10FFFF, "%YAML 9.9"
+        # ruamel also raises these: characters above U+10FFFF, "%YAML 9.9".
         faults.append(_syntax_fault(file, text, error))
     else:
         if isinstance(node, MappingNode):
             keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
             # A key may be misspelt.
             if known and not any(k in known or get_close_matches(k[:60], known, 1) for k in keys):
-                rule = f"is no such configuration: none of its keys is one of {', '.join(known)}"
+                rule = f"is not such a configuration: it has none of the keys {', '.join(known)}"
                 faults.append(ConfigFault(file, _line(node), "", "", rule))
                 return text, None
             root, found = _entries_of(file, text)
             faults += found
             return text, root
-        rule = "is empty" if node is None else "the top level is no mapping"
+        rule = "is empty" if node is None else "the top level is not a mapping"
         line = 1 if node is None else _line(node)
         faults.append(ConfigFault(file, line, "", "", f"{rule}; write 'key: value' lines"))
     return text, None
 
 
 class _TooMany(MarkedYAMLError):
-    """A file holds more nodes than any configuration has."""
+    """A file has more nodes than any configuration."""
 
 
 class _BoundedComposer(Composer):
-    """A composer with a limit of nodes: all the time of loading goes into them."""
+    """A composer with a limit on the number of nodes, which take most of the loading time."""
 
     _composed = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         self._composed += 1
-        if self._composed > 2 * _VALUES:  # keys are nodes, too
+        if self._composed > 2 * _VALUES:  # keys are nodes too
             raise _TooMany(problem_mark=self.parser.peek_event().start_mark)
         return super().compose_node(parent, index)
 
 
 @lru_cache(maxsize=64)
 def compose_yaml(text: str) -> Node | None:
-    """Return YAML parsed as far as nodes, which know their lines and are only read.
+    """Return YAML parsed to nodes, which have line numbers and are never modified.
 
-    The parser takes nearly all the time of loading, and a rig loads the same layers again
-    with each tuning, saving and checking.
+    The parser takes nearly all the time of loading, and tuning, saving and checking a rig load the
+    same layers again.
     """
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _BoundedComposer
     yaml.max_depth = _DEPTH
-    yaml.composer.warn_double_anchors = False  # YAML 1.2 allows to set an anchor again
+    yaml.composer.warn_double_anchors = False  # YAML 1.2 allows an anchor to be redefined
     node: Node | None = yaml.compose(text)
     return node
 
 
 @lru_cache(maxsize=64)
 def _entries_of(file: str, text: str) -> tuple[Entry | None, tuple[ConfigFault, ...]]:
-    """Return the top mapping of a text as an entry, None if it is too large, and its faults.
+    """Return the top mapping of a text as an entry (None if it is too large), and its faults.
 
-    Kept for the next loading of the same file: entries are only read, as nodes are.
+    The result is cached for the next load of the same file: entries and nodes are never modified.
     """
     node, faults = compose_yaml(text), list[ConfigFault]()
     assert isinstance(node, MappingNode)
@@ -151,7 +151,7 @@ def _entries_of(file: str, text: str) -> tuple[Entry | None, tuple[ConfigFault, 
 
 
 def _read_error(path: Path, error: OSError) -> str:
-    """Return why a file cannot be opened, and the remedy."""
+    """Return the reason why a file cannot be opened, and the remedy."""
     match error:
         case FileNotFoundError():
             beside = [p.name for p in path.parent.glob("*.yaml")] if path.parent.is_dir() else []
@@ -159,7 +159,7 @@ def _read_error(path: Path, error: OSError) -> str:
         case IsADirectoryError():
             return "is a directory; name a file in it"
         case PermissionError():
-            return "may not be read; give yourself the right with chmod u+r"
+            return "cannot be read: permission denied; allow it with chmod u+r"
     if isinstance(error, NotRegularFile | FileTooLarge):
         return f"{error.strerror}; name a YAML file"
     return f"cannot be read ({error.strerror}); check the path"
@@ -171,7 +171,7 @@ def _syntax_fault(file: str, text: str, error: Exception) -> ConfigFault:
         before = text[: error.position]
         column = len(before) - before.rfind("\n")
         code = f"U+{ord(text[error.position]):04X}"
-        rule = f"not valid YAML: character {code} is not allowed; take it out"
+        rule = f"not valid YAML: character {code} is not allowed; remove it"
         return ConfigFault(file, before.count("\n") + 1, "", "", rule, column)
     if not isinstance(error, MarkedYAMLError) or error.problem_mark is None:
         words = _remove_quotes(" ".join(str(error).split()))
@@ -189,16 +189,16 @@ def _syntax_fault(file: str, text: str, error: Exception) -> ConfigFault:
 
 
 def _remove_quotes(words: str) -> str:
-    """Return a parser's message without what it quotes of the text."""
-    kept = ("' '", "'\\t'")  # one character, or a parser's own name for what it met
+    """Remove quoted file content from a parser's message."""
+    kept = ("' '", "'\\t'")  # one character, or the parser's own name of a token
     return _QUOTED.sub(
         lambda m: m[0] if len(m[1]) == 3 or m[1] in kept or m[1][1] == "<" else "", words
     )
 
 
 _TAG = "tag:yaml.org,2002:"
-_TOO_DEEP = f"nested deeper than {_DEPTH} levels, or refers to itself; write it flat"
-_TOO_MANY = f"holds more than {_VALUES} values; write less"
+_TOO_DEEP = f"nested deeper than {_DEPTH} levels, or recursive; reduce the nesting"
+_TOO_MANY = f"contains more than {_VALUES} values; shorten it"
 
 
 def _line(node: Node) -> int:
@@ -207,17 +207,17 @@ def _line(node: Node) -> int:
 
 
 class _Reader:
-    """Converts the nodes of one file into entries and records what a file may not hold."""
+    """Converter from the nodes of one file to entries, which records unsupported content."""
 
     def __init__(self, file: str, faults: list[ConfigFault]) -> None:
-        """Remember the file and where its faults go."""
+        """Set the file, and the list that receives its faults."""
         self._file = file
         self._faults = faults
         self._values = 0
         self._endless = False
 
     def read_top(self, node: MappingNode) -> Entry | None:
-        """Return the top node as an entry, None if it is too deep, too large or no mapping."""
+        """Return the top node as an entry, None if it is too deep, too large or not a mapping."""
         root = self._entry(node, _line(node), ())
         return root if isinstance(root.value, dict) and not self._endless else None
 
@@ -235,7 +235,7 @@ class _Reader:
         if isinstance(node, ScalarNode) and tag in _SCALARS:
             return Entry(_SCALARS[tag](node.value), self._file, line)
         if tag != "seq":
-            self._note(line, path, f"the tag {node.tag} is not read; take it out")
+            self._note(line, path, f"the tag {node.tag} is not supported; remove it")
             return Entry(None, self._file, line)
         items = (self._entry(n, _line(n), (*path, i)) for i, n in enumerate(node.value))
         return Entry(tuple(items), self._file, line)
@@ -247,14 +247,14 @@ class _Reader:
             line = _line(key)
             if not isinstance(key, ScalarNode) or str(key.tag) != f"{_TAG}str":
                 if str(key.tag) == f"{_TAG}merge":
-                    bad_key = "merge keys (<<) are not read; write the keys out"
+                    bad_key = "merge keys (<<) are not supported; write the keys in full"
                 else:
                     name = abbreviate(key.value) if isinstance(key, ScalarNode) else "this"
                     bad_key = f"key {name} is not text; put it in quotes"
                 self._note(line, path, bad_key)
             elif key.value in entries:
                 first = entries[key.value].line
-                self._note(line, (*path, key.value), f"key stands twice, first in line {first}")
+                self._note(line, (*path, key.value), f"duplicate key, first in line {first}")
             else:
                 entries[key.value] = self._entry(value, line, (*path, key.value))
         return entries
@@ -276,7 +276,7 @@ def _parse_integer(text: str) -> int | str:
 
 
 def _parse_float(text: str) -> float | str:
-    """Return a float of YAML 1.2, .inf and .nan among them."""
+    """Return a float of YAML 1.2, including .inf and .nan."""
     try:
         return float(text.replace("_", "").lower().replace(".inf", "inf").replace(".nan", "nan"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""JSON Schema of a Params dataclass, and its errors as text for people."""
+"""JSON Schema of a Params dataclass, and its errors as text."""
 
 import difflib
 import reprlib
@@ -22,7 +22,7 @@ _TYPE_WORDS: dict[type, str] = {
 
 
 class Violation(NamedTuple):
-    """One error in plain values: path, value and the rule as text."""
+    """One error in plain values: path, value and the broken rule as text."""
 
     path: tuple[Step, ...]
     value: str
@@ -30,19 +30,19 @@ class Violation(NamedTuple):
 
 
 def json_schema(into: type) -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of a file that is loaded into ``into``.
+    """Return the JSON Schema (draft 2020-12) of files that are loaded into ``into``.
 
-    Bounds, choices, descriptions and units are those of the fields; unknown keys are
-    refused. Rules between fields and the difference of 1 and 1.0 are beyond the schema.
+    Bounds, choices, descriptions and units are those of the fields; unknown keys are rejected.
+    Rules between fields and the difference of 1 and 1.0 cannot be expressed in the schema.
     """
     return {"$schema": DIALECT, **model_of(into).model_json_schema()}
 
 
 def violation(into: type, details: ErrorDetails) -> Violation:
-    """Return one pydantic error as text for people."""
+    """Return one pydantic error as a violation."""
     root = Shape("params", params=into)
     path = details["loc"]
-    if path[-1:] == ("[key]",):  # of a mapping's key, not of what it holds
+    if path[-1:] == ("[key]",):  # the error is in a mapping's key, not in its value
         return Violation(path[:-1], "", _rule(Shape("text"), details))
     if details["type"] == "extra_forbidden":
         holder = _nested_shape(root, path[:-1])
@@ -86,7 +86,7 @@ def expected_text(shape: Shape) -> str:
 
 
 def suggestion_text(word: str, words: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" if a known word is similar, else ""."""
+    """Return "; did you mean 'x'?" if a known word is similar, otherwise ""."""
     near = difflib.get_close_matches(word, list(words), n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
@@ -100,7 +100,7 @@ def abbreviate(value: object) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a bound as a person would write it: 2000, not 2000.0 or 2e+03."""
+    """Return a bound in plain notation: 2000, not 2000.0 or 2e+03."""
     return format(value, ".12g")
 
 
@@ -126,12 +126,12 @@ def _rule(shape: Shape, details: ErrorDetails) -> str:
         named = f"is {_TYPE_WORDS[type(value)]}"
     else:
         named = f"{abbreviate(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
-    hint = ""  # the correction if it is obvious
+    hint = ""  # the correction, if it is obvious
     if shape.form == "text" and isinstance(value, bool | int | float):
         hint = "; put it in quotes"
     elif shape.form in ("number", "whole") and isinstance(value, str):
         bare = value.replace(".", "", 1).removeprefix("-").isdecimal()
-        hint = "; take the quotes away" if bare else ""
+        hint = "; remove the quotes" if bare else ""
     return f"{named}, wanted {expected_text(shape)}{hint}"
 
 

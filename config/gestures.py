@@ -1,4 +1,4 @@
-"""Gestures by name: those shipped, and those of a rig's own files; each read and checked."""
+"""Gestures by name: shipped ones, and those of a rig's own files; all are checked."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,13 +28,13 @@ def load_gesture(path: Path) -> Gesture:
     """Return the gesture of a file.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: lists every fault.
     """
     return load(path, Gesture, checks=CHECKS)
 
 
 def shipped_gestures() -> Mapping[str, Gesture]:
-    """Return the gestures that come with the package, by name."""
+    """Return the gestures of this package by name."""
     return _shipped()
 
 
@@ -46,13 +46,13 @@ def _shipped() -> Mapping[str, Gesture]:
 
 
 def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
-    """Return the gestures of a rig: the shipped ones, and its own by the names of their files.
+    """Return the gestures of a rig: shipped ones, and its own by the names of their files.
 
     Args:
-        files: paths of its own; one with the name of a shipped gesture takes its place.
+        files: Paths of its own gestures; they replace shipped gestures of the same name.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault of all files.
+        gazerig.config.load.ConfigError: lists every fault of all files.
     """
     found = dict(shipped_gestures())
     faults: list[ConfigFault] = []
@@ -68,16 +68,16 @@ def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
 
 @dataclass(frozen=True)
 class GestureSet:
-    """Gestures as a recording keeps them."""
+    """Gestures as stored in a recording."""
 
-    gestures: Annotated[Mapping[str, Gesture], "a rig's own gestures, by name"]
+    gestures: Annotated[Mapping[str, Gesture], "gestures of the rig by name"]
 
 
 def gesture_path(file: str) -> Path:
-    """Return the path of a gesture file; a bare name is that of a package's gesture.
+    """Return the path of a gesture file; a name alone selects a gesture of a package.
 
     Raises:
-        gazerig.config.load.ConfigError: no package brings one of this name.
+        gazerig.config.load.ConfigError: no package has a gesture of this name.
     """
     if "/" in file or file.endswith((".yaml", ".yml")):
         return Path(file).expanduser()
@@ -88,14 +88,12 @@ def gesture_name(file: str) -> str:
     """Return the name of a gesture in a file.
 
     Raises:
-        gazerig.config.load.ConfigError: it is no name.
+        gazerig.config.load.ConfigError: it is not a valid name.
     """
     name = Path(file).stem
     if JOINT_NAME.fullmatch(name):
         return name
-    rule = (
-        "the file's name names the gesture: small letters, digits and _, a letter first, at most 40"
-    )
+    rule = "the file name is the gesture's name: lower-case letters, digits and _, beginning with a letter, at most 40 characters"
     raise ConfigError([ConfigFault(file, None, "", repr(name), rule)])
 
 
@@ -113,10 +111,10 @@ def _joint_names(gesture: Gesture) -> Iterable[tuple[str, str]]:
             for joint in frame.joints_deg:
                 if joint in GAZE_JOINTS:
                     instead = _HEAD_KEYS.get(joint, "lids" if joint.endswith("lid") else "eyes_yaw_deg and eyes_pitch_deg")  # fmt: skip
-                    yield f"{key}.{i}.joints_deg.{joint}", f"is moved by {instead}; write that"
+                    yield f"{key}.{i}.joints_deg.{joint}", f"is moved by {instead}; use that"
                 elif not JOINT_NAME.fullmatch(joint):
-                    yield f"{key}.{i}.joints_deg.{joint}", "no name of a joint"
+                    yield f"{key}.{i}.joints_deg.{joint}", "not the name of a joint"
 
 
 CHECKS = (_frame_times, _joint_names)
-"""What no single frame can know."""
+"""Rules across frames."""

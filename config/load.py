@@ -1,8 +1,8 @@
-"""YAML files in layers to frozen values, with every fault of every layer in one message.
+"""YAML files in layers to frozen values; one message lists every fault of every layer.
 
-A rig is read in layers, the later over the earlier. Each value remembers the file and
-line it came from, so that a fault found after the layers were merged, or by a rule
-between two sections, still names the line to change.
+A rig is read in layers; later layers override earlier ones. Each value has its file and line, so
+that a fault found after merging the layers, or by a rule between two sections, still names the line
+to change.
 """
 
 import contextlib
@@ -25,22 +25,22 @@ from gazerig.drivers.plugins import GESTURES, RIGS, yaml_files
 
 T = TypeVar("T")
 _GROUPS = {"rigs": RIGS, "gestures": GESTURES}
-"""Kinds of files that packages bring too."""
+"""Kinds of files that packages can provide too."""
 
 
 RIGS_FOLDER, GESTURES_FOLDER = SHIPPED / "rigs", SHIPPED / "gestures"
-"""What this package registers in the groups of rigs and gestures."""
+"""Folders that this package registers in the groups of rigs and gestures."""
 
 
 _FILES_BESIDE, _MESHES = "gesture_files", "meshes"
-"""Keys of a rig with paths of files, relative to the folder of the file that names them."""
+"""Keys of a rig with file paths, relative to the folder of the file that contains them."""
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """One YAML file as read: plain values, the text with its comments, and every line."""
+    """One parsed YAML file: plain values, the text with its comments, and every line."""
 
     file: Path
     text: str
@@ -63,13 +63,13 @@ def load(
     defaults: Sequence[Path] = (),
     checks: Sequence[Check[T]] = (),
 ) -> T:
-    """Return the frozen dataclass that ``path`` over its ``defaults`` (the earliest lowest) makes.
+    """Return the frozen dataclass of ``path`` merged over ``defaults`` (the first is the lowest).
 
-    Checks get the whole value; if fields are at fault, what they find
-    is listed if it holds whatever right values take their place.
+    Checks receive the whole value. If fields are faulty, a finding is listed only if it is true for
+    any correct values of these fields.
 
     Raises:
-        ConfigError: with every fault of every file.
+        ConfigError: lists every fault of every file.
     """
     files = (*defaults, path)
     faults: list[ConfigFault] = []
@@ -93,9 +93,9 @@ def load(
 def validate_entries(
     into: type[T], root: Entry, checks: Sequence[Callable[[T], Iterable[tuple[str, str]]]] = ()
 ) -> tuple[T | None, list[ConfigFault]]:
-    """Return the frozen dataclass that merged entries make, None where impossible, and every fault.
+    """Return the frozen dataclass of merged entries, None if impossible, and every fault.
 
-    Findings of checks are faults too, so a value may come with some.
+    Findings of checks are faults too, so a valid dataclass may have faults.
     """
     into, problems = extend_type(into, root.to_plain())
     if problems:
@@ -115,10 +115,10 @@ def validate_entries(
 def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
     """Return one YAML 1.2 file whose top level is a mapping.
 
-    known: keys of the top level; a file with none of them is refused and nothing of it shown
+    known: keys of the top level; a file with none of them is rejected and its content is not shown
 
     Raises:
-        ConfigError: unreadable, not UTF-8, not YAML, empty, keys twice, no mapping.
+        ConfigError: unreadable, not UTF-8, not YAML, empty, duplicate keys, or not a mapping.
     """
     faults: list[ConfigFault] = []
     text, root = read(path, faults, known)
@@ -128,15 +128,15 @@ def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
 
 
 def shipped_path(kind: str, name: str, home: Path | None = None) -> Path:
-    """Return the path of a file that comes with the package, e.g. ``shipped("rigs", "desk")``.
+    """Return the path of a shipped file, e.g. ``shipped("rigs", "desk")``.
 
     Args:
-        kind: of the files.
-        name: of the file, without its ending.
-        home: the folder of kinds, such as that of a feature; None: ``SHIPPED``.
+        kind: Kind of the file.
+        name: Name of the file, without its extension.
+        home: Folder of kinds, e.g. that of a feature; None: ``SHIPPED``.
 
     Raises:
-        ConfigError: there is none of that name; lists those that exist.
+        ConfigError: no file has this name; lists the existing names.
     """
     names = shipped_names(kind, home)
     if name in names:
@@ -147,10 +147,10 @@ def shipped_path(kind: str, name: str, home: Path | None = None) -> Path:
 
 
 def package_file_path(kind: str, name: str) -> Path:
-    """Return the path of a file that another package brings, of rigs or gestures.
+    """Return the path of a rig or gesture file of another package.
 
     Raises:
-        ConfigError: no package brings one of this name, or one cannot be imported.
+        ConfigError: no package has a file of this name, or a package cannot be imported.
     """
     try:
         files = yaml_files(_GROUPS[kind])
@@ -164,7 +164,7 @@ def package_file_path(kind: str, name: str) -> Path:
 
 
 def _unknown(kind: str, name: str, names: Sequence[str]) -> ConfigError:
-    known = f"there are {', '.join(names)}" if names else "there are none of this kind"
+    known = f"available: {', '.join(names)}" if names else "there are none of this kind"
     rule = f"nothing named {name!r} is shipped{suggestion_text(name, names) or ';'} {known}"
     return ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
 
@@ -175,7 +175,7 @@ def _steps(key: str) -> tuple[str, ...]:
 
 
 def _resolve_paths(layer: Entry) -> Entry:
-    """Return a file's entries with paths of neighbouring files relative to the working folder."""
+    """Return a file's entries with its relative file paths made relative to the working folder."""
     if not isinstance(layer.value, dict):
         return layer
     folder, found = Path(layer.file).parent, dict(layer.value)
@@ -194,7 +194,7 @@ def _resolve_paths(layer: Entry) -> Entry:
 
 
 def _relative_mesh(mesh: Entry, folder: Path) -> Entry:
-    """Return the entry of a mesh with its file as seen from the working folder."""
+    """Return the entry of a mesh with its file relative to the working folder."""
     file = mesh.value.get("file") if isinstance(mesh.value, dict) else None
     if file is None or not isinstance(file.value, str) or file.value.startswith("~"):
         return mesh
@@ -205,16 +205,16 @@ def _relative_mesh(mesh: Entry, folder: Path) -> Entry:
 
 
 def _is_relative(value: object) -> bool:
-    """Return whether it is a path below a folder; a bare name is that of a package's file."""
+    """Return whether it is a relative path; a name alone selects a file of a package."""
     path = isinstance(value, str) and ("/" in value or value.endswith((".yaml", ".yml")))
     return path and not str(value).startswith("~")
 
 
 def _merge(low: Entry, high: Entry, into: type | None = None) -> Entry:
-    """Return one entry laid over another; a mapping keeps the line of the lowest file.
+    """Return one entry merged over another; a mapping keeps the line of the lowest file.
 
-    into: the dataclass that they make; its default mapping is below ``high`` where
-        ``low`` has none, so that a character can change one rule of those every rig has
+    into: the dataclass of both entries; if ``low`` has no mapping, ``high`` is merged over the
+        default one, so that a character can change one of the default rules
     """
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
         return high
@@ -232,7 +232,7 @@ def _merge(low: Entry, high: Entry, into: type | None = None) -> Entry:
 def _default_mapping(
     into: type | None, key: str, shape: Shape | None, above: Entry
 ) -> Entry | None:
-    """Return what a dataclass has at a key by default if that is a mapping, else None."""
+    """Return the default at a key of a dataclass if it is a mapping, otherwise None."""
     if into is None or shape is None:
         return None
     if shape.params is not None:
@@ -246,7 +246,7 @@ def _default_mapping(
 
 
 def entries_at(value: Any, at: Entry) -> Entry:
-    """Return plain values as entries of the place of another."""
+    """Return plain values as entries with the file and line of another entry."""
     if isinstance(value, dict):
         value = {key: entries_at(one, at) for key, one in value.items()}
     elif isinstance(value, tuple):
@@ -255,14 +255,14 @@ def entries_at(value: Any, at: Entry) -> Entry:
 
 
 def _to_fault(root: Entry, violation: Violation) -> ConfigFault:
-    """Return a complaint its file and line."""
+    """Return a violation as a fault with its file and line."""
     entry = root.nearest(violation.path)
     key = ".".join(map(str, violation.path))
     return ConfigFault(entry.file, entry.line, key, violation.value, violation.rule)
 
 
 def _contradiction(root: Entry, key: str, rule: str) -> Violation:
-    """Return what a check found as a violation."""
+    """Return a finding of a check as a violation."""
     stands = root.nearest(_steps(key)).value
     return Violation(
         _steps(key), "" if isinstance(stands, dict | tuple) else abbreviate(stands), rule
@@ -272,7 +272,7 @@ def _contradiction(root: Entry, key: str, rule: str) -> Violation:
 def _certain_findings(
     root: Entry, into: type[T], wrong: set[tuple[Step, ...]], checks: Sequence[Check[T]]
 ) -> list[tuple[str, str]]:
-    """Return what the checks find whichever right values take the place of the wrong ones."""
+    """Return the findings of the checks that hold for any correct values of the faulty fields."""
     low, high = (fill_stand_ins(into, root.to_plain(), wrong, end) for end in (False, True))
     found: list[tuple[str, str]] = []
     for check in checks:
@@ -283,6 +283,6 @@ def _certain_findings(
 
 
 def _findings_until_failure(check: Check[T], value: T) -> Iterator[tuple[str, str]]:
-    """Return the findings of a check until a stand-in makes it fail."""
+    """Return the findings of a check until a placeholder value makes it fail."""
     with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         yield from check(value)

@@ -1,4 +1,4 @@
-"""The text of a new rig's file: the shortest that works, from a few answers. Pure."""
+"""Text of a new rig's file: the shortest working one, from a few answers. Pure."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ BOARDS: Mapping[str, str] = {
     "pca9685": "hobby servos on a PCA9685 board, over I2C",
     "none": "no board yet: emulated servos",
 }
-"""What the servos are on, and what that is."""
+"""Boards of servos, with their descriptions."""
 
 CAMERAS: Mapping[str, str] = {
     "webcam": "a webcam",
     "oak": "an OAK-D",
     "none": "no camera yet: a simulated visitor",
 }
-"""What the head sees with."""
+"""Cameras, with their descriptions."""
 
 _EYES = ("eyes_pan", "eyes_tilt")
 _BOTH_EYES = ("left_eye_pan", "left_eye_tilt", "right_eye_pan", "right_eye_tilt")
@@ -30,7 +30,7 @@ _NECK = ("neck_yaw", "neck_pitch", "neck_roll")
 
 
 class Mechanism(NamedTuple):
-    """A well-known mechanism: what it is, and its joints, one servo each."""
+    """A common mechanism: its description, and its joints, one servo each."""
 
     summary: str
     joints: tuple[str, ...]
@@ -39,10 +39,10 @@ class Mechanism(NamedTuple):
 MECHANISMS: Mapping[str, Mechanism] = {
     "eyes": Mechanism("two servos: one turns both eyes left and right, one up and down", _EYES),
     "eyes-lids": Mechanism("six: the same, and four lids", (*_EYES, *_UPPER, *_LOWER)),
-    "two-eyes": Mechanism("six: each eye by itself, two upper lids", (*_BOTH_EYES, *_UPPER)),
+    "two-eyes": Mechanism("six: each eye separately, two upper lids", (*_BOTH_EYES, *_UPPER)),
     "head": Mechanism("nine: the same, and a neck", (*_BOTH_EYES, *_UPPER, *_NECK)),
 }
-"""By the name that ``gazerig new --joints`` takes; it takes names of joints as well."""
+"""Mechanisms by the name for ``gazerig new --joints``, which also accepts names of joints."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class NewRig:
 
 
 class _Servo(NamedTuple):
-    """The drive of a joint: its servo, its function, and the other settings in its line."""
+    """Drive of a joint: its servo model, its function, and further settings in its line."""
 
     model: str
     speed_deg_s: int
@@ -80,8 +80,8 @@ class _Servo(NamedTuple):
 class _Board(NamedTuple):
     """Properties of a board.
 
-    port: its usual one; first_id: of the servos, by custom
-    eye, lid, neck: how joints are driven; gaze: what is slower than with the fastest servos
+    port: its usual port; first_id: usual first id of its servos
+    eye, lid, neck: drives of the joints; gaze: settings for servos slower than the fastest ones
     """
 
     port: str
@@ -97,7 +97,7 @@ class _Board(NamedTuple):
 _NECKLESS_GAZE = (
     "idle: {reach_deg: 28, glance_yaw_deg: 24, glance_pitch_deg: 9, search_aside_deg: 14}"
 )
-"""Where nothing is to be seen it looks no farther than eyes alone can turn."""
+"""Idle gaze without a neck goes no farther than the eyes alone can turn."""
 _HOBBY = "servo_speed_deg_s: 600"
 _HOBBY_GAZE = (
     "saccade: {max_speed_deg_s: 380}",
@@ -138,7 +138,7 @@ _NECK_DEG = {"neck_yaw": 70, "neck_pitch": 35, "neck_roll": 25}
 _HOBBY_TILT_DEG = 22
 _UPPER_ENDS, _LOWER_ENDS = (-25, 20), (-8, 20)
 _MIRRORED = ("right_eye_tilt", *_UPPER[1:], *_LOWER[1:])
-"""Joints whose servo sits mirrored to its fellow on the left."""
+"""Joints whose servo is mounted mirrored to that on the left."""
 
 
 def rig_text(new: NewRig) -> str:
@@ -156,14 +156,14 @@ def usual_port(board: str) -> str:
 
 
 def joints_of(text: str) -> tuple[str, ...]:
-    """Return the joints that a mechanism's name or names with commas between them mean."""
+    """Return the joints of a mechanism's name, or of joint names separated by commas."""
     if text in MECHANISMS:
         return MECHANISMS[text].joints
     return tuple(name for word in text.split(",") if (name := word.strip()))
 
 
 def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
-    there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` shows it"
+    there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` lists it"
     yield f"# A head of {len(new.joints)} servos. All keys, with units and ranges: docs/parameters.md."
     yield f"name: {format_value(new.name)}"
     yield "profile: robot"
@@ -184,12 +184,12 @@ def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
     if "neck_yaw" not in new.joints:
         gaze.append(_NECKLESS_GAZE)
     if gaze:
-        yield "gaze:  # what differs from a head with a neck and fast servos"
+        yield "gaze:  # differences from a head with a neck and fast servos"
         yield from (f"  {line}" for line in gaze)
 
 
 def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
-    """Return the shut and open angles of the lids, and the pose before the torque goes off."""
+    """Return the shut and open angles of the lids, and the pose before torque is switched off."""
     lids = [name for name in joints if name in (*_UPPER, *_LOWER)]
     if lids:
         yield "lid_joints:  # deg, each lid shut and fully open"
@@ -238,7 +238,7 @@ def _lid_ends_deg(lid: str) -> tuple[int, int]:
 
 
 def _camera_lines(new: NewRig, camera: str) -> Iterator[str]:
-    """Return the place of the camera: on the head if a neck turns it, else next to it."""
+    """Return the mount of the camera: on the head if a neck turns it, otherwise next to it."""
     if CAMERAS[camera] == CAMERAS["none"]:
         return
     where = ("head", "[20, 0, 45]") if new.has_neck else ("base", "[10, 0, 140]")

@@ -1,10 +1,10 @@
-"""Every parameter of a rig: meaning, bounds, default, and when a change takes effect.
+"""Parameters of a rig: meaning, bounds, default, and the time at which a change takes effect.
 
-A key is the dotted path of the YAML. A rig is changed by keys as a file would change it:
-errors have the same texts, and nothing is changed then. Pure.
+A key is the dotted path of the YAML. Changes by keys are checked like those in a file: errors have
+the same texts, and after an error nothing is changed. Pure.
 
-A changed rig shares with the old one every section in which nothing changed, and only the others
-are checked and compared: a dragged slider makes ten rigs a second while the control loop runs.
+A changed rig shares the unchanged sections with the old one, and only the others are checked and
+compared: moving a slider creates ten rigs per second while the control loop runs.
 """
 
 import dataclasses
@@ -29,19 +29,19 @@ NEXT_START = "next start"
 
 _AT_OPENING = "the camera is opened with it"
 _MASSES = "the model of the head's weight is made with it"
-_CHOOSER = "what chooses whom to look at is made with it"
+_CHOOSER = "the chooser of gaze targets is created with it"
 _AT_START: dict[str, str] = {
     "name": "it only names the rig",
-    "profile": "its file is laid over the rig's when that is read",
+    "profile": "its file is merged over the rig's when the rig is read",
     "bus.*": "the servo bus is opened with it",
-    "joints.*.id": "the servos are looked for with it when the bus is opened",
-    "joints.*.model": "the servos are looked for with it when the bus is opened",
-    "joints.*.firmware_min": "the servos are looked for with it when the bus is opened",
-    "joints.*.bus": "the servos are looked for with it when the bus is opened",
-    "joints.*.transmission_points": "a push rod's places are taken over while its servo holds nothing",
-    "joints.*.servo_speed_deg_s": "the servos' places are estimated from it after the first goal",
+    "joints.*.id": "servos are searched with it when the bus is opened",
+    "joints.*.model": "servos are searched with it when the bus is opened",
+    "joints.*.firmware_min": "servos are searched with it when the bus is opened",
+    "joints.*.bus": "servos are searched with it when the bus is opened",
+    "joints.*.transmission_points": "positions of a push rod are applied while its servo has no torque",
+    "joints.*.servo_speed_deg_s": "positions of the servos are estimated with it from the first goal on",
     "gesture_files": "gestures are read and checked when the rig is read",
-    "couplings.*": "the servos' places are turned into angles with it from the first reading on",
+    "couplings.*": "positions of the servos are converted to angles with it from the first reading on",
     "mass.*": _MASSES,
     "joints.*.friction_nm": _MASSES,
     "joints.*.play_deg": _MASSES,
@@ -49,9 +49,9 @@ _AT_START: dict[str, str] = {
     "joints.*.spring_rest_deg": _MASSES,
     "meshes.*": "meshes are read when the rig is drawn for the first time",
     "buses.*": "the servo buses are opened with it",
-    "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
-    "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",
-    "camera.mount": "who looks at the frames must know from the first whether they turn",
+    "joints.*.gains": "servos are set up while their torque is off; a stop and a resume are sufficient",
+    "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume are sufficient",
+    "camera.mount": "detectors need the rotation of the frames from the first frame on",
     "camera.rotation": _AT_OPENING,
     "camera.mirrored": _AT_OPENING,
     "gaze.chooser": _CHOOSER,
@@ -62,9 +62,9 @@ _AT_START: dict[str, str] = {
 _SECTIONS = frozenset(field.name for field in dataclasses.fields(Rig))
 _GAZE = frozenset(field.name for field in dataclasses.fields(GazeConfig))
 _UNLISTED = ("park_deg", "face_parts_mm")
-"""Mappings whose entries a file may leave out."""
+"""Mappings with entries that a file may omit."""
 _LEFT_OUT: dict[str, Value] = {"park_deg": 0.0}
-"""What a left-out entry stands for; None where no value of its own does."""
+"""Value of an omitted entry; None if it has no value of its own."""
 
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
@@ -77,10 +77,11 @@ def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
 
 
 def value_of(rig: Rig, key: str) -> Value:
-    """Return the value at a dotted key; of a group, a mapping.
+    """Return the value at a dotted key; a mapping for a group.
 
     Raises:
-        gazerig.config.load.ConfigError: there is no such key; the message lists those that exist.
+        gazerig.config.load.ConfigError: the key does not exist; the message lists the existing
+            ones.
     """
     value: Any = rig
     for done, step in enumerate(steps := key.split(".")):
@@ -93,7 +94,7 @@ def value_of(rig: Rig, key: str) -> Value:
             return _LEFT_OUT.get(over)
         names = tuple(held or ())
         near = suggestion_text(step, names) or ";"
-        there = f"there is {', '.join(names)}" if names else f"{over} has no keys"
+        there = f"available: {', '.join(names)}" if names else f"{over} has no keys"
         raise ConfigError(
             [ConfigFault("", None, key, "", f"unknown key {abbreviate(step)}{near} {there}")]
         )
@@ -102,12 +103,12 @@ def value_of(rig: Rig, key: str) -> Value:
 
 
 def values(rig: Rig) -> dict[str, Value]:
-    """Return key -> value of every knob."""
+    """Return the values of all parameters by key."""
     return {key: value for key, _, value in _leaves(_root(rig), rig, (), _unlisted(rig))}
 
 
 def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[str, Value]:
-    """Return ``values(after)``; known: ``values(before)``, of which few will differ."""
+    """Return ``values(after)``; known: ``values(before)``, few of which differ."""
     found = differences(before, after)
     same_entries = all(
         list(getattr(before, over)) == list(getattr(after, over)) for over in _UNLISTED
@@ -119,26 +120,26 @@ def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[st
 
 
 def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
-    """Return the rig with other values at dotted keys, every rule checked.
+    """Return the rig with other values at dotted keys, after checking every rule.
 
-    A mapping is laid over what is there, as a file's layer is. None takes an entry out of a
-    mapping whose entries cannot be null.
+    A mapping is merged over the present one, like a layer of a file. None removes an entry of a
+    mapping that cannot contain null.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault, as in loading a file.
+        gazerig.config.load.ConfigError: lists every fault, as when a file is loaded.
     """
-    # Sections in which nothing changes go through the judge as they are, already checked.
+    # Unchanged sections are passed to the validation as they are, as they are checked already.
     data = _unfreeze_paths(rig, [tuple(key.split(".")) for key in changes])
     if not any([_put(_root(rig), data, key, _freeze(value)) for key, value in changes.items()]):
         into, problems = extend_type(Rig, data)
         made, _ = validate(into, data)
         if not problems and made is not None and not any(True for r in RULES for _ in r(made)):
             return made
-    # Something is wrong with it: every fault of every rule is named.
+    # It has a fault: list every fault of every rule.
     data, faults = to_plain(rig), []
     for key, value in changes.items():
         faults += _put(_root(rig), data, key, _freeze(value))
-    unnamed = Entry(None, "", 0)  # as if read from a file without a name
+    unnamed = Entry(None, "", 0)  # like an entry of a file without a name
     outcome = validate_entries(Rig, entries_at(data, unnamed), RULES)
     made, found = outcome
     faults += [dataclasses.replace(fault, line=None) for fault in found]
@@ -150,13 +151,13 @@ def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
 def differences(before: Rig, after: Rig) -> dict[str, Value]:
     """Return the changes that turn one rig into another: ``changed(before, ...) == after``.
 
-    An entry that a mapping lost has the value None.
+    A removed entry of a mapping has the value None.
     """
     return dict(_iterate_differences(_root(after), before, after, ()))
 
 
 def flatten_changes(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
-    """Return changes with mappings written out as their single keys, as a file holds them."""
+    """Return changes with mappings expanded to their single keys, as in a file."""
     out: dict[str, Value] = {}
     for key, value in changes.items():
         shape = shape_at(_root(rig), key.split("."))
@@ -190,7 +191,7 @@ def _parts(value: Any) -> dict[str, Any] | None:
 
 
 def _unfreeze_paths(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
-    """Return a value with plain dicts along the paths and at their ends, the rest as it is."""
+    """Return a value with plain dicts along the paths and at their ends; the rest is unchanged."""
     if () in paths:
         return to_plain(value)
     parts = _parts(value) if paths else None
@@ -202,12 +203,12 @@ def _unfreeze_paths(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
 
 
 def _root(rig: Rig) -> Shape:
-    """Return the shape of a rig, with the sections of plug-ins that it has."""
+    """Return the shape of a rig, with the sections of its plug-ins."""
     return Shape("params", params=type(rig))
 
 
 _Unlisted = Mapping[str, tuple[str, ...]]
-"""Key of a mapping -> the entries that it may have."""
+"""Key of a mapping -> its possible entries."""
 
 
 def _unlisted(rig: Rig) -> _Unlisted:
@@ -255,7 +256,7 @@ def _parameter(key: str, shape: Shape, default: Value) -> Parameter:
 
 @lru_cache(maxsize=1024)
 def effect_time(key: str) -> str:
-    """Return when a change of a key takes effect, and why no sooner."""
+    """Return when a change of a key takes effect, and the reason for a delay."""
     for pattern, reason in _AT_START.items():
         if fnmatchcase(key, pattern):
             return f"{NEXT_START}: {reason}"
@@ -268,13 +269,13 @@ def effect_time(key: str) -> str:
 
 
 def start_note(key: str) -> str:
-    """Return " (next start: ...)" with the reason if a running rig cannot take a key, else ""."""
+    """Return " (next start: ...)" if a running rig cannot apply a key, with the reason; else ""."""
     when = effect_time(key)
     return f" ({when})" if when.startswith(NEXT_START) else ""
 
 
 def _at(rig: Rig, key: str) -> Value:
-    """Return the value at a key, None where this rig has no such entry."""
+    """Return the value at a key, None if this rig has no such entry."""
     try:
         return value_of(rig, key)
     except ConfigError:
@@ -291,7 +292,7 @@ def _iterate_differences(
             if hasattr(before, name):
                 both = getattr(before, name), getattr(after, name)
                 yield from _iterate_differences(field, *both, (*path, name))
-            else:  # the section of a plug-in that was not there before
+            else:  # the section of a new plug-in
                 yield ".".join((*path, name)), to_plain(getattr(after, name))
     elif before == after and type(before) is type(after):
         return

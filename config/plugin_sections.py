@@ -1,8 +1,8 @@
-"""The sections that plug-ins bring: the type of a rig that names some of them.
+"""Sections of plug-ins, and the type of a rig that uses some of them.
 
-A rig file that uses another package's bus, camera, detector or rule of attention has a section of
-that part's name, checked like ours. Its type is ``Rig`` with these sections added; a rig that
-names none is a plain ``Rig``, for which nothing is looked up.
+A rig file that uses another package's bus, camera, detector or attention rule has a section with
+that part's name, which is checked like ours. Its type is ``Rig`` with these sections added. A rig
+without such parts is a plain ``Rig``, for which nothing is looked up.
 """
 
 import dataclasses
@@ -43,7 +43,7 @@ _PARTS: dict[str, Any] = {
 
 
 class NamedPlugins(NamedTuple):
-    """The parts of packages that a rig names, by group."""
+    """Parts of other packages that a rig uses, by group."""
 
     bus: tuple[str, ...] = ()
     detector: tuple[str, ...] = ()
@@ -55,18 +55,18 @@ NONE = NamedPlugins()
 
 
 class Problem(NamedTuple):
-    """A part that cannot be used: dotted key and rule."""
+    """A part that cannot be used: dotted key, and the reason."""
 
     key: str
     rule: str
 
 
 def extend_type(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
-    """Return the type that a rig's data need, and what keeps parts from being used.
+    """Return the type for a rig's data, and the problems of parts that cannot be used.
 
     Args:
-        into: ``Rig``; any other type is returned as it is.
-        data: plain values, or values of which some are checked already.
+        into: ``Rig``; any other type is returned unchanged.
+        data: plain values, some of which may be checked already.
     """
     if not issubclass(into, Rig):
         return into, ()
@@ -78,7 +78,7 @@ def extend_type(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]
         try:
             _section(group, name)
         except PluginError as error:
-            # A name that no package registers breaks its key's rule, which lists the known ones.
+            # A name that no package registers violates its key's rule, which lists the known names.
             if any(one.name == name for one in registrations(group)):
                 problems.append(Problem(key, str(error)))
             elif group != CAMERA:
@@ -92,7 +92,7 @@ def extend_type(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]
 
 
 def _named_plugins(data: Any) -> Iterable[tuple[str, str, str]]:
-    """Return group, key and name of what a rig names."""
+    """Return group, key and name of each part that a rig uses."""
     buses = _at(data, "buses")
     chosen = [
         (BUS, "bus.kind", _at(data, "bus", "kind")),
@@ -117,7 +117,7 @@ def _at(value: Any, *path: str) -> Any:
 
 @cache
 def rig_type(named: NamedPlugins) -> type[Rig]:
-    """Return the type of a rig with the sections of some parts; an empty name: only the choices.
+    """Return the type of a rig with sections of some parts; for an empty name, only the choices.
 
     Raises:
         PluginError: a part cannot be used.
@@ -164,9 +164,9 @@ def _section(group: str, name: str) -> tuple[str, Any, Any]:
     label = find(group, name).label
     part = load(group, name, _PARTS[group])
     if not _NAME.fullmatch(name):
-        raise PluginError(f"{label} needs another name: small letters, digits and _")
+        raise PluginError(f"{label} needs another name: lower-case letters, digits and _")
     if not (isinstance(part.params, type) and dataclasses.is_dataclass(part.params)):
-        raise PluginError(f"{label}: params is no dataclass")
+        raise PluginError(f"{label}: params is not a dataclass")
     if isinstance(part, BusPlugin):
         if "baud" not in {field.name for field in dataclasses.fields(part.params)}:
             raise PluginError(f"{label}: its params need a field baud")
@@ -178,7 +178,7 @@ def _section(group: str, name: str) -> tuple[str, Any, Any]:
 def _default(params: type) -> Any:
     try:
         params()
-    except TypeError:  # something in it has no default
+    except TypeError:  # a field of it has no default
         return dataclasses.field(kw_only=True)
     return dataclasses.field(default_factory=params, kw_only=True)
 
@@ -194,7 +194,7 @@ def _create_type(
 ) -> type[T]:
     """Return a dataclass with more fields; its values can be sent to another process.
 
-    source: the function of this module that makes it, and its arguments
+    source: the function of this module that creates it, and its arguments
     """
     make, *given = source
 

@@ -45,7 +45,7 @@ from gazerig.robot.model.types import order_joints
 
 @dataclass(frozen=True)
 class Ranges:
-    """Ranges a style of gaze keeps to, inside those of the rig's joints."""
+    """Ranges of a style of gaze, within those of the rig's joints."""
 
     eye_yaw_deg: Annotated[
         float, Bounds(1, 90), "largest eye rotation to the left and to the right"
@@ -76,7 +76,7 @@ class BusConfig:
 
     @property
     def baud(self) -> int:
-        """Return the speed of its line in bit/s."""
+        """Return the baud rate of its line, bit/s."""
         return int(self.section.baud)
 
 
@@ -106,12 +106,12 @@ class LidJoints:
         for name in LIDS:
             shut, wide = self.ends_deg(name)
             if (shut is None) != (wide is None):
-                raise ValueError(f"of the {name.replace('_', ' ')} one end is missing; give both")
+                raise ValueError(f"one end of the {name.replace('_', ' ')} is missing; give both")
             if shut is not None and shut == wide:
                 raise ValueError("a lid's shut and open angles must differ")
 
     def ends_deg(self, name: str) -> tuple[float | None, float | None]:
-        """Return the angles of the lid of a joint shut and open, None where they are not given."""
+        """Return the angles of a joint's lid, shut and open; None if they are not given."""
         shut, wide = (getattr(self, key) for key in self.keys(name))
         return shut, wide
 
@@ -128,22 +128,22 @@ class GazeConfig:
     """The gaze models."""
 
     # fmt: off
-    field_of_view: Annotated[FieldOfViewParams, "what an eye can see"] = field(default_factory=FieldOfViewParams)
-    bottom_up: Annotated[BottomUpParams, "how motion pulls"] = field(default_factory=BottomUpParams)
-    top_down: Annotated[TopDownParams, "what a behaviour looks at"] = field(default_factory=TopDownParams)
-    chooser: Annotated[str, Choices("attention"), "what chooses whom to look at: attention, or the rule of a package"] = "attention"
+    field_of_view: Annotated[FieldOfViewParams, "visual field of an eye"] = field(default_factory=FieldOfViewParams)
+    bottom_up: Annotated[BottomUpParams, "bottom-up attention by motion"] = field(default_factory=BottomUpParams)
+    top_down: Annotated[TopDownParams, "gaze target of each behaviour"] = field(default_factory=TopDownParams)
+    chooser: Annotated[str, Choices("attention"), "selection of the gaze target: attention, or the rule of a package"] = "attention"
     attention: Annotated[AttentionParams, "who wins"] = field(default_factory=AttentionParams)
-    idle: Annotated[IdleParams, "when nothing is there"] = field(default_factory=IdleParams)
-    aversion: Annotated[AversionParams, "looking away while talking"] = field(default_factory=AversionParams)
-    scanpath: Annotated[ScanpathParams, "the walk over a face"] = field(default_factory=ScanpathParams)
-    saccade: Annotated[SaccadeParams, "how the eyes jump"] = field(default_factory=SaccadeParams)
-    pursuit: Annotated[PursuitParams, "how the eyes follow"] = field(default_factory=PursuitParams)
-    head: Annotated[HeadParams, "how the head joins"] = field(default_factory=HeadParams)
-    breathing: Annotated[BreathingParams, "the head's slow sway"] = field(default_factory=BreathingParams)
-    sway: Annotated[SwayParams, "the head's random sway"] = field(default_factory=SwayParams)
+    idle: Annotated[IdleParams, "idle gaze without a target"] = field(default_factory=IdleParams)
+    aversion: Annotated[AversionParams, "gaze aversion during conversation"] = field(default_factory=AversionParams)
+    scanpath: Annotated[ScanpathParams, "scanpath over a face"] = field(default_factory=ScanpathParams)
+    saccade: Annotated[SaccadeParams, "saccades of the eyes"] = field(default_factory=SaccadeParams)
+    pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = field(default_factory=PursuitParams)
+    head: Annotated[HeadParams, "head movements in gaze shifts"] = field(default_factory=HeadParams)
+    breathing: Annotated[BreathingParams, "breathing of the head"] = field(default_factory=BreathingParams)
+    sway: Annotated[SwayParams, "random sway of the head"] = field(default_factory=SwayParams)
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
-    gestures: Annotated[GestureParams, "gestures laid over gaze"] = field(default_factory=GestureParams)
-    oculomotor: Annotated[OculomotorParams, "how it all fits together"] = field(default_factory=OculomotorParams)
+    gestures: Annotated[GestureParams, "gestures added to the gaze"] = field(default_factory=GestureParams)
+    oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = field(default_factory=OculomotorParams)
     # fmt: on
 
 
@@ -154,58 +154,58 @@ class Rig:
     # fmt: off
     name: Annotated[str, "name of the rig"]
     profile: Annotated[str, "name of a shipped profile or path of a YAML file"]
-    ranges: Annotated[Ranges, "how far eyes and head go; the profile says"]
+    ranges: Annotated[Ranges, "ranges of eyes and head; null: those of the profile"]
     bus: Annotated[BusConfig, "servo bus"]
     buses: Annotated[Mapping[str, BusConfig],
-        "further servo buses by name, for joints whose bus is that name"] = field(default_factory=dict, kw_only=True)
-    geometry: Annotated[GeometryParams, "measures of the head"]
-    joints: Annotated[Mapping[str, JointParams], "one entry a joint"]
-    lid_joints: Annotated[LidJoints, "lid angles, of a rig that has lids"] = field(default_factory=LidJoints)
+        "further servo buses by name; a joint selects its bus by this name"] = field(default_factory=dict, kw_only=True)
+    geometry: Annotated[GeometryParams, "dimensions of the head"]
+    joints: Annotated[Mapping[str, JointParams], "one entry per joint"]
+    lid_joints: Annotated[LidJoints, "lid angles of a rig with lids"] = field(default_factory=LidJoints)
     couplings: Annotated[Mapping[str, CouplingParams],
-        "pairs of joints that two servos move together, each under any name"] = field(default_factory=dict, kw_only=True)
+        "pairs of joints that two servos move together, each pair under any name"] = field(default_factory=dict, kw_only=True)
     meshes: Annotated[Mapping[str, MeshParams],
-        "mesh files shown instead of what the program makes, by the name of the link"] = field(default_factory=dict, kw_only=True)
+        "mesh files that replace the generated shapes, by the name of the link"] = field(default_factory=dict, kw_only=True)
     mass: Annotated[MassParams, "masses and their balance"] = field(default_factory=MassParams, kw_only=True)
     park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
-        "pose to which the joints move before torque is switched off; joints left out go to 0"] = field(default_factory=dict)
-    camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)
-    webcam: Annotated[WebcamParams, "what is asked of a webcam"] = field(default_factory=WebcamParams)
-    oak: Annotated[OakParams, "what is asked of an OAK-D"] = field(default_factory=OakParams)
-    camera_recovery: Annotated[CameraRecoveryParams, "a camera that went away"] = field(default_factory=CameraRecoveryParams)
-    motion: Annotated[MotionParams, "how moving things are found"] = field(default_factory=MotionParams)
-    detector: Annotated[FaceDetectorParams, "how faces are found"] = field(default_factory=FaceDetectorParams)
+        "pose to which the joints move before torque is switched off; omitted joints go to 0"] = field(default_factory=dict)
+    camera: Annotated[CameraParams, "mount of the camera"] = field(default_factory=CameraParams)
+    webcam: Annotated[WebcamParams, "settings requested from a webcam"] = field(default_factory=WebcamParams)
+    oak: Annotated[OakParams, "settings requested from an OAK-D"] = field(default_factory=OakParams)
+    camera_recovery: Annotated[CameraRecoveryParams, "recovery of a lost camera"] = field(default_factory=CameraRecoveryParams)
+    motion: Annotated[MotionParams, "detection of moving things"] = field(default_factory=MotionParams)
+    detector: Annotated[FaceDetectorParams, "detection of faces"] = field(default_factory=FaceDetectorParams)
     face_parts_mm: Annotated[Mapping[str, tuple[float, float, float]], Bounds(-300, 300),
         "measured positions of one person's face parts (DN FL LE M N FR RE UP) relative to the nose tip: "
-        "out of the face, to that person's left, up; parts left out use an average adult's"] = field(default_factory=dict)
-    tracks: Annotated[TrackParams, "how identities are kept"] = field(default_factory=TrackParams)
+        "out of the face, to that person's left, up; omitted parts have an average adult's position"] = field(default_factory=dict)
+    tracks: Annotated[TrackParams, "tracking of identities"] = field(default_factory=TrackParams)
     loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
-    gesture_files: Annotated[tuple[str, ...], "YAML files with further gestures, relative to this file; named as the gestures"] = ()
+    gesture_files: Annotated[tuple[str, ...], "YAML files with further gestures, relative to this file; file names are gesture names"] = ()
     expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
-        "facial expressions: name -> joint -> angle added to it; of a lid, of the open lid"] = field(default_factory=dict)
+        "facial expressions: name -> joint -> angle added to it; for a lid, to the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
     levels: Annotated[Mapping[str, LevelParams],
-        "values 0..1 that a program sets many times a second, such as a jaw by loudness"] = field(default_factory=dict)
+        "values 0..1 that a program sets many times per second, such as a jaw's opening from loudness"] = field(default_factory=dict)
     # fmt: on
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the names of the joints, in the order of every sequence of them."""
+        """Return the names of the joints, in the common order of all sequences."""
         return order_joints(self.joints)
 
     def bus_named(self, name: str) -> BusConfig:
-        """Return a bus by its name, "" for the one without.
+        """Return a bus by its name; "" is the unnamed one.
 
         Raises:
-            KeyError: there is no such bus.
+            KeyError: the bus does not exist.
         """
         return self.buses[name] if name else self.bus
 
     def bus_of(self, joint: str) -> BusConfig:
-        """Return the bus that a joint's servo is on.
+        """Return the bus of a joint's servo.
 
         Raises:
-            KeyError: there is no such joint, or no such bus.
+            KeyError: the joint or the bus does not exist.
         """
         return self.bus_named(self.joints[joint].bus)

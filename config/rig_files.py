@@ -1,7 +1,7 @@
-"""The files of a running rig: read together, and written only if they can be loaded again.
+"""Files of a running rig: read together, and written only if they can be loaded again.
 
-A file is written from the text that was last read without a fault: a rig's file that was broken
-by hand meanwhile is kept as a backup, and is never the base of a new file.
+A file is written from its last text without a fault. A rig's file that a user has made invalid
+meanwhile is kept as a backup, and is never the base of a new file.
 """
 
 import os
@@ -22,7 +22,7 @@ _LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 
 
 class RigLayers(NamedTuple):
-    """The requested files of a rig, each a shipped name or a path."""
+    """Requested files of a rig, each a shipped name or a path."""
 
     name: str
     character: str | None
@@ -30,18 +30,18 @@ class RigLayers(NamedTuple):
 
 
 class RigFiles(NamedTuple):
-    """The files of a rig, its own first, and what they held when they were read."""
+    """Files of a rig, its own first, and their contents when they were read."""
 
     paths: tuple[Path, ...]
     texts: tuple[bytes, ...]
 
     @property
     def own_text(self) -> bytes:
-        """The text of the rig's own file."""
+        """Text of the rig's own file."""
         return self.texts[0] if self.texts else b""
 
     def has_changed(self) -> bool:
-        """Whether any of them holds something else now, or cannot be read."""
+        """Whether the content of any of them has changed, or cannot be read."""
         try:
             return tuple(read_limited(path, _LARGEST) for path in self.paths) != self.texts
         except OSError:
@@ -49,7 +49,7 @@ class RigFiles(NamedTuple):
 
 
 def read_all(layers: RigLayers) -> tuple[Rig, RigFiles]:
-    """Return a rig with the files that it is made of.
+    """Return a rig and its files.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.schema.load_rig.
@@ -62,17 +62,16 @@ def read_all(layers: RigLayers) -> tuple[Rig, RigFiles]:
 def save_over(
     layers: RigLayers, good: bytes, wanted: Mapping[str, Any], now: datetime
 ) -> tuple[SavedFile, RigFiles]:
-    """Write values into a rig's file; each must hold with character and profile laid over it.
+    """Write values into a rig's file; character and profile must not override any of them.
 
     Args:
-        layers: The rig's file, and what is laid over it.
-        good: The file's text as it was last read without a fault; written in the place of one
-            that has faults now.
+        layers: The rig's file, and the files merged over it.
+        good: Last text of the file without a fault; it replaces a text that has faults now.
         wanted: Values by dotted key.
-        now: Goes into the backup's name.
+        now: Time for the backup's name.
 
     Returns:
-        The written file, and the files that the rig is now made of.
+        The written file, and the present files of the rig.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.save.save.
@@ -89,10 +88,10 @@ def save_over(
 
 
 def refuse_copy(to: str) -> None:
-    """Check that a rig can be copied to a path; nothing is opened.
+    """Check that a rig can be copied to a path, without opening anything.
 
     Raises:
-        gazerig.config.load.ConfigError: the path is taken, or is no YAML file.
+        gazerig.config.load.ConfigError: the path exists, or is not that of a YAML file.
     """
     rule = ""
     if os.path.isdir(to):
@@ -100,7 +99,7 @@ def refuse_copy(to: str) -> None:
     elif os.path.exists(to) and not os.path.isfile(to):
         rule = f"is {kind_of(os.stat(to))}; name a new .yaml file"
     elif not to.endswith((".yaml", ".yml")):
-        rule = "a rig's file ends in .yaml; name it so"
+        rule = "a rig's file ends in .yaml; rename it"
     elif os.path.lexists(to):
         rule = "already exists and is not overwritten; choose another name"
     if rule:
@@ -110,13 +109,13 @@ def refuse_copy(to: str) -> None:
 def save_copy(
     layers: RigLayers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
 ) -> tuple[SavedFile, RigFiles]:
-    """Write values into a new copy of a rig's file, which is not there if that fails.
+    """Write values into a new copy of a rig's file; after a failure the copy does not exist.
 
     Returns:
         What ``save_over`` returns.
 
     Raises:
-        gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is no
+        gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is not a
             YAML file.
     """
     refuse_copy(to)
@@ -137,7 +136,7 @@ def save_copy(
         raise ConfigError(
             f
             if f.file != to
-            else ConfigFault(source, f.line, f.key, f.value, f"{f.rule}; no {to} made")
+            else ConfigFault(source, f.line, f.key, f.value, f"{f.rule}; {to} was not created")
             for f in error.faults
         ) from None
 

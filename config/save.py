@@ -1,7 +1,7 @@
-"""Writing values into a user's YAML file, in one step and with a backup.
+"""Writing values into a user's YAML file, atomically and with a backup.
 
-The new text is checked as a file of its own before it takes the old one's place, in one
-step; the old file stays in the folder under a name with the time.
+The new text is checked as a separate file before it atomically replaces the old one. The old file
+stays in the folder; its name then contains the time.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ Check = Callable[[str], Any]
 def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> SavedFile:
     """Write values into a rig file: ``save_rig("my.yaml", {"loop.rate_hz": 100.0}, now)``.
 
-    path: the file; the name of a shipped rig is understood too, to be refused with the remedy
+    path: the file; the name of a shipped rig is refused with the remedy
 
     Raises:
         gazerig.config.load.ConfigError: see ``save``.
@@ -40,7 +40,7 @@ def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> S
 
 
 def rig_file(name_or_path: Path | str) -> Path:
-    """Return the file behind a rig's name or path, as ``gazerig.config.schema.load_rig`` takes it.
+    """Return the file for a rig's name or path, as in ``gazerig.config.schema.load_rig``.
 
     Raises:
         gazerig.config.load.ConfigError: no rig of that name is shipped.
@@ -59,20 +59,20 @@ def save(
     into: type,
     base: bytes | None = None,
 ) -> SavedFile:
-    """Write values at dotted key paths into a YAML file and keep the old file as a backup.
+    """Write values at dotted key paths into a YAML file, and keep the old file as a backup.
 
-    Keys that are not there are added with a comment. Comments, order, style and anchors stay. The
-    file is replaced only after ``check`` has loaded the new one and found every
-    value in it; on any error the file is as it was.
+    Missing keys are added with a comment. Comments, order, style and anchors are unchanged. The
+    file is replaced only after ``check`` has loaded the new one with every value. After any error
+    the file is unchanged.
 
-    now: goes into the backup's name, ``rig.yaml.bak-20260131-235959``
-    check: loads a file by path, as ``gazerig.config.schema.load_rig`` does
-    into: the Params dataclass of the file, whose fields explain added keys
-    base: text to write the values into, in the place of a file that has faults or is gone
+    now: time for the backup's name, ``rig.yaml.bak-20260131-235959``
+    check: loads a file by its path, like ``gazerig.config.schema.load_rig``
+    into: the Params dataclass of the file, whose fields describe added keys
+    base: text for the values instead of that of a file that has faults or does not exist
 
     Raises:
-        gazerig.config.load.ConfigError: the file is shipped, unreadable or not writable, a value
-            is refused, or another layer overrides it.
+        gazerig.config.load.ConfigError: the file is shipped, unreadable or not writable, a value is
+            rejected, or another layer overrides it.
     """
     target = Path(os.path.realpath(path))
     # An update of the package would overwrite a file inside it.
@@ -80,8 +80,8 @@ def save(
     if package in target.parents:
         raise _fault(
             target,
-            "comes with the program and is never changed: copy it "
-            f"(cp {target} my{target.name}) and name the copy",
+            "is part of the program and is never changed: copy it "
+            f"(cp {target} my{target.name}) and use the copy",
         )
     before, text, found = _proposal(target, changes, into, base)
     if text == before:
@@ -102,7 +102,7 @@ def save(
             if held is not _ABSENT and held != value:
                 raise _fault(
                     target,
-                    f"{key} stays {held} whatever this file says: a later layer sets it",
+                    f"{key} stays {held} with any value in this file: a later layer sets it",
                     key,
                 )
         if _read_content(target) != before:
@@ -117,7 +117,7 @@ def save(
 def propose(
     path: Path | str, changes: Mapping[str, Value], into: type = Rig
 ) -> tuple[ParamChange, ...]:
-    """Return what ``save`` would change; nothing is written.
+    """Return the changes that ``save`` would make, without writing.
 
     Raises:
         gazerig.config.load.ConfigError: the file cannot be read, or a value cannot be written.
@@ -126,10 +126,10 @@ def propose(
 
 
 def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
-    """Copy a file that comes with the package, to be changed; never over another file.
+    """Copy a shipped file for editing; never overwrite a file.
 
     Raises:
-        gazerig.config.load.ConfigError: none of that name is shipped, or ``to`` exists or cannot
+        gazerig.config.load.ConfigError: no shipped file has this name, or ``to`` exists or cannot
             be written.
     """
     source, target = shipped_path(kind, name), Path(to)
@@ -144,7 +144,7 @@ def _proposal(
     """Return the file's text (None without a file), its new text, and the difference."""
     known = tuple(shapes_of(into))
     if base is None:
-        before = read_yaml(target, known)  # refuses what is no YAML, with the line
+        before = read_yaml(target, known)  # rejects a file that is not YAML, with the line
         base = target.read_bytes()
         raw: bytes | None = base
     else:
@@ -152,14 +152,14 @@ def _proposal(
     mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
     try:
         text = edit_text(before.text, changes, into)
-        # An anchor lends its value to other places, which must not change unseen.
+        # Aliases of an anchor would change unnoticed.
         kept, fresh = _leaves(before.data), _leaves(_document(text.encode()).data)
         for key in sorted({*kept, *fresh}):
             requested = key in changes or any(c.startswith(f"{key}.") for c in changes)
             if not requested and kept.get(key, _ABSENT) != fresh.get(key, _ABSENT):
                 raise EditRefused(
-                    f"{key} would change as well, as an anchor (&) ties it to "
-                    f"{', '.join(changes)}; write its value out first"
+                    f"{key} would also change, because an anchor (&) connects it to "
+                    f"{', '.join(changes)}; write its value in full first"
                 )
     except EditRefused as error:
         raise _fault(target, str(error)) from None
@@ -184,7 +184,7 @@ def _read_content(target: Path) -> bytes | None:
 
 
 def _document(text: bytes) -> Document:
-    """Return a text read as a file of its own."""
+    """Return a text parsed as a separate file."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "new.yaml"
         file.write_bytes(text)
@@ -207,7 +207,7 @@ def _value_at(value: Any, key: str) -> Any:
 
 
 def _leaves(value: Any, path: str = "") -> dict[str, Any]:
-    """Return all that is not a mapping, or an empty one, by dotted path."""
+    """Return all values except non-empty mappings by dotted path."""
     if not isinstance(value, dict) or not value:
         return {path: value}
     found: dict[str, Any] = {}
@@ -218,7 +218,7 @@ def _leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _replacement_file(target: Path, text: bytes) -> Iterator[Path]:
-    """Write a new file in the same folder, gone again unless it has taken the target's place."""
+    """Write a new file in the same folder, which is deleted unless it has replaced the target."""
     handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".yaml", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -228,7 +228,7 @@ def _replacement_file(target: Path, text: bytes) -> Iterator[Path]:
         if target.exists() and not (
             os.access(target, os.W_OK) and target.stat().st_mode & _ANY_WRITE
         ):
-            raise PermissionError(None, "it is read-only; chmod u+w gives the right to write")
+            raise PermissionError(None, "it is read-only; allow writing with chmod u+w")
         yield Path(name)
     finally:
         with contextlib.suppress(FileNotFoundError):
@@ -236,7 +236,7 @@ def _replacement_file(target: Path, text: bytes) -> Iterator[Path]:
 
 
 def _backup(target: Path, before: bytes, now: datetime) -> Path:
-    """Keep the old file under a new name and return that."""
+    """Keep the old file under a new name and return that name."""
     stem = f"{target}.bak-{now:%Y%m%d-%H%M%S}"
     for number in range(1, 100):
         path = Path(stem if number == 1 else f"{stem}-{number}")
@@ -244,12 +244,12 @@ def _backup(target: Path, before: bytes, now: datetime) -> Path:
             with path.open("xb") as file:
                 file.write(before)
             return path
-    raise _fault(target, f"has 99 backups of this second ({stem} ...); clear some away")
+    raise _fault(target, f"has 99 backups of this second ({stem} ...); delete some")
 
 
 @contextlib.contextmanager
 def _convert_os_errors(target: Path) -> Iterator[None]:
-    """Turn errors of the file system into a ConfigError of one line."""
+    """Convert errors of the file system to a ConfigError of one line."""
     try:
         yield
     except FileExistsError:

@@ -1,7 +1,7 @@
-"""Changing values inside YAML text; every other byte stays as it is.
+"""Changes of values inside YAML text; every other byte stays unchanged.
 
-The text is parsed only to find the place of each value. Comments, order, indentation,
-quotes, anchors and line ends survive because they are not rewritten.
+The text is parsed only to find the position of each value. Comments, order, indentation, quotes,
+anchors and line ends survive because they are not rewritten.
 """
 
 import json
@@ -32,11 +32,11 @@ _NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 
 
 class EditRefused(ValueError):
-    """A value cannot be changed in place; the message has its key, the reason and the remedy."""
+    """A value cannot be changed in place; the message contains key, reason and remedy."""
 
 
 class _Edit(NamedTuple):
-    """Text that takes the place of ``text[start:end]``."""
+    """Text that replaces ``text[start:end]``."""
 
     start: int
     end: int
@@ -44,9 +44,9 @@ class _Edit(NamedTuple):
 
 
 def edit_text(text: str, changes: Mapping[str, Value], into: type) -> str:
-    """Return the text with the values at dotted key paths replaced, missing keys added.
+    """Return the text with replaced values at dotted key paths and with added missing keys.
 
-    into: the Params dataclass of the file; its fields' descriptions explain keys that are added
+    into: the Params dataclass of the file; descriptions of its fields become comments of added keys
 
     Raises:
         EditRefused: a value cannot be written at its place.
@@ -62,7 +62,7 @@ def edit_text(text: str, changes: Mapping[str, Value], into: type) -> str:
     for edit in sorted(edits, reverse=True):
         text = text[: edit.start] + edit.new + text[edit.end :]
     for key, value in absent.items():
-        # One after the other: the first may make the mapping that the next one needs.
+        # One after the other: the first may create the mapping that the next one needs.
         edit = _add_key(text, _top_node(text), key, value, into)
         text = text[: edit.start] + edit.new + text[edit.end :]
     return text
@@ -72,7 +72,7 @@ def format_value(value: Value) -> str:
     """Return a value as YAML on one line.
 
     Raises:
-        EditRefused: not finite, or no scalar or list.
+        EditRefused: it is not finite, or neither a scalar nor a list.
     """
     if value is None:
         return "null"
@@ -90,14 +90,16 @@ def format_value(value: Value) -> str:
     try:
         return str(operator.index(value))
     except TypeError:
-        raise EditRefused(f"{value!r} is no number, text, truth value or list of those") from None
+        raise EditRefused(
+            f"{value!r} is not a number, text, truth value or list of those"
+        ) from None
 
 
 def _top_node(text: str) -> MappingNode:
-    """Return the top node of the text; nodes hold their places and are not changed."""
+    """Return the top node of the text; nodes have positions and are not changed."""
     node = compose_yaml(text)
     if not isinstance(node, MappingNode):
-        raise EditRefused("the top level is no mapping; write 'key: value' lines")
+        raise EditRefused("the top level is not a mapping; write 'key: value' lines")
     return node
 
 
@@ -105,7 +107,7 @@ def _top_node(text: str) -> MappingNode:
 
 
 class _KeyAndValue(NamedTuple):
-    """A value with the node before it (a key, or the list itself)."""
+    """A value with the node before it (its key, or the list)."""
 
     before: Node
     node: Node
@@ -130,12 +132,12 @@ def _span(text: str, place: _KeyAndValue) -> tuple[int, int]:
     """Return the span of a value: after its anchor and tag; an alias is the whole value."""
     before, node = place
     at = before.start_mark.index if isinstance(before, SequenceNode) else before.end_mark.index
-    if node.start_mark.index < at:  # the value itself is at its anchor, further up
+    if node.start_mark.index < at:  # the value is defined at its anchor, further up
         alias = _ALIAS.match(text, at)
         if alias is None:
-            raise EditRefused("stands behind an alias that cannot be followed; write it out")
+            raise EditRefused("is part of an alias that cannot be resolved; write it in full")
         return alias.span(1)
-    if node.start_mark.index == node.end_mark.index:  # nothing but "key:"
+    if node.start_mark.index == node.end_mark.index:  # only "key:"
         colon = text.index(":", at) + 1
         return colon, colon
     anchor = _ANCHOR.match(text, node.start_mark.index)
@@ -144,7 +146,7 @@ def _span(text: str, place: _KeyAndValue) -> tuple[int, int]:
 
 
 def _end(text: str, place: _KeyAndValue) -> int:
-    """Return the place of a value's last character, without comments after it."""
+    """Return the position of a value's last character, without comments after it."""
     node = place.node
     inside = isinstance(node, MappingNode | SequenceNode) and not node.flow_style
     if not inside or node.start_mark.index < place.before.start_mark.index:
@@ -186,7 +188,7 @@ def _add_key(text: str, root: MappingNode, key: str, value: Value, into: type) -
     depth = next(n for n in range(len(steps) - 1, -1, -1) if _find(root, steps[:n]) is not None)
     holder = _find(root, steps[:depth])
     if holder is None or holder.node.start_mark.index < holder.before.start_mark.index:
-        raise EditRefused(f"{key}: its mapping is an alias (*); write it out first")
+        raise EditRefused(f"{key}: its mapping is an alias (*); write it in full first")
     node, newline = holder.node, "\r\n" if "\r\n" in text else "\n"
     if isinstance(node, MappingNode) and node.flow_style:
         new = (
@@ -202,7 +204,7 @@ def _add_key(text: str, root: MappingNode, key: str, value: Value, into: type) -
     elif isinstance(node, ScalarNode) and node.start_mark.index == node.end_mark.index:
         at, indent = _span(text, holder)[1], holder.before.start_mark.column + 2
     else:
-        raise EditRefused(f"{key}: {'.'.join(steps[:depth])} is no mapping; make it one")
+        raise EditRefused(f"{key}: {'.'.join(steps[:depth])} is not a mapping; change it to one")
     end = text.find("\n", at)
     end = len(text) if end < 0 else end
     at = end - 1 if end > at and text[end - 1] == "\r" else end
@@ -214,7 +216,7 @@ def _add_key(text: str, root: MappingNode, key: str, value: Value, into: type) -
 
 
 def _add_comment(body: str, description: str, indent: str) -> list[str]:
-    """Return a line with a comment behind it, or above it if it is too long."""
+    """Return a line with a trailing comment, or with one above it if it is too long."""
     line = f"{indent}{body}"
     if not description:
         return [line]
@@ -239,37 +241,37 @@ def comment(into: type, steps: list[str]) -> str:
 
 
 def params_text(params: Any) -> str:
-    """Return a dataclass of parameters as YAML: a world's script, or all in force of a rig.
+    """Return a dataclass of parameters as YAML: a world's script, or those of a rig.
 
-    It is read back with ``gazerig.config.load.load``; values come back exactly.
+    ``gazerig.config.load.load`` reads exactly the same values.
     """
     return "".join(_lines(to_plain(params)))
 
 
 def walk_text(name_or_path: str) -> str:
-    """Return the face walk that a rig names as YAML.
+    """Return the face walk of a rig as YAML.
 
     Raises:
-        gazerig.config.load.ConfigError: the walk is at fault.
+        gazerig.config.load.ConfigError: the walk has a fault.
     """
     return "".join(_lines(to_plain(load_walk(name_or_path))))
 
 
 def gestures_text(files: Sequence[str]) -> str:
-    """Return the gestures that a rig names itself as one YAML text, "" if it names none.
+    """Return the rig's own gestures as one YAML text, "" without any.
 
     Raises:
-        gazerig.config.load.ConfigError: one is at fault.
+        gazerig.config.load.ConfigError: one has a fault.
     """
     found = {gesture_name(file): load_gesture(gesture_path(file)) for file in files}
     return "".join(_lines(to_plain(GestureSet(found)))) if found else ""
 
 
 def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
-    """Write each gesture of a text of ``gestures_text`` to a file of its own; return the files.
+    """Write each gesture of a text from ``gestures_text`` to a separate file; return the files.
 
     Raises:
-        gazerig.config.load.ConfigError: the text is at fault.
+        gazerig.config.load.ConfigError: the text has a fault.
     """
     files = []
     for name, gesture in load(text, GestureSet).gestures.items():
@@ -280,7 +282,7 @@ def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
 
 
 def changes_text(changes: Mapping[str, Any]) -> str:
-    """Return values at dotted keys as the YAML of a layer: a character's, for example."""
+    """Return values at dotted keys as the YAML of a layer, for example a character."""
     nested: dict[str, Any] = {}
     for key, value in changes.items():
         *over, last = key.split(".")
@@ -292,7 +294,7 @@ def changes_text(changes: Mapping[str, Any]) -> str:
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
-    """Return mappings as YAML, one key a line."""
+    """Return mappings as YAML, one key per line."""
     for key, value in values.items():
         start = f"{'  ' * depth}{format_value(key)}:"
         if isinstance(value, dict) and value:

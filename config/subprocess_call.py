@@ -1,8 +1,8 @@
 """Function calls in another process: rig files are read and written while a control loop runs.
 
-Reading a rig takes 130 ms of pure Python. In another thread of the loop's process that made
-ticks last up to 90 ms instead of 1, as every answer of a servo was waited for behind the
-interpreter lock; in another process it costs the loop nothing that could be measured.
+Reading a rig takes 130 ms of pure Python. In another thread of the loop's process, ticks then took
+up to 90 ms instead of 1 ms, because the loop waited for the interpreter lock after every answer of
+a servo. In another process it has no measurable effect on the loop.
 """
 
 import logging
@@ -25,13 +25,13 @@ _MODULE = "gazerig.config.subprocess_call"
 
 
 def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
-    """Return what ``work``, a function of a module, returns when called in another process.
+    """Return the result of ``work``, a module's function, called in another process.
 
-    ``in_subprocess(load_rig, "my.yaml", "shy")`` blocks for half a second and leaves this process's
-    interpreter free. Paths mean the same there; arguments and results are copied.
+    ``in_subprocess(load_rig, "my.yaml", "shy")`` takes half a second, during which this process's
+    interpreter is free. Paths have the same meaning there; arguments and results are copied.
 
     Raises:
-        gazerig.config.load.ConfigError: as ``work`` does, or the process failed.
+        gazerig.config.load.ConfigError: as from ``work``, or the process failed.
     """
     try:
         done = child_process.run(_MODULE, pickle.dumps((work, words, named)), _LONGEST_S)
@@ -41,7 +41,7 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
         raise _failed(work, f"cannot be started: {error.strerror}") from None
     if done.returncode:
         last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise _failed(work, f"ended by itself: {' '.join(last) or done.returncode}")
+        raise _failed(work, f"ended unexpectedly: {' '.join(last) or done.returncode}")
     for line in done.stderr.decode(errors="replace").splitlines():
         _LOG.warning("%s", line)
     value, faults = pickle.loads(done.stdout)
@@ -52,8 +52,8 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
 
 
 def serve() -> None:
-    """Run as the other process: one call from standard input, its result to standard output."""
-    os.nice(5)  # processes that wait for servos go first
+    """Run in the other process: read one call from standard input and write its result."""
+    os.nice(5)  # processes that wait for servos have priority
     work, words, named = pickle.load(sys.stdin.buffer)
     pickle.dump(_outcome(work, words, named), sys.stdout.buffer)
 

@@ -137,6 +137,6 @@ def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path: Pat
     own = tmp_path / "own.yaml"
     text = shipped_path("rigs", "maker").read_text(encoding="utf-8")
     rule = "gaze:\n  top_down: {rules: {wait: {look_at: face, salience: 0.9}}}\n"
-    own.write_text(text.replace("gaze:  # what differs", rule + "  # what differs"), "utf-8")
+    own.write_text(text.replace("gaze:  # differences", rule + "  # differences"), "utf-8")
     rules = load_rig(str(own), "sleepy").gaze.top_down.rules
     assert list(rules) == ["wait"] and rules["wait"].salience == 0.35

@@ -89,7 +89,7 @@ def test_the_value_is_the_dataclass_with_floats_tuples_and_its_own_defaults() ->
     [
         ({"id": True}, "id: True is a truth value, wanted a whole number, 0 to 252"),
         ({"id": 1.0}, "id: 1.0 is a number, wanted a whole number, 0 to 252"),
-        ({"id": "1"}, "id: '1' is text, wanted a whole number, 0 to 252; take the quotes away"),
+        ({"id": "1"}, "id: '1' is text, wanted a whole number, 0 to 252; remove the quotes"),
         ({"id": 253}, "id: 253 is above 252"),
         ({"id": None}, "id: is empty, wanted a whole number, 0 to 252"),
         ({"name": 5}, "name: 5 is a whole number, wanted text; put it in quotes"),
