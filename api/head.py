@@ -46,7 +46,7 @@ class Head(ABC):
     angles in degrees; the names of values end with their unit. Yaw is positive to the left, pitch
     upwards.
 
-    Orders return immediately. ``Order.reply`` reports what the head makes of them, and
+    Orders return immediately. ``Order.reply`` returns the head's reply, and
     ``Order.wait`` waits for them to end. An order that takes control of gaze or joints keeps it
     until another order takes it, until ``look_freely``, until its time (``for_s``) is over, or
     until the head's ``with`` block or the program ends.
@@ -132,7 +132,7 @@ class Head(ABC):
         self, x_px: float, y_px: float, *, distance_m: float | None = None,
         captured_s: float | None = None, for_s: float | None = None,
     ) -> Order:  # fmt: skip
-        """Look at what a pixel of the camera image shows, from the camera's pose at that time.
+        """Look at the object at a pixel of the camera image, from the camera's pose at that time.
 
         Args:
             x_px: to the right from the centre of the upper left pixel.
@@ -190,7 +190,7 @@ class Head(ABC):
 
         Args:
             expression: its name; "neutral" ends it.
-            strength: 0 (no effect) .. 1 (as written).
+            strength: 0 (no effect) .. 1 (as defined).
         """
         return self._send(Express(expression, strength))
 
@@ -230,7 +230,7 @@ class Head(ABC):
 
     # Stop
 
-    def stop(self, why: str = "asked for by the program") -> Order:
+    def stop(self, why: str = "requested by the program") -> Order:
         """Switch the torque off immediately, without parking; the program continues."""
         order = self._send(Stop(why, self._who))
         _ = order.reply  # wait until the torque is off
@@ -356,7 +356,7 @@ class Head(ABC):
 
     @abstractmethod
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Let the head's time pass until a condition is true, or at most ``seconds``.
+        """Wait by the head's clock until a condition is true, at most ``seconds``.
 
         Raises:
             HeadEnded: the head has ended in the meantime.

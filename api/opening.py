@@ -51,8 +51,8 @@ def open(
         with gazerig.open("desk", mock=True) as head:
             head.look_at(1.0, 0.2, 0.3).wait()
 
-    Real servos look where the program directs them. Emulated servos look at a simulated visitor,
-    unless ``camera``, ``oak``, ``video``, ``scene`` or ``world`` is given.
+    With real servos the head looks at the program's targets. With emulated servos it looks at a
+    simulated visitor, unless ``camera``, ``oak``, ``video``, ``scene`` or ``world`` is given.
 
     Args:
         rig: name of a shipped rig, or the path of a YAML file.
@@ -103,7 +103,7 @@ def open(
 
 
 _FOR_EVER_S = 1e9
-"""Seconds; without it, a scene in simulated time would end after one round."""
+"""Duration of a scene in simulated time, seconds; otherwise it would end after one round."""
 
 
 def _path(given: Path | str | None) -> Path | None:

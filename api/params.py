@@ -1,7 +1,7 @@
 """The declaration of a parameter: one annotated field of a frozen dataclass, in one line.
 
-    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity at which the eye is at ease"] = 8.0
-    profile: Annotated[Literal["min_jerk", "main_sequence"], "how an eye jumps"] = "min_jerk"
+    comfort_deg: Annotated[float, Bounds(0, 90), "comfortable eccentricity of an eye"] = 8.0
+    profile: Annotated[Literal["min_jerk", "main_sequence"], "profile of saccades"] = "min_jerk"
 
 The configuration, its JSON Schema, live tuning, the page and the documents read this line.
 Every part of the program may import this module; it needs the standard library only.
@@ -76,8 +76,8 @@ class Unit:
 class Declaration:
     """One parameter as declared.
 
-    kind: the type annotation without its metadata
-    bounds: of a number, or of the numbers in it; None without bounds
+    kind: type annotation without its metadata
+    bounds: bounds of the number, or of the numbers in it; None without bounds
     choices: the allowed values, () if all are allowed
     unit: e.g. "deg/s", "" for a bare number
     """

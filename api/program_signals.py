@@ -28,7 +28,7 @@ class ProgramSignals:
 
     Only handlers that are still at their defaults are replaced. Ctrl-C raises KeyboardInterrupt as
     usual. While a head parks, it skips the rest of parking instead, so that the program never ends
-    with the torque on, whatever the number of signals. SIGTERM and SIGHUP make every open head park
+    with the torque on, after any number of signals. SIGTERM and SIGHUP make every open head park
     and raise SystemExit(128 + number) in the main thread.
     """
 

@@ -219,9 +219,9 @@ def test_what_another_program_changes_is_set_right(world, spoil):
 @pytest.mark.parametrize(
     ("command", "reported"),
     [
-        ("absent on", "no PCA9685 answers at 0x40: has the board its logic supply"),
+        ("absent on", "no PCA9685 answers at 0x40: does the board have its logic supply"),
         ("stuck on", "the I2C bus is stuck"),
-        ("foreign on", "the chip at 0x40 is no PCA9685"),
+        ("foreign on", "the chip at 0x40 is not a PCA9685"),
         ("lose all", "no answer as an I2C bus"),
     ],
 )

@@ -82,7 +82,7 @@ class Absence(NamedTuple):
 class Fault(NamedTuple):
     """A fault that a servo or board reports itself.
 
-    command: starts it; ``{id}`` is replaced by the servo's
+    command: starts it; ``{id}`` is replaced by the servo's id
     times: number of calls of the command, a third of a second apart
     cause_text: the text of the bus for it, after the servo's or board's name
     board: name in messages of a board with the fault; "": the fault is one servo's
@@ -113,8 +113,9 @@ class BusUnderTest:
             the whole board.
         grain_steps: largest rounding of a goal by a device that counts in coarser steps.
         fault: a fault that it reports; None: it reports none.
-        absence: of a board; None: a servo with another id replaces an absent one.
-        pulses_on: makes a board hold its servos already; takes the bench and the kind's name.
+        absence: absence of a board; None: a servo with another id replaces an absent one.
+        pulses_on: makes a board hold its servos before the test; receives the bench and the kind's
+            name.
     """
 
     name: str
@@ -146,7 +147,7 @@ class BusBench:
     Positions and goals are shares of each servo's range, 0..1 within its limits.
 
     Args:
-        kinds: by name.
+        kinds: kinds by name.
         places: indices of each kind's servos among all servos.
         wires: the other end of the ports.
         patient: the machine may stall for a long time.

@@ -67,7 +67,7 @@ class BusLossSuite(BusBenches):
         here.run_until(held_here, are_healthy, here.start_shares())
         assert here.are_near(here.true_shares(), here.start_shares())
 
-    # --- a port goes away
+    # --- loss of a port
 
     def test_an_unplugged_port_comes_back_and_holds(self, twin, held):
         name = next(iter(twin.buses))

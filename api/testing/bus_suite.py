@@ -229,9 +229,9 @@ class BusSuite(BusBenches):
         here.run(bus, 1.0, here.away_shares())
         for setup, goal in zip(narrow, here.true_goals_steps(), strict=True):
             assert setup.min_steps <= goal <= setup.max_steps
-        with pytest.raises(ValueError, match="other servos need another bus"):
+        with pytest.raises(ValueError, match="ids and models must not change"):
             bus.retune([s._replace(id=s.id + 1) for s in narrow])
-        with pytest.raises(ValueError, match="other servos need another bus"):
+        with pytest.raises(ValueError, match="ids and models must not change"):
             bus.retune(narrow[:-1])
 
     # --- properties

@@ -39,7 +39,7 @@ class CameraBench:
     Attributes:
         make: creates another camera on the same device.
         now_s: clock of its frames.
-        wait: lets a short time pass.
+        wait: waits for a short time.
         lose, restore: remove the device and bring it back; None: not possible.
         block, release: make the device block its reader, and release it; None: not possible.
     """

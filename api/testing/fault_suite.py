@@ -52,7 +52,7 @@ class FaultSuite:
         assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
 
     def test_many_at_once_and_nothing_leaves_its_limits(self, machine):
-        """Three random faults at a time; the joints that are left end well nevertheless."""
+        """Three random faults at a time; afterwards the remaining joints must recover."""
         dice = random.Random(machine.rig.bus.kind)
         gentle = [case for case in self.cases if case.name not in self.left]
         # Servos that catch up by themselves have no other limit.
