@@ -18,16 +18,20 @@ from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
 _SET_EVERY_S = 0.1
-"""A level falls to 0 when it is not set for half a second."""
+"""Interval of setting; a level that is not set for half a second falls to 0."""
 
 
 @app.command()
 def express(
     expression: Annotated[
-        str | None, typer.Argument(help="One of the rig's table; without it, all are listed.")
+        str | None,
+        typer.Argument(help="Name in the rig's table; without it, all expressions are listed."),
     ] = None,
     strength: Annotated[
-        float, typer.Option("--strength", min=0.0, max=1.0, help="1 as in the table, 0 none of it.")
+        float,
+        typer.Option(
+            "--strength", min=0.0, max=1.0, help="Strength: 1 as in the table, 0 no effect."
+        ),
     ] = 1.0,
     pid: PidOption = None,
 ) -> None:
@@ -38,19 +42,24 @@ def express(
             say(", ".join(there) or "this rig has no table expressions")
             return
         rig.express(expression, strength)
-        say(f"{expression} is in force" + (f", strength {strength:g}" if strength != 1.0 else ""))
+        say(f"{expression} is active" + (f", strength {strength:g}" if strength != 1.0 else ""))
 
 
 @app.command()
 def level(
     name: Annotated[str, typer.Argument(help="A level of the rig's table, such as mouth.")],
-    value: Annotated[str, typer.Argument(metavar="0..1 | -", help="Or - to read values by line.")],
+    value: Annotated[
+        str,
+        typer.Argument(
+            metavar="0..1 | -", help="Or - to read values from standard input, one per line."
+        ),
+    ],
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Keep it for S seconds; else until Ctrl-C.")
+        float | None, typer.Option(min=0.0, help="Keep it for S seconds; otherwise until Ctrl-C.")
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Set a level, such as a jaw by loudness, while this command runs; then it falls to 0."""
+    """Set a level, such as the opening of a jaw, while this command runs; then it falls to 0."""
     with clear_errors():
         values = (
             (_number(line) for line in sys.stdin if line.strip())
@@ -67,15 +76,24 @@ def level(
 @app.command()
 def play(
     gesture: Annotated[
-        str | None, typer.Argument(help="A gesture, e.g. nod; none ends the one under way.")
+        str | None, typer.Argument(help="A gesture, e.g. nod; none ends the present one.")
     ] = None,
     speed: Annotated[
-        float, typer.Option("--speed", min=MIN_SPEED, max=MAX_SPEED, help="1 as it was written.")
+        float,
+        typer.Option(
+            "--speed", min=MIN_SPEED, max=MAX_SPEED, help="Speed factor; 1 is the original speed."
+        ),
     ] = 1.0,
     count: Annotated[
-        int, typer.Option("--count", min=0, max=MAX_COUNT, help="How often; 0 as it says.")
+        int,
+        typer.Option(
+            "--count",
+            min=0,
+            max=MAX_COUNT,
+            help="Number of repetitions; 0: as the gesture defines.",
+        ),
     ] = 0,
-    listed: Annotated[bool, typer.Option("--list", help="List the gestures there are.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the gestures.")] = False,
     pid: PidOption = None,
 ) -> None:
     """Play a gesture on the running head, or list all gestures with their fit to this rig."""
@@ -112,5 +130,5 @@ def _number(text: str) -> float:
     except ValueError:
         value = -1.0
     if not 0.0 <= value <= 1.0:
-        raise SetupError(f"{text.strip()!r:.40} is no level: give a number 0..1")
+        raise SetupError(f"{text.strip()!r:.40} is not a level: give a number 0..1")
     return value

@@ -1,4 +1,4 @@
-"""Opening the live page in the user's browser, on a desktop with a user."""
+"""Opening the live page in a browser on the user's desktop."""
 
 import contextlib
 import os
@@ -9,12 +9,12 @@ from collections.abc import Mapping
 
 
 def has_desktop(environ: Mapping[str, str], platform: str, terminal: bool) -> bool:
-    """Return whether a browser can be opened that the user sees.
+    """Return whether a browser can be opened on the user's desktop.
 
     Args:
-        environ: environment variables.
-        platform: as ``sys.platform``.
-        terminal: standard output is a terminal; else a program has started this one.
+        environ: Environment variables.
+        platform: Value of ``sys.platform``.
+        terminal: Whether standard output is a terminal; otherwise a program has started this one.
     """
     if not terminal or environ.get("CI"):
         return False
@@ -26,13 +26,13 @@ def has_desktop(environ: Mapping[str, str], platform: str, terminal: bool) -> bo
 
 
 def is_desktop_here() -> bool:
-    """Return ``has_desktop`` of this process."""
+    """Return ``has_desktop`` for this process."""
     terminal = sys.stdout is not None and sys.stdout.isatty()
     return has_desktop(os.environ, sys.platform, terminal)
 
 
 def open_page(url: str) -> None:
-    """Open an address in the user's browser; returns at once, and failing changes nothing."""
+    """Open an address in the user's browser, without waiting; a failure has no effect."""
     threading.Thread(target=_open, args=(url,), name="browser", daemon=True).start()
 
 

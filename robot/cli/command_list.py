@@ -1,8 +1,8 @@
-"""The commands of ``gazerig``: where each is defined, and its line in the list of all.
+"""The commands of ``gazerig``: their modules, and their lines in the list of commands.
 
-The list is written here and not collected, as a short command must not wait for the modules of all
-others; tests/test_cli_start.py holds it against them. Those of features and packages come from
-entry points.
+The list is static, because a short command must not import the modules of all others;
+tests/test_cli_start.py compares it with them. Commands of features and packages come from entry
+points.
 """
 
 from collections.abc import Mapping
@@ -14,17 +14,17 @@ from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registrations
 
 Examples = tuple[tuple[str, str], ...]
-"""What to type after ``gazerig``, and what it is for."""
+"""Arguments of ``gazerig``, and their purpose."""
 
 
 class CommandEntry(NamedTuple):
-    """One command in the list; what an entry point of the group ``gazerig.command`` names.
+    """One command in the list; the object of an entry point of the group ``gazerig.command``.
 
     Attributes:
-        module: has the command in its ``app``, a ``typer.Typer``.
-        summary: the first paragraph of its help.
-        panel: of the help, under which it is listed.
-        examples: for its help, by its name; those of a group's commands by both names.
+        module: Module whose ``app``, a ``typer.Typer``, contains the command.
+        summary: First paragraph of its help.
+        panel: Panel of the help that lists it.
+        examples: Examples for its help by its name; for commands of a group by both names.
     """
 
     module: str
@@ -34,12 +34,12 @@ class CommandEntry(NamedTuple):
 
 
 SPECIALIST = "For specialists"
-"""Panel of commands that a first head does without."""
+"""Panel of commands that are not needed for a first head."""
 
 PANELS: dict[str, dict[str, CommandEntry]] = {
     "Run": {
         "run": CommandEntry(
-            "run", "Run the head: gazerig run --mock, then open the page it names."
+            "run", "Run the head: gazerig run --mock, then open the page at the printed address."
         ),
         "ctl": CommandEntry(
             "tune",
@@ -108,7 +108,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
 
 @cache
 def shipped_commands() -> Mapping[str, CommandEntry]:
-    """Return the core's commands and those of the features that are there, by name."""
+    """Return the commands of the core and of the installed features, by name."""
     found = {
         name: CommandEntry(f"gazerig.robot.cli.{entry.module}", entry.summary, panel)
         for panel, entries in PANELS.items()
@@ -123,13 +123,13 @@ def package_commands() -> Mapping[str, CommandEntry]:
 
 
 def sort_by_panel(commands: Mapping[str, CommandEntry]) -> list[str]:
-    """Return names of commands panel by panel, as the help shows them."""
+    """Return names of commands by panel, in the order of the help."""
     panels = [*PANELS, *(entry.panel for entry in commands.values())]
     return sorted(commands, key=lambda name: panels.index(commands[name].panel))
 
 
 def _load_entries(parts: list[Registration]) -> dict[str, CommandEntry]:
-    """Return the commands of the parts that can be loaded."""
+    """Return the commands whose parts can be loaded."""
     found = {}
     for one in parts:
         try:

@@ -1,4 +1,4 @@
-"""The command describe: a rig as files that robot simulators and viewers read."""
+"""Command describe: a rig as files for robot simulators and viewers."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,7 +18,9 @@ def describe(
     rig: RigArgument = "desk",
     out: Annotated[
         Path | None,
-        typer.Argument(help="Folder to write to; default: the rig's name and _description, here."),
+        typer.Argument(
+            help="Folder to write to; default: the rig's name with _description, in this folder."
+        ),
     ] = None,
     mjcf: Annotated[bool, typer.Option("--mjcf", help="Write MJCF, for MuJoCo.")] = False,
     urdf: Annotated[
@@ -54,7 +56,7 @@ def describe(
 
 
 def _file_lines(folder: Path, files: dict[str, bytes]) -> list[str]:
-    """Return what was written, and how it is opened."""
+    """Return a list of the written files, with a hint how to open each."""
     lines = []
     for name, data in files.items():
         if "/" not in name:
@@ -70,7 +72,7 @@ def _file_lines(folder: Path, files: dict[str, bytes]) -> list[str]:
 
 
 _OPENED = {
-    ".xml": "a MuJoCo model of its own, to be put into a world",
+    ".xml": "a separate MuJoCo model, to be added to a world",
     ".urdf": "for RViz, Foxglove and other simulators",
     ".glb": "for browsers and Blender",
 }

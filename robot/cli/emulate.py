@@ -1,4 +1,4 @@
-"""The command ``gazerig emulate``: servos on a pseudo-terminal, for any program to open."""
+"""Command emulate: servos on a pseudo-terminal, which any program can open."""
 
 import json
 import sys
@@ -25,11 +25,11 @@ app = typer.Typer()
 
 _KNOWN_BY: dict[BusKind, str] = {
     "dynamixel": "servos know",
-    "feetech": "STS servos know",
-    "maestro": "a Maestro's pins know",
-    "pca9685": "their bridge knows",
+    "feetech": "STS servos support",
+    "maestro": "a Maestro's pins support",
+    "pca9685": "their bridge supports",
 }
-"""How each kind is named before the baud rates it knows."""
+"""Text before the supported baud rates of each kind."""
 
 
 @app.command(cls=RigCommand)
@@ -59,7 +59,7 @@ def emulate(
                 f"name a rig, or its servos: --servos {EXAMPLE}, --maestro 12 or --pca9685 0x40"
             )
         if maestro is not None and firmware is not None:
-            raise SetupError("--firmware: a Maestro does not tell its version over this line")
+            raise SetupError("--firmware: a Maestro does not report its version on this line")
         if maestro is None and (crc or device is not None):
             raise SetupError(f"{'--crc' if crc else '--device'}: only with --maestro")
         if servos is not None:
@@ -76,7 +76,7 @@ def emulate(
             devices = _rig_devices(rig or "", firmware)
         several = len(devices) > 1
         if baud is not None and several:
-            raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
+            raise SetupError("--baud: the buses of this rig have their own rates; see its file")
         buses = [
             BusSettings(
                 _set_baud(device, baud, any_baud),
@@ -104,7 +104,7 @@ def _parse_boards(text: str) -> Pca9685Line:
 
 
 def _rig_devices(name: str, firmware: int | None) -> dict[str, Emulated]:
-    """Return what is on every bus of a rig by the bus's name, "" for the only one."""
+    """Return the devices on every bus of a rig by the bus's name, "" for a single bus."""
     lines = emulated_lines(load_rig(name))
     for bus, line in lines.items():
         if firmware is not None and not isinstance(line, MaestroLine | Pca9685Line | PluginLine):
@@ -114,7 +114,7 @@ def _rig_devices(name: str, firmware: int | None) -> dict[str, Emulated]:
 
 
 def _set_baud(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
-    """Return a device at another baud rate, None for its own."""
+    """Return a device with another baud rate; None keeps its own rate."""
     if isinstance(device, PluginLine):
         return device
     known = BAUDS[device.kind]
@@ -127,7 +127,7 @@ def _set_baud(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
 
 
 def _apply_choices(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
-    """Return every bus the choices that its kind knows."""
+    """Return every bus with the settings that its kind supports."""
     known = {case: None for bus in buses for case in CASES.get(bus.device.kind, {})}
     choices = {}
     for text in given:
@@ -135,7 +135,7 @@ def _apply_choices(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[
         if not name or not value:
             raise SetupError(f"--set {text}: not CASE=VALUE; cases: {', '.join(known)}")
         if name.replace("_", "-") not in known:
-            raise SetupError(f"--set {text}: unknown case; there is {', '.join(known)}")
+            raise SetupError(f"--set {text}: unknown case; available: {', '.join(known)}")
         choices[name.replace("_", "-")] = value
     return tuple(
         replace(
@@ -146,7 +146,7 @@ def _apply_choices(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[
 
 
 def _print_answer(line: str) -> None:
-    """Show an answer to a person at a terminal: long texts as they are."""
+    """Print an answer; on a terminal, long texts are printed as they are, not as JSON."""
     answer = json.loads(line)
     text = answer.get("ok", answer.get("error", ""))
     print(text if "\n" in text else line, flush=True)

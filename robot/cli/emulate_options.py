@@ -1,4 +1,4 @@
-"""The options of the command emulate, with their help."""
+"""Options of the command emulate, with their help."""
 
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +24,7 @@ Rig = Annotated[
     str | None,
     typer.Argument(
         metavar="RIG",
-        help="All buses of a rig, each with its own terminal.",
+        help="Emulate all buses of a rig, each with its own terminal.",
         autocompletion=complete_rig,
     ),
 ]
@@ -52,29 +52,34 @@ Pca9685 = Annotated[
 Link = Annotated[
     Path | None,
     typer.Option(
-        help="Name under which to open it; kept over unplug and plug. "
-        "A rig's further buses add their own names: LINK-NAME."
+        help="Path under which it can be opened, also after unplug and plug. "
+        "Further buses of a rig add their names: LINK-NAME."
     ),
 ]
 Baud = Annotated[
     int | None,
     typer.Option(
         help=f"Baud rate of the servos in bit/s (default {DEFAULT_BAUD}, or the rig's), "
-        "or of a Maestro's pins (default: its USB port, which takes any)."
+        "or of a Maestro's pins (default: its USB port, which accepts any)."
     ),
 ]
-AnyBaud = Annotated[bool, typer.Option("--any-baud", help="Answer at every baud rate.")]
-WireTime = Annotated[bool, typer.Option("--wire-time", help="Bytes take their time on the line.")]
+AnyBaud = Annotated[bool, typer.Option("--any-baud", help="Answer clients at every baud rate.")]
+WireTime = Annotated[
+    bool, typer.Option("--wire-time", help="Simulate the time of bytes on the line.")
+]
 TurnaroundUs = Annotated[
-    float, typer.Option(min=0.0, max=10_000.0, help="With wire time: before each answer.")
+    float,
+    typer.Option(
+        min=0.0, max=10_000.0, help="With wire time: additional delay before each answer."
+    ),
 ]
 Firmware = Annotated[
     int | None,
     typer.Option(
         min=1,
         max=255,
-        help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); of STS servos "
-        "the number behind 3.",
+        help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); for STS servos "
+        "the number after 3.",
     ),
 ]
 Device = Annotated[
@@ -95,4 +100,4 @@ Case = Annotated[
         + " ".join(f"Of {_NAMES[kind]}: {', '.join(CASES[kind])}." for kind in CASES),
     ),
 ]
-UntilEof = Annotated[bool, typer.Option("--until-eof", help="End when standard input ends.")]
+UntilEof = Annotated[bool, typer.Option("--until-eof", help="Stop at the end of standard input.")]

@@ -1,4 +1,4 @@
-"""Examples for every command's help, and the names a shell completes."""
+"""Examples for every command's help, and shell completion of names."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -10,119 +10,121 @@ from gazerig.robot.cli.command_list import Examples, shipped_commands
 
 EXAMPLES: dict[str, Examples] = {
     "run": (
-        ("run --mock", "no hardware: a visitor comes, the page shows what the head does"),
+        ("run --mock", "no hardware: a simulated visitor; the page shows the head"),
         ("run --mock --world living-room", "a room with physics, seen through a rendered camera"),
-        ("run my.yaml --oak", "the real rig looks through its OAK-D"),
-        ("run --mock --video party.mp4", "an emulated rig before a film"),
+        ("run my.yaml --oak", "the real rig with its OAK-D camera"),
+        ("run --mock --video party.mp4", "an emulated rig that watches a film"),
         ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
-        ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other machines too"),
-        ("run my.yaml --oak --record evening.mcap", "keep every tick, to replay and judge"),
+        ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other computers too"),
+        ("run my.yaml --oak --record evening.mcap", "record every tick, for replay and reports"),
     ),
     "new": (
         ("new", "asks for board, mechanism, camera and eye distance, and writes myrig.yaml"),
         ("new eyes.yaml --board pca9685 --joints eyes-lids --camera webcam", "without questions"),
     ),
-    "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),
+    "check": (("check my.yaml", "list all faults of a file; no servo is contacted"),),
     "describe": (
         ("describe my.yaml", "MJCF, URDF and glTF with meshes, in a folder named as the rig"),
-        ("describe my.yaml --urdf out/", "URDF alone, in a folder of your choice"),
+        ("describe my.yaml --urdf out/", "only URDF, in a given folder"),
     ),
     "schema": (
-        ("schema rig.schema.json", "let an editor complete and check rig files"),
+        ("schema rig.schema.json", "make an editor complete and check rig files"),
         ("schema study.schema.json --of study", "and studies"),
     ),
     "kinds": (
-        ("kinds", "what buses, cameras, detectors and rules there are, and from which package"),
-        ("kinds --json", "the same for a program"),
+        ("kinds", "list buses, cameras, detectors and rules, and their packages"),
+        ("kinds --json", "the same for programs"),
     ),
     "models": (
-        ("models list", "what there is, its licence, and what is here"),
-        ("models fetch", "bring what is not here"),
-        ("models fetch yunet", "one of them"),
-        ("models fetch people --from ~/downloads", "without a network, out of downloaded files"),
+        ("models list", "list the files with their licences and whether they are installed"),
+        ("models fetch", "download the missing files"),
+        ("models fetch yunet", "only this one"),
+        ("models fetch people --from ~/downloads", "offline, from downloaded files"),
     ),
     "import-gesture": (
-        ("import-gesture my.yaml wave.csv wave --fps 24", "key frames of an animation program"),
+        ("import-gesture my.yaml wave.csv wave --fps 24", "key frames from an animation program"),
     ),
     "record-camera": (
-        ("record-camera seen.mcap --oak", "keep frames, depth and times of a camera"),
+        ("record-camera seen.mcap --oak", "record frames, depth and times of a camera"),
     ),
     "emulate": (
         ("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),
-        ("emulate --servos 1-6:sts3215", "servos of Feetech"),
+        ("emulate --servos 1-6:sts3215", "Feetech servos"),
         ("emulate --maestro 12", "a Pololu Maestro with twelve hobby servos"),
         ("emulate my.yaml", "every bus of a rig, each on its own terminal"),
     ),
     "ctl": (
-        ("ctl status", "what the running rig looks at and why, guard, joints"),
+        ("ctl status", "target and its reason, guard, joints of the running rig"),
         ("ctl set gaze.saccade.max_speed_deg_s 400", "change a parameter at the next tick"),
-        ("ctl look 1 0.2 0.3", "the running head looks there"),
+        ("ctl look 1 0.2 0.3", "make the running head look there"),
     ),
     "rigs": (
-        ("ctl rigs", "name, process and page of every rig that runs"),
-        ("ctl rigs --json", "the same for a program"),
+        ("ctl rigs", "name, process and page of every running rig"),
+        ("ctl rigs --json", "the same for programs"),
     ),
     "get": (
         ("ctl get", "every parameter of the running rig"),
-        ("ctl get gaze.saccade", "those of the saccades"),
-        ("ctl get --differs", "what differs from the defaults"),
+        ("ctl get gaze.saccade", "only parameters of saccades"),
+        ("ctl get --differs", "only values that differ from the defaults"),
     ),
-    "set": (("ctl set gaze.saccade.max_speed_deg_s 400", "at the next tick; not yet in the file"),),
-    "save": (("ctl save my.yaml", "keep what was set, comments and order stay"),),
-    "revert": (("ctl revert", "back to what the file says"),),
-    "stop": (("stop", "torque off at once; the program goes on"),),
-    "resume": (("ctl resume", "torque on again, slowly on"),),
-    "character": (("ctl character shy", "lay a character over the running rig"),),
+    "set": (
+        ("ctl set gaze.saccade.max_speed_deg_s 400", "at the next tick; not saved in the file"),
+    ),
+    "save": (("ctl save my.yaml", "save changed values; comments and order stay"),),
+    "revert": (("ctl revert", "restore the values of the file"),),
+    "stop": (("stop", "torque off immediately; the program continues"),),
+    "resume": (("ctl resume", "torque on again, with a slow start"),),
+    "character": (("ctl character shy", "apply a character to the running rig"),),
     "ask": (
-        ("ctl ask", "the menus of the running rig, the choices in force first"),
-        ("ctl ask behaviour guard", "another behaviour of its rules"),
-        ("ctl ask conversation listen", "look away as a listener does"),
+        ("ctl ask", "menus of the running rig, the active choices first"),
+        ("ctl ask behaviour guard", "choose another behaviour of its rules"),
+        ("ctl ask conversation listen", "avert the gaze like a listener"),
     ),
     "express": (
-        ("ctl express", "the expressions of the running rig, the present one first"),
-        ("ctl express happy", "blend to one of them"),
-        ("ctl express happy --strength 0.5", "half of it"),
+        ("ctl express", "expressions of the running rig, the present one first"),
+        ("ctl express happy", "blend to an expression"),
+        ("ctl express happy --strength 0.5", "at half strength"),
     ),
     "level": (
         ("ctl level mouth 0.7 --seconds 2", "the jaw 70 % open for two seconds"),
-        ("ctl level mouth -", "values from standard input, one a line"),
+        ("ctl level mouth -", "values from standard input, one per line"),
     ),
     "play": (
-        ("ctl play nod", "two nods, with the eyes on the person all the while"),
+        ("ctl play nod", "nod twice; the eyes stay on the person"),
         ("ctl play laugh --count 6 --speed 1.2", "longer and faster"),
-        ("ctl play --list", "the gestures, and what this rig can do of them"),
-        ("ctl play none", "end the one under way"),
+        ("ctl play --list", "the gestures, and whether this rig can play them"),
+        ("ctl play none", "end the present one"),
     ),
     "status": (
-        ("ctl status", "what the running rig looks at and why, guard, joints"),
-        ("ctl status --json", "the same for a program"),
+        ("ctl status", "target and its reason, guard, joints of the running rig"),
+        ("ctl status --json", "the same for programs"),
     ),
     "steer": (
-        ("ctl steer", "arrow keys lead the gaze; space is STOP"),
-        ("ctl steer --gamepad", "stick, buttons, and Start for STOP"),
+        ("ctl steer", "arrow keys move the gaze; space is STOP"),
+        ("ctl steer --gamepad", "stick and buttons; Start is STOP"),
     ),
     "look": (
-        ("ctl look 1 0.2 0.3", "the running head looks there"),
-        ("ctl look free", "and freely again"),
+        ("ctl look 1 0.2 0.3", "make the running head look there"),
+        ("ctl look free", "let it choose its targets again"),
     ),
     "fault": (
         ("ctl fault lose 3 for 2", "an emulated servo of the running rig is silent for 2 s"),
-        ("ctl fault help", "all there are"),
+        ("ctl fault help", "list all faults"),
     ),
     "replay": (
         ("replay evening.mcap", "on the page, with a time slider"),
-        ("replay evening.mcap --rerun", "the same people, with today's code and settings"),
+        ("replay evening.mcap --rerun", "the same input, with the present code and settings"),
     ),
     "export": (
-        ("export evening.mcap --csv --out gaze", "columns that eye-tracking tools read"),
+        ("export evening.mcap --csv --out gaze", "tables for eye-tracking tools"),
         ("export evening.mcap --bids --out study", "a BIDS data set"),
     ),
 }
-"""Command of the core -> examples, each with what it is for."""
+"""Command of the core -> examples, each with its purpose."""
 
 
 def all_examples() -> dict[str, Examples]:
-    """Return the examples of the core and of the features that are there."""
+    """Return the examples of the core and of the installed features."""
     return EXAMPLES | {k: v for one in shipped_commands().values() for k, v in one.examples.items()}
 
 
@@ -130,9 +132,9 @@ def add_examples(app: typer.Typer, given: Mapping[str, Examples], within: str = 
     """Add examples to the help of every command of an app.
 
     Args:
-        app: the app.
-        given: examples by command; those in a group of a feature with the group's name.
-        within: the group that it is in, "" for none.
+        app: The app.
+        given: Examples by command; for a feature's group of commands with the group's name.
+        within: Group that contains the app, "" for none.
     """
     for command in app.registered_commands:
         name = command.name or str(getattr(command.callback, "__name__", "")).replace("_", "-")
@@ -144,7 +146,7 @@ def add_examples(app: typer.Typer, given: Mapping[str, Examples], within: str = 
         if part is None:
             continue
         title = part.info.name
-        if not isinstance(title, str):  # a module's commands
+        if not isinstance(title, str):  # commands of a module
             add_examples(part, given, within)
             continue
         if title in given:
@@ -153,12 +155,12 @@ def add_examples(app: typer.Typer, given: Mapping[str, Examples], within: str = 
 
 
 def epilog(examples: Iterable[tuple[str, str]]) -> str:
-    """Write examples as lines that help keeps apart."""
+    """Format examples as separate lines of the help."""
     return "\n\n".join(f"gazerig {text}   ({what})" for text, what in examples)
 
 
 def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], list[str]]:
-    """Return what completes the names of a kind of shipped file, e.g. "characters"."""
+    """Return the completion function for names of a kind of shipped file, e.g. "characters"."""
     return lambda incomplete: [
         name for name in shipped_names(kind, home) if name.startswith(incomplete)
     ]

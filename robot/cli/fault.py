@@ -10,14 +10,16 @@ from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
 _NEGATIVE = {"ignore_unknown_options": True}
-"""Click settings: -3 is a number, no option."""
+"""Click settings: -3 is a number, not an option."""
 
 
 @app.command(context_settings=_NEGATIVE)
 def fault(
     words: Annotated[
         list[str],
-        typer.Argument(metavar="COMMAND", help="As of gazerig emulate; help lists them all."),
+        typer.Argument(
+            metavar="COMMAND", help="A fault as in gazerig emulate; help lists all faults."
+        ),
     ],
     pid: PidOption = None,
 ) -> None:

@@ -1,4 +1,4 @@
-"""Keys of a terminal as they are pressed."""
+"""Single key presses in a terminal."""
 
 import contextlib
 import os
@@ -17,10 +17,10 @@ _BEGUN = re.compile(r"\x1b(?:\[[0-9;?]*|O)?$")
 
 
 def split_keys(text: str) -> tuple[list[str], str]:
-    """Return what was typed key by key, and the rest that a sequence begins with.
+    """Return the typed keys one by one, and the start of an incomplete sequence.
 
-    A letter is itself, an arrow key "up", "down", "left" or "right"; other keys that send
-    sequences are left out.
+    A letter is returned unchanged, an arrow key as "up", "down", "left" or "right". Other keys that
+    send sequences are omitted.
     """
     begun = _BEGUN.search(text)
     rest = begun[0] if begun is not None else ""
@@ -35,23 +35,23 @@ def split_keys(text: str) -> tuple[list[str], str]:
 
 
 class TerminalInput:
-    """Standard input without lines and echo; Ctrl-C stays a signal, the terminal is restored."""
+    """Standard input without line buffering and echo; Ctrl-C remains a signal; restored on exit."""
 
     def __enter__(self) -> Self:
-        """Switch off lines and echo."""
+        """Switch line buffering and echo off."""
         self._before = termios.tcgetattr(sys.stdin)
         tty.setcbreak(sys.stdin, termios.TCSANOW)
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """Switch them on again; keys that were not read are forgotten."""
-        # Not TCSAFLUSH: a terminal that was stopped with Ctrl-S would be waited for.
-        with contextlib.suppress(termios.error, OSError):  # it may be gone
+        """Switch them on again; unread keys are discarded."""
+        # Not TCSAFLUSH, which would wait for a terminal that was stopped with Ctrl-S.
+        with contextlib.suppress(termios.error, OSError):  # it may not exist any more
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
             termios.tcsetattr(sys.stdin, termios.TCSANOW, self._before)
 
     def text(self) -> str | None:
-        """Return the typed text, "" for nothing, None if the terminal is gone."""
+        """Return the typed text, "" for none, None if the terminal does not exist any more."""
         if not select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
             return ""
         try:

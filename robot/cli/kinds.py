@@ -1,4 +1,4 @@
-"""The command kinds: what buses, cameras, detectors and rules there are, and from whom."""
+"""Command kinds: a list of buses, cameras, detectors and rules with their packages."""
 
 import json
 from dataclasses import asdict
@@ -45,7 +45,7 @@ def kinds(
 
 
 def _part_row(found: Registration) -> dict[str, Any]:
-    """Return the listing of a part; a part that cannot be loaded has a fault."""
+    """Return the row of a part; a part that cannot be loaded has a fault."""
     row: dict[str, Any] = {
         "name": found.name, "group": GROUPS[found.group], "package": found.package,
         "version": found.version, "abilities": [], "evidence": {}, "proven": "", "fault": "",

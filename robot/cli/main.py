@@ -1,6 +1,6 @@
-"""The command ``gazerig``: what people type, and what they read on the terminal.
+"""The command ``gazerig`` with its options, and its output without a command.
 
-Only the module of the typed command is imported. Without arguments, next steps are shown.
+Only the module of the typed command is imported. Without arguments, next steps are printed.
 """
 
 import logging
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 
 class CommandsByName(UserDict[str, Any]):
-    """Commands by name, each imported when it is taken out.
+    """Commands by name, each imported on access.
 
-    data: those imported until now; the others have a name, summary and panel only
+    data: commands imported so far; for the others only name, summary and panel are known
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class CommandsByName(UserDict[str, Any]):
         self._add(shipped_commands())
 
     def add_packages(self) -> None:
-        """Add the commands of installed packages; names that are taken stay as they are."""
+        """Add the commands of installed packages; existing names are not replaced."""
         self._add(package_commands())
 
     def _add(self, entries: Mapping[str, CommandEntry]) -> None:
@@ -52,7 +52,7 @@ class CommandsByName(UserDict[str, Any]):
             self.data.setdefault(name, listed)
 
     def __getitem__(self, name: str) -> Any:
-        """Return a whole command; raise KeyError if there is none of this name."""
+        """Return a complete command; raise KeyError if the name is unknown."""
         if name in self.data and name not in self._imported:
             app = typer.Typer()
             app.add_typer(import_module(self.entries[name].module).app)
@@ -65,7 +65,7 @@ class CommandsByName(UserDict[str, Any]):
 
 
 class CommandGroup(TyperGroup):
-    """Lists the commands panel by panel, and imports one to run it or show its help."""
+    """A group that lists commands by panel, and imports one to run it or show its help."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -77,7 +77,7 @@ class CommandGroup(TyperGroup):
         return sort_by_panel(self._every.entries)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command as far as a list of all needs it, None if there is none of this name."""
+        """Return a command with the data for a list, None if the name is unknown."""
         if cmd_name not in self._every.data:
             self._every.add_packages()
         if cmd_name not in self._every.data and cmd_name in SHIPPED[COMMAND]:
@@ -86,7 +86,7 @@ class CommandGroup(TyperGroup):
         return self._every.data.get(cmd_name)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the name and the whole command that the arguments begin with, and the rest."""
+        """Return the name and the complete command at the start of the arguments, and the rest."""
         name, command, rest = super().resolve_command(ctx, args)
         return name, self._every[name] if name is not None else command, rest
 
@@ -108,7 +108,7 @@ def _version(wanted: bool) -> None:
 def begin(
     context: typer.Context,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show where an error comes from, with any command.")
+        bool, typer.Option("--debug", help="Show the traceback of an error, with any command.")
     ] = False,
     version: Annotated[
         bool,
@@ -127,12 +127,12 @@ def begin(
 
 
 def main() -> None:
-    """Run the command line: an error is one line, with --debug also its traceback."""
+    """Run the command line: an error is one line; --debug adds its traceback."""
     arguments = sys.argv[1:]
-    if "--debug" in arguments:  # wherever people put it
+    if "--debug" in arguments:  # at any position
         arguments = [word for word in arguments if word != "--debug"]
         logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)
-    run_app(app, arguments, "say it again with --debug and report what it shows")
+    run_app(app, arguments, "repeat it with --debug and report the output")
 
 
 def rig_files() -> list[Path]:
@@ -151,16 +151,16 @@ def _looks_like_a_rig(path: Path) -> bool:
 
 _BEGIN = (
     ("gazerig run --mock", "see a head look at a visitor in your browser; no hardware needed"),
-    ("gazerig report --scene face-to-face", "how human that gaze is, as one HTML file"),
-    ("gazerig new my.yaml", "a rig file of your own, from four questions"),
+    ("gazerig report --scene face-to-face", "compare that gaze with people's, in one HTML file"),
+    ("gazerig new my.yaml", "your own rig file, from four questions"),
 )
 
 
 def next_steps(ports: "Iterable[SerialPort]", rigs: Iterable[Path], running: bool) -> str:
-    """Return what makes sense now, as lines.
+    """Return the useful next steps, as lines.
 
     ports: serial ports of this computer; rigs: rig files in this folder
-    running: a rig runs on this computer already
+    running: whether a rig is running on this computer
     """
     usb = [port for port in ports if port.usb]
     own = next(iter(sorted(rigs)), None)
@@ -169,34 +169,37 @@ def next_steps(ports: "Iterable[SerialPort]", rigs: Iterable[Path], running: boo
         lines += _block(
             "A rig is running here:",
             (
-                ("gazerig ctl get", "every parameter, and what is not saved yet"),
-                ("gazerig ctl set gaze.blink... VALUE", "change one; gazerig ctl save keeps it"),
-                ("gazerig stop", "torque off at once"),
+                ("gazerig ctl get", "all parameters, and which are not saved yet"),
+                ("gazerig ctl set gaze.blink... VALUE", "change one; gazerig ctl save saves it"),
+                ("gazerig stop", "torque off immediately"),
             ),
         )
     lines += _block("Without hardware:", _BEGIN)
     if usb and own is None:
         lines += _block(
-            f"A servo adapter is there ({usb[0].by_id or usb[0].device}):",
+            f"A servo adapter is plugged in ({usb[0].by_id or usb[0].device}):",
             (
                 (f"gazerig scan --port {usb[0].device}", "which servos answer; changes nothing"),
-                ("gazerig new my.yaml", "a rig file of your own, from four questions"),
+                (
+                    "list the servos that answer; changes nothing",
+                    "your own rig file, from four questions",
+                ),
             ),
         )
     elif own is not None:
         lines += _block(
             f"With your rig {own}:",
             (
-                (f"gazerig check {own}", "is the file good?"),
+                (f"gazerig check {own}", "check the file"),
                 (
                     f"gazerig doctor {own}",
-                    "are port and servos as it says? every fault with a cure",
+                    "check port and servos against it; every fault has a remedy",
                 ),
                 (f"gazerig run {own} --oak", "go"),
             ),
         )
     else:
-        lines += ["No USB serial adapter is plugged in; docs/start.md tells which fit.", ""]
+        lines += ["No USB serial adapter is plugged in; docs/start.md lists suitable ones.", ""]
     lines.append("All commands: gazerig --help    one of them, with examples: gazerig run --help")
     return "\n".join(lines)
 

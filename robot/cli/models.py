@@ -1,4 +1,4 @@
-"""The commands under models: which model files there are, and how they come here."""
+"""Commands under models: a list of model files, and their download."""
 
 import json
 from pathlib import Path
@@ -44,7 +44,7 @@ def list_models(
     Console().print(table)
     print(f"folder: {models_folder()}")
     if any(row["state"] != "there" for row in rows):
-        print("gazerig models fetch brings what is not there")
+        print("gazerig models fetch downloads missing files")
 
 
 @models.command("fetch")
@@ -53,7 +53,7 @@ def fetch_models(
         list[str] | None,
         typer.Argument(
             metavar="[NAME]...",
-            help=f"Which ones: {', '.join(_NAMES)}; all if none is named.",
+            help=f"Names: {', '.join(_NAMES)}; default: all.",
             autocompletion=lambda incomplete: [n for n in _NAMES if n.startswith(incomplete)],
         ),
     ] = None,
@@ -65,7 +65,7 @@ def fetch_models(
     """Download model files, verify them and put them into the folder of models."""
     with clear_errors():
         if unknown := sorted({*(names or ())} - {*_NAMES}):
-            raise SetupError(f"no model is called {unknown[0]!r}: there is {', '.join(_NAMES)}")
+            raise SetupError(f"unknown model {unknown[0]!r}; available: {', '.join(_NAMES)}")
         wanted = [file for file in MODEL_FILES if not names or file.name in names]
         failed = []
         with progress_bar(remaining=True) as progress:
@@ -78,7 +78,7 @@ def fetch_models(
                     continue
                 for file in some:
                     print(
-                        f"{file.name}: {file.path} {'fetched' if file in brought else 'is there'}"
+                        f"{file.name}: {file.path} {'fetched' if file in brought else 'already exists'}"
                     )
         if failed:
             raise SetupError("\n".join(failed))

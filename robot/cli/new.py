@@ -1,4 +1,4 @@
-"""The command ``gazerig new``: a rig of one's own from a few answers."""
+"""Command new: a new rig from a few answers."""
 
 import sys
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ app = typer.Typer()
 
 _EYES_MM = 62.0
 _BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
-"""What is taken where nothing is said and nobody can be asked."""
+"""Defaults if there is no option and nobody can be asked."""
 
 
 @app.command()
@@ -63,14 +63,16 @@ def new(
             raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
         refuse_existing(file, force=force)
         asked = Questions(sys.stdin.isatty())
-        chosen = asked.choice("What are the servos on?", "board", board, BOARDS, _BOARD)
+        chosen = asked.choice("Which board drives the servos?", "board", board, BOARDS, _BOARD)
         mechanisms = {name: one.summary for name, one in MECHANISMS.items()}
         wanted = asked.choice(
-            "What do the servos move? (or names of joints: eyes_pan,eyes_tilt,jaw)",
+            "Which joints do the servos move? (a mechanism, or names of joints: eyes_pan,eyes_tilt,jaw)",
             "joints", joints, mechanisms, _JOINTS, others=True,
         )  # fmt: skip
-        seen = asked.choice("What does it see with?", "camera", camera, CAMERAS, _CAMERA)
-        distance = asked.number("How far apart are the eyes, in mm?", "eyes-mm", eyes_mm, _EYES_MM)
+        seen = asked.choice("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
+        distance = asked.number(
+            "What is the distance between the eyes, in mm?", "eyes-mm", eyes_mm, _EYES_MM
+        )
         rig = NewRig(
             file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
         )
@@ -79,7 +81,7 @@ def new(
         write_file(file, rig_text(rig), force)
         try:
             say(check_line(str(file)))
-        except ConfigError:  # a faulty one is not left there
+        except ConfigError:  # an invalid file is deleted
             file.unlink()
             raise
         for line in next_steps(rig, str(file)):
@@ -87,9 +89,9 @@ def new(
 
 
 class Questions:
-    """Asks on the terminal what no option has answered; without one, what is usual is taken.
+    """Questions on the terminal for missing options; without a terminal, defaults are used.
 
-    terminal: a person can answer
+    terminal: whether a person can answer
     """
 
     def __init__(self, terminal: bool) -> None:
@@ -99,26 +101,26 @@ class Questions:
         self, question: str, option: str, given: str | None, choices: Mapping[str, str],
         usual: str, others: bool = False,
     ) -> str:  # fmt: skip
-        """Return one of some choices, by its name or its number.
+        """Return a choice, given by its name or its number.
 
         Args:
             question: Its text.
             option: The option that answers it.
             given: The value of that option.
-            choices: Each with what it is.
-            usual: The answer of who presses Enter.
-            others: Other answers are right as well.
+            choices: Choices with their descriptions.
+            usual: Default, chosen with Enter.
+            others: Whether other answers are valid too.
 
         Raises:
-            SetupError: the option was given something else, or there is no answer.
+            SetupError: the option's value is invalid, or there is no answer.
         """
         names = list(choices)
         if given is not None:
             if given in choices or (others and given):
                 return given
-            raise SetupError(f"--{option} {given}: there is {', '.join(names)}")
+            raise SetupError(f"--{option} {given}: expected {', '.join(names)}")
         if not self._terminal:
-            say(f"{option}: {usual} ({choices[usual]}); --{option} takes {', '.join(names)}")
+            say(f"{option}: {usual} ({choices[usual]}); choices for --{option}: {', '.join(names)}")
             return usual
         say(question)
         for number, (name, what) in enumerate(choices.items(), 1):
@@ -129,7 +131,7 @@ class Questions:
                 return names[int(answer) - 1]
             if answer in choices or (others and "_" in answer):
                 return answer
-            say(f"{answer!r} is none of them: a number from 1 to {len(names)}, or a name")
+            say(f"{answer!r} is not a choice: give a number from 1 to {len(names)}, or a name")
 
     def number(self, question: str, option: str, given: float | None, usual: float) -> float:
         """Return a length in mm.
@@ -149,20 +151,20 @@ class Questions:
                     return value
             except ValueError:
                 pass
-            say(f"{answer!r} is no length from 10 to 500 mm")
+            say(f"{answer!r} is not a length from 10 to 500 mm")
 
 
 def next_steps(rig: NewRig, file: str) -> Iterable[str]:
-    """Return what to type with a rig that was just written, as lines."""
+    """Return the next commands for a new rig file, as lines."""
     named = quote(file)
     sees = {"webcam": "--camera 0", "oak": "--oak", "none": "--scene visitor"}[rig.camera]
     steps = [(f"gazerig run {named} --mock", "the head in your browser, without any hardware")]
     if rig.board != "none":
-        numbers = "tries each channel" if rig.board in ("maestro", "pca9685") else "gives ids"
+        numbers = "moves each channel" if rig.board in ("maestro", "pca9685") else "gives ids"
         steps += [
             (f"gazerig setup {named}", f"with the board plugged in: {numbers}"),
-            (f"gazerig doctor {named} --fix", "port, servos and settings against the file"),
-            (f"gazerig calibrate {named}", "zero, sign and range of each joint"),
+            (f"gazerig doctor {named} --fix", "check port, servos and settings against the file"),
+            (f"gazerig calibrate {named}", "measure zero, sign and range of each joint"),
             (f"gazerig run {named} {sees}", "the real head"),
         ]
     wide = max(len(command) for command, _ in steps)
@@ -173,7 +175,7 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
 
 
 def _plugged_in(board: str) -> str:
-    """Return the port of the only USB serial adaptor if the board uses one, else ""."""
+    """Return the port of the only USB serial adaptor if the board uses one, otherwise ""."""
     if not usual_port(board).startswith("/dev/tty") or board == "none":
         return ""
     from gazerig.drivers.serial.list_ports import serial_ports
@@ -186,4 +188,4 @@ def _missing_answer(what: str, usual: str, option: str) -> str:
     try:
         return input(f"{what} [{usual}]: ").strip() or usual
     except EOFError:
-        raise SetupError(f"no answer: give it as an option, --{option}") from None
+        raise SetupError(f"no answer: use the option --{option}") from None

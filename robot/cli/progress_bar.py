@@ -1,4 +1,4 @@
-"""Bars for what takes long, on a terminal only."""
+"""Progress bars of long tasks, on a terminal only."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -15,15 +15,15 @@ from rich.progress import (
 )
 
 Steps = Callable[[str, float], None]
-"""Told what is being done and the share of it that is done, 0..1."""
+"""Receives the name of the current step and the finished share, 0..1."""
 
 
 @contextmanager
 def progress_bar(remaining: bool = False) -> Iterator[Steps]:
-    """Draw a bar for each step on a terminal; nothing elsewhere.
+    """Draw a bar for each step on a terminal; elsewhere nothing.
 
     Args:
-        remaining: show how long it will still take, too.
+        remaining: Also show the remaining time.
     """
     columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
     if remaining:

@@ -1,4 +1,4 @@
-"""The command ``gazerig record-camera``: what a camera gives, into a file to run from later."""
+"""Command record-camera: frames of a camera in a file, as input of later runs."""
 
 import sys
 import threading
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False)
 
-_NEVER = threading.Event()  # a frame comes soon enough to look for Ctrl-C in between
+_NEVER = threading.Event()  # frames come often enough to check for Ctrl-C between them
 
 
 @app.command("record-camera")
@@ -26,15 +26,13 @@ def record_camera(
     file: Annotated[Path, typer.Argument(help="File to write, usually .mcap.")],
     oak: Annotated[bool, typer.Option(help="Record an OAK-D: colour, depth, lens.")] = False,
     camera: Annotated[int | None, typer.Option(help="Record webcam N.")] = None,
-    video: Annotated[
-        Path | None, typer.Option(help="Record a film, as if it were a camera.")
-    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Record a film like a camera.")] = None,
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Stop after S seconds; else at Ctrl-C.")
+        float | None, typer.Option(min=0.0, help="Stop after S seconds; otherwise at Ctrl-C.")
     ] = None,
     width: Annotated[int, typer.Option(min=16, help="Requested width.")] = 640,
     height: Annotated[
-        int | None, typer.Option(min=16, help="Height (default: 400 for --oak, else 480).")
+        int | None, typer.Option(min=16, help="Height (default: 400 for --oak, otherwise 480).")
     ] = None,
     rate: Annotated[float, typer.Option(min=1.0, help="Requested frames per second.")] = 30.0,
     jpeg: Annotated[
@@ -60,7 +58,7 @@ def _source(
             f"record-camera takes one of --oak, --camera N and --video FILE, not {len(asked)}"
         )
     width, height, rate_hz = requested
-    # OpenCV and depthai are heavy: loaded when it is clear that there is something to do.
+    # OpenCV and depthai are large: imported only when they are needed.
     if oak:
         from gazerig.drivers.camera.oak.params import OakParams
         from gazerig.drivers.camera.oak.source import OakSource
@@ -86,7 +84,7 @@ def _record(
     force: bool,
     stopped: Callable[[], str | None],
 ) -> None:
-    """Record until stopped, and print what the file contains."""
+    """Record until stopped, and print the content of the file."""
     from gazerig.drivers.camera.recorder import CameraRecorder
 
     clock = RealClock()
@@ -103,12 +101,12 @@ def _record(
                 say(line)
             depth = "with depth" if shot is not None and shot.depth_m is not None else "no depth"
             if sys.stderr.isatty():
-                status(f"{past_s:7.1f} s  {recorder.written_frames} frames, {depth}: Ctrl-C ends")
+                status(f"{past_s:7.1f} s  {recorder.written_frames} frames, {depth}: Ctrl-C stops")
     finally:
         recorder.close()
         recorder.finish()
         size_mb = file.stat().st_size / 1e6
-        left = f", {recorder.dropped_frames} left out" if recorder.dropped_frames else ""
+        left = f", {recorder.dropped_frames} omitted" if recorder.dropped_frames else ""
         say(f"{recorder.written_frames} frames ({size_mb:.1f} MB{left}) in {file}")
     if recorder.failure:
         raise SetupError(recorder.failure)

@@ -1,4 +1,4 @@
-"""The RIG argument of commands: the first of several, and it may be left out."""
+"""Optional first argument RIG of commands with several arguments."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ DEFAULT_RIG = "desk"
 
 
 class RigCommand(TyperCommand):
-    """A command in which RIG may be left out although other words follow.
+    """A command whose first argument RIG may be omitted although others follow.
 
     ``gazerig jog my.yaml neck_yaw 10`` and, for the shipped rig, ``gazerig jog neck_yaw 10``.
     """
@@ -23,7 +23,7 @@ class RigCommand(TyperCommand):
         return list(super().parse_args(ctx, args))
 
     def _names_rig(self, ctx: Any, args: list[str], positional: list[Any]) -> bool:
-        """Return whether the first word is a rig: there is one more than needed, or it looks so."""
+        """Return whether the first argument is a rig: it looks like one, or is one too many."""
         options = [one for one in self.params if isinstance(one, TyperOption)]
         parser = TyperCommand(self.name, params=list(options)).make_parser(ctx)
         _, given, _ = parser.parse_args(list(args))
@@ -34,5 +34,5 @@ class RigCommand(TyperCommand):
         missing = positional[1 + len(given) - named :]
         if missing and given and missing[0].required and not ctx.resilient_parsing:
             needed = [f"{one.metavar} ({(one.help or '').rstrip('.')})" for one in positional[1:]]
-            ctx.fail(f"needs {', '.join(needed)}: there is no {missing[0].metavar}")
+            ctx.fail(f"needs {', '.join(needed)}: {missing[0].metavar} is missing")
         return len(given) >= len(positional)

@@ -1,4 +1,4 @@
-"""The options of the command run, with their help."""
+"""Options of the command run, with their help."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from gazerig.robot.cli.examples import complete_shipped, complete_world
 
 Name = Annotated[
     str | None,
-    typer.Option(help="Name of this head, for gazerig ctl --rig NAME; else that of its file."),
+    typer.Option(help="Name of this head, for gazerig ctl --rig NAME; default: that of its file."),
 ]
 Mock = Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")]
 Port = Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")]
@@ -32,13 +32,13 @@ World = Annotated[
 ]
 Rate = Annotated[
     float | None,
-    typer.Option(min=20.0, max=1000.0, metavar="HZ", help="Rate of the loop, not the rig's."),
+    typer.Option(min=20.0, max=1000.0, metavar="HZ", help="Rate of the loop instead of the rig's."),
 ]
 Computer = Annotated[
     str | None,
     typer.Option(
         metavar="LEVEL",
-        help="What this computer can run: full, small, busy or least. `make run` measures it; "
+        help="Power of this computer: full, small, busy or least. `make run` measures it; "
         "--rate and --world override it.",
     ),
 ]
@@ -62,7 +62,7 @@ Replay = Annotated[
     typer.Option("--camera-recording", help="Look at a recording of record-camera, in a loop."),
 ]
 Pixels = Annotated[
-    bool, typer.Option(help="Draw the scene and detect faces and motion in the frames.")
+    bool, typer.Option(help="Draw the scene, and detect faces and motion in the frames.")
 ]
 Seconds = Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
@@ -84,7 +84,7 @@ Profile = Annotated[
 Character = Annotated[
     str | None,
     typer.Option(
-        help="A character laid over the rig: shy, bold, sleepy, strong_boxer ...",
+        help="A character applied over the rig: shy, bold, sleepy, strong_boxer ...",
         autocompletion=complete_shipped("characters"),
     ),
 ]
@@ -95,11 +95,10 @@ Rules = Annotated[
         autocompletion=complete_shipped("rules"),
     ),
 ]
-Behaviour = Annotated[
-    str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
-]
+Behaviour = Annotated[str | None, typer.Option(help="Initial behaviour, one of the rig's rules.")]
 Conversation = Annotated[
-    str | None, typer.Option(help="Looking away as in: talk, listen, think; none (default).")
+    str | None,
+    typer.Option(help="Gaze aversion as in a conversation: talk, listen, think; none (default)."),
 ]
 Scanpath = Annotated[
     str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
@@ -111,11 +110,11 @@ Page = Annotated[
     str,
     typer.Option(
         metavar="HOST:PORT",
-        help="Where the live page is served. Other machines reach it at 0.0.0.0:8080. It "
-        "opens with the token in the address that is printed at start.",
+        help="HOST:PORT of the live page; 0.0.0.0:8080 serves other computers too. It "
+        "needs the token in the address that is printed at the start.",
     ),
 ]
-NoPage = Annotated[bool, typer.Option("--no-page", help="Without the live page.")]
+NoPage = Annotated[bool, typer.Option("--no-page", help="Do not serve the live page.")]
 NoBrowser = Annotated[
     bool,
     typer.Option("--no-browser", help="Do not open the page in a browser."),
@@ -129,12 +128,12 @@ Verbose = Annotated[
 Heatmap = Annotated[
     Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
 ]
-HeatmapFace = Annotated[Path | None, typer.Option(help="Frame of a face to lay the heat map over.")]
+HeatmapFace = Annotated[Path | None, typer.Option(help="Frame of a face behind the heat map.")]
 Record = Annotated[
-    Path | None, typer.Option(help="Record every tick, to replay and judge: FILE.mcap.")
+    Path | None, typer.Option(help="Record every tick, for replay and reports: FILE.mcap.")
 ]
 RecordPictures = Annotated[
-    float, typer.Option(min=0.0, max=60.0, help="Camera frames a second in the recording.")
+    float, typer.Option(min=0.0, max=60.0, help="Camera frames per second in the recording.")
 ]
 Force = Annotated[
     bool,
