@@ -22,10 +22,10 @@ SILENT_S = 1.5
 """Silence after which a browser counts as gone."""
 
 _BEGINS = (
-    f"looking through a browser's camera, taken to be {FIELD_DEG:g} deg wide as nothing is known "
-    "of its lens; the scene waits"
+    f"using a browser's camera; its unknown field of view is assumed to be {FIELD_DEG:g} deg; "
+    "the scene pauses"
 )
-_ENDS = "the browser's camera has ended: the scene is there again"
+_ENDS = "the browser's camera has ended: the scene continues"
 
 Make = Callable[[Callable[[], FrameSource], int], CameraProcess]
 """Function that returns a camera process of a source; the number counts the former ones."""
@@ -35,10 +35,11 @@ class BorrowedCamera:
     """The rig's own camera, or a browser's while its images arrive.
 
     Args:
-        own: the rig's.
-        make: returns the process that analyses the browser's images.
-        now_s: the host's clock.
-        place: called in the loop's thread when ``lent`` has changed, to place the camera again.
+        own: The rig's camera.
+        make: Returns the process that analyses the browser's images.
+        now_s: The host's clock.
+        place: Called in the loop's thread when ``lent`` has changed, to update the camera's
+            placement.
 
     lent: whether the browser's camera is in use
     """
@@ -78,7 +79,7 @@ class BorrowedCamera:
         try:
             process.open()
         except SetupError as error:
-            self._events.append(f"a browser's camera cannot be looked through: {error}")
+            self._events.append(f"a browser's camera cannot be used: {error}")
             return
         if self._closed:
             process.close()
@@ -116,7 +117,7 @@ class BorrowedCamera:
         process = self._process
         events, self._events = tuple(self._events), []
         others = process.events() if process is not None else ()
-        # A browser may end at any time: that is reported as such, and not as a lost camera.
+        # A browser may end at any time: that is reported as its end, not as a lost camera.
         told = [line for line in others if not line.startswith((LOST, BACK))]
         return (*events, *told, *self.own.events())
 

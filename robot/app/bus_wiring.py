@@ -19,7 +19,7 @@ from gazerig.robot.model.coupling_params import coupled_pairs
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
-    """Return the names of the buses with joints, "" for the one without a name first."""
+    """Return the names of the buses with joints; the unnamed one, "", is the first."""
     used = {joint.bus for joint in rig.joints.values()}
     return tuple(name for name in ("", *rig.buses) if name in used)
 
@@ -32,8 +32,8 @@ def joints_on(rig: Rig, name: str) -> tuple[str, ...]:
 def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:
     """Return the serial port of every bus: the rig's, or the given one.
 
-    given: a port for the bus without a name, or for the only one; NAME=PORT for another one;
-        several are separated by commas
+    given: a port for the unnamed or only bus; NAME=PORT for another one; several are separated by
+        commas
 
     Raises:
         SetupError: it names an unknown bus.
@@ -45,7 +45,7 @@ def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:
             (name,) = ports
         if name not in ports or not port:
             named = ", ".join(f"{name}=PORT" if name else "PORT" for name in ports)
-            raise SetupError(f"--port {given}: no such bus in this rig; it can be {named}")
+            raise SetupError(f"--port {given}: no such bus in this rig; expected {named}")
         ports[name] = port
     return ports
 
@@ -59,7 +59,7 @@ def servo_configs(rig: Rig) -> tuple[ServoConfig, ...]:
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
     """Return the bus of a rig; nothing is opened.
 
-    ports: by the name of the bus
+    ports: ports by the name of the bus
     """
     return _join_buses([_bus_share(rig, name, ports[name]) for name in bus_names(rig)])
 
@@ -73,7 +73,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
 
     Args:
         rig: the rig.
-        paths: of the serial ports, by the name of the bus.
+        paths: Paths of the serial ports, by the name of the bus.
     """
     plans = release_plans(rig, paths)
     guarded = list(plans)
@@ -96,7 +96,7 @@ def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
 
     Args:
         rig: the rig.
-        paths: of the serial ports, by the name of the bus.
+        paths: Paths of the serial ports, by the name of the bus.
     """
     return {
         name: release_plan(rig, name, paths[name])
@@ -110,8 +110,8 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
 
     Args:
         rig: the rig.
-        name: of the bus.
-        path: of its serial port.
+        name: Name of the bus.
+        path: Path of its serial port.
     """
     config, board = rig.bus_named(name), rig.bus_named(name).maestro
     ours = is_ours(BUS, config.kind)
@@ -134,7 +134,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
 def can_be_released(rig: Rig, name: str) -> bool:
     """Return whether a guardian can switch off the servos of one bus.
 
-    It can for all kinds of this package; another package defines a plan, or that none is needed.
+    It can for all kinds of this package. Another package defines a plan, or that none is needed.
     """
     kind = rig.bus_named(name).kind
     return is_ours(BUS, kind) or load(BUS, kind, BusPlugin).release is not None
@@ -168,6 +168,6 @@ def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
     except SetupError:
         raise
     except Exception as error:
-        raise PluginError(f"{label} cannot be made: {describe_error(error)}") from error
+        raise PluginError(f"{label} cannot be created: {describe_error(error)}") from error
     now_s = getattr(port, "now_s", None) or RealClock().now_s
     return BusShare(name, CheckedBus(bus, label, own, now_s), places)

@@ -1,4 +1,4 @@
-"""What a computer can run: its figures are measured in a second, and a load level is chosen.
+"""Measurement of this computer in a second, and choice of the load level that it can run.
 
 ``python -m gazerig.robot.app.computer`` prints the option of ``gazerig run``.
 """
@@ -31,14 +31,14 @@ class ComputerFigures(NamedTuple):
 
 
 class LoadLevel(NamedTuple):
-    """What a computer runs.
+    """A load level of a computer.
 
     Attributes:
         rate_hz: highest rate of the loop, None for the rig's.
         pictures: of the camera in a world: "full", "coarse" (15 a second, without smoothed edges)
             or "none" (detections are computed).
         room: whether ``make run`` is in a room with physics.
-        text: the choice in words.
+        text: Description of the level.
     """
 
     rate_hz: float | None
@@ -53,14 +53,14 @@ LEVELS = {
     "busy": LoadLevel(100.0, "none", True, "a loop of 100 Hz, a room without rendered pictures"),
     "least": LoadLevel(50.0, "none", False, "a loop of 50 Hz, a scene instead of a room"),
 }
-"""Level -> what it runs, from the most to the least."""
+"""Load levels by name, from the highest to the lowest."""
 
 
 def load_level(figures: ComputerFigures) -> str:
     """Return the name of the level that a computer can run.
 
-    A software renderer and a browser with another one take a core and a half, which two processors
-    have only beside a slower loop.
+    A software renderer and a browser with another one take one and a half cores. Two processors
+    have that only next to a slower loop.
     """
     cores, late, share, software = figures
     if share < 0.5 or late >= 0.4 or (cores == 1 and software is not False):
@@ -72,7 +72,7 @@ def load_level(figures: ComputerFigures) -> str:
 
 
 def level_text(name: str) -> str:
-    """Return a level in one line, with the options that override it."""
+    """Return a description of a level in one line, with the options that override it."""
     return (
         f"measured for this computer ({name}): {LEVELS[name].text}; --rate and --world override it"
     )
@@ -84,7 +84,7 @@ def measure(software: bool | None) -> ComputerFigures:
     Args:
         software: see ``ComputerFigures``.
     """
-    from gazerig.drivers.process.priority import SHORT_S, request_slice  # a run has measured
+    from gazerig.drivers.process.priority import SHORT_S, request_slice  # a run has measured it
 
     request_slice(SHORT_S)
     clock, late = RealClock(), 0

@@ -47,7 +47,7 @@ class DrawnSource:
 
     Args:
         make: returns the drawing camera, given the head's pose.
-        poses: of the head.
+        poses: Poses of the head.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class DrawnSource:
                 continue
             self._now = newest
             if self._number == 0:
-                self._camera.latest(self._poses.first_s)  # the scene's own time starts here
+                self._camera.latest(self._poses.first_s)  # the time of the scene starts here
             found = self._camera.latest(newest.t_s)
             if found is None or found.number == self._number:
                 stop.wait(_LOOK_S)
@@ -96,7 +96,7 @@ class DrawnSource:
         self._camera.close()
 
     def _head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        assert self._now is not None  # ``take`` waits for the first
+        assert self._now is not None  # ``take`` waits for the first pose
         return self._now.R_world_head, self._now.p_world_head_m
 
 
@@ -106,10 +106,10 @@ def scene_pixels(
     """Return the camera that draws a scene, for its own process.
 
     Args:
-        scene: in front of the camera.
-        mount: its placement on the head.
-        field_deg: its horizontal field of view.
-        rng: for the noise of the frames.
+        scene: Scene in front of the camera.
+        mount: Placement on the head.
+        field_deg: Horizontal field of view.
+        rng: Random numbers of the noise.
         head: returns the pose of the head.
     """
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
@@ -119,7 +119,7 @@ def scene_pixels(
 
 
 class NoFaces:
-    """Detector of no faces: the process detects them later, as in every camera's frames."""
+    """Detector that finds no faces: the camera's process detects them later."""
 
     def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
         """Return no faces."""
@@ -130,7 +130,7 @@ class DrawnCamera:
     """Camera in a drawn scene, which receives the head's pose at each call.
 
     Args:
-        process: draws and detects; or a thread that does.
+        process: Process or thread that draws and detects.
         poses: receives the pose of the head.
         where: returns rotation and position of the head in the world at a time.
     """

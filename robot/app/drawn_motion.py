@@ -28,7 +28,7 @@ class SyntheticMotionDetector:
             self._detector.forget()
 
     def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
-        """Find motion since the frame before; empty while not enabled."""
+        """Find motion since the previous frame; empty if disabled."""
         before, self._before = self._before, shot.R_world_camera
         if not self._enabled:
             return ()

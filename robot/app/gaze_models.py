@@ -88,9 +88,9 @@ def target_chooser(
     """Return the chooser of the target: the rig's attention, or a package's rule before it.
 
     Args:
-        rig: its ``gaze.chooser`` names the rule.
+        rig: Its ``gaze.chooser`` selects the rule.
         own: the rig's own attention.
-        say: gets one line when the rule is dropped.
+        say: Receives one line when the rule is dropped.
         simulated: time is simulated, so that no answer can be late.
 
     Raises:
@@ -103,5 +103,5 @@ def target_chooser(
     rule = create(ATTENTION, name, part, getattr(rig.gaze, name))
     label = find(ATTENTION, name).label
     if not callable(getattr(rule, "choose", None)):
-        raise PluginError(f"{label} made a {type(rule).__name__}, which has no method choose")
+        raise PluginError(f"{label} created a {type(rule).__name__}, which has no method choose")
     return GuardedChooser(rule, own, label, say, None if simulated else LONGEST_S)

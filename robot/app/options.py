@@ -1,4 +1,4 @@
-"""Options of one run: the same value from the command line to the assembly."""
+"""Options of one run: one value from the command line to the assembly."""
 
 import re
 from dataclasses import dataclass, replace
@@ -21,31 +21,31 @@ class RunOptions:
     Attributes:
         mock: emulated servos instead of the rig's.
         fast: simulated time.
-        seed: of all random generators.
-        scene, video, camera, oak, replay, world: source of the view; one of them;
-            a camera is the number of a webcam or the name of another package's.
+        seed: Seed of all random generators.
+        scene, video, camera, oak, replay, world: source of the view; one of them; a camera is the
+            number of a webcam or the name of another package's camera.
         world: a world with physics, by name or path; its camera's images are rendered and analysed
             by the real detectors.
-        no_pictures: a world is not rendered: detections are computed, as of a scene.
+        no_pictures: a world is not rendered: detections are computed, as for a scene.
         pixels: the scene is drawn and analysed by the real detectors.
         scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
         port: serial port instead of the rig's.
         film_delay_s: age of a film's frames in simulated time.
-        placed_by: detections are placed by the head's pose at capture, or, for comparison only,
-            by the newest pose, which makes the head overshoot.
+        placed_by: detections are placed by the head's pose at capture, or, only for comparison, by
+            the newest pose, which makes the head overshoot.
         rig, character, profile: by name or path; name: of this head, for other programs.
         behaviour, conversation: initial choices.
         seconds: duration of the run.
         page: HOST:PORT of the live page; no_page: without it.
-        heatmap: PNG to write; heatmap_face: image of a face to lay it over.
+        heatmap: PNG to write; heatmap_face: image of a face behind it.
         record: file to record to; record_pictures: camera frames per second in it.
         force: overwrite older files.
         no_browser: leave opening the page to the user.
-        verbose: print details, too.
+        verbose: also print details.
         summary: file of the figures, "-" for standard output.
         bus: replacement of the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
         rate: rate of the loop, Hz, instead of the rig's.
-        computer: what the computer can run, a level of ``gazerig.robot.app.computer``.
+        computer: power of the computer, a level of ``gazerig.robot.app.computer``.
     """
 
     mock: bool = False
@@ -88,7 +88,7 @@ class RunOptions:
 
     @property
     def camera_source(self) -> str | None:
-        """Return the real or filmed camera, None for a scene."""
+        """Return the name of the real or filmed camera, None for a scene."""
         if self.video is not None:
             return "a film"
         if self.replay is not None:
@@ -107,7 +107,7 @@ class RunOptions:
         """Return the address of the live page, None without one.
 
         Raises:
-            SetupError: ``page`` is no address.
+            SetupError: ``page`` is not an address.
         """
         if self.page is None:
             return None
@@ -130,21 +130,21 @@ class RunOptions:
         """Return the options with the default scene if none was given.
 
         Args:
-            blind: no scene is needed.
+            blind: Whether no scene is needed.
 
         Raises:
             SetupError: they contradict each other.
         """
         _ = self.page_address
         if self.fast and not self.mock:
-            raise SetupError("--fast needs --mock: real servos cannot be hurried")
+            raise SetupError("--fast needs --mock: real servos need real time")
         if self.name is not None and not _NAME.fullmatch(self.name):
             raise SetupError(f"--name {self.name}: a letter, then at most 31 of a-z A-Z 0-9 _ -")
         self._refuse_bus()
         asked = [
             name
             for name in ("scene", "video", "camera", "oak", "replay", "world")
-            # By identity: webcam 0 is a choice.
+            # Compared with None, because webcam 0 is valid.
             if getattr(self, name) is not None and getattr(self, name) is not False
         ]
         if len(asked) > 1:
@@ -164,21 +164,21 @@ class RunOptions:
 
     @property
     def level(self) -> LoadLevel | None:
-        """Return what the computer can run, None if it was not measured.
+        """Return the load level of the computer, None if it was not measured.
 
         Raises:
-            SetupError: there is no such level.
+            SetupError: the level is unknown.
         """
         if self.computer is not None and self.computer not in LEVELS:
-            raise SetupError(f"--computer {self.computer}: unknown; there is {', '.join(LEVELS)}")
+            raise SetupError(f"--computer {self.computer}: unknown; available: {', '.join(LEVELS)}")
         return None if self.computer is None else LEVELS[self.computer]
 
     def _refuse_bus(self) -> None:
-        """Refuse a bus that is unknown, or that replaces no servos."""
+        """Reject a bus that is unknown, or that replaces no servos."""
         if self.bus is None:
             return
         if self.bus not in BUSES:
-            raise SetupError(f"--bus {self.bus}: unknown; there is {', '.join(BUSES)}")
+            raise SetupError(f"--bus {self.bus}: unknown; available: {', '.join(BUSES)}")
         if self.port is not None:
             raise SetupError(
                 f"--bus {self.bus} and --port exclude each other: servos at a port are real"
@@ -189,17 +189,19 @@ class RunOptions:
             )
 
     def _refuse_clashes(self, scene: str | None) -> None:
-        """Refuse options that exclude each other."""
+        """Reject options that exclude each other."""
         world, camera = self.world is not None, self.camera is not None or self.oak
         if self.port is not None and self.mock:
-            raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
+            raise SetupError("--port and --mock exclude each other: --mock has its own port")
         if self.fast and camera:
-            raise SetupError("--fast needs a scene, a film or a recording: a camera has real time")
+            raise SetupError(
+                "--fast needs a scene, a film or a recording: a camera runs in real time"
+            )
         if world and not self.mock:
             raise SetupError("--world needs --mock: real servos are in the real world")
         if world and self.bus == "ideal" and not self.fast:
             raise SetupError(
-                "--world with --bus ideal needs --fast: in real time servos have bytes"
+                "--world with --bus ideal needs --fast: ideal servos have no real time"
             )
         if world and self.pixels:
             raise SetupError(
@@ -207,7 +209,7 @@ class RunOptions:
             )
         if self.no_pictures and not world:
             raise SetupError(
-                "--no-pictures needs --world: of a scene pictures are drawn with --pixels alone"
+                "--no-pictures needs --world: pictures of a scene are drawn only with --pixels"
             )
         if self.pixels and scene is None:
             raise SetupError("--pixels draws a scene: it cannot be used with a film or a camera")
@@ -219,7 +221,7 @@ def parse_host_port(text: str) -> tuple[str, int]:
     """Return host and port of HOST:PORT.
 
     Raises:
-        SetupError: it is no address.
+        SetupError: it is not an address.
     """
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:

@@ -1,8 +1,8 @@
 """Resimulation of a recorded run: its percepts, times, commands and rng with the present models.
 
-With the recorded configuration and code every command is identical to the bit; the
-joints are then those recorded. After a change the recorded joints would belong to
-other commands, so emulated servos follow instead, ideal ones if they were ideal.
+With the recorded configuration and code every command is bit-identical, and the joint angles are
+the recorded ones. After a change the recorded angles would belong to other commands, so emulated
+servos follow the commands instead (ideal ones if they were ideal).
 """
 
 import tempfile
@@ -37,8 +37,10 @@ class Resimulation(NamedTuple):
     """Result of a resimulation.
 
     joints: source of the joints' angles
-    ticks: compared; agreeing: number with the same target, gaze and commands, to the bit
-    first_difference_s: from the first tick, None if all agree; differs: the difference there
+    ticks: number of compared ticks; agreeing: number of ticks with bit-identical target, gaze and
+        commands
+    first_difference_s: time of the first difference from the first tick, None if all agree;
+    differs: the difference there
     sent_bytes_same: whether the bytes on the emulated bus are the same too, None if unknown
     recorded_figures, rerun_figures: the figures of both (gazerig.robot.analysis.summary)
     notes: further messages for the user
@@ -72,7 +74,7 @@ def rerun(
     rig: another rig, by name, by path or as an object; None: as recorded
     character: applied to it, by name or path
     joints: "recorded" (the default if nothing is changed) or "emulated"
-    on_tick: gets every tick of the new run, to be recorded or reported on
+    on_tick: receives every tick of the new run, for a recording or a report
 
     Raises:
         gazerig.config.load.ConfigError: the rig or character is invalid.
@@ -137,14 +139,14 @@ class _Resimulator:
                 f"the rig has the joints {', '.join(names)}, the recording {', '.join(recorded)}"
             )
             if self._body is not None:
-                raise SetupError(f"{apart}: let the servos be emulated")
+                raise SetupError(f"{apart}: use emulated servos")
             self._notes.append(apart)
         if recording.note:
             self._notes.append(recording.note)
         began_s = first.tick.t_s - first.dt_s
         starts = [one.t_s for one in first.before if isinstance(one, MeasuredJoints)]
         if not starts:
-            self._notes.append("the start of the run is not in the recording: it begins a little")
+            self._notes.append("the start of the run is not in the recording: it begins")
         self._made.clock.sleep_until(starts[0] if starts else began_s)
         if self._body is not None:
             self._body.play(first)
@@ -158,7 +160,7 @@ class _Resimulator:
         count = LoopCount(self._compared.ticks, 0, ended or end.stopped_by or "seconds")
         shut_down(self._made, count, lambda line: None)
         if ended is not None:
-            self._notes.append(f"the new run ended early by {ended}")
+            self._notes.append(f"the new run ended early: {ended}")
         now = self._made.sent_bytes_digest()
         same = now == end.tx_sha256 if end.tx_sha256 else None
         return self._compared.result(self._joints, same, tuple(self._notes))
@@ -181,7 +183,7 @@ class _Resimulator:
                 tick = made.robot.tick(was.t_s, moment.dt_s)
             except DriverError as error:
                 return f"fault: {error}"
-            if self._body is not None:  # events of bus and camera are of the recorded machine
+            if self._body is not None:  # events of bus and camera belong to the recorded computer
                 tick = tick._replace(events=was.events)
             self._compared.update(was, tick)
             if self._on_tick is not None:
@@ -227,7 +229,7 @@ class _Comparison:
 
 
 class _Decisions(NamedTuple):
-    """Decisions of a tick, as text that is equal only if every bit is."""
+    """Decisions of a tick, as text that is equal only if every bit is equal."""
 
     target: str
     gaze: str
@@ -237,11 +239,11 @@ class _Decisions(NamedTuple):
 
 
 def _decisions(tick: Tick) -> _Decisions:
-    gaze = tick.gaze._replace(limited=())  # recorded by later versions only
-    # Commands to absent lids have no effect.
+    gaze = tick.gaze._replace(limited=())  # only in recordings of later versions
+    # Commands for absent lids have no effect.
     if _LOWER_LIDS.isdisjoint(tick.guard_result.joints):
         gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
-    # The wording of the reason may change; its contents are in the pulls.
+    # The wording of the reason may change; its content is in the saliences.
     return _Decisions(
         repr(tick.target._replace(why="")),
         repr(gaze),
@@ -284,7 +286,7 @@ def _resimulation_rig(
     except ConfigError as error:
         first = error.faults[0]
         raise BadRecording(
-            f"{recording.path} was made with a configuration that this version does not know "
+            f"{recording.path} was made with a configuration that this version does not support "
             f"({first.key}: {first.rule}): give another rig"
         ) from None
     found = base
@@ -293,7 +295,7 @@ def _resimulation_rig(
         file = Path(character) if by_path else shipped_path("characters", character)
         found = load(file, Rig, defaults=(whole,))
     if rig is None and recording.info.gestures_yaml:
-        # The files of gestures may have changed since, too.
+        # The files of gestures may also have changed since then.
         kept = _write_text(recording.info.gestures_yaml, folder / "gestures.yaml")
         (folder / "gestures").mkdir()
         found = replace(found, gesture_files=gesture_files(kept, folder / "gestures"))
@@ -301,7 +303,7 @@ def _resimulation_rig(
     same_walk = rig is None and scanpath.transition_matrix == base.gaze.scanpath.transition_matrix
     if not same_walk or not recording.info.walk_yaml:
         return found
-    # The walk's own file may have changed since, or be on another machine.
+    # The walk's own file may have changed since then, or be on another computer.
     walk = str(_write_text(recording.info.walk_yaml, folder / "walk.yaml"))
     return replace(
         found, gaze=replace(found.gaze, scanpath=replace(scanpath, transition_matrix=walk))

@@ -23,7 +23,7 @@ P = TypeVar("P", ScanpathParams, SaccadeParams)
 
 
 def run_rig(options: RunOptions) -> Rig:
-    """Return the rig of a run, with its meshes checked, too.
+    """Return the rig of a run; its meshes are checked too.
 
     Raises:
         gazerig.config.load.ConfigError: rig, character, profile or rule set are invalid.
@@ -61,7 +61,7 @@ def _with_choice(params: P, key: str, value: str, option: str) -> P:
     """Replace one key that has choices by an option of the command line."""
     choices = choices_of(type(params), key)
     if value not in choices:
-        raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")
+        raise SetupError(f"{option} {value}: unknown; available: {', '.join(choices)}")
     return replace(params, **{key: value})  # type: ignore[arg-type]
 
 
@@ -69,9 +69,9 @@ def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
     """Return the requested scene, None if the camera has another source.
 
     Raises:
-        gazerig.config.load.ConfigError: its script is at fault.
+        gazerig.config.load.ConfigError: its script has faults.
         SetupError: the scene is unknown, or the rig has no rule for a behaviour that its action
-            planner would have to choose there.
+            planner needs in it.
     """
     if options.scene is None:
         return None
@@ -81,7 +81,7 @@ def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
 
 
 def refuse_missing_rules(rules: TopDownParams, scene: Scene, option: str) -> None:
-    """Refuse a scene whose planner needs behaviours without rules.
+    """Reject a scene whose planner needs behaviours without rules.
 
     Raises:
         SetupError: the message names them.
@@ -95,10 +95,10 @@ def refuse_missing_rules(rules: TopDownParams, scene: Scene, option: str) -> Non
 
 
 def with_surroundings(rig: Rig, options: RunOptions) -> Rig:
-    """Return the rig with the settings of a boxing match, if its surroundings are one.
+    """Return the rig with the settings of a boxing match, if the surroundings are one.
 
-    Its action planner is switched on, and in a world the finder of red gloves. Rules that lack a
-    behaviour stay unchanged: ``scene_of`` refuses the scene.
+    The action planner is enabled, and in a world also the detection of red gloves. Rules that lack
+    a behaviour are not changed: ``scene_of`` rejects the scene.
     """
     scene: Scene | None = None
     if options.scene is not None:

@@ -1,4 +1,4 @@
-"""The files of simulated scenes: by a shipped name, or by a path of the user's own."""
+"""Files of simulated scenes, by a shipped name or by a user's path."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
 from gazerig.sim_mock.scenes.script import SceneScript
 
 KIND = "scenes"
-"""The folder of the shipped scenes."""
+"""Folder of the shipped scenes."""
 
 
 def scene_names() -> tuple[str, ...]:
@@ -23,11 +23,11 @@ def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
 
     Args:
         name_or_path: name of a shipped scene, or path of a script.
-        seed: of acts with a random time.
+        seed: Seed of acts with a random time.
 
     Raises:
-        gazerig.config.load.ConfigError: the file is at fault.
-        SetupError: there is none of that name.
+        gazerig.config.load.ConfigError: the file has faults.
+        SetupError: the name is unknown.
     """
     if not is_path(name_or_path) and name_or_path not in scene_names():
         raise SetupError(
@@ -49,7 +49,7 @@ def script_file(
     """Return the path of a script, and the version of its content, None if it cannot be read.
 
     Raises:
-        gazerig.config.load.ConfigError: none of that name is shipped.
+        gazerig.config.load.ConfigError: no shipped script has this name.
     """
     path = Path(name_or_path) if is_path(name_or_path) else shipped_path(kind, name_or_path, home)
     try:
@@ -61,5 +61,5 @@ def script_file(
 
 @lru_cache(maxsize=8)
 def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
-    """Return a script; a run requests it several times, and reads it once."""
+    """Read a script, with a cache, as a run requests it several times."""
     return load(path, SceneScript, checks=(faults,))

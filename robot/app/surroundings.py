@@ -1,6 +1,6 @@
 """Surroundings of an emulated rig: servo mechanics, camera view and appearance.
 
-``gazerig run --world NAME`` runs in them. A package provides some by an entry point of the group
+``gazerig run --world NAME`` runs in them. A package provides its own by an entry point of the group
 ``gazerig.surroundings``, which names a subclass of ``Surroundings``.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from gazerig.sim_mock.scenes.scene import Scene
 
 WORLD = "world"
-"""Our own surroundings: they serve all names that no package has."""
+"""Our own surroundings, which handle all names that no package has."""
 
 
 class RunRoom(Protocol):
@@ -50,7 +50,7 @@ class RunRoom(Protocol):
 
     @property
     def placement(self) -> tuple[float, ...]:
-        """Return the rig's placement, as of ``RunInfo.placement``; () at the origin."""
+        """Return the rig's placement, as in ``RunInfo.placement``; () at the origin."""
         ...
 
     def camera(
@@ -63,29 +63,29 @@ class RunRoom(Protocol):
         own: "ProgramParts",
         say: Callable[[str], None],
     ) -> "Camera":
-        """Return the rig's camera; called once.
+        """Return the rig's camera; called only once.
 
         Args:
-            rig: with the parameters of detectors.
-            options: of the run.
-            sight: placement of the camera, and history of its rotation.
-            placed: the present parameters of the camera.
-            rng: for its noise.
-            own: camera and detector of a program.
-            say: gets messages for the user.
+            rig: Rig with the parameters of detectors.
+            options: Options of the run.
+            sight: Placement of the camera, and history of its rotation.
+            placed: Present parameters of the camera.
+            rng: Random numbers of its noise.
+            own: Camera and detector of a program.
+            say: Receives messages for the user.
         """
         ...
 
     def start_s(self) -> float | None:
-        """Return the start of its script, on the clock of the ticks, None before."""
+        """Return the start of its script on the clock of the ticks, None before it."""
         ...
 
     def shapes(self) -> "WorldShapes | None":
-        """Return its appearance, for the page; None: it is not shown."""
+        """Return its appearance for the page, None if it is not shown."""
         ...
 
     def world_info(self) -> "WorldInfo | None":
-        """Return its part of a recording, None before its script began or without one."""
+        """Return its part of a recording, None before its script has begun or without a script."""
         ...
 
 
@@ -100,7 +100,7 @@ class GroupRun(Protocol):
         watch: "Callable[[Tick], object] | None" = None,
         browse: Callable[[str], object] | None = None,
     ) -> dict[str, object]:
-        """Run; arguments and figures as of ``gazerig.robot.app.session.run``."""
+        """Run; arguments and figures as in ``gazerig.robot.app.session.run``."""
         ...
 
 
@@ -136,19 +136,19 @@ class Surroundings(ABC):
 
         Args:
             rig: the rig.
-            options: of the run; ``options.world`` names them.
-            clock: of the run.
+            options: Options of the run; ``options.world`` names the surroundings.
+            clock: Clock of the run.
 
         Raises:
             SetupError: they cannot be used.
         """
 
     def names(self) -> tuple[str, ...]:
-        """Return the names that a shell completes after ``--world``."""
+        """Return the names for shell completion of ``--world``."""
         return ()
 
     def group(self, options: "RunOptions") -> GroupRun | None:
-        """Return the run of several heads, None if there is one head in them.
+        """Return the run of several heads, None for a single head.
 
         Raises:
             SetupError: they cannot be used.
@@ -159,17 +159,17 @@ class Surroundings(ABC):
         """Return the appearance of a recorded run's surroundings, relative to its head's neck base.
 
         Args:
-            info: the result of ``RunRoom.recorded``.
-            placement: placement of the head, as of ``RunInfo.placement``.
+            info: Result of ``RunRoom.world_info``.
+            placement: placement of the head, as in ``RunInfo.placement``.
 
         Raises:
             SetupError: they cannot be shown; the message has the reason.
         """
-        raise SetupError(f"the surroundings {info.name} are not shown: they keep no shapes")
+        raise SetupError(f"the surroundings {info.name} are not shown: they store no shapes")
 
 
 def surroundings(name: str) -> Surroundings:
-    """Return the surroundings of a name or path: a package's of that name, else our world.
+    """Return the surroundings of a name or path: a package's of that name, otherwise our world.
 
     Raises:
         PluginError: they cannot be imported, or several packages have this name.
@@ -179,11 +179,11 @@ def surroundings(name: str) -> Surroundings:
     part = found.load()
     if isinstance(part, type) and issubclass(part, Surroundings):
         return part()
-    raise PluginError(f"{found.label} is no subclass of {Surroundings.__module__}.Surroundings")
+    raise PluginError(f"{found.label} is not a subclass of {Surroundings.__module__}.Surroundings")
 
 
 def surroundings_names() -> list[str]:
-    """Return the names after ``--world``, ours and packages', without those that are missing."""
+    """Return the names for ``--world``, ours and packages', without missing ones."""
     names: list[str] = []
     for one in registrations(SURROUNDINGS):
         if not one.is_ours:
