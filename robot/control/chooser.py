@@ -41,7 +41,7 @@ class TargetChooser(Protocol):
     top_down: TopDown
 
     def reset(self, t_s: float) -> None:
-        """Forget everything seen."""
+        """Forget all observations."""
         ...
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
@@ -96,7 +96,7 @@ class GuardedChooser:
         self._own_shift = 0
 
     def reset(self, t_s: float) -> None:
-        """Forget everything seen."""
+        """Return the target of the rule, otherwise that of the rig's own attention."""
         self._own.reset(t_s)
         self._overruns.clear()
         self._chosen, self._identity = None, None
@@ -107,7 +107,7 @@ class GuardedChooser:
                 self._drop(f"failed ({outcome.error_text})")
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Return the target of the rule, else that of the rig's own attention."""
+        """Return the target of the rule, otherwise that of the rig's own attention."""
         own, rule = self._own.choose(percept, state, t_s), self._rule
         if rule is not None:
             self._call_rule(rule, percept, state, t_s)
@@ -123,7 +123,7 @@ class GuardedChooser:
     ) -> None:
         """Call the rule, and keep its choice until its next answer."""
         outcome = self._call(lambda: _answer(rule, percept, state, t_s))
-        if outcome is None:  # the computer may be busy: only the rule's own time counts
+        if outcome is None:  # the computer may be busy: only the rule's run time counts
             if self._call.running_s() > BLOCKED_S:
                 self._drop(f"has not answered for {BLOCKED_S:g} s")
             return

@@ -48,7 +48,7 @@ class CoupledServos:
         return angles
 
     def set_goals(self, shafts_rad: Sequence[float]) -> None:
-        """Record the servo angles at which the torque came on."""
+        """Record the servo angles at which torque was switched on."""
         for i, j, _ in self._pairs:
             self._goals[i] = shafts_rad[i], shafts_rad[j]
 
@@ -68,8 +68,8 @@ class CoupledServos:
         """Return feedback in which both servos of a pair share the values for both joints.
 
         If one servo did not answer, both joints are stale, at their last common position. The
-        higher load, a fault, and torque that came on again apply to both. The torque is on if
-        both servos have it; after a release (``released``), if one has it.
+        higher load, a fault, and torque that was switched on again apply to both. The torque is on
+        if both servos have it; after a release (``released``), if one has it.
         """
         for i, j, _ in self._pairs:
             feedback = self._complete(feedback, i, j, released)

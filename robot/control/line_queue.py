@@ -1,4 +1,4 @@
-"""Queue of lines for people, delivered by a thread: a slow receiver delays no caller."""
+"""Queue of message lines, delivered by a thread: a slow receiver delays no caller."""
 
 import contextlib
 import sys
@@ -55,7 +55,7 @@ class LineQueue:
         for_s = self._call.running_s()
         if for_s == 0.0:
             return None
-        waiting = f"{self._call.waiting_calls()} lines wait, {self.dropped} are lost"
+        waiting = f"{self._call.waiting_calls()} lines are waiting, {self.dropped} are lost"
         return for_s, f"{self._name} has not returned for {for_s:.0f} s: {waiting}"
 
     def __enter__(self) -> Self:
@@ -81,7 +81,7 @@ class LineQueue:
             last.flush(_END_S)
 
     def _deliver_line(self, text: str) -> None:
-        """Deliver a line, and before it a note of missing ones."""
+        """Deliver a line, preceded by a note about lost ones."""
         missing, self._missing = self._missing, 0
         try:
             if missing:

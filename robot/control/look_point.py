@@ -19,7 +19,7 @@ from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 
 class LastObservation(NamedTuple):
-    """The observations before the first tick; afterwards the newest tick replaces them."""
+    """Placeholder observations before the first tick, which replaces them."""
 
     pose: GazeState | None = None
     detections: Detections | None = None
@@ -62,7 +62,7 @@ class LookPoints:
                 return p
             case LookAtPixel():
                 if command.p_world_m is None:
-                    raise ValueError("there is no camera frame to look into yet")
+                    raise ValueError("there is no camera frame yet")
                 return command.p_world_m
             case LookAtInHead(p) if pose is not None:
                 return add(pose.p_world_head_m, rotate(pose.R_world_head, p))
@@ -85,5 +85,5 @@ class LookPoints:
             if face.id == command.id and percept is not None:
                 return face, percept.captured_s
         there = ", ".join(str(face.id) for face in faces)
-        seen = f"there is {there}" if there else "no one is seen"
-        raise ValueError(f"no person {command.id} is seen now; {seen}")
+        seen = f"visible: {there}" if there else "nobody is visible"
+        raise ValueError(f"person {command.id} is not visible; {seen}")

@@ -69,7 +69,7 @@ class LoopTiming:
 
 
 def busy_text(figures: LoopFigures | None) -> str:
-    """Return a text if the computer is too busy, else "".
+    """Return a text if the computer is too busy, otherwise "".
 
     Args:
         figures: Figures of the last seconds, None if unknown.

@@ -34,4 +34,4 @@ def failure_text(name: str, error: Exception) -> str:
     """Return a message that the run continues without a failed observer."""
     what = " ".join(str(error).split())
     why = f"{type(error).__name__}: {what}" if what else type(error).__name__
-    return f"{name} failed ({why}); the rig runs on without"
+    return f"{name} failed ({why}); the rig continues without it"

@@ -15,9 +15,9 @@ from gazerig.robot.model.types import JointAngles, JointState
 
 _SAME_RAD = radians(0.1)
 _OFF_POINT_RAD = radians(0.5)
-"""A gaze within this distance is on its point: converging eyes differ by rounding."""
+"""Distance within which a gaze counts as on its point: converging eyes differ by rounding."""
 _AT_END = "at the end of its range"
-_TOO_NEAR = "the eyes converge on no nearer point"
+_TOO_NEAR = "the eyes cannot converge on a nearer point"
 _ABSENT = "this rig has none"
 
 

@@ -14,8 +14,8 @@ whole slot of the loop."""
 def freeze_objects() -> None:
     """Exclude all present objects from later passes of the garbage collector.
 
-    A full pass over the objects from start-up takes 20 ms, four slots. Call this before the
-    torque is on, as nothing may delay the servos afterwards. Objects that were excluded for an
+    A full pass over the objects from start-up takes 20 ms, four slots. Call this before torque is
+    switched on, as nothing may delay the servos afterwards. Objects that were excluded for an
     earlier robot in this process are collected first.
     """
     gc.unfreeze()
