@@ -61,7 +61,9 @@ def open_gamepad(path: str | None, load: Callable[[], Any] = load_evdev) -> "Gam
             other.close()
     if pads:
         return Gamepad(pads[0])
-    where = f"{path} is no gamepad" if path else "no gamepad is there, or you may not read it"
+    where = (
+        f"{path} is not a gamepad" if path else "no gamepad is connected, or you may not read it"
+    )
     raise SetupError(f"{where}: plug one in; sudo usermod -aG input $USER, then log out and in")
 
 

@@ -3,8 +3,8 @@
 A rig that is being calibrated accepts only stops: ``StopOnlyServer``.
 
 Files that users edit are watched. Editors overwrite a file, write it in two steps, rename a new
-file over it, or delete it for a moment. New content therefore counts when two checks in a row found
-the same, and a missing file when it is missing for several checks.
+file over it, or delete it for a moment. New content is therefore accepted when two checks in a row
+found the same, and a missing file when it is missing for several checks.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ _LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing
 _SAME_LOOKS = 1
 """Checks that must find the same as the one before."""
 _SAME_LOOKS_CUT = 5
-"""The same for a text without a final line end: the rest is probably not written yet."""
+"""Such checks for a text without a final line end, which is probably not complete yet."""
 _MISSING_LOOKS = 6
 """Checks in a row with a missing or empty file before it counts as missing."""
 
@@ -85,7 +85,7 @@ class Debouncer:
         if now is None:
             self._missing += 1
             gone = self._missing == _MISSING_LOOKS
-            # A file that appears again is read, whatever it contains.
+            # A file that appears again is read, even with the same content.
             self._known = b"" if gone else self._known
             return gone
         self._missing = 0
@@ -186,11 +186,11 @@ class LiveServer:
         tuning: Parameters and their files.
         refusals: Exceptions that ``tuning`` raises if a value breaks a rule.
         clock: Clock of the loop.
-        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
         timing: Returns the timing statistics of the loop.
         fault: Executes a fault command of emulated servos; None if the servos are real.
-        changing: Returns the other fields of the status, as {"page": address}.
+        changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
     """
 
@@ -224,12 +224,12 @@ class LiveServer:
         try:
             self._server.open()
         except SetupError as error:  # the head runs without remote control
-            self._say(f"gazerig ctl set and stop will not find this rig: {error}")
+            self._say(f"gazerig ctl set and stop cannot find this rig: {error}")
         self._watch.start()
 
     @property
     def path(self) -> Path | None:
-        """Return the path of the socket while it listens, else None."""
+        """Return the path of the socket while it listens, otherwise None."""
         return self._server.path
 
     @property
@@ -247,7 +247,7 @@ class LiveServer:
         self._server.close()
 
     def _files(self) -> tuple[Path, ...]:
-        """Return the files in use; if a new one cannot be found, the previous ones."""
+        """Return the files in use; if the present ones cannot be determined, the previous ones."""
         version, files = self._in_use
         now = self._tuning.version
         if now != version:
@@ -261,7 +261,7 @@ class LiveServer:
         try:
             notes = self._tuning.reload(path)
         except self._refusals as error:
-            self._say(f"{path} changed and is refused; the values from before stay:\n{error}")
+            self._say(f"{path} changed but has errors; the previous values stay:\n{error}")
             return
         lines = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
         if lines:
@@ -270,7 +270,7 @@ class LiveServer:
             self._say(f"{path} was written again without changes")
 
 
-_FIXED = "it is being calibrated: its parameters stay as they are until that is over"
+_FIXED = "it is being calibrated: its parameters cannot be changed until the calibration ends"
 
 
 class StopOnlyServer:
@@ -279,7 +279,7 @@ class StopOnlyServer:
     Args:
         command: Queues a command for the next tick.
         clock: Clock of the loop.
-        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
     """
 
@@ -300,8 +300,8 @@ class StopOnlyServer:
         """Listen to other programs; print a line if that fails."""
         try:
             self._server.open()
-        except SetupError as error:  # the head goes on without
-            self._say(f"gazerig stop will not find this rig: {error}")
+        except SetupError as error:  # the head runs without remote control
+            self._say(f"gazerig stop cannot find this rig: {error}")
 
     def update(self, tick: Tick) -> None:
         """Store the newest tick; called by the loop."""

@@ -1,7 +1,7 @@
 """Socket of a running rig: its path, and JSON lines in both directions.
 
-A Unix socket in a folder of the user: programs that may open files of the user may control the
-head, other users and other machines may not. On a system without such sockets, a port of the
+A Unix socket in a folder of the user: programs with access to the user's files may control the
+head; other users and other computers may not. On a system without such sockets, a port of the
 loopback replaces it: the file then contains the port and a token, which a caller must send first.
 """
 
@@ -46,7 +46,7 @@ def parse_json(text: str | bytes) -> Any:
     """Return the value of a JSON text.
 
     Raises:
-        ValueError: it is not JSON; NaN and Infinity are not.
+        ValueError: it is not JSON; NaN and Infinity are not allowed.
         RecursionError: it is nested too deep.
     """
 
@@ -90,10 +90,12 @@ def make_private(path: Path, uid: int) -> None:
             path.mkdir(mode=0o700)
         private = is_private(path, uid)
     except OSError as error:
-        raise SetupError(f"{path}: cannot be made ({error.strerror}); no remote control") from None
+        raise SetupError(
+            f"{path}: cannot be created ({error.strerror}); no remote control"
+        ) from None
     if not private:
         raise SetupError(
-            f"{path}: not a folder of yours alone; remove it, or chmod 700 it if it is yours"
+            f"{path}: not a private folder of yours; remove it, or chmod 700 it if it is yours"
         )
 
 
@@ -146,7 +148,7 @@ def _connect_to_port(path: Path, within_s: float) -> socket.socket:
     """Connect to the port in a file, and send the token."""
     port, _, token = path.read_text(encoding="ascii").partition(" ")
     if not port.isdecimal():
-        raise ConnectionRefusedError(f"{path} names no port")
+        raise ConnectionRefusedError(f"{path} does not contain a port")
     caller = socket.create_connection((_LOOPBACK, int(port)), within_s)
     try:
         caller.sendall(token.encode())
@@ -240,7 +242,9 @@ def listen(path: Path) -> Listener:
         early.rename(path)
     except OSError as error:
         listener.close()
-        raise SetupError(f"{path}: no socket there ({error.strerror}); no remote control") from None
+        raise SetupError(
+            f"{path}: no socket can be created there ({error.strerror}); no remote control"
+        ) from None
     return Listener(listener)
 
 
@@ -257,7 +261,9 @@ def _listen_on_port(path: Path, early: Path) -> Listener:
         os.replace(early, path)
     except OSError as error:
         listener.close()
-        raise SetupError(f"{path}: no port there ({error.strerror}); no remote control") from None
+        raise SetupError(
+            f"{path}: no port can be opened there ({error.strerror}); no remote control"
+        ) from None
     return Listener(listener, token)
 
 
@@ -319,7 +325,7 @@ class Wire:
         try:
             return parse_json(line)
         except RecursionError:
-            raise MalformedMessage("nested too deep", over=False) from None
+            raise MalformedMessage("nested too deeply", over=False) from None
         except ValueError as error:
             raise MalformedMessage(f"not a line of JSON: {error}", over=False) from None
 

@@ -2,7 +2,7 @@
 
 The threads never touch the control loop: they use the tuning and queue commands, which the loop
 executes at its next tick. A program that sends malformed data, stops within a request or reads no
-answers occupies a thread and nothing else.
+answers only occupies a thread.
 """
 
 import os
@@ -139,9 +139,9 @@ class RemoteServer:
         while self._listener is not None:
             try:
                 end = listener.accept()
-            except OSError:  # closed
+            except OSError:  # it was closed
                 return
-            if not listener.waits_for_token:  # in the order of arrival
+            if not listener.waits_for_token:  # accept programs in the order of arrival
                 self._admit(end, listener)
             elif not self._start(self._admit, end, listener):
                 end.close()
@@ -157,11 +157,11 @@ class RemoteServer:
             return
         wire = Wire(end, REQUEST_BYTES)
         with self._lock:
-            if self._listener is None:  # closed meanwhile: nothing would close this connection
+            if self._listener is None:  # closed meanwhile: this connection would stay open
                 wire.close()
                 return
             if len(self._wires) >= _MOST:
-                # A client that comes to stop the head must always be accepted.
+                # A client that wants to stop the head must always be accepted.
                 quietest = next(iter(self._wires))
                 del self._wires[quietest]
                 quietest.close()
@@ -197,9 +197,9 @@ class RemoteServer:
         try:
             answer = self._requests.answer(request, peer)
         except Exception as error:
-            # An internal error in one request must not end the remote control: stops need it.
+            # An internal error in one request must not end the remote control, which stops need.
             answer = {"failed": f"{type(error).__name__}: {error}"}
-            self._say(f"remote control: {request!r:.200} met an error: {answer['failed']}")
+            self._say(f"remote control: {request!r:.200} failed: {answer['failed']}")
         taken = self._answer(wire, answer)
         used_s, now_s = time.thread_time() - began_s, self._clock.now_s()
         own.spend(used_s, now_s)
@@ -213,7 +213,7 @@ class RemoteServer:
         if wait_s > 0.0:
             self._clock.sleep_until(now_s + min(wait_s, _LONGEST_WAIT_S))
         left_s = wait_s - _LONGEST_WAIT_S
-        return f"too many requests: ask again in {left_s:.1f} s" if left_s > 0.0 else ""
+        return f"too many requests: try again in {left_s:.1f} s" if left_s > 0.0 else ""
 
     def _answer(self, wire: Wire, answer: dict[str, object]) -> bool:
         """Send an answer; return whether it was sent."""
@@ -221,7 +221,7 @@ class RemoteServer:
             try:
                 wire.write(answer, _TAKES_S)
             except ValueError as error:
-                wire.write({"failed": f"the answer has no JSON: {error}"}, _TAKES_S)
+                wire.write({"failed": f"the answer cannot be written as JSON: {error}"}, _TAKES_S)
         except OSError:
             return False
         return True

@@ -1,7 +1,7 @@
 """Manual control of the head by keys, sticks and buttons; pure functions of time.
 
-A stick out of its middle controls the gaze. A terminal reports only that keys are pressed, so
-keys stop to control it after a time without one.
+A deflected stick controls the gaze. A terminal reports only key presses, so control by keys ends
+some time after the last one.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Stick:
 
 
 class Steering:
-    """Direction that a person steers the gaze to.
+    """Gaze direction that a person steers.
 
     Args:
         behind: Whether the person is behind the head, so that both have the same right. In front of
