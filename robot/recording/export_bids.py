@@ -125,7 +125,7 @@ def refuse_foreign(root: Path, force: bool = False) -> None:
     except (OSError, ValueError, AttributeError, TypeError):
         pass
     raise SetupError(
-        f"{root} exists and is not a data set of gazerig: name another folder, or use --force"
+        f"{root} exists and is not a data set of gazerig: use another folder, or use --force"
     )
 
 
@@ -225,7 +225,7 @@ def _write_eye(
         "EyeTrackingMethod": _METHODS[basis],
         "GazeBasis": basis,
         "EstimatedJoints": list(trace.estimated),
-        "ReckonedJoints": list(trace.estimated),  # the key until this version
+        "ReckonedJoints": list(trace.estimated),  # the former key, for compatibility
         "Manufacturer": "gazerig",
         "ManufacturersModelName": about.subject,
         "DeviceSerialNumber": _MISSING,
@@ -300,7 +300,7 @@ def _write_events(
             "Description": "kind of event, n/a for a message",
             "Levels": {
                 "fixation": "the gaze rests on a still target",
-                "saccade": "the gaze jumps",
+                "saccade": "the gaze moves rapidly",
                 "pursuit": "the gaze follows a moving target",
                 "blink": "the lids close and open",
             },
@@ -309,7 +309,7 @@ def _write_events(
         "peak_velocity": {"Description": "fastest angular speed", "Units": "deg/s"},
         "target": {"Description": "target of the gaze or of the saccade: kind and number"},
         "part": {
-            "Description": "part of a face; left and right are the face's owner's",
+            "Description": "part of a face; left and right are those of the person",
             "Levels": dict(PART_NAMES),
         },
         "message": {"Description": "message of the machine, or a command to it"},

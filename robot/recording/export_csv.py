@@ -88,9 +88,9 @@ def csv_files(stem: Path) -> tuple[Path, ...]:
 def columns(joints: Collection[str]) -> tuple[str, ...]:
     """Return the columns of the samples of a rig with these joints.
 
-    ``x_deg`` and ``y_deg`` are the cyclopean gaze. Lids are 0 shut .. 1 open. ``event`` is
-    "blink" during a blink, else the movement. ``target`` and ``part`` are the fixated object,
-    and during a saccade its destination.
+    ``x_deg`` and ``y_deg`` are the cyclopean gaze. Lids are 0 shut .. 1 open. ``event`` is "blink"
+    during a blink, otherwise the movement. ``target`` and ``part`` are the fixated object, and
+    during a saccade its destination.
     """
     there = [name for joint, name in (_HEAD | _LIDS).items() if joint in joints]
     return (*_GAZE, *there, *_LABELS)
@@ -106,7 +106,7 @@ def _basis_by_column(trace: GazeAngles) -> dict[str, object]:
     return {
         "joints": list(trace.joints),
         "estimated_joints": list(trace.estimated),
-        "reckoned_joints": list(trace.estimated),  # the key until this version
+        "reckoned_joints": list(trace.estimated),  # the former key, for compatibility
         "basis": {key: trace.basis(of) for key, of in (gaze | there).items()},
         "estimated": ESTIMATED,
     }

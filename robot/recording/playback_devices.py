@@ -27,7 +27,8 @@ H = TypeVar("H", bound=BodyRecord)
 class PlaybackBody(ForwardingBody):
     """A body that forwards commands and returns the recorded readings.
 
-    The wrapped body receives every call, so that its bus carries the bytes of the first run.
+    The wrapped body receives every call, so that the same bytes are sent on its bus as in the first
+    run.
     """
 
     def __init__(self, body: Body) -> None:

@@ -1,4 +1,4 @@
-"""Reader of a recorded run; the recording of a killed program is read as far as it is complete."""
+"""Reader of a recorded run; that of a killed program is readable to its last complete part."""
 
 import base64
 import struct
@@ -154,10 +154,10 @@ class RunRecording:
         """Return a description of the recording's defect, "" if it has none."""
         name, lost = self.path.name, self.end.lost
         if not self.whole:
-            return f"{name} was not closed: it contains what its writer had put on the disk"
+            return f"{name} was not closed: it contains the data that its writer had written to the disk"
         if not self.end.stopped_by:
             return f"{name} ends at the time at which the program was killed"
-        return f"{name} lacks {lost} ticks that could not be kept" if lost else ""
+        return f"{name} lacks {lost} ticks that could not be stored" if lost else ""
 
     def ticks(self) -> Iterator[Tick]:
         """Return the ticks, bit for bit, without detections and frames (``detections=None``).
@@ -186,7 +186,7 @@ class RunRecording:
                     continue
                 moment = from_json(message, percepts)
                 t_s = moment.tick.t_s
-                # Exports fill gaps, and would fill years.
+                # Exports fill gaps with rows; a gap of years would give too many.
                 if not isfinite(t_s) or (
                     before_s is not None and not 0.0 <= t_s - before_s < _LONGEST_GAP_S
                 ):
@@ -207,7 +207,7 @@ class RunRecording:
             yield frame
 
     def health(self) -> Iterator[dict[str, Any]]:
-        """Return the bus counts and the servos' readings, as recorded once a second.
+        """Return the bus counts and the servos' readings, recorded once per second.
 
         Raises:
             BadRecording: The file is damaged.
@@ -238,7 +238,7 @@ class RunRecording:
             return read_run_info(record.metadata) if record.name == fmt.RUN else None
 
     def _check_profile(self, profile: str) -> None:
-        """Refuse a file that is not a recording of a run."""
+        """Reject a file that is not a recording of a run."""
         if profile == PROFILE:
             return
         if profile.startswith(_CAMERA):
@@ -257,10 +257,10 @@ class RunRecording:
         )
 
     def _check_sum(self, file: BinaryIO, offset: int, length: int) -> None:
-        """Refuse a file whose bytes do not match its checksum."""
+        """Reject a file whose bytes do not match its checksum."""
         with _damage_errors(self.path):
             wanted = DataEnd.read(_content(file, offset, length)).data_section_crc
-        if not wanted:  # an earlier version wrote none
+        if not wanted:  # earlier versions wrote no checksum
             return
         file.seek(0)
         left, found = offset - _HEAD, 0
@@ -311,7 +311,7 @@ def _select_messages(
 
 @contextmanager
 def report_bad_contents(path: Path) -> Iterator[None]:
-    """Turn errors caused by impossible contents of a recording into one line.
+    """Convert errors caused by impossible contents of a recording to one line.
 
     Use it around code that processes a recording: a well-formed file may contain impossible
     values.
@@ -330,7 +330,7 @@ def report_bad_contents(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _damage_errors(path: Path) -> Iterator[None]:
-    """Turn errors of a damaged file into one line."""
+    """Convert errors of a damaged file to one line."""
     try:
         yield
     except BadRecording:

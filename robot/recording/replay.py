@@ -39,7 +39,7 @@ _SAME_S = 1e-6
 
 
 class Mark(NamedTuple):
-    """A position to step to: kind is "saccade", "blink" or "event", words describe it."""
+    """A position to step to: kind is "saccade", "blink" or "event", words describes it."""
 
     at_s: float
     kind: str
@@ -118,7 +118,7 @@ class PlaybackClock:
             ValueError: There is no further one, or ``where`` is not in STEPS.
         """
         if where not in STEPS:
-            raise ValueError(f"no step {where!r}; choose from {', '.join(STEPS)}")
+            raise ValueError(f"unknown step {where!r}; available: {', '.join(STEPS)}")
         way, kind = where.split()
         at_s, times = self.state(now_s).at_s, self._marks[kind]
         if way == "next":
@@ -147,7 +147,7 @@ class PlaybackClock:
                 self.step(where, now_s)
             case _:
                 raise ValueError(
-                    f"{request!r:.80} is invalid: a replay takes one of play (true or false), "
+                    f"{request!r:.80} is invalid: a replay accepts one of play (true or false), "
                     "seek_s (seconds), speed and step"
                 )
 
@@ -256,7 +256,7 @@ class SnapshotIndex:
         return zlib.decompress(self._packed[number])
 
     def message_without_history(self, number: int) -> bytes:
-        """Return a snapshot's message without its trail and events, which are shown only once."""
+        """Return a snapshot's message without its trail and events, which are sent only once."""
         return encode_snapshot(replace(decode_snapshot(self.message(number)), trail=(), events=()))
 
     def message_with_history(self, first: int, number: int) -> bytes:
@@ -300,7 +300,7 @@ class MarkDetector:
     """A detector of the positions to step to, tick by tick.
 
     Attributes:
-        behaviour, conversation: Those of the newest command.
+        behaviour, conversation: Choices of the newest command.
     """
 
     def __init__(self) -> None:
@@ -371,7 +371,7 @@ class Replay:
     def handle_request(self, data: Mapping[str, object]) -> str | None:
         """Apply a request of the page; return the refusal if it is invalid. Thread-safe."""
         if "replay" not in data:
-            return "this is a recording: nothing moves here"
+            return "this is a recording: it cannot move a head"
         try:
             self.ask(data["replay"])
         except ValueError as error:
@@ -433,7 +433,7 @@ class Replay:
             self._number, self._still = number, 0
 
     def _repeat_frame(self, screen: Screen) -> None:
-        """Send the same frame again for some rounds, as a page draws its panels alternately.
+        """Send the same frame again for some rounds, because a page draws its panels in turns.
 
         When the slider is at rest, also send the frames that a jump has skipped, so that traces
         and figures show the time before the position.
@@ -447,7 +447,7 @@ class Replay:
             self._missing = None
 
     def _due(self, state: PlaybackState, now_s: float) -> bool:
-        """Return whether to send the state: changes immediately, else at intervals."""
+        """Return whether to send the state: changes immediately, otherwise at intervals."""
         sent = self._sent
         if sent is None or state._replace(at_s=sent.at_s) != sent:
             return True
@@ -460,7 +460,7 @@ class Replay:
 
 
 def introduction(frames: SnapshotIndex) -> dict[str, object]:
-    """Return what a page needs once per recording: marks, events, whether it has pictures."""
+    """Return the data that a page needs once: marks, events, whether there are pictures."""
     events = [m for m in frames.marks if m.kind == "event"]
     return {
         "marks": {

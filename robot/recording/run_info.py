@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Any
 
 FORMAT = 1
-"""Version of the message contents; it rises when an older reader would misread them."""
+"""Version of the message contents; it increases when an older reader would misinterpret them."""
 PROFILE = "gazerig-run-1"
 """MCAP profile of recordings of runs."""
 
@@ -19,7 +19,7 @@ class RunInfo:
     """Settings at the start of a run.
 
     Attributes:
-        rig, profile, character: Names as given on the command line, or paths.
+        rig, profile, character: Names or paths from the command line.
         config_yaml: The complete configuration at the start.
         seed: Seed of the random numbers.
         rate_hz: Control rate at the start.
@@ -64,7 +64,7 @@ class RunEnd:
         stopped_by: "seconds", a signal, a fault; "" if the program was killed.
         lost: Number of ticks that were not recorded.
         ran_s: Time from the start of the loop to the slot at which it ended.
-        tx_sha256: Hash of all bytes sent to an emulated bus in simulated time, else "".
+        tx_sha256: Hash of all bytes sent to an emulated bus in simulated time, otherwise "".
     """
 
     stopped_by: str = ""
@@ -187,6 +187,6 @@ def read_world_info(text: Mapping[str, str]) -> WorldInfo:
 
 
 def _read_fields(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:
-    """Read the fields that this version knows."""
+    """Read the fields that this version supports."""
     known = {key: value for key, value in text.items() if key in names}
     return {k: v if k.endswith("_yaml") else json.loads(v) for k, v in known.items()}

@@ -130,7 +130,7 @@ class RunWriter:
             self.failed = error.strerror or str(error)
             self._file.cut()
         except (TypeError, ValueError) as error:
-            self.failed = f"it cannot be written down: {error}"
+            self.failed = f"it cannot be encoded: {error}"
             self._file.cut()
 
 

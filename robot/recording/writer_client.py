@@ -47,7 +47,7 @@ class WriterClient:
         """Create a client without a process.
 
         Args:
-            patient: Wait for a slow writer.
+            patient: Whether to wait for a slow writer.
         """
         self._patient = patient
         self._socket: socket.socket | None = None
@@ -79,8 +79,8 @@ class WriterClient:
     def post(self, kind: bytes, body: bytes) -> bool:
         """Send or queue a message; return False if it is lost.
 
-        Each message wakes the writer, which takes the loop longer than making the message, so
-        one large message is better than several small ones.
+        Each message wakes the writer, which takes the loop longer than creating the message. So one
+        large message is better than several small ones.
         """
         if self._socket is None or self._queued > QUEUE_BYTES:
             return False

@@ -30,11 +30,11 @@ from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.tick_record import as_json, percept_as_json
 
 _PERCEPT, _JOINTS = TickRow._fields.index("percept"), TickRow._fields.index("joints")
-_VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
+_VIEWED_EVERY_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 
 
 class RecordRouter:
-    """A writer of one run's messages in the order of the calls."""
+    """Writer of one run's messages, in the order of the calls."""
 
     def __init__(self, writer: RunWriter) -> None:
         self._writer = writer
