@@ -1,9 +1,9 @@
 """Avoidance of pairs of joint ranges that collide, such as a lid and a frame, chin and chest.
 
-In every pair one joint, the keeper, stays out of its range: it has a wall in front of it at
-which it can always stop. The other joint is free. The keeper changes only if the other joint is
-out too, by its command and by its measured angle. Therefore no path between two commands crosses
-the forbidden box, however long a tick is.
+In every pair one joint, the keeper, stays out of its range: a wall in front of the range always
+allows it to stop. The other joint is free. The keeper changes only if command and measured angle of
+the other joint are also outside. Therefore no path between two commands crosses the forbidden box,
+however long a tick is.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ class Collisions:
 
     Attributes:
         exits: Joints that leave a box in which they started -> their goals in rad.
-        still: Joints that wait for these.
+        still: Joints that wait for the exits.
 
     Args:
         params: The forbidden pairs of ranges.
-        margin_deg: Distance to the boxes, as servos round and lag.
+        margin_deg: Distance to the boxes, because servos round positions and lag.
         limits: One limit per joint.
         joints: The joints' names.
 
@@ -91,7 +91,7 @@ class Collisions:
         desired: JointAngles,
         position: JointAngles,
     ) -> bool:
-        """Put up the keeper's wall; return False if both joints are inside their ranges."""
+        """Set the keeper's wall; return False if both joints are inside their ranges."""
         keeper = self._keeper[k]
         if not _present_side(pair[keeper], motion):
             keeper = 1 - keeper

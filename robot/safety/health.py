@@ -15,7 +15,7 @@ from gazerig.robot.model.types import JointState
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
 _Column = tuple[float | None, ...]
-_COOLER_C = 2.0  # hysteresis: temperatures have whole degrees, a joint would stutter without it
+_COOLER_C = 2.0  # hysteresis: temperatures are whole degrees, without it a joint would stutter
 
 
 class JointHealth:
@@ -47,7 +47,7 @@ class JointHealth:
         self.held: list[Strain] = [""] * count
         self.fine = True
         self._counting = False
-        self._heated = [0.0] * count  # load^2 above the lasting one, times seconds
+        self._heated = [0.0] * count  # (load^2 - continuous load^2) times seconds
         self._outside_s = [0.0] * count
         self._hot = [False] * count
         self._overloaded = [False] * count
@@ -59,7 +59,7 @@ class JointHealth:
         self._set_params(params)
         self._heated = [min(heat, self._full) for heat in self._heated]
         self._outside_s = [min(s, self._outside_full_s) for s in self._outside_s]
-        self._seen = ((), ())  # the newest reports are judged again
+        self._seen = ((), ())  # evaluate the newest reports again
         self._counting = True
 
     def step(self, joints: JointState, dt_s: float) -> None:
@@ -100,7 +100,7 @@ class JointHealth:
             self.held[i] = "hot" if self._hot[i] else "voltage" if self._no_volts[i] else ""
 
     def _heat(self, i: int, celsius: float | None) -> float:
-        """Return the share that heat leaves, from 1 when warm to 0 when hot."""
+        """Return the speed share allowed by heat, from 1 when warm to 0 when hot."""
         if celsius is None:
             return 1.0
         warm = self._limits[i].hottest_c - self._params.warm_c
@@ -109,10 +109,10 @@ class JointHealth:
         return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
 
     def _load(self, i: int, load: float | None, dt_s: float) -> float:
-        """Return the share that load leaves, from 1 at half the motor's heat limit to 0 at it.
+        """Return the speed share allowed by load, from 1 at half the motor's heat limit to 0 at it.
 
-        Heat rises with the square of the current. It is given off at the rate at which the
-        lasting load produces it.
+        Heat rises with the square of the current. It is dissipated at the rate at which the
+        continuous load produces it.
         """
         if load is not None:
             gained = (load * load - self._params.lasting_load**2) * dt_s
@@ -122,7 +122,7 @@ class JointHealth:
         return min(max(2.0 - 2.0 * filled, 0.0), 1.0)
 
     def _volts(self, i: int, volts: float | None, dt_s: float) -> float:
-        """Return the share that voltage leaves, from 1 inside the margin to 0 at the limit."""
+        """Return the speed share allowed by voltage, from 1 inside the margin to 0 at the limit."""
         if volts is None:
             return 1.0
         room = min(volts - self._limits[i].lowest_v, self._limits[i].highest_v - volts)
@@ -181,8 +181,8 @@ class StallDetector:
     def has_stalled(self, i: int, command: float, position: float, at_s: float, t_s: float) -> bool:
         """Update with a new measurement; return whether the joint has stalled.
 
-        Only motion towards the command counts: a joint that a hand moves the other way must
-        give way.
+        Only motion towards the command counts: a joint that a hand moves in the other direction
+        must give way.
 
         Args:
             i: Number of the joint.
