@@ -14,11 +14,11 @@ class ReleasePlan(NamedTuple):
 
     port: path of the serial port
     baud: bit/s
-    ids: of the servos; channels of a Maestro
-    protocol, device, crc, channels: of a Maestro, as in gazerig.drivers.maestro.params
-    addresses: of PCA9685 boards
-    family: of smart servos, by its name
-    settings: of a package's bus, its parameters as ``pickle_params`` wrote them
+    ids: ids of the servos; channels of a Maestro
+    protocol, device, crc, channels: settings of a Maestro, as in gazerig.drivers.maestro.params
+    addresses: addresses of PCA9685 boards
+    family: name of the family of smart servos
+    settings: parameters of a package's bus, from ``pickle_params``
     """
 
     kind: BusKind
@@ -45,7 +45,7 @@ def encode(plans: tuple[ReleasePlan, ...]) -> str:
 
 
 def decode(text: str) -> tuple[ReleasePlan, ...]:
-    """Return the plans that ``encode`` wrote."""
+    """Return the plans from the text of ``encode``."""
     plans = [ReleasePlan(*fields) for fields in json.loads(text)]
     return tuple(
         plan._replace(ids=tuple(plan.ids), addresses=tuple(plan.addresses)) for plan in plans
