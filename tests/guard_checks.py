@@ -80,7 +80,7 @@ def stopped_loop(m: ModuleType) -> None:
     assert bench.guard.check((0.8,) * 9, state, 0.0, 10.0).command_rad[0] <= 0.1 * TOP + 1e-9
     for t_s in (10.0, 9.0, nan, inf):
         verdict = bench.guard.check((0.8,) * 9, state, 0.0, t_s)
-        assert verdict.reasons == ("all: time stands still",) and verdict.level == "hold"
+        assert verdict.reasons == ("all: time does not advance",) and verdict.level == "hold"
 
 
 def late(m: ModuleType) -> None:

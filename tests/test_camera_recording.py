@@ -221,10 +221,10 @@ def test_damaged_lengths_are_named(file):
     [
         (lambda p: None, "no recording at"),
         (lambda p: p.mkdir(), "is not a file"),
-        (lambda p: p.touch(), "is no recording"),
-        (lambda p: p.write_text("short"), "is no recording"),
-        (lambda p: p.write_text("hello world, this is text"), "is no recording"),
-        (lambda p: write(p, []), "holds no frame"),
+        (lambda p: p.touch(), "is not a recording"),
+        (lambda p: p.write_text("short"), "is not a recording"),
+        (lambda p: p.write_text("hello world, this is text"), "is not a recording"),
+        (lambda p: write(p, []), "contains no frame"),
     ],
 )
 def test_what_is_no_recording_is_named(tmp_path, make, words):

@@ -80,9 +80,9 @@ def test_it_is_another_process_that_ctrl_c_does_not_reach(importable: None) -> N
 def test_a_process_that_fails_is_an_error_in_one_line(
     importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(ConfigError, match="process for fails: ended by itself: KeyError"):
+    with pytest.raises(ConfigError, match="process for fails: ended unexpectedly: KeyError"):
         in_subprocess(fails)
-    with pytest.raises(ConfigError, match="process for ends: ended by itself: -9"):
+    with pytest.raises(ConfigError, match="process for ends: ended unexpectedly: -9"):
         in_subprocess(ends)
     monkeypatch.setattr("gazerig.config.subprocess_call._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):

@@ -37,12 +37,12 @@ def faults_of(folder: Path, text: str | bytes) -> list[str]:
     [
         ("", "rig.yaml:1: is empty; write 'key: value' lines"),
         ("# only words\n", "rig.yaml:1: is empty; write 'key: value' lines"),
-        ("\n- a\n", "rig.yaml:2: the top level is no mapping; write 'key: value' lines"),
-        ("null\n", "rig.yaml:1: the top level is no mapping; write 'key: value' lines"),
+        ("\n- a\n", "rig.yaml:2: the top level is not a mapping; write 'key: value' lines"),
+        ("null\n", "rig.yaml:1: the top level is not a mapping; write 'key: value' lines"),
         (b"a: 1\nb: \xff\n", "rig.yaml:2: is not UTF-8 text (byte 0xff); save it as UTF-8"),
         (
             "a: 1\nb: 2\x07\n",
-            "rig.yaml:2:5: not valid YAML: character U+0007 is not allowed; take it out",
+            "rig.yaml:2:5: not valid YAML: character U+0007 is not allowed; remove it",
         ),
         (
             "a:\n\tb: 1\n",
@@ -71,16 +71,16 @@ def faults_of(folder: Path, text: str | bytes) -> list[str]:
         ),
         (
             "name: &a [*a]\n",
-            "rig.yaml:1: nested deeper than 40 levels, or refers to itself; write it flat",
+            "rig.yaml:1: nested deeper than 40 levels, or recursive; reduce the nesting",
         ),
         (
             "[" * 200,
-            "rig.yaml:1:41: nested deeper than 40 levels, or refers to itself; write it flat",
+            "rig.yaml:1:41: nested deeper than 40 levels, or recursive; reduce the nesting",
         ),
         (
             "name: &a0 [1]\n"
             + "".join(f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(9)),
-            "rig.yaml:1: holds more than 20000 values; write less",
+            "rig.yaml:1: contains more than 20000 values; shorten it",
         ),
     ],
 )
@@ -132,7 +132,7 @@ def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr("gazerig.config.entries.read_limited", refuse)  # the tests may run as root
-    with pytest.raises(ConfigError, match=r"rig\.yaml: may not be read"):
+    with pytest.raises(ConfigError, match=r"rig\.yaml: cannot be read: permission denied"):
         read_yaml(write(tmp_path, GOOD))
 
 
@@ -179,7 +179,7 @@ def test_an_unknown_shipped_name_lists_those_that_exist(
     with pytest.raises(ConfigError) as caught:
         shipped_path("rigs", "nood")
     assert str(caught.value) == (
-        "config/rigs: nothing named 'nood' is shipped; did you mean 'nod'? there are nod, shake"
+        "config/rigs: nothing named 'nood' is shipped; did you mean 'nod'? available: nod, shake"
     )
 
 

@@ -84,7 +84,7 @@ def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str)
             "500",
             "'500'",
             "7: joints.pan.max_speed_deg_s: '500' is text, "
-            "wanted a number, 1 to 2000 deg/s; take the quotes away",
+            "wanted a number, 1 to 2000 deg/s; remove the quotes",
         ),
         (
             "500",
@@ -122,13 +122,13 @@ def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str)
         ("id: 2", "id: 1", "6: joints.pan.id: id 1 is also that of neck"),
         ("neck", "nekc", "3: joints: there is no neck"),
         ("offset_m: [0, 0.5, -1e-2]", "fps: 2", "9: camera.fps: too slow to follow a face"),
-        ("name: nod", "name: nod\nname: x", "3: name: key stands twice, first in line 2"),
+        ("name: nod", "name: nod\nname: x", "3: name: duplicate key, first in line 2"),
         ("name: nod", "name: nod\n5: x", "3: key '5' is not text; put it in quotes"),
         ("name: nod", "name: nod\n[a]: x", "3: key this is not text; put it in quotes"),
         (
             "pan:\n",
             "pan:\n    <<: {id: 3}\n",
-            "6: joints.pan: merge keys (<<) are not read; write the keys out",
+            "6: joints.pan: merge keys (<<) are not supported; write the keys in full",
         ),
     ],
 )
@@ -140,7 +140,7 @@ def test_each_fault_alone(tmp_path: Path, change: str, to: str, fault: str) -> N
 
 def test_a_refused_tag_is_named(tmp_path: Path) -> None:
     found = faults_of(tmp_path, GOOD + "gains: {x: !force 3}\n")
-    assert found[0] == "rig.yaml:10: gains.x: the tag !force is not read; take it out"
+    assert found[0] == "rig.yaml:10: gains.x: the tag !force is not supported; remove it"
 
 
 ALL_WRONG = """\
@@ -174,12 +174,12 @@ rig.yaml:2: joints.neck.id: 300 is above 252
 rig.yaml:3: joints.pan.max_sped_deg_s: unknown key 'max_sped_deg_s'; did you mean \
 'max_speed_deg_s'? allowed: id, max_speed_deg_s, low_deg, high_deg
 rig.yaml:4: joints.tilt.max_speed_deg_s: 9000.0 is above 2000 (unit deg/s)
-rig.yaml:5: joints.roll.id: '6' is text, wanted a whole number, 0 to 252; take the quotes away
+rig.yaml:5: joints.roll.id: '6' is text, wanted a whole number, 0 to 252; remove the quotes
 rig.yaml:5: joints.roll.low_deg: True is a truth value, wanted a number in deg
 rig.yaml:6: joints.lid_left.id: missing; wanted a whole number, 0 to 252 (servo id)
 rig.yaml:7: joints.lid_right: low_deg must be below high_deg
 rig.yaml:8: joints.lid_right.id: id 5 is also that of tilt
-rig.yaml:10: joints.lid_right.low_deg: key stands twice, first in line 9
+rig.yaml:10: joints.lid_right.low_deg: duplicate key, first in line 9
 rig.yaml:11: joints.eye_left.id: id 4 is also that of pan
 rig.yaml:13: joints.eye_right.id: id 5 is also that of tilt
 rig.yaml:14: camera.fps: 3.5 is a number, wanted a whole number, 1 to 120 Hz
@@ -190,7 +190,7 @@ rig.yaml:18: gains.x: -1 is below 0
 rig.yaml:18: gains.y: inf is not a finite number
 rig.yaml:19: matrix.0.1: 'x' is text, wanted a number
 rig.yaml:20: matrix.2: 3 is a whole number, wanted a list, each a number
-rig.yaml:21: baud: '57600' is text, wanted a whole number in bit/s; take the quotes away
+rig.yaml:21: baud: '57600' is text, wanted a whole number in bit/s; remove the quotes
 rig.yaml:22: colour: unknown key 'colour'; allowed: name, joints, camera, spare, dwell, gains, \
 matrix, baud"""
 
@@ -201,7 +201,7 @@ def test_all_faults_together_in_one_message(tmp_path: Path) -> None:
 
 def test_a_second_reading_of_the_same_file_tells_the_same_faults(tmp_path: Path) -> None:
     first = faults_of(tmp_path, ALL_WRONG)
-    assert any("stands twice" in fault for fault in first)
+    assert any("duplicate key" in fault for fault in first)
     assert faults_of(tmp_path, ALL_WRONG) == first
 
 

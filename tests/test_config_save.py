@@ -34,7 +34,7 @@ class Joint:
 @dataclass(frozen=True)
 class Head:
     name: str = "a"
-    joints: Annotated[dict[str, Joint], "one entry a joint"] = field(default_factory=dict)
+    joints: Annotated[dict[str, Joint], "one entry per joint"] = field(default_factory=dict)
     spare: Annotated[Joint, "one on the shelf"] = field(default_factory=Joint)
 
 
@@ -180,9 +180,9 @@ def test_nothing_differs_nothing_is_written(small):
         ({"joints.tilt.min_deg": float("-inf")}, "not a finite number"),
         ({"joints.tilt.min_degree": 1.0}, "unknown key 'min_degree'"),
         ({"joints.tilt": 1}, "joints.tilt is a mapping"),
-        ({"name.x": 1}, "name is no mapping"),
+        ({"name.x": 1}, "name is not a mapping"),
         ({"joints.tilt.gains": (1, 2)}, "spread over several lines"),
-        ({"joints.tilt.note": object()}, "is no number, text"),
+        ({"joints.tilt.note": object()}, "is not a number, text"),
     ],
 )
 def test_a_refused_value_leaves_everything_as_it_was(small, changes, says):
@@ -232,7 +232,7 @@ def test_rights_and_links_stay(small, tmp_path):
 
 def test_files_that_cannot_be_written(small, tmp_path):
     small.chmod(0o444)
-    with pytest.raises(ConfigError, match="read-only; chmod u"):
+    with pytest.raises(ConfigError, match="read-only; allow writing with chmod u"):
         save(small, {"name": "b"}, NOW, check, Head)
     with pytest.raises(ConfigError, match="no such file"):
         save(tmp_path / "none.yaml", {"name": "b"}, NOW, check, Head)
@@ -240,7 +240,7 @@ def test_files_that_cannot_be_written(small, tmp_path):
         save(tmp_path, {"name": "b"}, NOW, check, Head)
     small.chmod(0o644)
     small.write_text("name: a\nname: b\n")
-    with pytest.raises(ConfigError, match="key stands twice"):
+    with pytest.raises(ConfigError, match="duplicate key"):
         save(small, {"name": "c"}, NOW, check, Head)
     assert small.read_text() == "name: a\nname: b\n"
 

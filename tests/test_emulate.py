@@ -182,7 +182,7 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
     assert asked(emulator.path, STS_PING, 6, 500_000) == STS_PONG
     assert emulator.end() == 0
     with present(emulator.process.stderr) as reported:
-        assert reported.read() == "a client speaks at 1000000 bit/s; the servos listen at 500000\n"
+        assert reported.read() == "a client sends at 1000000 bit/s; the servos listen at 500000\n"
 
 
 def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
@@ -227,20 +227,20 @@ def test_every_bus_of_a_rig_has_a_terminal_and_obeys_by_its_name(tmp_path, monke
         ((), "name a rig, or its servos: --servos 1-6:xl330-m077"),
         (("--servos", "1:sts3215", "--maestro", "6"), "name a rig, or its servos"),
         (("--servos", "1:sts3215,2:xl330-m077"), "start a second `gazerig emulate`"),
-        (("--servos", "1:sts3215", "--baud", "2000000"), "STS servos know 1000000"),
-        (("--servos", "1:sts3215", "--set", "bad-crc=reply"), "there is after-missing"),
+        (("--servos", "1:sts3215", "--baud", "2000000"), "STS servos support 1000000"),
+        (("--servos", "1:sts3215", "--set", "bad-crc=reply"), "available: after-missing"),
         (("--servos", "1:sts3215", "--crc"), "--crc: only with --maestro"),
         (("desk", "--device", "3"), "--device: only with --maestro"),
         (("--maestro", "7"), "--maestro 7: a board has 6, 12, 18, 24 channels"),
-        (("--maestro", "6", "--baud", "12"), "a Maestro's pins know 9600"),
-        (("--maestro", "6", "--firmware", "3"), "does not tell its version"),
+        (("--maestro", "6", "--baud", "12"), "a Maestro's pins support 9600"),
+        (("--maestro", "6", "--firmware", "3"), "does not report its version"),
         (("--maestro", "6", "--set", "mode=usb"), "expected usb-dual-port"),
         (("--servos", "1:xl330-m077", "desk"), "name a rig, or its servos"),
-        (("nobody",), "there are desk"),
+        (("nobody",), "available: desk"),
         (("--servos", "1:xl330-m077", "--baud", "12"), "--baud 12: servos know 9600"),
         (("--servos", "1:xl330-m077", "--set", "bad-crc"), "not CASE=VALUE"),
         (("--servos", "1:xl330-m077", "--set", "bad-crc=no"), "expected silent, reply"),
-        (("--servos", "1:xl330-m077", "--baud", "4500000"), "xl330-m077 knows 9600, 57600"),
+        (("--servos", "1:xl330-m077", "--baud", "4500000"), "xl330-m077 supports 9600, 57600"),
         (("--servos", "1:xl330-m077", "--link", "/nowhere/x"), "/nowhere/x: No such file"),
         (("--servos", "1:xl330-m077", "--link", "README.md"), "another file has this name"),
     ],

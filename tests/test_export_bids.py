@@ -114,7 +114,7 @@ def test_a_run_is_not_put_into_the_data_set_of_another_program(
     about = tmp_path / "dataset_description.json"
     about.write_text(there if isinstance(there, str) else json.dumps(there))
     before = about.read_bytes()
-    with pytest.raises(SetupError, match="is not a data set of gazerig: name another folder"):
+    with pytest.raises(SetupError, match="is not a data set of gazerig: use another folder"):
         write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [about.name]
     write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path, force=True)

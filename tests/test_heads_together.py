@@ -27,7 +27,7 @@ class Head:
         return ticket
 
 
-DONE, HOLDS = CommandReply(), CommandReply("a stop holds at least 2 s: ask again in 0.1 s")
+DONE, HOLDS = CommandReply(), CommandReply("a stop lasts at least 2 s: try again in 0.1 s")
 
 
 def together(first: Head, *others: Head) -> RobotGroup:

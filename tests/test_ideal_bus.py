@@ -76,7 +76,7 @@ def test_without_torque_they_stand_still():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--mock", "--bus", "perfect"), "--bus perfect: unknown; there is emulated, ideal"),
+        (("--mock", "--bus", "perfect"), "--bus perfect: unknown; available: emulated, ideal"),
         (("--bus", "ideal"), "--bus ideal needs --mock"),
         (("--scene", "visitor", "--bus", "emulated"), "--bus emulated needs --mock"),
         (("--mock", "--bus", "ideal", "--port", "/dev/x"), "--bus ideal and --port exclude"),

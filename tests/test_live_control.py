@@ -20,7 +20,7 @@ class Robot:
     """A robot that accepts commands and ignores them."""
 
     def command(self, command: Command) -> None:
-        raise ValueError("nothing moves here")
+        raise ValueError("it cannot move a head")
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         return {}
@@ -107,7 +107,7 @@ def test_an_edited_file_is_read_again_and_what_changed_is_said(rig: Rig) -> None
 def test_a_wrong_file_is_refused_with_every_fault_and_the_next_good_one_taken(rig: Rig) -> None:
     rig.written("second\n")
     said = rig.written("wrong\n").splitlines()
-    assert said[0] == f"{rig.path} changed and is refused; the values from before stay:"
+    assert said[0] == f"{rig.path} changed but has errors; the previous values stay:"
     assert [line.rpartition(": ")[2] for line in said[1:]] == ["a is above 1", "unknown key"]
     assert rig.tuning.text == "second\n"
     assert "values are applied" in rig.written("third\n")
@@ -118,7 +118,7 @@ def test_a_file_that_went_away_is_said_and_the_values_stay(rig: Rig) -> None:
     rig.path.unlink()
     for _ in range(20):
         rig.live._watch.look()
-    assert "the values from before stay" in rig.said[-1] and "No such file" in rig.said[-1]
+    assert "the previous values stay" in rig.said[-1] and "No such file" in rig.said[-1]
     assert rig.tuning.text == "second\n" and len(rig.said) == 2
 
 
@@ -138,7 +138,7 @@ def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
     rig = Rig(folder)
     rig.live.open()
     try:
-        assert rig.said[0].startswith("gazerig ctl set and stop will not find this rig: ")
+        assert rig.said[0].startswith("gazerig ctl set and stop cannot find this rig: ")
         assert "values are applied" in rig.written("second\n")
     finally:
         rig.live.close()
@@ -149,6 +149,6 @@ def test_close_without_open_is_no_error(folder: Path) -> None:
 
 
 def test_a_refusal_of_the_robot_is_no_error_of_the_program(rig: Rig) -> None:
-    with connect_to_all()[0] as remote, pytest.raises(SetupError, match="nothing moves here"):
+    with connect_to_all()[0] as remote, pytest.raises(SetupError, match="it cannot move a head"):
         remote.stop()
     assert rig.said == []

@@ -54,7 +54,7 @@ def test_camera_that_only_the_system_sees_gives_the_udev_rule(tmp_path):
 
 
 def test_camera_in_use_is_named(tmp_path):
-    with pytest.raises(CameraError, match="OAK camera AA is in use: end the other program"):
+    with pytest.raises(CameraError, match="OAK camera AA is in use: close the program"):
         find_oak(sdk(connected=[info("AA")]), usb=tmp_path)
 
 
@@ -67,7 +67,7 @@ def test_usb_2_that_carries_what_is_asked_is_told_so():
     rig = Rig("HIGH")
     source = rig.opened()  # 640 x 400 at 30 Hz with depth: 26.9 MB/s
     (reported,) = source.events()
-    assert "USB 2 speed (HIGH)" in reported and "enough for what is asked" in reported
+    assert "USB 2 speed (HIGH)" in reported and "enough for the requested frames" in reported
     assert source.events() == ()
 
 
@@ -75,7 +75,7 @@ def test_usb_2_that_cannot_carry_it_says_what_it_can():
     rig = Rig("HIGH")
     source = rig.opened(width_px=1280, height_px=720)
     (reported,) = source.events()
-    assert "97 are asked for" in reported and "USB 3 cable" in reported
+    assert "97 are requested" in reported and "USB 3 cable" in reported
     assert "set oak.rate_hz 9 or oak.depth: false" in reported
 
 
@@ -141,8 +141,8 @@ def test_camera_without_colour_is_refused(rig):
     ("imu", "extrinsics", "told"),
     [
         ("BMI270", True, ""),
-        ("NONE", True, "no IMU; oak.gyro: false"),
-        ("", True, "no IMU; oak.gyro: false"),
+        ("NONE", True, "no IMU; set oak.gyro: false"),
+        ("", True, "no IMU; set oak.gyro: false"),
         ("BMI270", False, "lacks the IMU's orientation: set oak.imu_rotation_deg"),
     ],
 )
@@ -174,7 +174,7 @@ def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own(rig):
         ({"parser": "YOLO", "points": None}, "it finds 0 key points, wanted 5"),
         ({"parser": "SCRFDParser"}, "read by SCRFDParser, wanted YuNet or YOLO"),
         ({"heads": 0}, "has 0 heads, wanted 1"),
-        ({"height_px": 240}, "its frames of (320, 240) are no multiples of 32 px"),
+        ({"height_px": 240}, "its frames of (320, 240) are not multiples of 32 px"),
         ({"outputs": ("cls", "obj", "bbox")}, "it has no outputs kps_8, kps_16, kps_32"),
     ],
 )
@@ -196,7 +196,7 @@ def test_face_model_that_is_no_archive_is_told_and_left_out(tmp_path):
     rig = Rig()
     source = rig.opened(face_model=str(file))
     (reported,) = source.events()
-    assert "is no NNArchive" in reported and not rig.asked.face_model
+    assert "is not an NNArchive" in reported and not rig.asked.face_model
 
 
 def test_face_model_that_is_not_there_is_refused(tmp_path):
@@ -284,7 +284,7 @@ def test_stamps_out_of_step_give_way_to_arrivals(rig, stamp_s):
     (shot,) = take(rig, source, lambda: 100.1, Message(5.0, stamp_s))
     assert shot.captured_s == pytest.approx(100.07)
     (reported,) = source.events()
-    assert "not in step" in reported and "30 ms (latency_ms)" in reported
+    assert "not synchronised" in reported and "30 ms (latency_ms)" in reported
 
 
 def test_device_clock_set_anew_is_told(rig):

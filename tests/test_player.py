@@ -100,7 +100,7 @@ def test_no_further_step_says_so_and_stays(player: PlaybackClock) -> None:
     player.seek(8.0, 0.0)
     with pytest.raises(ValueError, match="there is no next saccade"):
         player.step("next saccade", 0.0)
-    with pytest.raises(ValueError, match="no step 'sideways'; choose from previous saccade"):
+    with pytest.raises(ValueError, match="unknown step 'sideways'; available: previous saccade"):
         player.step("sideways", 0.0)
     assert at(player, 0.0) == 8.0
 

@@ -292,8 +292,8 @@ def test_a_camera_that_cannot_be_opened_refuses_the_start():
         (7, "returned a int, wanted a Shot"),
         (SHOT(nan, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time nan"),
         (SHOT(1e9, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time 1000000000.0"),
-        (SHOT(1.0, 1, np.zeros((4, 4, 3))), "no image of 8 or 16 bits"),
-        (SHOT(1.0, 1, "picture"), "no image"),
+        (SHOT(1.0, 1, np.zeros((4, 4, 3))), "not an image of 8 or 16 bits"),
+        (SHOT(1.0, 1, "picture"), "not an image"),
         (RuntimeError("cable"), "failed (RuntimeError: cable)"),
     ],
 )
@@ -330,7 +330,7 @@ def test_a_detector_that_fails_is_replaced_by_ours(answer, reported):
     assert detector.find(NO_IMAGE) == (FACE,)
     (line,) = detector.events()
     assert line.startswith("detector 'd' of d 1 ") and reported in line
-    assert line.endswith(": dropped, mtcnn finds the faces")
+    assert line.endswith(": it is no longer used, mtcnn finds the faces")
 
 
 # A bus of a package that raises, is slow or reads nonsense: it is named, no torque stays on

@@ -144,8 +144,8 @@ def test_a_name_that_is_taken_is_named_with_both_packages(folder):
         plugins.find(DETECTOR, "eyes")
     assert plugins.find(DETECTOR, "mtcnn").is_ours
     assert [line.replace(plugins._version(), "V") for line in plugins.name_conflicts(DETECTOR)] == [
-        "detector 'mtcnn' of one 1.2 is left out: gazerig V has that name",
-        "detector 'eyes' of two 3.0 is left out: one 1.2 has that name",
+        "detector 'mtcnn' of one 1.2 is ignored: gazerig V already uses that name",
+        "detector 'eyes' of two 3.0 is ignored: one 1.2 already uses that name",
     ]
 
 
@@ -241,7 +241,7 @@ def test_rigs_and_gestures_of_a_package_are_found_by_their_names(folder, tmp_pat
 
 def test_a_package_that_names_no_folder_is_refused(folder):
     install(folder, "odd", {RIGS: {"odd": "odd_one:x"}}, {"odd_one": "x = 7"})
-    with pytest.raises(ConfigError, match="rigs 'odd' of odd 1.2 is no folder"):
+    with pytest.raises(ConfigError, match="rigs 'odd' of odd 1.2 is not a folder"):
         load_rig("nowhere")
 
 
@@ -269,7 +269,7 @@ def test_kinds_lists_all_with_package_abilities_and_proof(folder, capsys):
     (fish,) = [row for row in listed["kinds"] if row["name"] == "fish"]
     assert "camera 'fish' of bad 7 cannot be loaded: ModuleNotFoundError" in fish["fault"]
     (taken,) = listed["left_out"]
-    assert taken.startswith("bus 'dynamixel' of bad 7 is left out: gazerig")
+    assert taken.startswith("bus 'dynamixel' of bad 7 is ignored: gazerig")
     kinds.kinds(as_json=False)
     shown = capsys.readouterr().out
     assert "tallest" in shown and taken in shown

@@ -211,7 +211,7 @@ def test_a_configuration_of_another_version_is_told_in_one_line(once: Once) -> N
     recording = RunRecording(once.recording.path)
     text = f"{recording.info.config_yaml}antennas: 2\n"
     recording.info = replace(recording.info, config_yaml=text)
-    words = r"a configuration that this version does not know \(antennas: .*\): give another rig"
+    words = r"a configuration that this version does not support \(antennas: .*\): give another rig"
     with pytest.raises(SetupError, match=words) as found:
         rerun(recording)
     assert "\n" not in str(found.value)

@@ -322,7 +322,7 @@ def test_a_wider_range_waits_until_the_servos_are_set_up_anew() -> None:
     running = started()
     running.tune({"joints.neck_yaw.max_deg": 73.0, "joints.neck_yaw.max_speed_deg_s": 250.0})
     running.go(1)
-    assert "neck_yaw: all of the range and speed come with a stop and a resume" in (
+    assert "neck_yaw: the full range and speed apply after a stop and a resume" in (
         running.ticks[-1].events
     )
     jog(running, "neck_yaw", 80.0, 500)

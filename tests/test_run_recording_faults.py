@@ -108,8 +108,8 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
     wrong = {
         tmp_path / "nothing": "no recording at .*nothing: check the path",
         tmp_path: "is not a file",
-        tmp_path / "text": "is no recording: make one with gazerig run --record",
-        tmp_path / "empty": "is no recording",
+        tmp_path / "text": "is not a recording: make one with gazerig run --record",
+        tmp_path / "empty": "is not a recording",
         written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
         written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* up to 1: update gazerig",
         written(

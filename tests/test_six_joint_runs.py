@@ -93,7 +93,7 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
     found = rerun(desk.recording, rig="maker")
     assert not found.is_same and found.joints == "emulated"
     assert any("the rig has the joints eyes_pan" in note for note in found.notes)
-    with pytest.raises(SetupError, match=r"the rig has the joints .*: let the servos be emulated"):
+    with pytest.raises(SetupError, match=r"the rig has the joints .*: use emulated servos"):
         rerun(maker.recording, rig="desk", joints="recorded")
 
 

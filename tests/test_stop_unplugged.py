@@ -145,7 +145,7 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     machine.made.robot.command(Stop("a hand", "the space bar"))
     ticks = machine.go(7.0)  # longer than the bus's time-out
     assert machine.ended == "seconds" and ticks[-1].stopped == "a hand"
-    assert machine.said("the stop is remembered, torque is NOT YET off")
+    assert machine.said("the stop is pending, torque is NOT YET off")
     assert any(machine.holding())
     ticket = machine.made.robot.command(Resume("the space bar"))
     machine.go(0.1)
@@ -173,5 +173,5 @@ def test_torque_that_comes_on_after_a_stop_is_taken_off_again(machine: Machine) 
     assert all(machine.holding())
     machine.go(1.0)
     assert not any(machine.holding())
-    assert machine.said("still held: torque off again")
+    assert machine.said("still had torque: switched off again")
     machine.made.robot.stop()

@@ -29,10 +29,10 @@ LEAST_CORNERS = 6
 class BoardParams:
     """Dimensions of the board. The default fits on A4 and on Letter in landscape format."""
 
-    columns: Annotated[int, Bounds(3, 20), "squares from left to right"] = 7
-    rows: Annotated[int, Bounds(3, 20), "squares from top to bottom"] = 5
-    square_mm: Annotated[float, Bounds(2, 500), "side of a square"] = 36.0
-    marker_mm: Annotated[float, Bounds(1, 500), "side of a marker"] = 27.0
+    columns: Annotated[int, Bounds(3, 20), "number of squares from left to right"] = 7
+    rows: Annotated[int, Bounds(3, 20), "number of squares from top to bottom"] = 5
+    square_mm: Annotated[float, Bounds(2, 500), "side length of a square"] = 36.0
+    marker_mm: Annotated[float, Bounds(1, 500), "side length of a marker"] = 27.0
 
     def __post_init__(self) -> None:
         """Check that the markers fit and that there are enough of them.
@@ -56,7 +56,7 @@ class BoardParams:
             ValueError: The factor is outside 0.2 to 5.
         """
         if not 0.2 <= factor <= 5.0:
-            raise ValueError(f"a printer scales by 0.2 to 5, not by {factor}")
+            raise ValueError(f"the print scale must be 0.2 to 5, not {factor}")
         return BoardParams(
             self.columns, self.rows, self.square_mm * factor, self.marker_mm * factor
         )

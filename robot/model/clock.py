@@ -1,4 +1,4 @@
-"""Clocks: the real one waits, the simulated one is set."""
+"""Clocks: a real one, which waits, and a simulated one, whose time is set."""
 
 import time
 from typing import Protocol
@@ -31,7 +31,7 @@ class RealClock:
 
 
 class SimulatedClock:
-    """A clock whose time is set: a simulated minute takes only its computation."""
+    """A clock whose time is set: a simulated minute takes only the time of its computation."""
 
     def __init__(self, start_s: float = 0.0) -> None:
         self._now_s = start_s

@@ -54,13 +54,15 @@ def check_command(command: Command) -> None:
     match command:
         case Ask(menu, choice):
             if not isinstance(menu, str) or not isinstance(choice, str):
-                raise ValueError("menu and choice are names")
+                raise ValueError("menu and choice must be names")
         case LookAt() | LookAtInHead() | LookAtDirection() | LookAtPerson() | LookAtPixel():
             _check_look(command)
             _check_control(command)
         case Jog(angles):
             if not isinstance(angles, tuple) or len(angles) > MAX_JOINTS:
-                raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
+                raise ValueError(
+                    "angles must be pairs of a joint and an angle in radians, one per joint"
+                )
             for pair in angles:
                 if not (
                     isinstance(pair, tuple)
@@ -68,7 +70,7 @@ def check_command(command: Command) -> None:
                     and _is_within(pair[1], MAX_ANGLE_RAD)
                 ):
                     raise ValueError(
-                        "angles are pairs of a joint and a finite angle in radians within +-360 deg"
+                        "angles must be pairs of a joint and a finite angle in radians within +-360 deg"
                     )
                 if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
                     raise ValueError(f"{pair[0]!r:.40} is not a joint name such as neck_yaw or jaw")
@@ -79,11 +81,13 @@ def check_command(command: Command) -> None:
             _check_share("a level", "value", level, value)
         case Play(gesture, speed, times, who):
             if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
-                raise ValueError("a gesture is given by its name")
+                raise ValueError("a gesture must be given by its name")
             if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:
-                raise ValueError(f"the speed of a gesture is a number {MIN_SPEED:g}..{MAX_SPEED:g}")
+                raise ValueError(
+                    f"the speed of a gesture must be a number {MIN_SPEED:g}..{MAX_SPEED:g}"
+                )
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
-                raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
+                raise ValueError(f"the times of a gesture must be a whole number 0..{MAX_COUNT}")
             _check_who(who)
         case MoveOpponent(p):
             if not _are_numbers(p, 3, MAX_COORDINATE_M) or any(
@@ -91,12 +95,16 @@ def check_command(command: Command) -> None:
                 for one, (least, most) in zip(p, OPPONENT_BOX_M, strict=True)
             ):
                 box = ", ".join(f"{least:g}..{most:g}" for least, most in OPPONENT_BOX_M)
-                raise ValueError(f"the opponent's fist is moved to three numbers in m within {box}")
+                raise ValueError(
+                    f"the opponent's fist must be moved to three numbers in m within {box}"
+                )
         case Renew(who):
             _check_who(who)
         case Stop(why, who):
             if not isinstance(why, str) or len(why) > MAX_WORDS:
-                raise ValueError(f"the reason of a stop is text of at most {MAX_WORDS} characters")
+                raise ValueError(
+                    f"the reason of a stop must be text of at most {MAX_WORDS} characters"
+                )
             _check_who(who)
         case Resume(who, confirmed):
             _check_who(who, confirmed)
@@ -105,14 +113,14 @@ def check_command(command: Command) -> None:
                 isinstance(c, tuple) and len(c) == 2 and isinstance(c[0], str) for c in changes
             )
             if not pairs:
-                raise ValueError("changes are pairs of a dotted key and a value")
+                raise ValueError("changes must be pairs of a dotted key and a value")
 
 
 def _check_look(command: Look) -> None:
     """Check the target of a look command."""
     match command:
         case LookAt(pointer=pointer) if not isinstance(pointer, bool):
-            raise ValueError("pointer is true or false")
+            raise ValueError("pointer must be true or false")
         case LookAt(None):
             pass
         case LookAt(p) | LookAtInHead(p):
@@ -120,7 +128,7 @@ def _check_look(command: Look) -> None:
         case LookAtDirection(direction, frame, distance):
             if not (_are_numbers(direction, 2, pi) and -pi / 2 <= direction[1] <= pi / 2):
                 raise ValueError(
-                    "a direction is a finite yaw within +-180 deg (left above 0) and a pitch "
+                    "a direction must be a finite yaw within +-180 deg (left above 0) and a pitch "
                     "within +-90 deg (up above 0)"
                 )
             if frame not in ("world", "head"):
@@ -129,15 +137,15 @@ def _check_look(command: Look) -> None:
         case LookAtPerson(person):
             if isinstance(person, bool) or not isinstance(person, int) or person < 0:
                 raise ValueError(
-                    f"a person is named by a whole number from 0 on, not {person!r:.40}"
+                    f"a person must be given by a whole number from 0 on, not {person!r:.40}"
                 )
         case LookAtPixel(pixel, distance, captured_s, p):
             if not _are_numbers(pixel, 2, MAX_PIXEL):
-                raise ValueError("a pixel is two finite numbers, x right and y down")
+                raise ValueError("a pixel must be two finite numbers, x right and y down")
             if distance is not None:
                 _check_distance(distance)
             if captured_s is not None and not _is_within(captured_s, _MAX_TIME_S):
-                raise ValueError("captured_s is the time of a frame in seconds")
+                raise ValueError("captured_s must be the time of a frame in seconds")
             if p is not None:
                 _check_point(p)
 
@@ -145,35 +153,35 @@ def _check_look(command: Look) -> None:
 def _check_point(p: object) -> None:
     if not _are_numbers(p, 3, MAX_COORDINATE_M):
         raise ValueError(
-            "a point is three finite numbers in metres, x ahead, y left, z up, none "
+            "a point must be three finite numbers in metres, x ahead, y left, z up, none "
             f"beyond +-{MAX_COORDINATE_M:g} m"
         )
 
 
 def _check_distance(distance: object) -> None:
     if not (_is_within(distance, MAX_COORDINATE_M) and distance > 0.0):  # type: ignore[operator]
-        raise ValueError(f"a distance is above 0 and at most {MAX_COORDINATE_M:g} m")
+        raise ValueError(f"a distance must be above 0 and at most {MAX_COORDINATE_M:g} m")
 
 
 def _check_control(command: ControlCommand) -> None:
     _check_who(command.who, command.stay)
     for_s = command.for_s
     if for_s is not None and not (_is_within(for_s, MAX_CONTROL_S) and for_s > 0.0):
-        raise ValueError(f"for_s is above 0 and at most {MAX_CONTROL_S:g} s")
+        raise ValueError(f"for_s must be above 0 and at most {MAX_CONTROL_S:g} s")
 
 
 def _check_who(who: object, flag: object = False) -> None:
     if not isinstance(who, str) or len(who) > MAX_WORDS:
-        raise ValueError(f"who asks is text of at most {MAX_WORDS} characters")
+        raise ValueError(f"who must be text of at most {MAX_WORDS} characters")
     if not isinstance(flag, bool):
-        raise ValueError("stay and confirmed are true or false")
+        raise ValueError("stay and confirmed must be true or false")
 
 
 def _check_share(what: str, key: str, name: object, value: object) -> None:
     if not isinstance(name, str) or len(name) > MAX_WORDS:
-        raise ValueError(f"{what} is given by its name")
+        raise ValueError(f"{what} must be given by its name")
     if not _is_within(value, 1.0) or value < 0.0:  # type: ignore[operator]
-        raise ValueError(f"the {key} of {what} is a number 0..1")
+        raise ValueError(f"the {key} of {what} must be a number 0..1")
 
 
 def _are_numbers(values: object, count: int, most: float) -> bool:
@@ -202,7 +210,7 @@ def as_recorded_json(command: Command) -> dict[str, object]:
 
 
 def from_json(data: object) -> Command:
-    """Read the result of ``as_json`` or ``as_recorded_json``; fields with defaults may be left out.
+    """Read the result of ``as_json`` or ``as_recorded_json``; fields with defaults may be omitted.
 
     Raises:
         ValueError: It is not a command; the message lists the commands or fields.
@@ -211,11 +219,13 @@ def from_json(data: object) -> Command:
     name = data.get(key) if isinstance(data, dict) else None
     kind = COMMANDS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(data, dict):
-        raise ValueError(f"no command; there is {', '.join(COMMANDS)}")
+        raise ValueError(f"not a command; available: {', '.join(COMMANDS)}")
     fields = {field: _to_tuples(value) for field, value in data.items() if field != key}
     needed = set(kind._fields).difference(kind._field_defaults)
     if not needed <= set(fields) <= set(kind._fields):
-        raise ValueError(f"{name} takes {', '.join(kind._fields)}; given {', '.join(fields)}")
+        raise ValueError(
+            f"{name} has the fields {', '.join(kind._fields)}; given {', '.join(fields)}"
+        )
     command = kind(**fields)  # type: ignore[arg-type]
     check_command(command)
     return command

@@ -49,7 +49,7 @@ class CameraParams:
     """The camera's pose and field of view."""
 
     # fmt: off
-    mount: Annotated[MountedOn, "head: the camera turns with the head; base: it stands still"] = "head"
+    mount: Annotated[MountedOn, "head: the camera turns with the head; base: it is fixed"] = "head"
     position_mm: Annotated[tuple[float, float, float], Bounds(-2000, 2000),
         "position of the lens in front of, left of and above the point between the eyes (mount head) or the neck base "
         "(mount base)"] = (20.0, 0.0, 45.0)
@@ -58,9 +58,9 @@ class CameraParams:
     horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = ASSUMED_FIELD_DEG
     roll_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera about its optical axis, right side down"] = 0.0
     rotation: Annotated[Literal[0, 90, 180, 270],
-        "degrees clockwise by which the camera's frames are turned upright; everything else here counts in upright frames"] = 0
+        "degrees clockwise by which the camera's frames are turned upright; all other values here refer to upright frames"] = 0
     mirrored: Annotated[bool, "the camera delivers mirror images: left and right are exchanged before the rotation"] = False
-    lens: Annotated[LensParams | None, "the lens as measured; left out, the field of view stands for it"] = None
+    lens: Annotated[LensParams | None, "measured lens; without it, the field of view is used"] = None
     # fmt: on
 
 
@@ -127,7 +127,7 @@ class PoseHistory:
         """
         times, angles = self._times, self._angles
         if not times:
-            raise LookupError("no pose has been remembered yet")
+            raise LookupError("no pose has been recorded yet")
         if t_s > times[-1]:
             return angles[-1]
         after = bisect_left(times, t_s)

@@ -15,11 +15,11 @@ class CollisionParams:
     """Two joints that collide if both are in these ranges."""
 
     first: Annotated[str, "a joint"]
-    first_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
-    first_max_deg: Annotated[float, Bounds(-180, 180), "to this one"]
-    second: Annotated[str, "the other joint"]
-    second_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
-    second_max_deg: Annotated[float, Bounds(-180, 180), "to this one"]
+    first_min_deg: Annotated[float, Bounds(-180, 180), "start of the first joint's range"]
+    first_max_deg: Annotated[float, Bounds(-180, 180), "end of that range"]
+    second: Annotated[str, "name of the other joint"]
+    second_min_deg: Annotated[float, Bounds(-180, 180), "start of the other joint's range"]
+    second_max_deg: Annotated[float, Bounds(-180, 180), "end of that range"]
 
     def __post_init__(self) -> None:
         """Check that these are two ranges of two joints.
@@ -31,7 +31,7 @@ class CollisionParams:
             if not JOINT_NAME.fullmatch(name):
                 raise ValueError(f"{name!r} is not a joint name such as neck_yaw or jaw")
         if self.first == self.second:
-            raise ValueError(f"first and second are both {self.first}; name two joints")
+            raise ValueError(f"first and second are both {self.first}; give two different joints")
         for key in ("first", "second"):
             low, high = getattr(self, f"{key}_min_deg"), getattr(self, f"{key}_max_deg")
             if not low < high:
@@ -58,7 +58,7 @@ def forbidden_pairs(
 
     Args:
         params: The forbidden pairs of ranges.
-        margin_deg: Distance to them, as servos round and lag.
+        margin_deg: Distance to them, because servos round positions and lag.
         limits: One limit per joint.
         joints: Names of the joints, in the order of the limits.
 
@@ -84,7 +84,7 @@ def forbidden_pairs(
                 for span in pair
             ]
             raise ValueError(
-                f"the collision of {' with '.join(halves)} leaves no pose, with its margin of "
+                f"the collision of {' with '.join(halves)} allows no pose, with its margin of "
                 f"{margin_deg:g} deg; narrow one of the two"
             )
     return pairs
@@ -93,7 +93,7 @@ def forbidden_pairs(
 def _index(name: str, joints: tuple[str, ...]) -> int:
     if name not in joints:
         raise ValueError(
-            f"a collision names {name}, which this rig does not have: take it out, or name one of "
+            f"a collision names {name}, which this rig does not have: remove it, or use one of "
             f"{', '.join(joints)}"
         )
     return joints.index(name)
@@ -109,11 +109,11 @@ class HealthParams:
     """Thresholds for slowing and stopping servos before they switch themselves off."""
 
     # fmt: off
-    warm_c: Annotated[float, Bounds(1, 60), "a joint is slowed down from this far below the servo's own temperature limit"] = 15.0
-    hot_c: Annotated[float, Bounds(0, 40), "a joint is stopped from this far below that limit"] = 5.0
+    warm_c: Annotated[float, Bounds(1, 60), "distance below the servo's own temperature limit from which a joint is slowed down"] = 15.0
+    hot_c: Annotated[float, Bounds(0, 40), "distance below that limit from which a joint is stopped"] = 5.0
     slowest: Annotated[float, Bounds(0.01, 1), "share of speed and acceleration that remains just before a joint is stopped"] = 0.2
     lasting_load: Annotated[float, Bounds(0.05, 0.95),
-        "share of the stall torque that is allowed continuously; a higher load counts by its square (I2t), as it heats the motor"] = 0.5
+        "share of the stall torque that is allowed continuously; a higher load is weighted by its square (I2t)"] = 0.5
     overload_ms: Annotated[float, Bounds(50, 60000),
         "full load for this long stops a joint; it is slowed down from half of this time"] = 700.0
     voltage_margin_v: Annotated[float, Bounds(0, 5),
@@ -138,7 +138,7 @@ class StallParams:
 
     # fmt: off
     position_error_deg: Annotated[float, Bounds(0.5, 45),
-        "a joint at least this far from its commanded angle should be moving; larger than the error that friction and weight leave"] = 3.0
+        "smallest distance from the commanded angle at which a joint must move; larger than the error due to friction and weight"] = 3.0
     moved_deg: Annotated[float, Bounds(0.1, 10), "motion towards the commanded angle that counts as moving"] = 0.5
     # The dead time of a healthy servo is about 30 ms. With the age of an answer and one more tick
     # a stall is found within 200 ms.
@@ -169,18 +169,18 @@ class GuardParams:
     """Timeouts, slow motion, and limits of the servos' strain."""
 
     # fmt: off
-    joint_timeout_ms: Annotated[float, Bounds(5, 5000), "a joint whose last measurement is older than this holds still"] = 150.0
-    frame_timeout_ms: Annotated[float, Bounds(50, 60000), "the neck holds still while the last frame is older than this"] = 1500.0
+    joint_timeout_ms: Annotated[float, Bounds(5, 5000), "a joint whose last measurement is older than this is stopped"] = 150.0
+    frame_timeout_ms: Annotated[float, Bounds(50, 60000), "the neck is stopped while the last frame is older than this"] = 1500.0
     soft_start_ms: Annotated[float, Bounds(0, 60000), "shortest time of slow motion after torque-on"] = 1000.0
     soft_start_speed_deg_s: Annotated[float, Bounds(1, 500), "speed after torque-on and while parking"] = 60.0
     soft_start_accel_deg_s2: Annotated[float, Bounds(1, 50000), "acceleration after torque-on and while parking"] = 300.0
     late_ms: Annotated[float, Bounds(0, 5000),
         "acceleration is limited to late_accel_deg_s2 for this long after a tick that missed its slot"] = 50.0
     late_accel_deg_s2: Annotated[float, Bounds(10, 200_000),
-        "acceleration limit after a late tick, as servos have braked when no goals came; slow motion regains its speed with it"] = 15000.0
-    health: Annotated[HealthParams, "what the servos bear"] = field(default_factory=HealthParams)
-    stall: Annotated[StallParams, "joints that are told to move and do not"] = field(default_factory=StallParams)
+        "acceleration limit after a late tick, because servos brake without new goals; slow motion regains its speed with it"] = 15000.0
+    health: Annotated[HealthParams, "limits of the servos' strain"] = field(default_factory=HealthParams)
+    stall: Annotated[StallParams, "detection of stalled joints"] = field(default_factory=StallParams)
     collision_margin_deg: Annotated[float, Bounds(0.1, 20),
-        "distance kept from forbidden ranges, as servos round positions and lag behind"] = 1.0
+        "distance kept from forbidden ranges, because servos round positions and lag"] = 1.0
     collisions: Annotated[tuple[CollisionParams, ...], "pairs of joint ranges that must not be occupied at the same time"] = ()
     # fmt: on

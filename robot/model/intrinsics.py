@@ -32,7 +32,7 @@ def intrinsics_of_lens(
     height_px: int,
     own: Intrinsics | None = None,
 ) -> Intrinsics:
-    """Return the intrinsics of images of a size: measured, reported by the camera, or by the view.
+    """Return the intrinsics of images of a size: measured, from the camera, or from the view.
 
     Images of another size with the same shape count as scaled measured ones. For another shape
     it is unknown which edges the camera has cut off, so the field of view is used, as without a

@@ -1,4 +1,4 @@
-"""Parameters of masses: what a head weighs, and where."""
+"""Parameters of the masses of a head and their positions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,12 +14,12 @@ Moments = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class LinkMassParams:
-    """Mass of one link; what is null follows from shapes and density."""
+    """Mass of one link; null values follow from shapes and density."""
 
     # fmt: off
-    mass_kg: Annotated[float | None, Bounds(1e-5, 50), "mass as weighed; null: from its shape and the density"] = None
+    mass_kg: Annotated[float | None, Bounds(1e-5, 50), "measured mass; null: from its shape and the density"] = None
     com_mm: Annotated[tuple[float, float, float] | None, Bounds(-1000, 1000),
-        "centre of mass ahead, left and above of the link's axis, of the head of the neck's pitch axis, "
+        "centre of mass ahead, left and above of the link's axis (for the head: of the neck's pitch axis), "
         "with all joints at 0; null: from its shape"] = None
     inertia_kg_mm2: Annotated[Moments | None, Bounds(-1e6, 1e6), Unit("kg mm2"),
         "moments and products of inertia about the centre of mass [xx, yy, zz, xy, xz, yz]; null: from its shape"] = None
@@ -56,14 +56,14 @@ class CounterweightParams:
     # fmt: off
     mass_kg: Annotated[float, Bounds(0, 20), "mass of the weight"]
     position_mm: Annotated[tuple[float, float, float], Bounds(-1000, 1000),
-        "where it is, ahead, left and above of the link's axis, of the head of the neck's pitch axis"]
+        "position ahead, left and above of the link's axis (for the head: of the neck's pitch axis)"]
     link: Annotated[str, "link that carries it: head, or a name of gazerig describe"] = "head"
     # fmt: on
 
 
 @dataclass(frozen=True)
 class MassParams:
-    """Masses of the links, and what is done about them."""
+    """Masses of the links, and compensation of their weight."""
 
     # fmt: off
     sag_share: Annotated[float, Bounds(0, 1.5),

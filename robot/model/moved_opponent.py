@@ -25,7 +25,7 @@ class MovableOpponent(Protocol):
         ...
 
     def update(self, t_s: float) -> None:
-        """Move on up to a time."""
+        """Advance the motion to a time."""
         ...
 
 
@@ -56,11 +56,11 @@ class TickClockOpponent:
         self._opponent, self._start_s = opponent, start_s
 
     def move(self, p_m: Vec3, t_s: float) -> None:
-        """Move the leading fist to a point; before the scene starts nothing moves."""
+        """Move the leading fist to a point; no effect before the start of the scene."""
         if (start_s := self._start_s()) is not None:
             self._opponent.move(p_m, t_s - start_s)
 
     def update(self, t_s: float) -> None:
-        """Move on up to a time."""
+        """Advance the motion to a time."""
         if (start_s := self._start_s()) is not None:
             self._opponent.update(t_s - start_s)

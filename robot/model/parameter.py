@@ -20,7 +20,7 @@ class Parameter(NamedTuple):
         choices: Allowed values, empty if any value of its kind is allowed.
         kind: number, whole, bool, text, choice, list or mapping.
         default: Value in the rig of defaults.
-        live: "next tick", or "next start: " and why a running rig cannot take it.
+        live: "next tick", or "next start: " and the reason why a running rig cannot apply it.
         optional: Whether null is allowed.
         length: Number of items of a list, None if any.
         items: Kind of the items.

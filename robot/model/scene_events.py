@@ -1,4 +1,4 @@
-"""Events of an emulated scene that runs are scored by."""
+"""Events of an emulated scene, used to score runs."""
 
 from typing import Literal, Protocol
 
@@ -11,18 +11,17 @@ class ExpectedResponse(Protocol):
     response: "look": be on a thing of this kind between start and end; "return": be on it
         again by the end
     start_s, end_s: from the beginning of a round
-    place_world_m, within_m: place of that thing: looking at another of its kind elsewhere
-        is no answer
+    place_world_m, within_m: place of that thing; a look at another one elsewhere is not a response
     """
 
     @property
     def name(self) -> str:
-        """Return the behaviour that is tested."""
+        """Return the tested behaviour."""
         ...
 
     @property
     def response(self) -> Literal["look", "return"]:
-        """Return how it is judged."""
+        """Return the kind of response."""
         ...
 
     @property
@@ -32,48 +31,48 @@ class ExpectedResponse(Protocol):
 
     @property
     def start_s(self) -> float:
-        """Return its beginning."""
+        """Return the start."""
         ...
 
     @property
     def end_s(self) -> float:
-        """Return its end."""
+        """Return the end."""
         ...
 
     @property
     def place_world_m(self) -> Vec3:
-        """Return its place."""
+        """Return the place."""
         ...
 
     @property
     def within_m(self) -> float:
-        """Return how far around."""
+        """Return the radius around the place."""
         ...
 
 
 class BoxingEvent(Protocol):
-    """An event of a boxing match; due_s: when the fist of a punch arrives."""
+    """An event of a boxing match; due_s: arrival time of the fist of a punch."""
 
     @property
     def name(self) -> str:
-        """Return "punch", "attack" or something else."""
+        """Return "punch", "attack" or another name."""
         ...
 
     @property
     def start_s(self) -> float:
-        """Return its beginning."""
+        """Return the start."""
         ...
 
     @property
     def end_s(self) -> float:
-        """Return its end."""
+        """Return the end."""
         ...
 
     @property
     def due_s(self) -> float | None:
-        """Return by when it must be answered, None: by its end."""
+        """Return the time by which a response is due, None: by the end."""
         ...
 
 
 class SceneEvent(ExpectedResponse, BoxingEvent, Protocol):
-    """Both in one."""
+    """An event with both interfaces."""

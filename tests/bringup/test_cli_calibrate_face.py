@@ -328,7 +328,7 @@ def goes_on(running: RobotClient) -> None:
         try:
             return running.resume()
         except RequestRejected as refused:
-            assert "holds at least" in str(refused) and time.monotonic() < end_s, refused
+            assert "lasts at least" in str(refused) and time.monotonic() < end_s, refused
             time.sleep(1.2)  # who asks sooner is refused for that
 
 
