@@ -11,7 +11,7 @@ from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
-from gazerig.robot.description.statics import NECK_JOINTS, Statics
+from gazerig.robot.description.statics import NECK_JOINTS, Statics, rig_statics
 from gazerig.robot.model.guard_params import CollisionParams
 from gazerig.robot.model.types import order_joints
 
@@ -24,7 +24,7 @@ def description_of(rig: Rig, *, looks: bool = True) -> Description:
         looks: Whether to include visible shapes; without them the same mechanism is built faster.
 
     Raises:
-        SetupError: a mesh of its own cannot be used.
+        SetupError: one of its meshes cannot be used.
     """
     return describe(shape_of(rig if looks else replace(rig, meshes={})), looks=looks)
 
@@ -66,16 +66,19 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
     )
 
 
-def statics_of(rig: Rig) -> Statics:
-    """Return the model of the torques that a rig's servos hold at rest."""
-    return Statics(description_of(rig, looks=False), rig.joints, rig.couplings)
+def statics_of(rig: Rig, *, of_neck: bool = False) -> Statics:
+    """Return the model of the torques that a rig's servos, or those of its neck, hold at rest."""
+    description = description_of(rig, looks=False)
+    return rig_statics(description, rig.joints, rig.couplings, of_neck=of_neck)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:
     """Return what makes up for the sag of a rig's neck; None without a neck or by its file."""
     if not rig.mass.sag_share or not any(name in rig.joints for name in NECK_JOINTS):
         return None
-    return SagCompensation(statics_of(rig), order_joints(rig.joints), rig.mass.sag_share)
+    return SagCompensation(
+        statics_of(rig, of_neck=True), order_joints(rig.joints), rig.mass.sag_share
+    )
 
 
 def collision_hints(rig: Rig) -> list[str]:

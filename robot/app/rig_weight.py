@@ -94,7 +94,7 @@ def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
     """Find what a neck holds at rest, its heat, and whether it stays where it is parked."""
     if not any(name in rig.joints for name in NECK_JOINTS):
         return
-    statics = statics_of(rig).of_neck()
+    statics = statics_of(rig, of_neck=True)
     level = holdings(rig, statics, {})
     for name, worst in worst_holdings(rig, statics).items():
         if worst.share < _SMALLEST:
@@ -137,7 +137,7 @@ def rest_park_deg(rig: Rig) -> dict[str, float]:
     sprung = any(joint.spring_nm_deg for joint in rig.joints.values())
     if (rig.mass == MassParams() and not sprung) or not rig.joints.keys() & set(NECK_JOINTS):
         return park
-    statics = statics_of(rig).of_neck()
+    statics = statics_of(rig, of_neck=True)
     pose = {name: radians(park.get(name, 0.0)) for name in statics.joints}
     rest = statics.rest_pose(pose)
     for name, at in pose.items():

@@ -1,6 +1,6 @@
 """The bus of one run: real ports, emulated servos (on a pseudo-terminal or here), or ideal ones.
 
-The emulated servos of a rig are built into its joints by its YAML.
+The emulated servos are mounted in the rig's joints as its YAML defines.
 """
 
 import hashlib
@@ -23,8 +23,8 @@ from gazerig.robot.app.bus_wiring import (
     servo_configs,
 )
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.rig_description import statics_of
-from gazerig.robot.description.statics import Weight
+from gazerig.robot.app.rig_description import description_of
+from gazerig.robot.description.statics import Weight, joint_weights
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import coupled_pairs, pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
@@ -72,14 +72,14 @@ class CameraPoses(NamedTuple):
 
 
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
-"""Start angles of emulated joints, a little crooked, like those of a head moved by hand."""
+"""Start angles of emulated joints: slightly off, like those of a head moved by hand."""
 
 STOP_BEYOND_DEG = 4.0
 """Distance of an emulated joint's mechanical stops beyond its configured range."""
 
 
 _NECK_SERVO_NM = 1.0
-"""Torque of a hobby servo of a head: standard size, 10 kg cm; eyes and lids have small ones."""
+"""Torque of a hobby servo of the neck: standard size, 10 kg cm; eyes and lids have small ones."""
 
 
 def emulated_lines(rig: Rig) -> dict[str, Emulated]:
@@ -89,7 +89,7 @@ def emulated_lines(rig: Rig) -> dict[str, Emulated]:
 
 def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
     """Return all servos of a rig without bytes, at the start angles of the emulated ones."""
-    measured = [rig.joints[name].facts.measures_position for name in rig.names]
+    measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
     return IdealBus(
         servo_configs(rig), [_start_step(rig, name) for name in rig.names], measured, now_s
     )
@@ -98,7 +98,7 @@ def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
 class _ServoWeight(NamedTuple):
     """Torque of a weight at a servo after its linkage: nm * sin(turns * (angle - upright)) + load.
 
-    turns: of the weight for one turn of the servo's part of the linkage
+    turns: turns of the weight per turn of the servo's part of the linkage
     """
 
     nm: float
@@ -108,7 +108,7 @@ class _ServoWeight(NamedTuple):
 
 
 def _servo_weight(rig: Rig, name: str, weights: Mapping[str, Weight]) -> _ServoWeight:
-    """Return the weight at a servo: with all other joints at 0, of a pair with the second at 0."""
+    """Return the weight at a servo, with all other joints at 0 (in a pair: the second)."""
     for first, second, coupling in coupled_pairs(rig.couplings):
         if name in (first, second):
             (a, b), (c, d) = coupling.rates((0.0, 0.0))
@@ -129,8 +129,8 @@ def _emulated_servo(rig: Rig, name: str, weights: Mapping[str, Weight]) -> Servo
     """Return the smart servo of one joint."""
     joint, weight = rig.joints[name], _servo_weight(rig, name, weights)
     start, (low, high) = _start_step(rig, name), _mechanical_stops(rig, name)
-    linkage = joint.made()
-    turns = linkage.steepest * 2.0 * pi / joint.facts.steps_per_turn
+    linkage = joint.make_linkage()
+    turns = linkage.steepest * 2.0 * pi / joint.model_facts.steps_per_turn
     physics = Physics(
         load_kg_m2=weights[name].inertia_kg_m2 / turns**2,
         load_nm=(1.0 if linkage.rising else -1.0) * weight.load_nm / turns,
@@ -157,7 +157,7 @@ def servo_index(rig: Rig, joint: str) -> int:
 def _emulated_line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind in CHAINS:
-        weights = statics_of(rig).weights()
+        weights = joint_weights(description_of(rig, looks=False), rig.joints)
         specs = tuple(_emulated_servo(rig, joint, weights) for joint in joints)
         return CHAINS[config.kind](specs, config.baud)
     if config.kind in BOARDS:
@@ -194,7 +194,7 @@ BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
 def _hobby_spec(rig: Rig, name: str) -> HobbySpec:
     joint = rig.joints[name]
     low, high = _mechanical_stops(rig, name)
-    facts, spec = joint.facts, HobbySpec(joint.id)
+    facts, spec = joint.model_facts, HobbySpec(joint.id)
     if joint.servo_speed_deg_s is not None:
         spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
     if "neck" in name:
@@ -213,7 +213,7 @@ def start_angles_rad(rig: Rig) -> dict[str, float]:
     """Return the start angles of a rig's emulated joints."""
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
     for first, second, _ in coupled_pairs(rig.couplings):
-        # Push rods have no angles far outside the range.
+        # Push rods have no angles far outside their range.
         for name in (first, second):
             limit = rig.joints[name].limit()
             crooked[name] = min(max(crooked[name], limit.low_rad), limit.high_rad)
@@ -233,7 +233,7 @@ def _mechanical_stops(rig: Rig, name: str) -> tuple[float, float]:
     for pair in coupled_pairs(rig.couplings):
         if name in pair[:2]:
             own = pair_setups(pair, rig.joints, {})[name]
-            beyond = joint.made().steepest * radians(STOP_BEYOND_DEG)
+            beyond = joint.make_linkage().steepest * radians(STOP_BEYOND_DEG)
             return own.min_steps - beyond, own.max_steps + beyond
     ends = (joint.min_deg - STOP_BEYOND_DEG, joint.max_deg + STOP_BEYOND_DEG)
     low, high = sorted(joint.steps(radians(end)) for end in ends)
@@ -243,12 +243,12 @@ def _mechanical_stops(rig: Rig, name: str) -> tuple[float, float]:
 def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
     """Return the real port, ideal servos, or an emulated bus here or on a pseudo-terminal.
 
-    Without pseudo-terminals the bus is emulated in this process in real time, too.
+    Without pseudo-terminals the bus is emulated in this process also in real time.
 
     Args:
-        rig: of the servos.
-        options: of the run, with their replacement.
-        clock: of the run.
+        rig: The rig of the servos.
+        options: Options of the run, which select the servos' replacement.
+        clock: Clock of the run.
     """
     if not options.mock:
         paths, here = bus_ports(rig, options.port), serial_ports()
@@ -282,7 +282,7 @@ def in_process_run_bus(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
 
 
 def _true_steps(rig: Rig, devices: Mapping[str, Device]) -> TrueSteps:
-    """Return the reader of the shafts of emulated devices; ``devices``: by the name of the bus."""
+    """Return the reader of the shafts of emulated devices; ``devices``: by bus name."""
     places = tuple((name, rig.joints[name].bus, servo_index(rig, name)) for name in rig.names)
 
     def now() -> dict[str, float]:

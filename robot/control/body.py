@@ -78,13 +78,12 @@ class Body:
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
             torque=(True,) * len(self.names),  # it was switched on, and no servo reports otherwise
-            measured=tuple([joint.facts.measures_position for joint in self._joints]),
+            measured=tuple([joint.model_facts.measures_position for joint in self._joints]),
         )
 
     def _set_joints(self, joints: tuple[JointParams, ...]) -> None:
         self._joints = joints
-        self._by_name = dict(zip(self.names, joints, strict=True))
-        linkages = [joint.made() for joint in joints]
+        linkages = [joint.make_linkage() for joint in joints]
         # All joints are computed as if every linkage were straight; the other joints are then
         # corrected.
         lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
@@ -102,6 +101,8 @@ class Body:
         """
         before, self._gentle_deg_s = self._joints, gentle_deg_s
         self._set_joints(tuple(joints[name] for name in self.names))
+        if self._sag is not None:
+            self._sag.retune(joints)
         self.bus.retune(servo_setups(joints, self._park_rad, self._gentle_deg_s, self._pairs))
         return {
             i: (
@@ -112,7 +113,7 @@ class Body:
             if not _same_conversion(old, now)
         }
 
-    def reach(self) -> tuple[JointLimit, ...]:
+    def configured_limits(self) -> tuple[JointLimit, ...]:
         """Return the ranges and speeds of the servos' configuration, in present joint angles."""
         return tuple(map(_configured_limit, self._set_up, self._joints))
 
@@ -134,7 +135,7 @@ class Body:
 
         Raises:
             BusLost: No servo has answered for too long while the torque was on. With the torque
-                off, a lost bus is no error.
+                off, a lost bus is not an error.
         """
         self._read_s = t_s
         try:
@@ -175,7 +176,7 @@ class Body:
         """
         if self._sag is not None:
             steps = self._steps(command_rad)
-            for i, offset in self._sag.offsets(command_rad, self._by_name, self._read_s):
+            for i, offset in self._sag.offsets(command_rad, self._read_s):
                 steps[i] += round(offset)
             self.bus.write(steps)
         elif self._bent or self._coupled is not None or len(command_rad) != len(self._zeros):
@@ -212,7 +213,7 @@ class Body:
         """Switch the torque off immediately; the bus stays open and reading continues.
 
         Raises:
-            BusLost: The port is gone; the torque is switched off when it reconnects.
+            BusLost: The port is lost; the torque is switched off when it reconnects.
         """
         self._torque_off = True
         self.bus.disable_torque()
@@ -275,7 +276,7 @@ def _configured_limit(set_up: JointParams, now: JointParams) -> JointLimit:
     limit = set_up.limit()
     if _same_conversion(set_up, now):
         return limit
-    was, made = set_up.made(), now.made()
+    was, made = set_up.make_linkage(), now.make_linkage()
     ends = sorted(made.angle_rad(was.steps(end)) for end in (limit.low_rad, limit.high_rad))
     speed = limit.speed_rad_s * was.steepest / made.steepest
     return limit._replace(low_rad=ends[0], high_rad=ends[1], speed_rad_s=speed)

@@ -22,7 +22,7 @@ from gazerig.robot.description.links import (
     turn_about,
 )
 from gazerig.robot.description.mass import in_parent_frame, join_inertias
-from gazerig.robot.model.coupling_params import CouplingParams, coupled_pairs
+from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 
@@ -53,39 +53,49 @@ class Weight(NamedTuple):
         return self.nm * sin(angle_rad - self.upright_rad)
 
 
-class Statics:
-    """Torques that the servos of a rig hold at rest.
+def rig_statics(
+    description: Description,
+    joints: Mapping[str, JointParams],
+    couplings: Mapping[str, CouplingParams],
+    *,
+    of_neck: bool = False,
+) -> "Statics":
+    """Return the torques that the servos of a rig hold at rest.
 
     Args:
         description: of the rig, with its masses.
         joints: of the rig.
         couplings: of the rig.
+        of_neck: of the joints of the neck only, with all others at 0; this is computed quickly.
+    """
+    chosen = {name: one for name, one in joints.items() if not of_neck or name in NECK_JOINTS}
+    pairs = tuple(one for one in coupled_pairs(couplings) if {one.first, one.second} <= {*chosen})
+    return Statics(_nodes(description, chosen.keys()), chosen, pairs)
+
+
+class Statics:
+    """Torques that servos hold at rest; ``rig_statics`` makes it.
+
+    Attributes:
+        joints: that are looked at.
     """
 
     def __init__(
         self,
-        description: Description,
+        nodes: "Sequence[_MovingBody]",
         joints: Mapping[str, JointParams],
-        couplings: Mapping[str, CouplingParams],
+        pairs: Sequence[CoupledPair],
     ) -> None:
-        self._description, self.joints = description, joints
-        self._pairs = coupled_pairs(couplings)
-        self._nodes = _nodes(description, joints.keys())
+        self.joints = joints
+        self._nodes, self._pairs = tuple(nodes), tuple(pairs)
         self._stall_nm = {
-            name: one.model_facts.stall_torque_nm
-            * one.make_linkage().steepest
-            * 2.0
-            * pi
-            / one.model_facts.steps_per_turn
+            name: one.model_facts.stall_torque_nm * _shaft_turns(one)
             for name, one in joints.items()
         }
 
-    def of_neck(self) -> "Statics":
-        """Return the same for the joints of the neck only, computed quickly."""
-        necks = {name: self.joints[name] for name in NECK_JOINTS if name in self.joints}
-        found = Statics(self._description, necks, {})
-        found._pairs = tuple(pair for pair in self._pairs if {pair.first, pair.second} <= {*necks})
-        return found
+    def retuned(self, joints: Mapping[str, JointParams]) -> "Statics":
+        """Return the same with other parameters of its joints."""
+        return Statics(self._nodes, {name: joints[name] for name in self.joints}, self._pairs)
 
     def load_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the torque of weight and spring at each joint; joints left out are at 0."""
@@ -94,17 +104,6 @@ class Statics:
             name: weight.get(name, 0.0) + spring_nm(joint, angles_rad.get(name, 0.0))
             for name, joint in self.joints.items()
         }
-
-    def weights(self) -> dict[str, Weight]:
-        """Return the weight at each joint."""
-        level, inertias = _weight_nm(self._nodes, {}), self._inertias()
-        found = {}
-        for name, inertia in inertias.items():
-            # About a fixed axis the torque is a sine of the angle.
-            torque = level.get(name, 0.0)
-            aside = _weight_nm(self._nodes, {name: 0.5 * pi}).get(name, 0.0)
-            found[name] = Weight(hypot(torque, aside), atan2(-torque, aside), inertia)
-        return found
 
     def stall_shares(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the torque that each servo holds in a pose as a share of its stall torque.
@@ -178,29 +177,46 @@ class Statics:
                 return at
         return limit.high_rad if torque > 0.0 else limit.low_rad
 
-    def _inertias(self) -> dict[str, float]:
-        """Return the inertia about the axis of each joint of the rig with all joints at 0."""
-        description = self._description
-        poses = description.poses(description.angles((), ()))
-        parents = {link.name: link.parent for link in description.links}
-        carried: dict[str, list[Inertia]] = {}
-        for link in description.links:
-            at: str | None = link.name if link.inertia is not None else None
-            while at is not None and link.inertia is not None:
-                own = in_parent_frame(link.inertia, *poses[link.name])
-                carried.setdefault(at, []).append(own)
-                at = parents[at]
-        found = dict.fromkeys(self.joints, 0.0)
-        for link in description.links:
-            if link.joint is not None and link.name in carried:
-                R, p = poses[link.name]
-                axis = np.array(rotate(R, link.joint.axis))
-                own = join_inertias(carried[link.name])
-                across = np.cross(axis, np.subtract(own.com_m, p))
-                name, ratio = link.joint.follows or LinkageFollower(link.joint.name)
-                moment = own.mass_kg * float(across @ across)
-                found[name] += ratio**2 * (moment + float(axis @ own.tensor_kg_m2 @ axis))
-        return found
+
+def joint_weights(description: Description, joints: Collection[str]) -> dict[str, Weight]:
+    """Return the weight at each of some joints of a rig with all others at 0."""
+    nodes, inertias = _nodes(description, joints), _inertias(description, joints)
+    level, found = _weight_nm(nodes, {}), {}
+    for name in joints:
+        # About a fixed axis the torque is a sine of the angle.
+        torque = level.get(name, 0.0)
+        aside = _weight_nm(nodes, {name: 0.5 * pi}).get(name, 0.0)
+        found[name] = Weight(hypot(torque, aside), atan2(-torque, aside), inertias[name])
+    return found
+
+
+def _inertias(description: Description, joints: Collection[str]) -> dict[str, float]:
+    """Return the inertia about the axis of each joint of the rig with all joints at 0."""
+    poses = description.poses(description.angles((), ()))
+    parents = {link.name: link.parent for link in description.links}
+    carried: dict[str, list[Inertia]] = {}
+    for link in description.links:
+        at: str | None = link.name if link.inertia is not None else None
+        while at is not None and link.inertia is not None:
+            own = in_parent_frame(link.inertia, *poses[link.name])
+            carried.setdefault(at, []).append(own)
+            at = parents[at]
+    found = dict.fromkeys(joints, 0.0)
+    for link in description.links:
+        if link.joint is not None and link.name in carried:
+            R, p = poses[link.name]
+            axis = np.array(rotate(R, link.joint.axis))
+            own = join_inertias(carried[link.name])
+            across = np.cross(axis, np.subtract(own.com_m, p))
+            name, ratio = link.joint.follows or LinkageFollower(link.joint.name)
+            moment = own.mass_kg * float(across @ across)
+            found[name] += ratio**2 * (moment + float(axis @ own.tensor_kg_m2 @ axis))
+    return found
+
+
+def _shaft_turns(joint: JointParams) -> float:
+    """Return the turns of a servo's shaft for one turn of its joint, where they are the most."""
+    return joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
 
 
 class _MovingBody(NamedTuple):
