@@ -26,7 +26,7 @@ class JointSolution:
     """Joint angles at which a head comes to rest on a point.
 
     Attributes:
-        joints_rad: by name; lids are open, joints that gaze does not move are at 0.
+        joints_rad: angles by name; lids are open, joints that gaze does not move are at 0.
         reachable: both eyes meet the point within a degree.
         error_deg: angle between the point and the line of sight of the worse eye.
         seen_m: the point at the target's distance that the eyes really look at, world frame.
@@ -75,7 +75,7 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
     head that is already turned towards the point may stay in its position.
 
     Args:
-        rig: from ``load_rig``, or the name or path of a rig.
+        rig: a rig from ``load_rig``, or the name or path of a rig.
         point_m: metres from the neck base; x ahead, y left, z up.
 
     Raises:
@@ -106,7 +106,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
     """Return the pose of head and eyes at joint angles.
 
     Args:
-        rig: from ``load_rig``, or the name or path of a rig.
+        rig: a rig from ``load_rig``, or the name or path of a rig.
         joints_rad: angles by joint; the others are 0.
 
     Raises:

@@ -105,8 +105,8 @@ class Head(ABC):
         """Look in a direction, seen from the present position of the head.
 
         Args:
-            yaw_deg: to the left, -180..180.
-            pitch_deg: upwards, -90..90.
+            yaw_deg: angle to the left, -180..180.
+            pitch_deg: angle upwards, -90..90.
             frame: "world", or "head": relative to the direction that the head faces now.
             distance_m: distance at which the eyes converge.
             for_s: seconds until the order gives up control.
@@ -135,10 +135,10 @@ class Head(ABC):
         """Look at the object at a pixel of the camera image, from the camera's pose at that time.
 
         Args:
-            x_px: to the right from the centre of the upper left pixel.
-            y_px: down from there.
-            distance_m: from the camera; None: as measured by the camera, or as far as the object
-                that is seen there.
+            x_px: distance to the right from the centre of the upper left pixel.
+            y_px: distance downwards from there.
+            distance_m: distance from the camera; None: as measured by the camera, or that of the
+                object detected there.
             captured_s: time of the frame (``HeadState.frame_s``); None: the newest frame.
             for_s: seconds until the order gives up control.
         """

@@ -47,7 +47,7 @@ class Shape:
     inner: shape of the items of a list or mapping
     params: the dataclass, for form "params"
     optional: null is allowed
-    low, high, choices, unit, description: from the declaration
+    low, high, choices, unit, description: values of the declaration
     length: number of items of a list, None for any
     """
 

@@ -49,7 +49,7 @@ MECHANISMS: Mapping[str, Mechanism] = {
 class NewRig:
     """The rig to write.
 
-    board, camera: of BOARDS and CAMERAS
+    board, camera: keys of BOARDS and CAMERAS
     joints: names, in the order of their ids
     eyes_mm: distance between the eye centres
     port: serial port or I2C bus; empty: the usual one of the board

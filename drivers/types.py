@@ -214,22 +214,22 @@ class DetectionInCamera(NamedTuple):
     across_sd_m, along_sd_m: standard deviations of the position, across and along the view
     v_camera_m_s: velocity over ground, None if only the position is known; across_sd_m_s,
         along_sd_m_s: its standard deviations
-    size_depth: of a face, ratio of its distance at an adult's size to the measured distance; None
+    size_depth: for a face, ratio of its distance at an adult's size to the measured distance; None
         if the camera measured none
     detector_id: the detector's own id, None if it has none
-    turn_sd_rad: of a face, standard deviation of its turn
-    gaze_camera: of a face, unit vector along which the eyes look, None if unknown
-    fastest_m, fastest_m_s: of a moving thing, position and velocity of its fastest part, None if
+    turn_sd_rad: for a face, standard deviation of its orientation
+    gaze_camera: for a face, unit vector along which the eyes look, None if unknown
+    fastest_m, fastest_m_s: for a moving thing, position and velocity of its fastest part, None if
         unknown
-    signs: of a face, state of eyes and mouth, None if they are not found
-    upper_m: of an upright moving thing, position of its upper end, at a person's head
-    compact: of a moving thing, whether its patch is solid and about as wide as high, as a fist's or
-        a hand's is and an arm's is not
-    thickness_m: of a moving thing, diameter of the largest disc within its patch, at its distance;
+    signs: for a face, state of eyes and mouth, None if they are not found
+    upper_m: for an upright moving thing, position of its upper end, at a person's head
+    compact: for a moving thing, whether its patch is solid and about as wide as high, as a fist's
+        or a hand's is and an arm's is not
+    thickness_m: for a moving thing, diameter of the largest disc within its patch, at its distance;
         from_side: the patch extends beyond the left or right edge of the image
-    clothing: of a person, colours of the clothes, None if they are not visible
-    box_m: of a face, size of its box at its distance, the root of its area
-    lower_face: of a face, width of the mouth over the distance of the eyes, times the position of
+    clothing: for a person, colours of the clothes, None if they are not visible
+    box_m: for a face, size of its box at its distance: the square root of its area
+    lower_face: for a face, width of the mouth over the distance of the eyes, times the position of
         the nose between eyes and mouth as a share; otherwise 0
     """
 
@@ -268,7 +268,7 @@ class LocatedFrame(NamedTuple):
     intrinsics: the calibration; things: moving things with a position
     faces: visible faces, then heads of people without a visible face, which have no
         ``R_camera_face``
-    palms: of the nearest person, None in a frame that was not searched for them
+    palms: palms of the nearest person, None in a frame that was not searched for them
     """
 
     intrinsics: Intrinsics
@@ -328,7 +328,7 @@ class DetectedPerson:
     head_px: middle of the head
     trunk_px: distance from the hips to the top of the head
     confidence: 0..1
-    clothing: as for a face
+    clothing: colours of the clothes, as for a face
     """
 
     box_px: tuple[float, float, float, float]

@@ -59,7 +59,7 @@ class FieldOfView:
 
         Args:
             bodies: the bodies.
-            rows: the same as plain numbers.
+            rows: the bodies as plain numbers.
             state: head and eyes.
         """
         left, right = eye_axes(state, left=True), None

@@ -101,7 +101,7 @@ class PluginLine:
 
     kind: kind of the bus
     settings: its parameters, pickled and encoded as text
-    servos: in the order of the joints
+    servos: servos in the order of the joints
     """
 
     kind: BusKind

@@ -173,7 +173,7 @@ def test_what_a_neck_holds_is_reported_with_its_heat() -> None:
     assert list(weight_findings(shipped("maker"))) == []
     pitch, _, parked = weight_findings(heavy("desk"))
     assert "level with 25% of its stall torque (0.46 A)" in pitch.what and pitch.level == "note"
-    assert parked.what == "parked at -12 deg it sinks to -35 deg when its torque goes off"
+    assert parked.what == "parked at -12 deg it sinks to -35 deg when torque is switched off"
     twice = MassParams(head=LinkMassParams(1.2, (40.0, 0.0, 30.0)))
     strong = next(iter(weight_findings(heavy("desk", twice))))
     assert strong.level == "warn" and "counterweights" in strong.cure

@@ -42,7 +42,7 @@ class ServoModelInfo(NamedTuple):
     measures_position: whether it measures its position; if not, it has no other feedback either
     hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it has any
     stall_torque_nm: stall torque at its rated voltage; 0.2 for a small hobby servo with metal gears
-    stall_current_a: at that torque, 0 if unknown
+    stall_current_a: current at that torque, 0 if unknown
     p_gain: its P gain as delivered
     full_steps: steps of error times P gain at which its drive is full, 0 if unknown
     """

@@ -54,7 +54,8 @@ def lower_priority(steps: int, group: Path = Path("/proc/self/autogroup")) -> No
     """Lower the priority of this process, and that of its session, which becomes its own.
 
     Args:
-        steps: of niceness; its session gets half of them, or a browser would starve it.
+        steps: increase of the niceness; the session gets half of it, because a browser would starve
+            it otherwise.
         group: file with the niceness of the session.
     """
     if not hasattr(os, "nice"):  # Windows has other priorities

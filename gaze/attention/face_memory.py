@@ -1,10 +1,10 @@
 """Memory of faces that have left the view, at their last positions.
 
 A camera has a smaller field of view than people, and it turns with the head: some of several people
-are always out of its view. The gaze returns to a remembered face when no face is visible. A visible
-one is left for it after the end of a turn of talk: if nobody in view continues, a person out of
-view may. A remembered face that the gaze does not find is forgotten. So is a face that is lost
-under the gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
+are always out of its view. The gaze returns to a remembered face when no face is visible. It also
+leaves a visible face for it after the end of a turn of talk: if nobody in view continues, a person
+out of view may. A remembered face that the gaze does not find is forgotten. So is a face that is
+lost under the gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
 """
 
 from dataclasses import dataclass
@@ -49,14 +49,15 @@ class FaceMemory:
     ) -> Bodies:
         """Return the bodies of a new frame with the remembered faces behind them.
 
-        With a visible face these are only those who may have begun to speak out of view.
+        If a face is visible, these are only faces of people who may have begun to speak out of
+        view.
 
         Args:
             bodies: bodies in the frame.
             attended_id: the present target; -1 for none.
             captured_s: capture time of the frame.
             lasts_s: time for which a face is remembered.
-            unseen_s: time before which such a speaker was last seen; -inf: there is none.
+            unseen_s: time before which such a speaker was last visible; -inf without one.
         """
         before, self._captured_s = self._captured_s, captured_s
         seen = frozenset(bodies.ids)

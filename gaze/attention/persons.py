@@ -31,17 +31,18 @@ farther away.
 _RAISED_M = 0.08
 """A hand is raised if it is at most this far below the face's centre; signs are lower."""
 _GESTURES_M_S, _GESTURES_S, _GESTURES = 0.25, 2.0, 0.5
-"""A person gestures whose lower hands were faster than this, in this time window, for this
-share."""
+"""A person gestures if the lower hands were faster than this, in this time window, for this share.
+"""
 _SANK_S = 0.3
-"""Time for which a hand counts as sinking after its last downward motion."""
+"""Time for which a hand counts as moving down after its last downward motion."""
 _HAND, _OWN = "hand", "own"
 """The robot's own body never waves."""
 _TOGETHER_S = 0.5
 """People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
 _TALKS_S, _BEGINS_S = 6.0, 2.0
-"""Silence after which a talk is over; time after which a silent person may have begun to speak."""
+"""Silence after which a talk has ended; time after which a silent person may have begun to speak.
+"""
 _GONE_S = 120.0
 
 
@@ -94,7 +95,7 @@ class Persons:
         """Update with a new frame.
 
         Args:
-            percept: its percept.
+            percept: percept of the frame.
             p_world_eye_m: position of the eye.
             recovery_s: time constant with which changes of side are forgotten.
         """
@@ -150,9 +151,10 @@ class Persons:
 
     @property
     def may_speak_unseen_s(self) -> float:
-        """Return the time before which a possible speaker was last seen; -inf: there is none.
+        """Return the time before which a possible speaker was last visible; -inf without one.
 
-        After a turn of talk anyone who was not seen to be silent since may have the next one.
+        After a turn of talk, anyone who has not been observed to be silent since then may speak
+        next.
         """
         if self.speaking or self._at_s - self._spoke_s > _TALKS_S:
             return -inf
@@ -230,15 +232,15 @@ class Persons:
     def weaken_known(
         self, factors: list[float], ids: Sequence[int], rhythm_ratio: float, sinking_ratio: float
     ) -> None:
-        """Lower the factors of hands that repeat their motion or sink.
+        """Lower the factors of hands that repeat their motion or move down.
 
         The first change of side soon after another is still new.
 
         Args:
-            factors: one for each body, changed in place.
-            ids: of the bodies.
+            factors: factor of each body, changed in place.
+            ids: ids of the bodies.
             rhythm_ratio: further factor for each repetition.
-            sinking_ratio: further factor for a hand that sinks.
+            sinking_ratio: further factor for a hand that moves down.
         """
         if not self._hands:
             return

@@ -44,7 +44,7 @@ class GestureMotion:
     """Curves of one gesture on one rig, at its original speed and size.
 
     duration_s: time until everything is at rest again
-    samples: of all channels
+    samples: samples of all channels
 
     Args:
         tracks: keys by track; at least one track.

@@ -49,7 +49,7 @@ class LidOpenings(NamedTuple):
     def scale(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
         """Return the openings times factors, slowing down towards fully open.
 
-        factors: of the left and right upper, then of the left and right lower lid
+        factors: factors of the left and right upper, then of the left and right lower lid
         """
         left, right, lower_left, lower_right = factors
         return LidOpenings(

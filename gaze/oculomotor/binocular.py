@@ -246,7 +246,7 @@ class BinocularController:
         """Return the distance at which both lines of sight meet.
 
         one_m: eye angles that fixate a point in the same direction 1 m away
-        otherwise_m: for eyes that cannot converge
+        otherwise_m: distance for eyes that cannot converge
         """
         half_m = tan(0.5 * mean_gaze_of(one_m).vergence_rad)
         if half_m <= 0.0:

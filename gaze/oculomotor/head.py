@@ -262,7 +262,7 @@ class HeadModel:
         """Return the head's yaw, pitch and roll for this instant.
 
         facing_rad: neck angles that would point the face straight at the target's centre
-        gaze_rad: the same for the target point itself
+        gaze_rad: neck angles for the target point itself
         eccentricity_rad: angle of that point from the face's front
         since_eye_onset_s: time since the eyes started towards it, negative before
         soon_rad: neck angles that will point the face at the centre ``foresees_s`` later; None: it

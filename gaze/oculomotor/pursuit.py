@@ -45,7 +45,7 @@ _SLOW_RAD_S = radians(5.0)
 class Slip(NamedTuple):
     """Position error and retinal slip of the target, as seen from the eyes.
 
-    error_rad: from the gaze to the target, as a vector across the line of sight
+    error_rad: angle from the gaze to the target, as a vector across the line of sight
     slip_rad_s: speed of the target minus that of pursuit, without the closing of the error
     """
 

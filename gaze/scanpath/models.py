@@ -150,7 +150,7 @@ class MarkovWalk:
     def next_part(self, part: int, factors: Sequence[float] | None = None) -> int:
         """Draw the part that follows ``part``, both as indices in the order given.
 
-        factors: on the probability of each part; the part stays if they leave none
+        factors: factor on the probability of each part; the part does not change if all become 0
         """
         row = self._rows[part]
         if factors is not None:

@@ -147,7 +147,7 @@ def assemble(
 
     Args:
         rig: the configuration.
-        options: what to run.
+        options: options of the run.
         substitutes: wrappers or replacements of the rig's own parts, by a recording, a replay or a
             calibration.
         room: open surroundings with other robots of the caller; None: they are opened if

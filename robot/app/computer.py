@@ -35,8 +35,8 @@ class LoadLevel(NamedTuple):
 
     Attributes:
         rate_hz: highest rate of the loop, None for the rig's.
-        pictures: of the camera in a world: "full", "coarse" (15 a second, without smoothed edges)
-            or "none" (detections are computed).
+        pictures: pictures of the camera in a world: "full", "coarse" (15 per second, without
+            smoothed edges) or "none" (detections are computed).
         room: whether ``make run`` is in a room with physics.
         text: Description of the level.
     """

@@ -33,7 +33,7 @@ class RunOptions:
         film_delay_s: age of a film's frames in simulated time.
         placed_by: detections are placed by the head's pose at capture, or, only for comparison, by
             the newest pose, which makes the head overshoot.
-        rig, character, profile: by name or path; name: of this head, for other programs.
+        rig, character, profile: names or paths; name: name of this head for other programs.
         behaviour, conversation: initial choices.
         seconds: duration of the run.
         page: HOST:PORT of the live page; no_page: without it.

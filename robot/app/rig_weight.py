@@ -1,4 +1,4 @@
-"""What a rig's neck carries: for ``gazerig check``, ``gazerig doctor`` and the documents."""
+"""Loads of a rig's neck: for ``gazerig check``, ``gazerig doctor`` and the documents."""
 
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -15,11 +15,11 @@ from gazerig.robot.model.types import JointAngles
 _SMALLEST = 0.01
 """A smaller share of the stall torque is not reported."""
 _POSES = 9
-"""Angles per joint of the neck at which its load is looked at."""
+"""Number of angles per joint of the neck at which its load is computed."""
 _STAYS_DEG = 1.0
 
 _LIGHTEN = (
-    "balance the head with mass.counterweights or joints.{name}.spring_nm_deg, or take a stronger "
+    "balance the head with mass.counterweights or joints.{name}.spring_nm_deg, or use a stronger "
     "servo"
 )
 
@@ -27,7 +27,7 @@ _LIGHTEN = (
 class WeightFinding(NamedTuple):
     """One finding about a neck's load.
 
-    joint: that it is about; cure: what to do, "" if nothing is needed
+    joint: its joint; cure: remedy, "" if none is needed
     """
 
     level: Literal["ok", "note", "warn"]
@@ -36,14 +36,14 @@ class WeightFinding(NamedTuple):
     cure: str = ""
 
     def __str__(self) -> str:
-        """Write it on one line."""
+        """Return it as one line."""
         return f"{self.joint}: {self.what}{f'; {self.cure}' if self.cure else ''}"
 
 
 class Holding(NamedTuple):
     """Load of a servo of the neck in one pose.
 
-    share: of its stall torque; current_a: None if its stall current is unknown
+    share: share of its stall torque; current_a: None if its stall current is unknown
     """
 
     pose_rad: dict[str, float]
@@ -52,7 +52,7 @@ class Holding(NamedTuple):
 
     @property
     def temperature_c(self) -> float:
-        """Return the temperature of the servo after half an hour of it."""
+        """Return the temperature of the servo after half an hour in this pose."""
         return holding_c(self.share)
 
     def text(self) -> str:
@@ -91,7 +91,7 @@ def worst_holdings(rig: Rig, statics: Statics) -> dict[str, Holding]:
 
 
 def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
-    """Find what a neck holds at rest, its heat, and whether it stays where it is parked."""
+    """Return findings about the load of a neck at rest, its heat, and its motion when parked."""
     if not any(name in rig.joints for name in NECK_JOINTS):
         return
     statics = statics_of(rig, of_neck=True)
@@ -115,7 +115,7 @@ def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
             yield WeightFinding(
                 "warn",
                 name,
-                f"parked at {at:.0f} deg it sinks to {falls:.0f} deg when its torque goes off",
+                f"parked at {at:.0f} deg it sinks to {falls:.0f} deg when torque is switched off",
                 f"set park_deg.{name} to {degrees(rest[name]):.0f}, where it needs no torque",
             )
         elif name == "neck_pitch":
@@ -124,14 +124,14 @@ def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
             if at in (low, high):
                 how = "it rests on its stop"
             elif _tips(statics, name, park):
-                how = "it stands on its axis, held by friction: a push tips it"
+                how = "it is above its axis, held by friction: a push tips it"
             yield WeightFinding("ok", name, f"parked at {at:.0f} deg it needs no torque: {how}")
 
 
 def rest_park_deg(rig: Rig) -> dict[str, float]:
-    """Return the rig's pose for parking, with a head that would sink there at its pose of rest.
+    """Return the rig's pose for parking; a head that would sink there is parked at its rest pose.
 
-    Only masses and springs of the rig's file change it; those of shapes are an estimate.
+    Only masses and springs in the rig's file change it, because masses from shapes are estimates.
     """
     park = dict(rig.park_deg)
     sprung = any(joint.spring_nm_deg for joint in rig.joints.values())
@@ -153,7 +153,7 @@ def rest_park_pose(rig: Rig) -> JointAngles:
 
 
 def park_note(rig: Rig) -> str | None:
-    """Return a message if the head is parked elsewhere than in its file."""
+    """Return a message if the head is parked in another pose than that of its file."""
     park = rest_park_deg(rig)
     moved = [name for name in park if park[name] != rig.park_deg.get(name, 0.0)]
     if not moved:

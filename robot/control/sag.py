@@ -1,7 +1,7 @@
-"""Goals that make up for the sag of a heavy neck: feed-forward from the masses of the rig.
+"""Compensation of the sag of a heavy neck: feed-forward to the goals from the rig's masses.
 
-A servo without an integral part holds a load only where its error is large enough. This error
-follows from the load and the servo's P gain, so the goal is moved by it to the other side.
+A servo without an integral part holds a load only with a sufficiently large error. This error
+follows from the load and the servo's P gain, so the goal is moved by it in the opposite direction.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +11,8 @@ from gazerig.robot.description.statics import Statics
 from gazerig.robot.model.joint import JointParams
 
 FASTEST_DEG_S = 3.0
-"""Speed of a change of a goal, so that nothing jumps when torque comes on or a gain changes."""
+"""Speed of a change of a goal, so that nothing jumps when torque is switched on or a gain changes.
+"""
 MOST_DEG = 4.0
 """Largest change of a goal, whatever masses the rig's file gives."""
 _NEW_RAD = 0.002
@@ -22,9 +23,9 @@ class SagCompensation:
     """Changes of the goals of the neck's servos.
 
     Args:
-        statics: of the neck.
-        names: of the joints, in the order of the goals.
-        share: of the sag that is made up for.
+        statics: statics of the neck.
+        names: names of the joints, in the order of the goals.
+        share: share of the sag that is compensated.
     """
 
     def __init__(self, statics: Statics, names: Sequence[str], share: float) -> None:
@@ -35,7 +36,7 @@ class SagCompensation:
         self.restart()
 
     def restart(self) -> None:
-        """Begin with unchanged goals: the torque has just been switched on."""
+        """Start with unchanged goals, because torque has just been switched on."""
         self._now: tuple[float, ...] = (0.0,) * len(self._places)
         self._last_s: float | None = None
 
@@ -48,7 +49,7 @@ class SagCompensation:
         """Return the change of goals in steps, by the number of the joint.
 
         Args:
-            command_rad: wanted joint angles.
+            command_rad: desired joint angles.
             t_s: time of the last reading.
         """
         at = tuple([command_rad[i] for i, _ in self._places])

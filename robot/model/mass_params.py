@@ -35,7 +35,7 @@ class LinkMassParams:
             raise ValueError(fault)
 
     def inertia_fault(self) -> str:
-        """Return why no body has this inertia, "" if one can have it."""
+        """Return the reason why no body can have this inertia, "" if one can."""
         if self.inertia_kg_mm2 is None:
             return ""
         xx, yy, zz, xy, xz, yz = self.inertia_kg_mm2
@@ -45,7 +45,7 @@ class LinkMassParams:
             return ""
         return (
             f"no body has the principal moments of inertia {least:.4g}, {middle:.4g} and "
-            f"{most:.4g} kg mm2: all must be above 0, and no one larger than the other two together"
+            f"{most:.4g} kg mm2: all must be above 0, and none may exceed the sum of the other two"
         )
 
 

@@ -10,7 +10,7 @@ class ExpectedResponse(Protocol):
 
     response: "look": be on a thing of this kind between start and end; "return": be on it
         again by the end
-    start_s, end_s: from the beginning of a round
+    start_s, end_s: times from the start of a round
     place_world_m, within_m: place of that thing; a look at another one elsewhere is not a response
     """
 

@@ -165,7 +165,7 @@ def expose(
         lens: lens of the camera, for pictures of this size, with its distortion.
         size_px: width and height.
         motion: pose and motion of the camera at that time.
-        depth: with distances, at the middle of each row's exposure.
+        depth: whether to return distances, at the middle of each row's exposure.
     """
     bands = [
         _average_exposure(view, params, t_s, lens, size_px, motion, late_s, rows, depth)

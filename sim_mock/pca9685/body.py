@@ -56,8 +56,8 @@ class Pca9685Body:
     """The bus with its boards and servos.
 
     Args:
-        chips: by their addresses.
-        servos: sixteen per board, in the order of the boards.
+        chips: chips by their addresses.
+        servos: sixteen servos per board, in the order of the boards.
 
     servo_power: whether the servos have their supply
     stuck: whether a device holds the data line low

@@ -221,11 +221,11 @@ class PtyBuses(_ServerProcess):
         Args:
             rigs: in the surroundings' order: a name, "" for the first, which precedes the names of
                 its buses in commands, and the devices of its buses.
-            surroundings: as for ``start``.
+            surroundings: as in ``start``.
 
         Raises:
-            SetupError: as ``start``, or two buses have the same name.
-            RuntimeError: as ``start``.
+            SetupError: as in ``start``, or two buses have the same name.
+            RuntimeError: as in ``start``.
         """
         places = [(number, bus) for number, (_, devices) in enumerate(rigs) for bus in devices]
         names = ["_".join(filter(None, (rigs[number][0], bus))) for number, bus in places]

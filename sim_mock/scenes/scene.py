@@ -51,7 +51,7 @@ class Event(NamedTuple):
 
     response: "look": be on the target between start and end; "return": be on it again by the end
     kind: kind of the target, within ``within_m`` of ``place_world_m``
-    start_s, end_s: from the start of the round
+    start_s, end_s: times from the start of the round
     due_s: arrival of a punch; None for all other events
     """
 

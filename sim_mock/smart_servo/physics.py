@@ -42,7 +42,7 @@ class Physics(NamedTuple):
         overload; overload_s: s; duration until it latches [A: in no data sheet].
     brown_out_share: share of the rated voltage below which the servo restarts [A].
     noise_current: units; largest noise of Present Current at rest [R: 1-3].
-    noise_velocity: units; the same of Present Velocity.
+    noise_velocity: units; largest noise of Present Velocity at rest.
     """
 
     rotor_s: float = 0.0373
@@ -178,8 +178,8 @@ class Motor(Protocol):
 class Loop(NamedTuple):
     """Controller gains and limits, in shares of full PWM per step, per step/ms and so on.
 
-    p, d, f1, f2: on position error, speed error, profile speed, profile acceleration
-    i: per ms on position error; vi: per ms on speed error (velocity mode)
+    p, d, f1, f2: gains on position error, speed error, profile speed, profile acceleration
+    i: gain per ms on position error; vi: gain per ms on speed error (velocity mode)
     bias: constant part, in modes without feedback
     u_max: PWM limit; torque_max: torque (current) limit; slew: largest change of PWM per ms
     """

@@ -21,7 +21,7 @@ class Limits(NamedTuple):
 
     hottest_c: degC; highest_01v, lowest_01v: 0.1 V
     overload_share: share of the stall torque at the present voltage; overload_s: its duration
-    current_a, current_s: the same for the current
+    current_a, current_s: limit of the current and its duration
     """
 
     hottest_c: int

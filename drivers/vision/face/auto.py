@@ -50,7 +50,7 @@ _MOST_ENLARGED = 1.2
 class Tile(NamedTuple):
     """A part of a frame and the size at which it is searched.
 
-    left, top, right, bottom: in pixels of the frame
+    left, top, right, bottom: edges in pixels of the frame
     width_px, height_px: its size after scaling
     """
 

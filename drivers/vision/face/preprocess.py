@@ -20,7 +20,7 @@ class PreparedImage(NamedTuple):
     """An image in the two sizes that a detector needs.
 
     full_size: (height, width, 3) BGR, in the original size
-    working_size: the same, scaled down to the working width
+    working_size: the same image, scaled down to the working width
     full_per_working: (2,) full size over small size, x and y
     """
 

@@ -47,7 +47,7 @@ def scale_down(
 
     It is scaled before it is converted, which is less work on a large image.
 
-    level: how often it is then halved for the search, unless it becomes too small
+    level: number of halvings for the search, unless the image becomes too small
 
     Raises:
         ValueError: it is not an 8-bit image: grey, BGR or BGR with alpha.
