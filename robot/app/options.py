@@ -7,6 +7,7 @@ from typing import Literal
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.computer import LEVELS, LoadLevel
+from gazerig.robot.dashboard.door.token_file import read_token
 
 DEFAULT_SCENE = "visitor"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
@@ -36,7 +37,8 @@ class RunOptions:
         rig, character, profile: names or paths; name: name of this head for other programs.
         behaviour, conversation: initial choices.
         seconds: duration of the run.
-        page: HOST:PORT of the live page; no_page: without it.
+        page: HOST:PORT of the live page; no_page: without it; token_file: file with its token, None
+            for a new token.
         heatmap: PNG to write; heatmap_face: image of a face behind it.
         record: file to record to; record_pictures: camera frames per second in it.
         force: overwrite older files.
@@ -73,6 +75,7 @@ class RunOptions:
     seconds: float | None = None
     page: str | None = None
     no_page: bool = False
+    token_file: Path | None = None
     heatmap: Path | None = None
     heatmap_face: Path | None = None
     record: Path | None = None
@@ -115,6 +118,17 @@ class RunOptions:
         return None if self.no_page or self.fast else address
 
     @property
+    def page_token(self) -> str:
+        """Return the token of the live page, "" for a new one.
+
+        Raises:
+            SetupError: ``token_file`` cannot be used.
+        """
+        if self.token_file is None or self.page_address is None:
+            return ""
+        return read_token(self.token_file)
+
+    @property
     def output_files(self) -> tuple[Path, ...]:
         """Return the files whose names must be free before the run starts."""
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
@@ -135,7 +149,7 @@ class RunOptions:
         Raises:
             SetupError: they contradict each other.
         """
-        _ = self.page_address
+        _ = self.page_address, self.page_token
         if self.fast and not self.mock:
             raise SetupError("--fast needs --mock: real servos need real time")
         if self.name is not None and not _NAME.fullmatch(self.name):

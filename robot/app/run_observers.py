@@ -118,7 +118,7 @@ class RunObservers:
             PixelToWorld(assembly.mount, assembly.poses, assembly.camera_params)
         )
         address = options.page_address
-        self._page = self._make_page(address) if address is not None else None
+        self._page = self._make_page(address, options.page_token) if address is not None else None
         # Simulated time runs faster than a page or a line can show.
         live = not options.fast
         self._publisher = None
@@ -141,7 +141,7 @@ class RunObservers:
         self._observers = Observers(say)
         self.attach(self._observers)
 
-    def _make_page(self, address: tuple[str, int]) -> PageProcess:
+    def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
         command, steer = self._commanded.command, self._steer
         page_requests = PageRequestHandler(
             command if steer is None else stop_only_handler(command),
@@ -157,7 +157,11 @@ class RunObservers:
         on_picture = camera.take if isinstance(camera, BorrowedCamera) else None
         live = self._live
         return PageProcess(
-            *address, page_requests, on_picture, lambda: live.path if live is not None else None
+            *address,
+            page_requests,
+            on_picture,
+            lambda: live.path if live is not None else None,
+            token,
         )
 
     def _live_rig(self) -> LiveRig:

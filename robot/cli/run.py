@@ -62,6 +62,7 @@ def run(
     saccade: options.Saccade = None,
     page: options.Page = "127.0.0.1:8080",
     no_page: options.NoPage = False,
+    token_file: options.TokenFile = None,
     no_browser: options.NoBrowser = False,
     verbose: options.Verbose = False,
     heatmap: options.Heatmap = None,

@@ -114,6 +114,13 @@ Page = Annotated[
         "needs the token in the address that is printed at the start.",
     ),
 ]
+TokenFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="File with the page's token, which stays the same; created if it does not exist.",
+    ),
+]
 NoPage = Annotated[bool, typer.Option("--no-page", help="Do not serve the live page.")]
 NoBrowser = Annotated[
     bool,

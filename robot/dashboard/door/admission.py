@@ -47,7 +47,7 @@ API = "/api/"
 
 _SHOW = (
     "show the token of the page's address as ?token=... or as a header, Authorization: Bearer ...; "
-    "there is a new one each time the rig is started (gazerig ctl rigs)"
+    "without --token-file there is a new one each time the rig is started (gazerig ctl rigs)"
 )
 
 

@@ -127,19 +127,21 @@ class PageProcess:
         on_request: OnRequest | None = None,
         on_picture: Callable[[bytes], None] | None = None,
         commands: Callable[[], Path | None] = lambda: None,
+        token: str = "",
     ) -> None:
         """Prepare a page for an address and port; if the port is busy, the next one is used.
 
         on_request: called with each request of a user of the page; None: requests are dropped
         on_picture: called with each picture of a browser's own camera; None: they are dropped
         commands: returns the path of the rig's command socket, to which programs are relayed
+        token: what browsers and programs must show, "" for a new one
         """
         self._commands = commands
         self._on_picture = on_picture
         self._host = host
         self._port = port
         self._on_request = on_request
-        self._token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._token = token or secrets.token_urlsafe(_TOKEN_BYTES)
         self._once = secrets.token_urlsafe(_TOKEN_BYTES)
         self._socket: MessageLink | None = None
         self._process: subprocess.Popen[bytes] | None = None

@@ -1,0 +1,100 @@
+"""The page's token in a file: the same after a restart, and refused where others could know it."""
+
+import os
+import signal
+import subprocess
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from command_line import GAZERIG, invoked
+from shown_page import free_port, wait_for
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.dashboard.door.token_file import read_token
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="files have other rights there")
+GOOD = "Zk3-_mcd94kfuw82kd01xy"
+
+
+def written(path: Path, text: str, mode: int = 0o600) -> Path:
+    path.write_text(text, encoding="utf-8")
+    path.chmod(mode)
+    return path
+
+
+def test_a_missing_file_gets_a_token_that_only_its_owner_can_read(tmp_path: Path) -> None:
+    path = tmp_path / "token"
+    token = read_token(path)
+    assert len(token) >= 22 and path.stat().st_mode & 0o777 == 0o600
+    assert read_token(path) == token != read_token(tmp_path / "other")
+
+
+def test_a_token_of_ones_own_is_read(tmp_path: Path) -> None:
+    assert read_token(written(tmp_path / "token", f"{GOOD}\n", 0o400)) == GOOD
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o620])
+def test_a_file_that_others_can_read_or_write_is_refused(tmp_path: Path, mode: int) -> None:
+    path = written(tmp_path / "token", GOOD, mode)
+    with pytest.raises(SetupError, match=f"--token-file {path}: other users may read it"):
+        read_token(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "hello", GOOD[:21], "a" * 40, "abcabc" * 6, f"{GOOD} {GOOD}", GOOD + "é", "x" * 999],
+)
+def test_a_weak_token_is_refused(tmp_path: Path, text: str) -> None:
+    path = written(tmp_path / "token", text)
+    with pytest.raises(SetupError, match="a token is 22 to 200 random letters.*remove it"):
+        read_token(path)
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe", 0o600)
+    for path, reason in (
+        (tmp_path, "Is a directory|not a file"),
+        (tmp_path / "none" / "token", "No such file"),
+        (tmp_path / "pipe", "not a file"),
+    ):
+        with pytest.raises(SetupError, match=f"--token-file {path}: ({reason})"):
+            read_token(path)
+
+
+def test_a_run_is_refused_in_one_line_before_anything_is_done(tmp_path: Path) -> None:
+    path = written(tmp_path / "token", "weak")
+    done = invoked("run", "--mock", "--seconds", "1", "--token-file", str(path))
+    assert done.code == 2 and done.err.count("\n") == 1
+    assert done.err.startswith(f"--token-file {path}: a token is 22 to 200 random letters")
+    # Without a page nobody is asked for it.
+    assert RunOptions(mock=True, fast=True, page="127.0.0.1:1", token_file=path).page_token == ""
+
+
+@pytest.mark.pty
+@pytest.mark.slow
+def test_a_program_keeps_its_token_when_the_head_is_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    path, port = written(tmp_path / "token", GOOD), free_port()
+
+    def state(token: str) -> int:
+        address = f"http://127.0.0.1:{port}/api/v1/state?token={token}"
+        with urllib.request.urlopen(address, timeout=20.0) as answer:
+            return int(answer.status)
+
+    words = ["run", "--mock", "--no-browser", f"--page=127.0.0.1:{port}", f"--token-file={path}"]
+    for _ in range(2):
+        with (tmp_path / "log").open("w+", encoding="utf-8") as log:
+            process = subprocess.Popen([*GAZERIG, *words], stdout=log, stderr=log)
+            try:
+                wait_for(lambda: f"/?token={GOOD}\n" in (tmp_path / "log").read_text(), "the page")
+                assert state(GOOD) == 200
+                with pytest.raises(urllib.error.HTTPError, match="403"):
+                    state(GOOD[:-1] + "z")
+            finally:
+                process.send_signal(signal.SIGINT)
+                assert process.wait(60.0) == 0
