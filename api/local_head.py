@@ -299,7 +299,7 @@ class SimulatedHead(LocalHead):
                 watch=self._feed.update,
                 summarised=False,
             )
-            self._loop: TickLoop = stack.enter_context(self._session.powered())
+            self._loop: TickLoop = stack.enter_context(self._session.power_on())
             self._stack = stack.pop_all()
         return self
 

@@ -81,8 +81,8 @@ class Order:
     @property
     def active(self) -> bool:
         """Return whether the order still controls gaze or joints."""
-        reply, lead = self._accepted_reply(), self._host._progress().lead
-        return reply is not None and 0 < reply.lead == lead.number and lead.active
+        reply, lead = self._accepted_reply(), self._host._progress().client_control
+        return reply is not None and 0 < reply.control_number == lead.number and lead.active
 
     @property
     def why(self) -> str:

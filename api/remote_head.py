@@ -79,7 +79,7 @@ class RemoteHead(Head):
 
     def _progress(self) -> Progress:
         state = self.state
-        return Progress(state.lead, state.gesture, state.led)
+        return Progress(state.client_control, state.gesture, state.controlled_by)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self._clock.now_s() + seconds
@@ -94,7 +94,7 @@ class RemoteHead(Head):
 
     def _send(self, command: Command) -> Order:
         try:
-            reply = self._client.give(command)
+            reply = self._client.send(command)
         except RequestRejected as rejected:
             if rejected.reply is None:
                 raise

@@ -30,8 +30,10 @@ class AllowedFolder:
     def __init__(self, folder: Path) -> None:
         self._folder = os.path.realpath(folder)
 
-    def file(self, given: str, kind: str = "", key: str = "", start: Path | None = None) -> str:
-        """Return a shipped name as it is, or the whole path of a file in the folder.
+    def check_file(
+        self, given: str, kind: str = "", key: str = "", start: Path | None = None
+    ) -> str:
+        """Return a shipped name as it is, or the whole path of a check_file in the folder.
 
         Args:
             given: a name or a path
@@ -57,7 +59,7 @@ class AllowedFolder:
         rule = f"from the page only files in {self._folder} and below can be named"
         raise ConfigError([ConfigFault("", None, key, repr(given), rule)])
 
-    def changes(self, changes: Mapping[str, object]) -> None:
+    def check_changes(self, check_changes: Mapping[str, object]) -> None:
         """Check the files that new values of a rig's keys name.
 
         Relative paths begin in the working folder, as they do where they are opened.
@@ -74,7 +76,7 @@ class AllowedFolder:
             for file in files:
                 try:
                     if isinstance(file, str) and file:
-                        self.file(file, kind, key, Path.cwd())
+                        self.check_file(file, kind, key, Path.cwd())
                 except ConfigError as error:
                     faults += error.faults
         if faults:

@@ -188,7 +188,7 @@ def _servo_setup(name: str, rig: Rig) -> ServoConfig:
         known = {one.first, one.second} <= rig.joints.keys() and all(
             rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
         )
-        pair = CoupledPair(one.first, one.second, one.made())
+        pair = CoupledPair(one.first, one.second, one.make_coupling())
         if known and name in pair[:2] and not unreachable_text(pair, rig.joints):
             return pair_setups(pair, rig.joints, {})[name]
     return rig.joints[name].setup(name)
@@ -281,7 +281,7 @@ def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
             rig.joints[joint].model in SERVOS for joint in (coupling.first, coupling.second)
         )
         if known:
-            pair = CoupledPair(coupling.first, coupling.second, coupling.made())
+            pair = CoupledPair(coupling.first, coupling.second, coupling.make_coupling())
             if fault := unreachable_text(pair, rig.joints):
                 yield f"couplings.{name}", fault
 

@@ -238,7 +238,11 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
         person = people(tick.t_s - (rows[0][0] if rows else tick.t_s))[0]
         face, pose = person.p_world_face_m, tick.pose
         part = true_part(person, tick.target.part)
-        yaws = angles_of_place(face, pose)[0], gaze_angles(pose)[0], kinematics.facing(face)[0]
+        yaws = (
+            angles_of_place(face, pose)[0],
+            gaze_angles(pose)[0],
+            kinematics.neck_angles_to(face)[0],
+        )
         rows.append((tick.t_s, *yaws, pose.head_rad[0], gaze_error_rad(part, pose)))
 
     made.robot.start(made.clock)

@@ -288,11 +288,11 @@ class HeadGeometry(Protocol):
         """Return R_world_head and p_world_head_m for angles of the neck and a lower neck."""
         ...
 
-    def facing(self, p_world_m: Vec3, base_rad: Angles2 = (0.0, 0.0)) -> Angles2:
+    def neck_angles_to(self, p_world_m: Vec3, base_rad: Angles2 = (0.0, 0.0)) -> Angles2:
         """Return the neck yaw and pitch that point the head's x axis through a point."""
         ...
 
-    def eyes_on(
+    def eye_angles_to(
         self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
     ) -> tuple[Angles2, Angles2]:
         """Return the left and right eye angles that fixate a point from a head pose."""

@@ -82,7 +82,7 @@ def record(
 def handed_over(tick: Tick, dt_s: float = 0.005) -> tuple[list[Any], list[Any]]:
     """Return a tick's percepts and its fields as the process that writes a recording has them."""
     stream, batches = TickStream(print), []
-    stream.add("test", lambda batch: not batches.append(batch.data))  # type: ignore[func-returns-value]
+    stream.add_sink("test", lambda batch: not batches.append(batch.data))  # type: ignore[func-returns-value]
     stream.append(tick, dt_s, ())
     stream.flush()
     percepts, (row,) = decode_plain(batches[0])

@@ -69,7 +69,7 @@ class SecondTuning:
             if value != self._file.get(key)
         )
 
-    def differs(self) -> tuple[ParamChange, ...]:
+    def changed_from_defaults(self) -> tuple[ParamChange, ...]:
         return self.unsaved()
 
     def save(self, path: Path | None = None) -> SavedFile:
@@ -84,7 +84,7 @@ class SecondTuning:
     def characters(self) -> tuple[str, ...]:
         return ("bold", "shy")
 
-    def character(self, name: str) -> tuple[str, ...]:
+    def apply_character(self, name: str) -> tuple[str, ...]:
         if name not in self.characters():
             raise Broken(f"no character {name!r}")
         return ()

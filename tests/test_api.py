@@ -37,7 +37,7 @@ def test_an_order_arrives_and_says_what_is_really_done(head: gazerig.SimulatedHe
     assert order.reply.done_m == pytest.approx(
         (1.0, 0.5, 0.3), abs=1e-3
     )  # where two lines of sight meet
-    assert order.active and head.state.led == "the program: look at 1 0.5 0.3"
+    assert order.active and head.state.controlled_by == "the program: look at 1 0.5 0.3"
     assert degrees(gaze_error(head, (1.0, 0.5, 0.3))) < 1.0
 
 

@@ -276,11 +276,11 @@ def test_two_heads_in_one_program_are_found_by_their_rigs(
     with opened() as desk, opened("feetech") as other:
         assert desk.look_at(1.0, 0.3, 0.3).wait(100.0) == "arrived"
         assert other.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
-        assert desk.state.led != other.state.led
+        assert desk.state.controlled_by != other.state.controlled_by
         with pytest.raises(gazerig.NotFound, match="2 rigs are running"):
             gazerig.connect()
         with gazerig.connect(rig=feetech) as far:
-            assert far.rig == feetech and far.state.led == other.state.led
+            assert far.rig == feetech and far.state.controlled_by == other.state.controlled_by
         with pytest.raises(gazerig.NotFound, match="no heads with the rig maker"):
             gazerig.connect(rig="maker")
     ends = [line for line in said if line.startswith("stopped by")]
@@ -309,7 +309,7 @@ def test_orders_of_another_program_are_awaited(head: gazerig.Head) -> None:
             await gazerig.aio.connect(name="eva").__aenter__()
         async with gazerig.aio.connect(os.getpid(), who="a show") as far:
             order = far.look_at(1.0, -0.4, 0.3)
-            assert (await order.reply()).lead and await order == "arrived"
+            assert (await order.reply()).control_number and await order == "arrived"
             assert await far.look_at_person(99) == "refused"
             with pytest.raises(gazerig.Refused, match="three finite numbers"):
                 await far.look_at(float("nan"), 0.0, 0.0)
@@ -320,7 +320,7 @@ def test_orders_of_another_program_are_awaited(head: gazerig.Head) -> None:
             )
             assert await far.set({"gaze.head.comfort_deg": 11.0}) and await far.menus()
             async for state in far.states(rate_hz=50.0):
-                assert state.led.startswith("a show")
+                assert state.controlled_by.startswith("a show")
                 break
             async for event in far.events():
                 assert event.number == 1
@@ -338,7 +338,7 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         order = far.look_at(1.0, -0.4, 0.3)
         assert order.wait(100.0) == "arrived" and order.reply.error_deg < 1.0
         assert mine.outcome == "arrived" and not mine.active
-        assert head.state.led.startswith("a show (process ")
+        assert head.state.controlled_by.startswith("a show (process ")
         assert far.look_at_person(99).wait(100.0) == "refused"
         assert far.look_at(-1.0, 0.1, 0.3).wait(100.0) == "out of reach"
         assert far.look_at_person(far.people[0].id).wait(100.0) == "arrived"
@@ -363,7 +363,7 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         assert led.active
     order = mine  # hung up: the lead of the other program lapses
     for state in head.states(rate_hz=50.0):
-        if not state.led:
+        if not state.controlled_by:
             break
 
 

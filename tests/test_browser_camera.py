@@ -262,11 +262,11 @@ def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(ne
             return of_button("getAttribute('aria-pressed')") == on
 
         press = "document.querySelector('#webcam').click();"
-        near.door.tell({"emulated": False})
+        near.door.send_state({"emulated": False})
         tab.go(f"{near.url}/?token={TOKEN}")
         wait_for(lambda: "gazerig" in tab.words(), "the page")
         assert of_button("hidden") == "true"  # a real rig has a camera of its own
-        near.door.tell({"emulated": True})
+        near.door.send_state({"emulated": True})
         wait_for(lambda: of_button("hidden") == "false", "the button")
         tab.run(REFUSED + press)
         wait_for(lambda: "not allowed to use its camera" in tab.words(), "the refusal")

@@ -111,7 +111,7 @@ def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None
         "gaze.scanpath.model = random",
         f"{RATE} = 150.0",
     ]
-    assert "in force already" in gazerig("ctl", "set", RATE, "150.0").stderr
+    assert "already active" in gazerig("ctl", "set", RATE, "150.0").stderr
     assert "not saved yet: 2 values" in done.stderr
 
 
@@ -129,7 +129,7 @@ def test_what_takes_effect_later_is_said() -> None:
         (("loop.rate", "100"), "unknown key"),
         (("gaze.scanpath.model", "markof"), "did you mean 'markov'?"),
         ((RATE,), "a value is missing"),
-        ((RATE, "100", RATE, "200"), "stands twice"),
+        ((RATE, "100", RATE, "200"), "duplicate key"),
         ((RATE, "[1"), "not valid YAML"),
         ((RATE, "100\nmore: 1"), "more than one value"),
     ],
@@ -186,7 +186,7 @@ def test_revert_tells_what_it_takes_back() -> None:
     gazerig("ctl", "set", RATE, "150")
     done = gazerig("ctl", "revert")
     assert f"{RATE} = 200.0" in done.stdout and held(RATE) == 200.0
-    assert "1 value taken back" in done.stderr
+    assert "1 value undone" in done.stderr
 
 
 def test_stop_and_resume() -> None:
@@ -244,7 +244,7 @@ def test_ask_lists_the_menus_and_chooses_from_them() -> None:
     assert f"conversation: {present} (in force), {', '.join(others)}" in lines
     try:
         done = gazerig("ctl", "ask", "conversation", others[0])
-        assert (done.returncode, done.stderr) == (0, f"conversation {others[0]} is in force\n")
+        assert (done.returncode, done.stderr) == (0, f"conversation {others[0]}is active\n")
         (line,) = gazerig("ctl", "ask", "conversation").stdout.splitlines()
         assert line.startswith(f"conversation: {others[0]} (in force), ")
     finally:
@@ -254,8 +254,8 @@ def test_ask_lists_the_menus_and_chooses_from_them() -> None:
 @pytest.mark.parametrize(
     ("words", "rule"),
     [
-        (("moods",), "moods: no menu of this rig; there is behaviour"),
-        (("moods", "glad"), "nothing called 'moods' to choose"),
+        (("moods",), "moods: not a menu of this rig; available: behaviour"),
+        (("moods", "glad"), "no menu 'moods'"),
         (("conversation", "shout"), "shout"),
     ],
 )
@@ -275,19 +275,21 @@ def test_status_says_what_the_rig_does() -> None:
     gazerig("ctl", "set", RATE, "150")
     gazerig("stop", "finger")
     said = gazerig("ctl", "status").stdout
-    assert "STOPPED, torque off: finger; gazerig ctl resume goes on" in said
+    assert "STOPPED, torque off: finger; gazerig ctl resume continues" in said
     assert "not saved: 1 value" in said and "said: stopped by gazerig stop (process" in said
     assert json.loads(gazerig("ctl", "status", "--json").stdout)["stopped"] == "finger"
 
 
 def test_a_rig_that_has_just_begun_or_is_held_up_says_so() -> None:
     begun = {"rig": "desk", "pid": 7, "ticks": 0, "stopped": "", "said": []}
-    assert state_lines(begun) == ["rig: desk, process 7", "it has just been started: nothing is "
+    assert state_lines(begun) == ["rig: desk, process 7", "it has just started: nothing is "
                                   "known yet"]  # fmt: skip
     with RobotClient.connect() as rig:
         now = rig.status()
     assert not any("held up" in line for line in state_lines({**now, "age_s": 0.1}))
-    assert "the loop is held up: what follows is 2.5 s old" in state_lines({**now, "age_s": 2.5})
+    assert "the loop is delayed: the following data are 2.5 s old" in state_lines(
+        {**now, "age_s": 2.5}
+    )
 
 
 def test_a_file_edited_by_hand_is_read_again(rig: Running) -> None:
@@ -297,7 +299,7 @@ def test_a_file_edited_by_hand_is_read_again(rig: Running) -> None:
     assert held(RATE) == 160.0
     wrong = before.replace("rate_hz: 200.0", "rate_hz: 2e6") + "nonsense: 1\n"
     rig.path.write_text(wrong, encoding="utf-8")
-    assert rig.hears("refused; the values from before stay")
+    assert rig.hears("but has errors; the previous values stay")
     said = rig.log.read_text(encoding="utf-8")
     assert "is above 1000" in said and "nonsense" in said
     assert held(RATE) == 160.0
@@ -385,7 +387,7 @@ class _Turns:
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
         self._turn += 1
-        self._seen.append(str(self._rig.status()["lead"]))
+        self._seen.append(str(self._rig.status()["control_text"]))
         steering.stick(Stick(1.0, 0.0) if self._turn < 5 else Stick())
         return {6: ("nod",), 8: (STOP,), 9: (END,)}.get(self._turn, ())
 
@@ -401,5 +403,5 @@ def test_steer_leads_a_running_rig_and_lets_go() -> None:
 
 def test_steer_needs_a_terminal_or_a_gamepad() -> None:
     done = gazerig("ctl", "steer")
-    assert done.returncode == 2 and "type this in one, or use --gamepad" in done.stderr
+    assert done.returncode == 2 and "run this in one, or use --gamepad" in done.stderr
     assert "one of them" in gazerig("ctl", "steer", "--keyboard", "--gamepad").stderr

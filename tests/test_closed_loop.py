@@ -75,7 +75,7 @@ def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen
                 degrees(gaze_angles(pose)[0]),
                 degrees(angles_of_place(part, pose)[0]),
                 degrees(pose.head_rad[0]),
-                degrees(kinematics.facing(person.p_world_face_m)[0]),
+                degrees(kinematics.neck_angles_to(person.p_world_face_m)[0]),
                 tick.gaze.phase == "saccade",
                 tick.percept.captured_s - start_s[0] if tick.percept else -1.0,
                 tick.target.kind == "face",

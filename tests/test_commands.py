@@ -203,7 +203,7 @@ def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running)
     with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
-    assert running.go(0.1)[0].led == "a client: jog neck_yaw 70.0"
+    assert running.go(0.1)[0].controlled_by == "a client: jog neck_yaw 70.0"
 
 
 def blinks_in_two_minutes(lids: Lids) -> int:
@@ -318,8 +318,8 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
 def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), "a show (process 7)"))
     ticks = running.go(1.5)
-    assert ticks[0].led == "a show (process 7): jog neck_yaw 17.2"
-    led = [tick for tick in ticks if tick.led]
+    assert ticks[0].controlled_by == "a show (process 7): jog neck_yaw 17.2"
+    led = [tick for tick in ticks if tick.controlled_by]
     assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
     words = [event for tick in ticks for event in tick.events]
     assert "led by a show (process 7): jog neck_yaw 17.2" in words
@@ -334,18 +334,18 @@ def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running)
     for _ in range(5):
         running.go(0.5)
         assert replied(running, Renew("a show")) == ""
-    assert running.ticks[-1].led == "a show: look at 1.2 0.6 0.3"
+    assert running.ticks[-1].controlled_by == "a show: look at 1.2 0.6 0.3"
     for _ in range(4):
         assert "lead nothing" in replied(running, Renew("another"))
         running.go(0.4)
-    assert running.ticks[-1].led == "" and running.ticks[-1].target.kind == "face"
+    assert running.ticks[-1].controlled_by == "" and running.ticks[-1].target.kind == "face"
 
 
 def test_a_lead_that_is_to_stay_stays_until_it_is_let_go(running: Running) -> None:
     running.order(LookAt((1.2, 0.6, 0.3), "a show", stay=True))
-    assert running.go(3.0)[-1].led
+    assert running.go(3.0)[-1].controlled_by
     running.order(LookAt(None, "another"))
-    assert running.go(0.1)[-1].led == ""
+    assert running.go(0.1)[-1].controlled_by == ""
 
 
 # Floods

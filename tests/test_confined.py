@@ -27,13 +27,13 @@ def home(tmp_path: Path) -> Path:
 def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
     confined = AllowedFolder(home)
     for given in ("mine.yaml", "below/mine.yaml", f"{home}/mine.yaml", "./x/../mine.yaml"):
-        path = Path(confined.file(given))
+        path = Path(confined.check_file(given))
         assert path.is_absolute() and path.is_relative_to(home)
-    assert confined.file("shy", "characters") == "shy"
-    confined.changes(
+    assert confined.check_file("shy", "characters") == "shy"
+    confined.check_changes(
         {"gaze.scanpath.transition_matrix": "nakamoto_tsuruno", "gaze.lids.close_ms": 80.0}
     )
-    confined.changes({"gaze": {"scanpath": {"transition_matrix": f"{home}/walk.yaml"}}})
+    confined.check_changes({"gaze": {"scanpath": {"transition_matrix": f"{home}/walk.yaml"}}})
 
 
 @pytest.mark.parametrize(
@@ -46,12 +46,12 @@ def test_files_beside_the_rig_and_shipped_names(home: Path) -> None:
 )  # fmt: skip
 def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
     with pytest.raises(ConfigError, match="only files in|no such name"):
-        AllowedFolder(home).file(given, "characters" if given else "")
+        AllowedFolder(home).check_file(given, "characters" if given else "")
     if given not in ("", ".", ".."):
         with pytest.raises(ConfigError):
-            AllowedFolder(home).changes({"gaze.scanpath.transition_matrix": given})
+            AllowedFolder(home).check_changes({"gaze.scanpath.transition_matrix": given})
         with pytest.raises(ConfigError):
-            AllowedFolder(home).changes({"gaze.scanpath": {"transition_matrix": given}})
+            AllowedFolder(home).check_changes({"gaze.scanpath": {"transition_matrix": given}})
 
 
 def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:

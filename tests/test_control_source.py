@@ -31,10 +31,13 @@ def shown(tick: Tick) -> Snapshot:
 
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     tick = running.go(0.1)[-1]
-    assert tick_control_source(tick) == ControlSource() and not tick_control_source(tick).led
+    assert (
+        tick_control_source(tick) == ControlSource()
+        and not tick_control_source(tick).overrides_gaze
+    )
     shot = shown(tick)
     assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
-    assert shot.leads_words == "nobody leads: it chooses by itself what to look at"
+    assert shot.control_sentence == "nobody leads: it chooses by itself what to look at"
 
 
 def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running: Running) -> None:
@@ -50,7 +53,7 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     shot = shown(tick)
     assert shot.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg, for 3 s"
     assert (shot.target_name, shot.phase) == ("neck_yaw and neck_pitch held", "held")
-    assert shot.why == shot.leads_words == shot.headline
+    assert shot.why == shot.control_sentence == shot.headline
     assert (shot.target_part, shot.saliences) == (None, ())
     for said in (health_table(shot), target_text(shot), salience_bars(shot)):
         assert "face 1" not in said and "person 1" not in said
@@ -91,7 +94,7 @@ def test_what_was_looked_at_before_joints_were_held_leads_again(running: Running
     tick = running.go(0.2)[-1]
     assert (
         tick_control_source(tick).kind == "person"
-        and tick_control_source(tick).what == "look at 1 0.2 0.3"
+        and tick_control_source(tick).description == "look at 1 0.2 0.3"
     )
 
 
@@ -115,7 +118,7 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     running.go(0.2)
     running.order(Stop("STOP was pressed", "ann"))
     shot = shown(running.go(0.5)[-1])
-    assert shot.leader.kind == shot.target_name == shot.phase == "stopped"
+    assert shot.control_source.kind == shot.target_name == shot.phase == "stopped"
     assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
     running.order(Resume("ann"))

@@ -73,14 +73,14 @@ def rig_with(coupling: CouplingParams) -> Rig:
 def test_servo_angles_come_back_as_joint_angles_to_1e_9(
     kind: str, first: float, second: float
 ) -> None:
-    coupling, at = KINDS[kind].made(), (radians(first), radians(second))
+    coupling, at = KINDS[kind].make_coupling(), (radians(first), radians(second))
     back = coupling.joint_rad(coupling.servo_rad(at))
     assert back == pytest.approx(at, abs=1e-9)
 
 
 @EACH
 def test_rates_are_the_slopes_of_the_angles(kind: str) -> None:
-    coupling, step = KINDS[kind].made(), 1e-6
+    coupling, step = KINDS[kind].make_coupling(), 1e-6
     for at in ((0.11, 0.07), (-0.5, 0.33), (0.55, -0.4)):
         here, rates = coupling.servo_rad(at), coupling.rates(at)
         for k in range(2):
@@ -92,12 +92,12 @@ def test_rates_are_the_slopes_of_the_angles(kind: str) -> None:
 
 
 def test_a_measured_point_is_found_in_the_triangle_that_holds_it_or_is_nearest() -> None:
-    table = KINDS["measured"].made()
+    table = KINDS["measured"].make_coupling()
     assert isinstance(table, MeasuredGrid)
     beyond = 0
     for servos in np.random.default_rng(0).uniform(-1.2, 1.2, (300, 2)).tolist():
         at = servos[0], servos[1]
-        weights = [triangle.inside(at) for triangle in table._triangles]
+        weights = [triangle.least_weight(at) for triangle in table._triangles]
         best = table._triangles[weights.index(max(weights))]
         assert table.joint_rad(at) == best.joints(at)
         beyond += max(weights) < 0.0
@@ -228,7 +228,7 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
     at = dict(zip(rig.names, last, strict=True))
     assert at["neck_pitch"] == pytest.approx(20.0, abs=0.4)
     assert at["neck_roll"] == pytest.approx(-15.0, abs=0.4)
-    servos = KINDS[kind].made().servo_rad((radians(20.0), radians(-15.0)))
+    servos = KINDS[kind].make_coupling().servo_rad((radians(20.0), radians(-15.0)))
     goals = dict(zip(rig.names, sent[-1], strict=True))
     for name, angle in zip(("neck_pitch", "neck_roll"), servos, strict=True):
         assert goals[name] == pytest.approx(rig.joints[name].steps(angle), abs=1.0)

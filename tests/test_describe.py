@@ -154,12 +154,12 @@ def test_a_joint_has_the_torque_of_all_its_servos() -> None:
     joint = shipped("desk").joints["neck_pitch"]
     joints = {"neck_pitch": joint, "neck_roll": replace(joint, ratio=2.0, torque_limit=0.5)}
     alone = joint_torques_nm(joints, {})
-    assert alone["neck_pitch"] == joint.facts.stall_torque_nm
+    assert alone["neck_pitch"] == joint.model_facts.stall_torque_nm
     assert alone["neck_roll"] == pytest.approx(alone["neck_pitch"])
     pair = CouplingParams("differential", "neck_pitch", "neck_roll", 1.5, 1.0)
     both = joint_torques_nm(joints, {"neck": pair})
-    assert both["neck_pitch"] == pytest.approx(1.5 * 2.0 * joint.facts.stall_torque_nm)
-    assert both["neck_roll"] == pytest.approx(2.0 * joint.facts.stall_torque_nm)
+    assert both["neck_pitch"] == pytest.approx(1.5 * 2.0 * joint.model_facts.stall_torque_nm)
+    assert both["neck_roll"] == pytest.approx(2.0 * joint.model_facts.stall_torque_nm)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -234,7 +234,18 @@ SAID = {
     # of a program's own
     *("import gazerig", "mypy --strict", "with", "for_s=2.0", "fast=True", *OUTCOMES),
     # keys, lines and answers of the program
-    *("ok", "bus ok", "null", "None", "path", '"baud": null', '{"ok": ...}', '{"error": ...}'),
+    *(
+        "ok",
+        "signed_rank",
+        "cup: {held_by: anna, side: left}",
+        "bus ok",
+        "null",
+        "None",
+        "path",
+        '"baud": null',
+        '{"ok": ...}',
+        '{"error": ...}',
+    ),
     *("q", "n", "y", "+", "-", "@", "left 3", "enter", "skip", "back", "end", "turn 300"),
     # values, files and columns of a sweep
     *("LOW:HIGH:STEPS", "LOW:HIGH", "sweep-my-visitor", "report.KEY", "verdict.KEY"),

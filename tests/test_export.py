@@ -270,7 +270,7 @@ def test_joints_whose_lead_has_lapsed_are_moved_by_the_models_again(face: Run) -
     """No command tells of a lapse."""
     ticks = list(face.ticks[1000:1400])
     ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
-    ticks[100:200] = [tick._replace(led="somebody: neck_yaw") for tick in ticks[100:200]]
+    ticks[100:200] = [tick._replace(controlled_by="somebody: neck_yaw") for tick in ticks[100:200]]
     known = collect_gaze_angles(ticks).movement > 0
     assert known[:100].all() and not known[100:200].any() and known[200:].all()
 

@@ -50,6 +50,6 @@ def test_buttons_and_strength_on_the_page() -> None:
     expressions, strength = panel.expressions, panel.strength
     assert expressions is not None and strength is not None
     assert expressions.options == ("neutral", "happy", "sad")
-    strength.arrived(0.4, "5")
-    expressions.arrived("sad", "5")
+    strength.receive_input(0.4, "5")
+    expressions.receive_input("sad", "5")
     assert outbox.asked == [(Express("sad", 0.4), "5")]

@@ -41,7 +41,7 @@ def test_wide_and_long_tables_and_frame_numbers_are_the_same_gesture(
         (0.5, -8.0, None),
         (1.0, 0.0, 4.0),
     ]
-    assert fitted.slowed_by == 1.0 and fitted.played.duration_s == pytest.approx(1.4)
+    assert fitted.slowed_by == 1.0 and fitted.gesture.duration_s == pytest.approx(1.4)
 
 
 BAD = {
@@ -101,6 +101,6 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
 
 def test_a_page_names_gesture_files_in_its_folder_alone(tmp_path: Path) -> None:
     folder = AllowedFolder(tmp_path)
-    folder.changes({"gesture_files": [str(tmp_path / "mine.yaml")]})
+    folder.check_changes({"gesture_files": [str(tmp_path / "mine.yaml")]})
     with pytest.raises(ConfigError, match="gesture_files"):
-        folder.changes({"gesture_files": [str(tmp_path / "mine.yaml"), "/etc/passwd.yaml"]})
+        folder.check_changes({"gesture_files": [str(tmp_path / "mine.yaml"), "/etc/passwd.yaml"]})

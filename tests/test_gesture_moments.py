@@ -42,7 +42,9 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
     rig = load_rig(rig_name)
     kinematics, ends = rig_kinematics(rig), lid_ends(rig)
-    eyes = [kinematics.eyes_on(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets]
+    eyes = [
+        kinematics.eye_angles_to(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets
+    ]
     left, right = np.array(eyes)[:, 0, :2].T, np.array(eyes)[:, 1, :2].T
     yaw, pitch = np.array([one.eyes_rad for one in offsets]).T
     lids = [LidOpenings(0.9, 0.9, False, 0.9, 0.9).scale(one.lids) for one in offsets]

@@ -102,9 +102,9 @@ def test_buttons_and_speed_on_the_page() -> None:
     gestures, speed = panel.gestures, panel.speed
     assert gestures is not None and speed is not None
     assert gestures.options == ("none", "nod", "tilt")
-    speed.arrived(1.5, "5")
+    speed.receive_input(1.5, "5")
     for chosen in ("nod", "none"):
-        gestures.arrived(chosen, "5")
+        gestures.receive_input(chosen, "5")
     assert outbox.asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
 
 

@@ -54,8 +54,8 @@ def test_every_shipped_gesture_is_done_by_every_shipped_rig_as_written(name: str
             fitted(gesture, rig)
         return
     found = fitted(gesture, rig)
-    assert found.slowed_by == 1.0 and found.smaller == ()
-    samples = found.played.motion.samples
+    assert found.slowed_by == 1.0 and found.reduced_joints == ()
+    samples = found.gesture.motion.samples
     assert np.abs(samples.value).max() > radians(3.0)
     for end in (0, -1):
         for column in samples[1:]:
@@ -157,7 +157,7 @@ def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
     # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
     assert slow.slowed_by == pytest.approx((23094.0 / 1600.0) ** 0.5, rel=0.01)
     assert slow.slow_joint == "neck_pitch"
-    most = np.abs(slow.played.motion.samples.scale(np.array(slow.played.sizes), slow.played.speed).acceleration)  # fmt: skip
+    most = np.abs(slow.gesture.motion.samples.scale(np.array(slow.gesture.sizes), slow.gesture.speed).acceleration)  # fmt: skip
     assert degrees(most.max()) == pytest.approx(1600.0, rel=0.01)
 
 
@@ -167,7 +167,7 @@ def test_at_the_end_of_a_range_it_is_smaller_or_refused() -> None:
     ):
         fitted(nod(), neck_pitch=-31.0)  # fmt: skip
     found = fitted(nod(fit="slow"), neck_pitch=-31.0)
-    assert found.smaller == (("neck_pitch", pytest.approx(0.5)),)
+    assert found.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)
     with pytest.raises(GestureRefused, match="neck_pitch is at the end of its range"):
         fitted(nod(fit="slow"), neck_pitch=-34.5)
 

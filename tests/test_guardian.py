@@ -74,15 +74,15 @@ def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
     clock: Any = SimpleNamespace(now_s=lambda: rig.now_s, sleep_until=rig.sleep_until)
     servo = access.SmartServoAccess("eye", joint, rig.port, clock, lambda: None, guardian)
     servo.check()
-    assert not guardian.other.armed(0)
+    assert not guardian.other.is_armed(0)
     servo.enable_torque(params)
-    assert guardian.other.armed(0) and rig.get(1, TORQUE_ENABLE)
+    assert guardian.other.is_armed(0) and rig.get(1, TORQUE_ENABLE)
     servo.go(params, 2060)
     guardian.other.set_state(0, RELEASING)
     with pytest.raises(ServoFault, match="stood still"):
         servo.go(params, 2020)
     servo.restore()
-    assert not guardian.other.armed(0) and not rig.get(1, TORQUE_ENABLE)
+    assert not guardian.other.is_armed(0) and not rig.get(1, TORQUE_ENABLE)
 
 
 # --- which ports
@@ -176,16 +176,16 @@ def sts():
 
 def test_it_watches_from_before_torque_on_until_torque_off(sts):
     other = sts.guardian.other
-    assert not other.armed(0)
+    assert not other.is_armed(0)
     refused, sts.inner.enable_torque = sts.inner.enable_torque, _refuse
     with pytest.raises(ServoFault):
         sts.bus.enable_torque()
-    assert other.armed(0), "some servos may have had their torque already"
+    assert other.is_armed(0), "some servos may have had their torque already"
     sts.inner.enable_torque = refused
     sts.bus.enable_torque()
-    assert other.armed(0)
+    assert other.is_armed(0)
     sts.bus.disable_torque()
-    assert not other.armed(0)
+    assert not other.is_armed(0)
 
 
 def test_every_tick_is_a_sign_of_life(sts):
@@ -343,5 +343,5 @@ def test_both_sides_see_the_same_memory():
     ours.beat()
     ours.arm(3, True)
     theirs.set_state(3, RELEASING)
-    assert theirs.beats == 1 and theirs.armed(3) and not theirs.armed(2)
+    assert theirs.beats == 1 and theirs.is_armed(3) and not theirs.is_armed(2)
     assert ours.state(3) == RELEASING and ours.state(2) == IDLE

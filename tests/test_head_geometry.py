@@ -39,7 +39,7 @@ def test_eyes_on_a_point_and_the_lines_of_sight_meet_in_it(
 ) -> None:
     angles = (head[0] * 1.2, head[1] * 0.6, head[2] * 0.5)
     R, p = KINEMATICS.head_pose(angles)
-    left, right = KINEMATICS.eyes_on(point, R, p)
+    left, right = KINEMATICS.eye_angles_to(point, R, p)
     state = KINEMATICS.forward(joints_at(*left, *right, 0.0, 0.0, *angles))
     for is_left in (True, False):
         eye = state.p_world_eye_left_m if is_left else state.p_world_eye_right_m
@@ -67,7 +67,7 @@ def test_forward_of_inverse_is_the_identity(
     point=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
 )
 def test_facing_leads_the_head_axis_through_the_point(point: tuple[float, float, float]) -> None:
-    yaw, pitch = KINEMATICS.facing(point)
+    yaw, pitch = KINEMATICS.neck_angles_to(point)
     R, p = KINEMATICS.head_pose((yaw, pitch, 0.0))
     assert angle_between(rotate(R, (1.0, 0.0, 0.0)), sub(point, p)) < 1e-9
 
@@ -105,7 +105,7 @@ ONE_PAN = Kinematics(GEOMETRY, ("eyes_pan", "eyes_tilt"), {})
 def test_eyes_on_one_linkage_point_between_what_each_would_need(angle: float, far: float) -> None:
     R, p = ONE_PAN.head_pose((0.0, 0.0, 0.0))
     point = (p[0] + far * cos(angle), far * sin(angle), p[2])
-    left, right = ONE_PAN.eyes_on(point, R, p)
+    left, right = ONE_PAN.eye_angles_to(point, R, p)
     assert left == right
     off = abs(left[0] - angle)
     # Beside the head one eye is nearer, so the mean is not quite that of the middle.
@@ -115,6 +115,6 @@ def test_eyes_on_one_linkage_point_between_what_each_would_need(angle: float, fa
 def test_eyes_on_one_linkage_turn_to_the_end_for_a_point_straight_behind() -> None:
     R, p = ONE_PAN.head_pose((0.0, 0.0, 0.0))
     for aside in (-0.05, -0.001, 0.0, 0.001, 0.05):
-        (pan, _), _ = ONE_PAN.eyes_on((p[0] - 1.0, aside, p[2]), R, p)
+        (pan, _), _ = ONE_PAN.eye_angles_to((p[0] - 1.0, aside, p[2]), R, p)
         assert abs(pan) > 3.0
         assert pan * aside >= 0.0

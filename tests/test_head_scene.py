@@ -39,7 +39,7 @@ def at_rest(name: str) -> Snapshot:
     kinematics = rig_kinematics(rig)
     zero = (0.0,) * len(kinematics.names)
     pose = kinematics.forward(JointState(zero, zero, zero, ()))
-    own, _ = kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
+    own, _ = kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)
     return replace(
         SNAPSHOT,
         joints=kinematics.names,
@@ -271,7 +271,7 @@ def test_another_reader_finds_the_mesh_in_the_file(
     painted: Callable[[], Painted], finish: Finish
 ) -> None:
     mesh, colours, normals = painted()
-    data = painted_glb(Painted(mesh, colours, normals), finish._replace(lit=False))
+    data = painted_glb(Painted(mesh, colours, normals), finish._replace(is_lit=False))
     scene = trimesh.load_scene(io.BytesIO(data), "glb")
     (found,) = scene.geometry.values()
     assert np.asarray(found.vertices) == pytest.approx(mesh.vertices, abs=1e-6)

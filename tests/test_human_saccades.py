@@ -74,6 +74,6 @@ def test_e73_small_saccades_keep_the_eyes_alive_where_servos_can_show_them() -> 
 def test_e73_each_rig_makes_no_smaller_ones_than_its_eyes_show() -> None:
     for name, joint in (("desk", "left_eye_pan"), ("feetech", "left_eye_pan"), ("expressive", "eyes_pan")):  # fmt: skip
         rig = load_rig(name)
-        step_deg = 360.0 / rig.joints[joint].facts.steps_per_turn / rig.joints[joint].ratio
+        step_deg = 360.0 / rig.joints[joint].model_facts.steps_per_turn / rig.joints[joint].ratio
         assert rig.gaze.oculomotor.refixation_least_deg >= 5.0 * step_deg
     assert load_rig("maker").gaze.oculomotor.refixation_deg == 0.0

@@ -27,7 +27,7 @@ def test_a_pipe_that_nobody_reads_keeps_nobody_waiting() -> None:
     got = b""
     while b"49 x" not in got:  # what was kept comes in order once somebody reads
         got += os.read(reads, 65536)
-    assert got.startswith(b"0 x") and writer.unread() is None
+    assert got.startswith(b"0 x") and writer.lost_reader() is None
 
 
 def test_a_reader_that_is_gone_is_told_apart_from_a_full_disk() -> None:
@@ -35,16 +35,18 @@ def test_a_reader_that_is_gone_is_told_apart_from_a_full_disk() -> None:
     os.close(reads)
     writer = LineWriter(writes)
     writer.line("a\n")
-    assert writer.flush(20.0) and "closed it" in (writer.unread() or "") and writer.dropped == 1
+    assert (
+        writer.flush(20.0) and "closed it" in (writer.lost_reader() or "") and writer.dropped == 1
+    )
     quiet_reads, quiet_writes = os.pipe()
     quiet = LineWriter(quiet_writes)
     quiet.line("a\n")
-    assert quiet.flush(20.0) and quiet.unread() is None
+    assert quiet.flush(20.0) and quiet.lost_reader() is None
     os.close(quiet_reads)
-    assert _wait_until(lambda: quiet.unread() is not None)  # without another line
+    assert _wait_until(lambda: quiet.lost_reader() is not None)  # without another line
     full = LineWriter(os.open("/dev/full", os.O_WRONLY))
     full.line("a\n")
-    assert full.flush(20.0) and full.unread() is None and full.dropped == 1
+    assert full.flush(20.0) and full.lost_reader() is None and full.dropped == 1
 
 
 def test_a_thread_that_is_gone_ends_the_work() -> None:

@@ -76,7 +76,7 @@ class Page:
             self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
         )
         self.stream = TickStream(self.said.append, every_s)
-        self.stream.add("the page", self.publisher.take)
+        self.stream.add_sink("the page", self.publisher.take)
         self.live = LiveFeed()
 
     def _rig(self, made: Assembly) -> LiveRig:

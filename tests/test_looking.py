@@ -87,7 +87,7 @@ def test_a_point_of_the_head_is_where_the_head_had_it(rig: Running) -> None:
     assert seen == pytest.approx((1.2, 0.3, 0.1), abs=1e-9)
     # The point stays in the world while the head turns to it.
     assert {tick.target.p_world_m for tick in ticks} == {reply.asked_m}
-    assert ticks[-1].lead.arrived and ticks[-1].lead.error_rad <= ARRIVED_RAD
+    assert ticks[-1].client_control.arrived and ticks[-1].client_control.error_rad <= ARRIVED_RAD
 
 
 @pytest.mark.parametrize("frame", ["world", "head"])
@@ -101,7 +101,7 @@ def test_a_direction_is_looked_in(rig: Running, frame: Any) -> None:
     if frame == "head":
         seen = yaw_pitch(rotate_back(before.R_world_head, sub(point, pose.p_world_head_m)))
     assert tuple(map(degrees, seen)) == pytest.approx((10.0, -5.0), abs=0.2)
-    assert ticks[-1].lead.arrived
+    assert ticks[-1].client_control.arrived
 
 
 def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Running) -> None:
@@ -109,10 +109,13 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Running) -> Non
     assert percept is not None
     person = percept.faces[0].id
     reply, ticks = rig.do(LookAtPerson(person, stay=True), 3.0)
-    assert not reply.refused and reply.lead == 1
+    assert not reply.refused and reply.control_number == 1
     assert {(tick.target.kind, tick.target.id) for tick in ticks} == {("face", person)}
     assert len({tick.target.part for tick in ticks}) > 1
-    assert ticks[-1].lead.arrived and ticks[-1].led == f"a client: look at person {person}"
+    assert (
+        ticks[-1].client_control.arrived
+        and ticks[-1].controlled_by == f"a client: look at person {person}"
+    )
 
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Running) -> None:
@@ -123,8 +126,8 @@ def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Running
     blind: Any = lambda found, poses: None  # noqa: E731
     rig.made.robot.perception.see = blind  # type: ignore[method-assign]
     ticks = rig.go(2.5)
-    assert ticks[100].led and not ticks[-1].led
-    assert ticks[-1].lead.ended == f"person {percept.faces[0].id} is gone"
+    assert ticks[100].controlled_by and not ticks[-1].controlled_by
+    assert ticks[-1].client_control.end_reason == f"person {percept.faces[0].id} is gone"
 
 
 def test_a_pixel_is_where_it_was_when_the_frame_was_taken(rig: Running) -> None:
@@ -141,7 +144,7 @@ def test_a_pixel_is_where_it_was_when_the_frame_was_taken(rig: Running) -> None:
     assert norm(sub(reply.asked_m, head)) == pytest.approx(norm(sub(face, head)), abs=0.1)
     (command,) = ticks[0].commands
     assert isinstance(command, LookAtPixel) and command.p_world_m == reply.asked_m
-    assert ticks[-1].lead.arrived
+    assert ticks[-1].client_control.arrived
     near = rig.do(LookAtPixel(pixel, 0.5))[0]
     assert near.asked_m is not None
     assert norm(sub(near.asked_m, head)) == pytest.approx(0.5, abs=0.1)
@@ -156,25 +159,35 @@ def test_a_pixel_without_a_frame_is_refused(rig: Running) -> None:
 
 def test_a_lead_ends_after_its_time_and_says_so(rig: Running) -> None:
     ticks = rig.do(LookAt((1.0, 0.5, 0.3), "a show", True, for_s=0.5), 1.0)[1]
-    led = [tick for tick in ticks if tick.led]
+    led = [tick for tick in ticks if tick.controlled_by]
     assert led[-1].t_s - led[0].t_s == pytest.approx(0.5, abs=0.011)
-    assert ticks[-1].lead.ended == "its time is over" and not ticks[-1].lead.active
+    assert (
+        ticks[-1].client_control.end_reason == "its time is over"
+        and not ticks[-1].client_control.active
+    )
     words = [event for tick in ticks for event in tick.events]
     assert "a show: look at 1 0.5 0.3: its time is over, so the gaze leads again" in words
 
 
 def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:
-    assert rig.go(0.006)[-1].lead == NO_CLIENT_CONTROL
-    assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].lead == 1
+    assert rig.go(0.006)[-1].client_control == NO_CLIENT_CONTROL
+    assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
     reply, ticks = rig.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
-    assert reply.lead == 2 and ticks[0].lead.number == 2 and not ticks[0].lead.arrived
-    assert ticks[-1].lead.arrived
+    assert (
+        reply.control_number == 2
+        and ticks[0].client_control.number == 2
+        and not ticks[0].client_control.arrived
+    )
+    assert ticks[-1].client_control.arrived
     free = rig.do(LookAt(None, "a show"))
-    assert free[0].lead == 0 and free[1][-1].lead.ended == "a show looks elsewhere"
+    assert (
+        free[0].control_number == 0
+        and free[1][-1].client_control.end_reason == "a show looks elsewhere"
+    )
     reply, ticks = rig.do(Jog((("neck_yaw", radians(20.0)),), stay=True), 0.1)
-    assert reply.lead == 3 and degrees(ticks[0].lead.error_rad) > 3.0
-    assert rig.go(2.0)[-1].lead.arrived
-    assert rig.do(Stop("a hand"))[1][-1].lead.ended == "stopped: a hand"
+    assert reply.control_number == 3 and degrees(ticks[0].client_control.error_rad) > 3.0
+    assert rig.go(2.0)[-1].client_control.arrived
+    assert rig.do(Stop("a hand"))[1][-1].client_control.end_reason == "stopped: a hand"
 
 
 def test_looks_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:

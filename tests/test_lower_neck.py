@@ -61,7 +61,7 @@ def test_the_lower_neck_carries_the_head() -> None:
 @pytest.mark.parametrize("base", [(0.0, 0.0), (0.4, -0.3), (-0.2, 0.5)])
 def test_a_neck_that_faces_a_point_leads_the_head_through_it(base: tuple[float, float]) -> None:
     made = kinematics()
-    yaw, pitch = made.facing(TARGET, base)
+    yaw, pitch = made.neck_angles_to(TARGET, base)
     R, p = made.head_pose((yaw, pitch, 0.0), base)
     assert angle_between(rotate(R, (1.0, 0.0, 0.0)), sub(TARGET, p)) < 1e-9
 

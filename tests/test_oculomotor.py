@@ -210,7 +210,7 @@ def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
 def test_e27_vergence_comes_from_geometry() -> None:
     kinematics = Rig().kinematics
     R, p = kinematics.head_pose((0.0, 0.0, 0.0))
-    left, right = kinematics.eyes_on((1.0, 0.0, 0.0), R, p)
+    left, right = kinematics.eye_angles_to((1.0, 0.0, 0.0), R, p)
     assert degrees(left[0]) == pytest.approx(-1.773, abs=0.01)
     assert degrees(right[0]) == pytest.approx(1.773, abs=0.01)
 

@@ -28,7 +28,7 @@ def in_range(eyes: Eyes) -> Eyes:
 def view(head_deg: Angles3) -> EyeGeometry:
     yaw, pitch, roll = head_deg
     R, p = KINEMATICS.head_pose((radians(yaw), radians(pitch), radians(roll)))
-    return EyeGeometry(R, p, KINEMATICS.eyes_on, 0.2, in_range)
+    return EyeGeometry(R, p, KINEMATICS.eye_angles_to, 0.2, in_range)
 
 
 def stand(model: OppositeAngles, head_deg: Angles3, gaze: Vec3 = POINT) -> tuple[Eyes, Vec3]:

@@ -29,7 +29,7 @@ def kind_of(
     """Return what a moving patch is called whose middle is seen in the direction of a place."""
     mm = tuple(1e3 * x for x in camera_m)
     placed = CameraMount(CameraParams(mount=mount, position_mm=mm))  # type: ignore[arg-type]
-    own = NECK.own_parts
+    own = NECK.body_volumes
     perception = Perception(placed, 69.0, Tracker(TrackParams()), own_parts=own)
     poses = PoseHistory(NECK)
     poses.remember(0.0, (radians(yaw_deg), 0.0, 0.0))
@@ -71,12 +71,12 @@ def test_a_ray_meets_a_capsule_where_steps_along_it_do(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start, end, eye = (tuple(rng.uniform(-1.0, 1.0, 3).tolist()) for _ in range(3))
     part = Capsule(start, end, float(rng.uniform(0.05, 0.4)))
-    if part.holds(eye):
+    if part.contains(eye):
         return
     aim = np.add(start, end) * 0.5 + rng.normal(0.0, 0.3, 3) - eye
     way = aim / np.linalg.norm(aim)
     steps = np.arange(0.0, 5.0, 0.002)
-    inside = [part.holds(tuple(np.add(eye, s * way).tolist())) for s in steps]
+    inside = [part.contains(tuple(np.add(eye, s * way).tolist())) for s in steps]
     hit = part.hit_m(eye, tuple(way.tolist()))
     assert (hit is not None) == any(inside) or sum(inside) < 20
     if hit is not None:  # of the sphere about the nearest point: not before the capsule itself

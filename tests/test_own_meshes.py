@@ -124,6 +124,6 @@ def test_a_mesh_that_went_away_is_one_clear_error(tmp_path: Path) -> None:
 def test_the_page_may_name_meshes_in_its_folder_only(tmp_path: Path) -> None:
     folder = AllowedFolder(tmp_path)
     with pytest.raises(ConfigError, match="only files in"):
-        folder.changes({"meshes.head.file": "/etc/passwd"})
+        folder.check_changes({"meshes.head.file": "/etc/passwd"})
     with pytest.raises(ConfigError, match="only files in"):
-        folder.changes({"meshes": {"head": {"file": "/etc/passwd"}}})
+        folder.check_changes({"meshes": {"head": {"file": "/etc/passwd"}}})

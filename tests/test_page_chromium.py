@@ -230,8 +230,8 @@ def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Per
     assert points[0] != points[1]
     wait_for(lambda: person.reads("looks at the pointer of browser "), "who leads")
     rig.pace_s = 0.01  # as fast as real time
-    wait_for(lambda: not present(rig.newest).lead.active, "the pointer letting go")
-    assert present(rig.newest).lead.ended == "not renewed"
+    wait_for(lambda: not present(rig.newest).client_control.active, "the pointer letting go")
+    assert present(rig.newest).client_control.end_reason == "not renewed"
     rig.pace_s = PACE_S
     person.click(toggle)
     before = len(rig.orders)

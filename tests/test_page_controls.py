@@ -277,13 +277,13 @@ class OneParam(StandIn):
     def unsaved(self) -> tuple[object, ...]:
         return ()
 
-    def differs(self) -> tuple[object, ...]:
+    def changed_from_defaults(self) -> tuple[object, ...]:
         return ()
 
     def characters(self) -> tuple[str, ...]:
         return ("none", "calm")
 
-    def character(self, name: str) -> tuple[str, ...]:
+    def apply_character(self, name: str) -> tuple[str, ...]:
         raise Refused(f"unknown character {name}")
 
     def get(self, prefix: str) -> dict[str, Value]:
@@ -437,11 +437,11 @@ def test_menus_become_buttons_that_ask(place: Container) -> None:
     lead = GazeTargetPanel(place, Scene(), mouth, lambda: freed.append(True))  # type: ignore[arg-type]
     lead.offer("behaviour", ["wait", "guard"])
     lead.offer("steer", ["left", "right"])
-    lead.characters(["none", "calm"], "none")
-    lead.menus["behaviour"].arrived("guard", WHO)
-    lead.menus["steer"].arrived("left", WHO)
-    lead.menus["character"].arrived("calm", WHO)
-    lead.free.arrived("look freely", WHO)
+    lead.add_characters(["none", "calm"], "none")
+    lead.menus["behaviour"].receive_input("guard", WHO)
+    lead.menus["steer"].receive_input("left", WHO)
+    lead.menus["character"].receive_input("calm", WHO)
+    lead.free.receive_input("look freely", WHO)
     assert mouth.parse_request == [
         (Ask("behaviour", "guard"), WHO),
         ({"steer": "left"}, WHO),
@@ -459,7 +459,7 @@ def jogging(place: Container) -> tuple[JogPanel, Mouth]:
     ends = {
         f"joints.{j}.{end}_deg": v for j in GAZE_JOINTS for end, v in (("min", -30), ("max", 40.0))
     }
-    view.values(ends)
+    view.update_ranges(ends)
     return view, mouth
 
 
@@ -467,7 +467,7 @@ def test_every_joint_has_a_slider_with_its_limits(place: Container) -> None:
     view, _ = jogging(place)
     assert tuple(view.sliders) == GAZE_JOINTS
     assert {slider.ends for slider in view.sliders.values()} == {(-30.0, 40.0)}
-    view.values({"joints.neck_yaw.min_deg": -10.0, "joints.neck_yaw.max_deg": 10.0})
+    view.update_ranges({"joints.neck_yaw.min_deg": -10.0, "joints.neck_yaw.max_deg": 10.0})
     assert view.sliders["neck_yaw"].ends == (-10.0, 10.0)
 
 
@@ -479,7 +479,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
     assert (
         slider.value == pytest.approx(5.7) and mouth.parse_request == []
     )  # 0.1 rad, and nobody asked
-    slider.arrived(20.0, WHO)
+    slider.receive_input(20.0, WHO)
     assert mouth.parse_request == [(Jog((("neck_yaw", radians(20.0)),)), WHO)]
 
     def wished(t_s: float, desired_deg: float, stopped: str = "") -> float:
@@ -492,7 +492,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
     assert wished(5.0, 20.0) == 20.0
     assert wished(5.2, -3.0) == 20.0
     assert wished(5.8, -3.0) == pytest.approx(5.7)  # somebody let go elsewhere
-    slider.arrived(20.0, WHO)
+    slider.receive_input(20.0, WHO)
     assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
 
 
@@ -512,13 +512,13 @@ def test_sliders_are_those_of_the_rig(place: Container) -> None:
     mouth = Mouth()
     view = JogPanel(place, mouth)  # type: ignore[arg-type]
     rig = values(load_rig("maker"))
-    view.values(rig)
+    view.update_ranges(rig)
     assert tuple(view.sliders) == SIX
     lid = view.sliders["left_lower_lid"]
     assert lid.ends == tuple(rig[f"joints.left_lower_lid.{e}_deg"] for e in ("min", "max"))
     view.show(of_six(SNAPSHOT))
     assert view.sliders["eyes_pan"].value == pytest.approx(20.0)
-    lid.arrived(5.0, WHO)
+    lid.receive_input(5.0, WHO)
     assert mouth.parse_request == [(Jog((("left_lower_lid", radians(5.0)),)), WHO)]
     view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
 
@@ -599,7 +599,7 @@ def test_every_parameter_of_every_rig_becomes_a_control(place: Container, name: 
             texts[param.key] = control.field.value
             assert parse_value(param, texts[param.key]) == value
         elif isinstance(control.field, Slider):
-            assert control.field.checked(control.field.value) == value
+            assert control.field.check_value(control.field.value) == value
         control.remove()
     if name == "maker":
         assert texts["joints.eyes_pan.transmission_points"].startswith("[[-32.0, 1068.0], [")
@@ -644,17 +644,17 @@ def test_who_searches_before_the_parameters_have_come_finds_them_then() -> None:
     state = ParamPanels(widgets, widgets.panel("tune"), mouth)  # type: ignore[arg-type]
     client = widgets.join("browser 1", lambda: None).name
     find = next(one for one in widgets._widgets.values() if one.props.get("label") == "find")
-    find.arrived("how far", client)
+    find.receive_input("how far", client)
     assert sliders(widgets) == []
-    state.params([PARAM._asdict()])
-    state.values({"values": {"a.b": 3.0}, "unsaved": ["a.b"], "path": "/rigs/mine.yaml"})
+    state.add_params([PARAM._asdict()])
+    state.update_values({"values": {"a.b": 3.0}, "unsaved": ["a.b"], "path": "/rigs/mine.yaml"})
     (slider,) = sliders(widgets)
     assert slider.value == 3.0 and slider.label == "● a.b (deg)"
-    slider.arrived(4.0, client)
+    slider.receive_input(4.0, client)
     assert mouth.parse_request == [({"do": "set", "changes": {"a.b": 4.0}}, f"{client}:tuning")]
-    state.values({"values": {"a.b": 3.5}, "unsaved": []})
+    state.update_values({"values": {"a.b": 3.5}, "unsaved": []})
     assert slider.value == 4.0  # not yet answered: it stays where the hand has put it
-    state.answered(f"{client}:tuning")
+    state.record_answer(f"{client}:tuning")
     assert slider.value == 3.5 and slider.label == "a.b (deg)"
 
 
@@ -668,8 +668,8 @@ def test_tune_opens_with_eight_controls_and_a_fold_with_all() -> None:
         menus.offer(name, ["wait", "guard"])
     rig = load_rig("desk")
     known = {param.key: param for param in parameters(rig, rig)}
-    state.params([known[key]._asdict() for key in FIRST])
-    state.values({"values": {key: known[key].default for key in FIRST}, "unsaved": []})
+    state.add_params([known[key]._asdict() for key in FIRST])
+    state.update_values({"values": {key: known[key].default for key in FIRST}, "unsaved": []})
     elements = [one.props for one in widgets._widgets.values() if one.props["in"] == "tune"]
     (fold,) = (one for one in elements if one.get("title") == ALL)
     assert fold["open"] is False
@@ -679,12 +679,12 @@ def test_tune_opens_with_eight_controls_and_a_fold_with_all() -> None:
         "target", "liveliness", "time on the eyes", "blinks", "head share", "conversation",
         "activity", "character",
     ]  # fmt: skip
-    menus.menus["conversation"].arrived("guard", WHO)
-    menus.menus["character"].arrived("wait", WHO)
-    menus.target.arrived("look straight ahead", WHO)
-    menus.target.arrived("look freely", WHO)
+    menus.menus["conversation"].receive_input("guard", WHO)
+    menus.menus["character"].receive_input("wait", WHO)
+    menus.target.receive_input("look straight ahead", WHO)
+    menus.target.receive_input("look freely", WHO)
     blinks = next(one for one in sliders(widgets) if one.label.startswith("blinks"))
-    blinks.arrived(30.0, client)
+    blinks.receive_input(30.0, client)
     assert mouth.parse_request == [
         (Ask("conversation", "guard"), WHO),
         ({"do": "character", "name": "wait"}, WHO),
@@ -692,8 +692,8 @@ def test_tune_opens_with_eight_controls_and_a_fold_with_all() -> None:
         ({"do": "set", "changes": {"gaze.lids.blinks_per_min": 30.0}}, f"{client}:tuning"),
     ]
     assert freed == [("look freely", WHO)]
-    state.values({"values": {"gaze.lids.blinks_per_min": 40.0}, "unsaved": []})
-    state.answered(f"{client}:tuning")
+    state.update_values({"values": {"gaze.lids.blinks_per_min": 40.0}, "unsaved": []})
+    state.record_answer(f"{client}:tuning")
     assert blinks.value == 40.0
 
 

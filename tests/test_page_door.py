@@ -151,7 +151,7 @@ def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> N
             time.sleep(0.05)
         assert renewed() > 2
     for _ in range(400):
-        if not near.door.browsers.leading():
+        if not near.door.browsers.in_control():
             break
         time.sleep(0.05)
     before = renewed()
@@ -162,7 +162,7 @@ def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> N
 def test_a_pointer_is_taken_without_an_answer_that_could_be_a_stops(near: Rig) -> None:
     near.points.clear()
     before = len(near.asked)
-    near.door.browsers.led_by("somebody")
+    near.door.browsers.give_control("somebody")
     with near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as line:
         for x in (0.1, 0.2, 0.3):
             line.send(json.dumps({"point": {"x": x, "y": 0.5, "aspect": 1.5}}))
@@ -192,7 +192,7 @@ def test_a_browser_that_is_silent_renews_nothing_though_its_connection_stands(ne
         body = b'{"do": "look_at", "p_world_m": [1, 0, 0]}'
         assert near.post(body, Cookie=ana)[0] == 204
         time.sleep(1.0)  # four pings
-        assert near.door.browsers.leading() and [one["do"] for one in near.asked] == ["look_at"]
+        assert near.door.browsers.in_control() and [one["do"] for one in near.asked] == ["look_at"]
         deaf.sendall(bytes((0x8A, 0x80, 0, 0, 0, 0)))  # a pong, as of a computer that wakes up
         for _ in range(400):
             if len(near.asked) > 1:
@@ -202,12 +202,14 @@ def test_a_browser_that_is_silent_renews_nothing_though_its_connection_stands(ne
 
 
 def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> None:
-    near.door.admission.once = "once-and-no-more"
+    near.door.admission.one_time_token = "once-and-no-more"
     assert fetch(f"{near.url}/?token=wrong")[0] == 403
     status, headers, _ = fetch(f"{near.url}/?token=once-and-no-more")
     assert status == 302 and TOKEN in headers["Set-Cookie"] + str(headers)
     assert fetch(f"{near.url}/?token=once-and-no-more")[0] == 403
-    assert fetch(f"{near.url}/?token={TOKEN}")[0] == 302 and near.door.admission.once == ""
+    assert (
+        fetch(f"{near.url}/?token={TOKEN}")[0] == 302 and near.door.admission.one_time_token == ""
+    )
 
 
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
@@ -242,11 +244,11 @@ def test_too_much_is_not_even_read(near: Rig) -> None:
 
 
 def test_the_stop_button_is_told_of_every_change(near: Rig) -> None:
-    near.door.tell({"stopped": ""})
+    near.door.send_state({"stopped": ""})
     with near.knock("/rig/line") as line:
         first = json.loads(line.recv(timeout=PATIENCE_S))["state"]
         assert (first["stopped"], first["you"]) == ("", "the page")
-        near.door.tell({"stopped": "a test"})
+        near.door.send_state({"stopped": "a test"})
         reported = (json.loads(line.recv(timeout=PATIENCE_S)) for _ in range(20))
         assert any(said["state"]["stopped"] == "a test" for said in reported)
 

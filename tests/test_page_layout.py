@@ -42,7 +42,7 @@ LEADS = {
 }
 CHANGES: dict[str, dict[str, Any]] = {
     "busy": {"busy": "the computer is too busy: 12% of ticks came late (worst 38 ms)"},
-    "stopped": {"stopped": LEADS["stopped"].what, "level": "torque_off"},
+    "stopped": {"stopped": LEADS["stopped"].description, "level": "torque_off"},
     "hold": {"level": "hold", "reasons": ("neck_pitch: no feedback for 120 ms: all joints hold",)},
     "bus lost": {
         "headline": "the torque is off: the servo bus is lost: /dev/ttyUSB0 is not there",
@@ -56,9 +56,9 @@ CHANGES: dict[str, dict[str, Any]] = {
 def snapshot(state: str) -> Snapshot:
     leader = LEADS[state]
     words = control_sentence(leader, 12.0)
-    headline = words if leader.led else "looks at person 3 (left eye)"
+    headline = words if leader.overrides_gaze else "looks at person 3 (left eye)"
     changes = {"headline": headline, **CHANGES.get(state, {})}
-    return replace(SNAPSHOT, t_s=12.0, leader=leader, leads_words=words, **changes)
+    return replace(SNAPSHOT, t_s=12.0, control_source=leader, control_sentence=words, **changes)
 
 
 class Shown:

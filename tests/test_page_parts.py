@@ -184,7 +184,7 @@ def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None
     first = Salience(3, "face", *terms, 1.0, sum(terms))
     shot = replace(snapshot(), saliences=(first,), behaviour="wait")
     assert reason_text(shot) == said and escape(said) in target_text(shot)
-    led = replace(shot, leader=ControlSource("person", "ann", "look at 1 0 0"))
+    led = replace(shot, control_source=ControlSource("person", "ann", "look at 1 0 0"))
     assert reason_text(led) == shot.why
 
 

@@ -38,7 +38,7 @@ class Tab:
         return [number for number, _ in said.get("put", [])]
 
     def send(self, *message: object) -> None:
-        self._widgets.received(self.client, json.dumps(message[0]))
+        self._widgets.handle_message(self.client, json.dumps(message[0]))
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_nothing_is_seen_by_halves(widgets: Widgets) -> None:
     first, second = (widgets.panel("watch").html() for _ in range(2))
     tab = Tab(widgets)
     tab.read()
-    with widgets.hold():
+    with widgets.hold_changes():
         first.content = "new"
         assert tab.read() == []
         second.content = "new"
@@ -92,7 +92,7 @@ def test_a_drawer_that_is_shut_is_not_sent_until_it_is_opened(widgets: Widgets) 
     words = widgets.panel("health").html("guard: ok")
     tab = Tab(widgets)
     tab.send({"seen": ["camera"]})
-    assert widgets.sees("camera") and not widgets.sees("health")
+    assert widgets.is_visible("camera") and not widgets.is_visible("health")
     assert tab.read() == [1]
     words.content = "guard: hold"
     camera.show(b"jpeg")
@@ -157,10 +157,10 @@ def test_what_a_field_cannot_hold_is_refused_in_words(
 
 def test_whole_numbers_stay_whole(widgets: Widgets) -> None:
     slider = widgets.panel("tune").slider("id", (0, 252), 1, 7, whole=True)
-    slider.arrived(9, "panels-1")
+    slider.receive_input(9, "panels-1")
     assert slider.value == 9 and isinstance(slider.value, int)
     with pytest.raises(ValueError, match="whole"):
-        slider.arrived(9.5, "panels-1")
+        slider.receive_input(9.5, "panels-1")
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_nonsense_is_refused_and_changes_nothing(widgets: Widgets, text: str) ->
     slider = widgets.panel("steer").slider("neck", (-10.0, 10.0), 0.1, 0.0)
     tab = Tab(widgets)
     tab.read()
-    widgets.received(tab.client, text)
+    widgets.handle_message(tab.client, text)
     assert slider.value == 0.0 and tab.client.seen >= {"steer", "watch"}
     tab.read()
     assert len(tab.notices) == 1 and tab.notices[0][1]
@@ -181,7 +181,7 @@ def test_nonsense_is_refused_and_changes_nothing(widgets: Widgets, text: str) ->
 def test_what_is_of_one_browser_is_neither_seen_nor_set_by_another(widgets: Widgets) -> None:
     heard: list[str] = []
     one, other = Tab(widgets, "browser 1"), Tab(widgets, "browser 2")
-    own = widgets.panel("tune").own(one.client.name)
+    own = widgets.panel("tune").for_client(one.client.name)
     field = own.section("parameters").text("find")
     field.on_change(lambda text, client: heard.append(text))
     assert one.read() == [1, 2] and other.read() == []

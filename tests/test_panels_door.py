@@ -98,8 +98,8 @@ def test_who_leaves_is_forgotten(near: Rig) -> None:
     gone: list[str] = []
     widgets.on_leave(gone.append)
     with near.knock(PANELS):
-        wait_for(lambda: widgets.watched, "the browser")
-    wait_for(lambda: len(gone) > 0 and not widgets.watched, "the end")
+        wait_for(lambda: widgets.is_watched, "the browser")
+    wait_for(lambda: len(gone) > 0 and not widgets.is_watched, "the end")
 
 
 # --- a person at a browser ----------------------------------------------------------------

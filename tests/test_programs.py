@@ -164,7 +164,7 @@ def test_state_is_that_of_the_socket(rig: Rig) -> None:
     state = answer["ok"]["state"]
     mine, _ = rig.client.state()
     assert mine is not None and state["joints"].keys() == mine.joints.keys()
-    assert set(state["lead"]) == set(mine.lead._fields)
+    assert set(state["client_control"]) == set(mine.client_control._fields)
     _, answer = rig.get("/state?after=0")
     assert {event["kind"] for event in answer["ok"]["events"]} <= set(EVENT_KINDS)
 
@@ -186,12 +186,12 @@ def test_orders_over_the_websocket_have_outcomes_by_tag(rig: Rig) -> None:
             "version": 1, "rig": rig.client.status()["rig"], "name": "eva", "pid": rig.client.pid,
         }  # fmt: skip
         ask(end, do="look_at", p_world_m=LEFT, who="a show", tag=1)
-        assert heard(end, "tag", 1)["ok"]["reply"]["lead"] > 0
+        assert heard(end, "tag", 1)["ok"]["reply"]["control_number"] > 0
         assert heard(end, "outcome") == {"outcome": "arrived", "why": "", "tag": 1}
-        led = rig.client.status()["led"]
+        led = rig.client.status()["controlled_by"]
         assert led.startswith("a show at 127.0.0.1 (process ")
         time.sleep(1.5)  # renewed as long as it is there
-        assert rig.client.status()["led"] == led
+        assert rig.client.status()["controlled_by"] == led
         ask(end, do="look_at", p_world_m=RIGHT, tag=2)
         ask(end, do="look_at", p_world_m=LEFT, tag=3)
         outcomes = [heard(end, "outcome") for _ in range(2)]
@@ -225,13 +225,13 @@ def test_who_leaves_while_leading_gives_control_back(rig: Rig, leave: str) -> No
     end = rig.dial()
     ask(end, do="jog", angles_rad=[["neck_yaw", 0.1]], tag=1)
     heard(end, "tag", 1)
-    rig.until(lambda now: now["led"])
+    rig.until(lambda now: now["controlled_by"])
     if leave == "closed":
         end.close()
     else:  # its computer is gone: no more packets, no farewell
         end.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
         end.socket.close()
-    rig.until(lambda now: not now["led"])
+    rig.until(lambda now: not now["controlled_by"])
 
 
 def test_who_hangs_while_leading_gives_control_back(rig: Rig) -> None:
@@ -245,17 +245,17 @@ def test_who_hangs_while_leading_gives_control_back(rig: Rig) -> None:
         )
         text = json.dumps({"do": "look_at", "p_world_m": LEFT}).encode()
         end.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
-        rig.until(lambda now: now["led"])
-        rig.until(lambda now: not now["led"])
+        rig.until(lambda now: now["controlled_by"])
+        rig.until(lambda now: not now["controlled_by"])
 
 
 def test_a_posted_order_ends_by_its_time_or_after_its_request(rig: Rig) -> None:
     began_s = time.monotonic()
     rig.post({"do": "look_at", "p_world_m": LEFT, "for_s": 2.5}, "?wait_s=0")
-    rig.until(lambda now: not now["led"])
+    rig.until(lambda now: not now["controlled_by"])
     assert time.monotonic() - began_s > 2.0
     rig.post({"do": "look_at", "p_world_m": RIGHT}, "?wait_s=0")
-    rig.until(lambda now: not now["led"])
+    rig.until(lambda now: not now["controlled_by"])
 
 
 def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
@@ -266,7 +266,7 @@ def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
         x, y, z = RIGHT
         rig.client.look_at(x, y, z)
     time.sleep(1.5)
-    assert rig.client.status()["led"].startswith("the test")
+    assert rig.client.status()["controlled_by"].startswith("the test")
 
 
 def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
@@ -569,7 +569,7 @@ def test_the_bridge_for_arduino_turns_the_gaze(rig: Rig, tmp_path: Path) -> None
     process = subprocess.Popen([sys.executable, str(file), os.ttyname(line)])
     try:
         end_s = time.monotonic() + PATIENCE_S
-        while not rig.client.status()["led"].startswith("a knob"):
+        while not rig.client.status()["controlled_by"].startswith("a knob"):
             assert time.monotonic() < end_s
             os.write(board, b"7\r\n\xff5\r\n20\r\n")
             time.sleep(0.1)
@@ -592,12 +592,12 @@ def test_the_node_example_follows_a_person(rig: Rig) -> None:
         [node, str(file), f"{rig.url}/?token={rig.token}"], stdout=subprocess.PIPE, text=True
     )
     try:
-        rig.until(lambda now: "look at person" in now["led"])
+        rig.until(lambda now: "look at person" in now["controlled_by"])
         assert process.stdout is not None and "person" in process.stdout.readline()
     finally:
         process.kill()
         process.communicate()
-    rig.until(lambda now: not now["led"])
+    rig.until(lambda now: not now["controlled_by"])
 
 
 @pytest.mark.browser
@@ -612,11 +612,11 @@ def test_the_browser_example_shows_the_head_and_commands_it(
         wait_for(lambda: "look" in browser.words().splitlines()[0], "the headline")
         click = "new MouseEvent('click', {clientX: 200, clientY: 150})"
         browser.run(f"document.querySelector('canvas').dispatchEvent({click})")
-        led = rig.until(lambda now: now["led"])["led"]
+        led = rig.until(lambda now: now["controlled_by"])["controlled_by"]
         assert led.startswith("browser.html at 127.0.0.1")
         wait_for(lambda: "look_at 1: " in browser.words(), "the outcome")
         Path(tmp_path / f"{size_px[0]}.png").write_bytes(browser.photograph())
         browser.run("document.querySelector('#stop').click()")
         rig.until(lambda now: now["stopped"])
         wait_for(lambda: "stopped: browser.html" in browser.words(), "the stop")
-    rig.until(lambda now: not now["led"])
+    rig.until(lambda now: not now["controlled_by"])

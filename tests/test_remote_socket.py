@@ -281,7 +281,7 @@ def test_values_rules_and_changes(rig: RobotClient) -> None:
     assert described[0]["description"] == "a rate"
     assert rig.set(RATE, 100.0) == ("taken",)
     assert rig.get(RATE) == {RATE: 100.0}
-    assert rig.unsaved() == rig.differs() == ((RATE, "200.0", "100.0"),)
+    assert rig.unsaved() == rig.changed_from_defaults() == ((RATE, "200.0", "100.0"),)
     assert rig.status()["version"] == 1 and rig.status()["unsaved"] == 1
     saved = rig.save("/tmp/my.yaml")
     assert saved.path == Path("/tmp/my.yaml") and saved.changes == ((RATE, "200.0", "100.0"),)
@@ -312,9 +312,9 @@ def test_unknown_key_and_character(rig: RobotClient) -> None:
     with pytest.raises(RequestRejected, match="unknown key"):
         rig.parameter("loop.rate")
     assert rig.characters() == ("bold", "shy")
-    rig.character("shy")
+    rig.apply_character("shy")
     with pytest.raises(RequestRejected, match="no character 'brave'"):
-        rig.character("brave")
+        rig.apply_character("brave")
 
 
 def test_when_set_returns_the_loop_has_it(rig: RobotClient, beat: Beat) -> None:
@@ -341,10 +341,10 @@ def test_the_first_tick_after_set_has_it(rig: RobotClient, beat: Beat) -> None:
 def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
     rig.look_at(1.0, 0.2, 0.1, stay=True)
     assert rig.status()["why"].endswith("makes it look at 1 0.2 0.1")
-    assert rig.status()["leads"] == "person"
+    assert rig.status()["control_kind"] == "person"
     assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
     rig.look_freely()
-    assert rig.status()["leads"] == "gaze" and "makes it" not in rig.status()["why"]
+    assert rig.status()["control_kind"] == "gaze" and "makes it" not in rig.status()["why"]
     rig.jog("neck_yaw", 10.0, stay=True)
     desired = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].desired_rad, strict=True))
     assert desired["neck_yaw"] == pytest.approx(radians(10.0))
@@ -393,7 +393,7 @@ def test_a_loop_that_hangs_is_told_to_who_stops(
             rig.stop()
     finally:
         beat.hold.clear()
-    assert beat.pulse.taken_up(20.0)
+    assert beat.pulse.wait_for_commands(20.0)
     rig.resume()
 
 
@@ -590,14 +590,14 @@ def test_a_program_leads_while_it_lives_and_is_named(
     with RobotClient.connect(who="a show") as show:
         reply = show.look_at(-1.0, 0.0, 0.3)
         assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.text()
-        assert show.leads
+        assert show.in_control
         status = rig.status()
-        assert status["led"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
+        assert status["controlled_by"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
         count = len(beat.ticks)
-        assert beat.pulse.taken_up(20.0, ticks=800)  # twice as long
-        assert show.leads and beat.ticks[-1].led and len(beat.ticks) > count
-    assert beat.pulse.taken_up(20.0, ticks=500)
-    assert beat.ticks[-1].led == "" and rig.status()["led"] == ""
+        assert beat.pulse.wait_for_commands(20.0, ticks=800)  # twice as long
+        assert show.in_control and beat.ticks[-1].controlled_by and len(beat.ticks) > count
+    assert beat.pulse.wait_for_commands(20.0, ticks=500)
+    assert beat.ticks[-1].controlled_by == "" and rig.status()["controlled_by"] == ""
 
 
 def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path) -> None:

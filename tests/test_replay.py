@@ -379,11 +379,11 @@ def test_the_slider_follows_what_is_played_and_asks_nothing(shelf: Shelf) -> Non
 
 def test_what_a_hand_does_is_asked_for(shelf: Shelf) -> None:
     view = shelf.view
-    view.slider.arrived(4.0, "7")
-    view.play.arrived("play", "7")
-    view.speed.arrived("2x", "7")
-    view.steps["next"].arrived("saccade", "7")
-    view.steps["previous"].arrived("event", "7")
+    view.slider.receive_input(4.0, "7")
+    view.play.receive_input("play", "7")
+    view.speed.receive_input("2x", "7")
+    view.steps["next"].receive_input("saccade", "7")
+    view.steps["previous"].receive_input("event", "7")
     assert shelf.asked == [
         ("7", {"replay": {"seek_s": 4.0}}), ("7", {"replay": {"play": True}}),
         ("7", {"replay": {"speed": 2.0}}), ("7", {"replay": {"step": "next saccade"}}),
@@ -393,8 +393,8 @@ def test_what_a_hand_does_is_asked_for(shelf: Shelf) -> None:
 
 def test_a_slider_in_the_hand_is_not_pulled_back(shelf: Shelf) -> None:
     shelf.view.show(state(1.0, playing=True))
-    shelf.view.slider.arrived(5.0, "7")
-    shelf.view.slider.arrived(6.0, "7")
+    shelf.view.slider.receive_input(5.0, "7")
+    shelf.view.slider.receive_input(6.0, "7")
     shelf.view.show(state(1.1, playing=True))
     assert shelf.view.slider.value == 6.0
     shelf.view.show(state(5.0, playing=True, sought_s=5.0))  # an older wish is heard
@@ -409,7 +409,7 @@ def test_a_player_takes_every_place_the_slider_can_ask_for(
     shelf: Shelf, frames: SnapshotIndex
 ) -> None:
     replay = Replay(frames, SimulatedClock())
-    shelf.view.slider.arrived(3.725, "7")
+    shelf.view.slider.receive_input(3.725, "7")
     (_, asked) = shelf.asked[0]
     assert replay.handle_request(json.loads(json.dumps(asked))) is None
     screen = Screen()

@@ -178,7 +178,9 @@ def test_joints_stand_in_their_order_whatever_bus_they_are_on(mixed: Rig) -> Non
     rests = {setup.name: setup.rest_steps for setup in servo_configs(mixed)}
     assert rests["neck_yaw"] is None and rests["neck_pitch"] is None
     lid = mixed.joints["left_upper_lid"]
-    assert rests["left_upper_lid"] == round(lid.made().steps(-20.0 * 3.141592653589793 / 180.0))
+    assert rests["left_upper_lid"] == round(
+        lid.make_linkage().steps(-20.0 * 3.141592653589793 / 180.0)
+    )
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     # Ticks of parking are never recorded.
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
-        "guard_result", "events", "commands", "stopped", "led", "lead",
+        "guard_result", "events", "commands", "stopped", "controlled_by", "client_control",
             "gesture", "parking",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
@@ -393,10 +393,10 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
 def test_leads_and_gestures_come_back(recorded: Recorded) -> None:
     gesture = GestureState(2, "nod", "", "somebody", 3.5)
     lead = ControlState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
-    tick = recorded.ticks[-1]._replace(lead=lead, gesture=gesture, percept=None)
+    tick = recorded.ticks[-1]._replace(client_control=lead, gesture=gesture, percept=None)
     data = msgspec.json.decode(msgspec.json.encode(moments.as_json(handed_over(tick)[1])))
     back = moments.from_json(data, {}).tick
-    assert (back.lead, back.gesture) == (lead, gesture)
+    assert (back.client_control, back.gesture) == (lead, gesture)
 
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])
@@ -475,7 +475,7 @@ def test_percepts_that_are_over_take_no_memory(recorded: Recorded, tmp_path: Pat
         router.ticks(batch.data)
         return True
 
-    stream.add("test", take)
+    stream.add_sink("test", take)
     for tick in recorded.ticks:
         stream.append(tick, 0.005, ())
     stream.flush()

@@ -214,14 +214,14 @@ def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish(
     )
     guard.reset(0.0, (0.5,) * 9)
     path, t = [0.5], 0.0
-    while guard.gentle and t < 3.0:
+    while guard.is_gentle and t < 3.0:
         t += DT
         verdict = guard.check((0.0,) * 9, measured(t, (path[-1],) * 9), 0.0, t)
         path.append(verdict.command_rad[0])
     speeds = np.diff(path) / DT
     assert np.abs(speeds).max() <= radians(60.0) + 1e-9
     assert np.abs(np.diff(speeds)).max() / DT <= radians(301.0)
-    assert not guard.gentle and abs(path[-1]) < radians(1.0) and t >= 1.0
+    assert not guard.is_gentle and abs(path[-1]) < radians(1.0) and t >= 1.0
     assert all(b <= a + SLACK for a, b in pairwise(path))
     assert driven(guard, [(0.3,) * 9] * 100, t)[-1].command_rad[0] == pytest.approx(0.3)
 
@@ -232,7 +232,7 @@ def test_going_gently_in_flight_brakes_within_the_joints_own_strength() -> None:
     for k in range(60):
         t += DT
         if k == 15:
-            guard.go_gently()
+            guard.start_gently()
         position = (0.0,) * 6 + ((path[-1] if path else 0.0),) * 3
         desired = (0.0,) * 6 + (0.8,) * 3
         path.append(guard.check(desired, measured(t, position), 0.0, t).command_rad[6])
@@ -380,10 +380,10 @@ def test_healthy_joints_are_left_alone(joint: int, lag_s: float, band_deg: float
 
 def test_a_slow_start_is_no_jam() -> None:
     world = World(6, 0.03, 0.6)
-    world.guard.go_gently()
+    world.guard.start_gently()
     for k in range(600):
         if k == 300:
-            world.guard.go_gently()
+            world.guard.start_gently()
         assert world.tick(0.5 if k < 300 else -0.5) != "not moving"
 
 

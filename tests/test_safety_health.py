@@ -90,7 +90,7 @@ def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: World) -> None:
 
 
 def test_a_hot_joint_lets_the_others_park(world: World) -> None:
-    world.guard.go_gently()
+    world.guard.start_gently()
     for _ in range(300):
         world.t_s += DT
         joints = JointState(tuple(world.position), (0.0,) * 9, (world.t_s,) * 9, ())

@@ -296,7 +296,7 @@ def test_angles_counted_otherwise_send_the_joint_to_the_same_place() -> None:
         watched.wander(1)
     i, factor, offset = int(fast.argmax()), -0.5, 0.2
     before: NDArray[np.float64] = watched.p.copy()
-    watched.guard.recount(i, factor, offset)
+    watched.guard.rescale_joint(i, factor, offset)
     watched.p[i], watched.v[i] = factor * watched.p[i] + offset, factor * watched.v[i]
     watched.tick()
     assert abs(watched.p[i] - (factor * before[i] + offset)) <= abs(watched.v[i]) * DT_S + 1e-9

@@ -149,17 +149,17 @@ class Rig:
     """Stands in for a RobotClient: keeps what it is told."""
 
     def __init__(self) -> None:
-        self.who, self.leads, self.told = "me", False, list[object]()
+        self.who, self.in_control, self.told = "me", False, list[object]()
         self.refuses = False
 
-    def give(self, command: LookAtDirection) -> None:
+    def send(self, command: LookAtDirection) -> None:
         if self.refuses:
             raise RequestRejected("stopped: resume first")
-        self.leads = True
+        self.in_control = True
         self.told.append(tuple(round(degrees(angle)) for angle in command.direction_rad))
 
     def look_freely(self) -> None:
-        self.leads = False
+        self.in_control = False
         self.told.append("free")
 
     def play(self, gesture: str) -> None:
@@ -216,7 +216,7 @@ def test_a_lead_that_was_taken_is_taken_back_while_the_stick_is_held() -> None:
 
     class Taken(Moves):
         def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-            rig.leads = False  # somebody clicked on the page
+            rig.in_control = False  # somebody clicked on the page
             return super().update(steering, now_s)
 
     run_steering(rig, Taken(held, held), Steering(), Clock(), str)  # type: ignore[arg-type]

@@ -44,7 +44,7 @@ def unwanted(line: str) -> None:
 
 def test_every_tick_is_in_one_batch_with_every_field(recorded: Recorded) -> None:
     stream, sink = TickStream(unwanted), Sink()
-    stream.add("test", sink.take)
+    stream.add_sink("test", sink.take)
     for tick in recorded.ticks:
         stream.update(tick)
     stream.flush()
@@ -68,7 +68,7 @@ def test_a_percept_is_sent_again_to_who_lost_it(recorded: Recorded) -> None:
     tick = next(tick for tick in recorded.ticks if tick.percept is not None)
     for refused in ((), (1,)):
         stream, sink = TickStream(unwanted, every_s=0.0), Sink(*refused)
-        stream.add("test", sink.take)
+        stream.add_sink("test", sink.take)
         for n in range(4):
             stream.update(tick._replace(t_s=0.005 * n))
         numbers = [[one[0] for one in decode_plain(batch.data)[0]] for batch in sink.batches]
@@ -84,8 +84,8 @@ def test_who_fails_is_left_out_and_the_others_go_on(recorded: Recorded) -> None:
     def fails(batch: TickBatch) -> bool:
         raise RuntimeError("no room")
 
-    stream.add("the page", fails)
-    stream.add("test", sink.take)
+    stream.add_sink("the page", fails)
+    stream.add_sink("test", sink.take)
     for tick in recorded.ticks[:5]:
         stream.update(tick)
     assert said == ["the page failed (RuntimeError: no room); the rig runs on without"]
@@ -94,7 +94,7 @@ def test_who_fails_is_left_out_and_the_others_go_on(recorded: Recorded) -> None:
 
 def test_a_text_that_cannot_be_written_is_written_as_far_as_it_can(recorded: Recorded) -> None:
     stream, sink = TickStream(unwanted), Sink()
-    stream.add("test", sink.take)
+    stream.add_sink("test", sink.take)
     stream.update(recorded.ticks[0]._replace(events=("port \udcff gone",)))
     (row,) = decode_rows(sink.batches[0].data)[1]
     assert row.events == ("port ? gone",)

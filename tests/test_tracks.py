@@ -411,7 +411,10 @@ def _seen_with_a_hand(jumps: float, from_frame: int) -> tuple[float, int]:
         found = replace(across(0.0, 2.0 * farther), along_sd_m=0.2, box_m=0.13 * farther)
         found = replace(found, lower_face=lower * (1.0 + rng.normal(0.0, jumps)))
         (one,) = tracker.step([found], CAMERA, k / 30)
-        off, covered = max(off, abs(one.filter.range_m / 2.0 - 1.0)), covered + (one.covered > 0)
+        off, covered = (
+            max(off, abs(one.filter.range_m / 2.0 - 1.0)),
+            covered + (one.covered_frames > 0),
+        )
     return off, covered
 
 

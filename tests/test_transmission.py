@@ -90,7 +90,7 @@ def hobby(**other: object) -> JointParams:
 
 def test_a_hobby_joint_is_set_up_in_quarter_microseconds() -> None:
     setup = hobby(servo_speed_deg_s=600.0).setup("eyes_pan", radians(10.0))
-    made = hobby().made()
+    made = hobby().make_linkage()
     assert (setup.min_steps, setup.max_steps) == (
         -(-made.steps(radians(28.0)) // 1),
         made.steps(radians(-28.0)) // 1,

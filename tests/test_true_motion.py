@@ -48,7 +48,7 @@ def driven(rig: Rig, seed: int, missed: Iterator[int], seconds: float) -> Judge:
     bench.start()
     desired = restless(rig, seed)
     centre = (0.0,) * len(rig.names)
-    while bench.guard.gentle:
+    while bench.guard.is_gentle:
         bench.tick(centre)
     bench.shafts.clear()
     end_s = bench.shafts.now_s() + seconds

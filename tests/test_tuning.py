@@ -64,7 +64,7 @@ def test_set_puts_all_in_force_with_one_order() -> None:
         "gaze.lids.close_ms": ("75.0", "90.0"),
         "bus.port": ("/dev/ttyUSB0", "/dev/ttyACM1"),
     }
-    assert bench.tuning.unsaved() == bench.tuning.differs()
+    assert bench.tuning.unsaved() == bench.tuning.changed_from_defaults()
 
 
 def test_what_is_in_force_already_orders_nothing() -> None:
@@ -257,7 +257,7 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them() -> None:
     bench = Bench("desk", "shy")
     assert bench.tuning.characters()[0] == "shy" and "none" in bench.tuning.characters()
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
-    bench.tuning.character("sleepy")
+    bench.tuning.apply_character("sleepy")
     want = load_rig("desk", "sleepy").gaze
     got = bench.made.live_params.rig.gaze
     assert got.head == want.head and got.top_down == want.top_down
@@ -265,10 +265,10 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them() -> None:
     assert bench.tuning.character_name == "sleepy"
     bench.tuning.revert()
     assert bench.made.live_params.rig == load_rig("desk", "sleepy")
-    bench.tuning.character("none")
+    bench.tuning.apply_character("none")
     assert bench.made.live_params.rig == load_rig("desk")
     with pytest.raises(ConfigError, match="nothing named 'slepy'"):
-        bench.tuning.character("slepy")
+        bench.tuning.apply_character("slepy")
     assert bench.tuning.character_name == "none"
 
 
@@ -284,7 +284,7 @@ def test_a_value_that_the_character_sets_is_not_saved_into_the_rig(mine: Path) -
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
     bench = Bench(str(mine), scanpath="random", saccade="main_sequence")
     assert bench.tuning.unsaved() == ()
-    bench.tuning.character("bold")
+    bench.tuning.apply_character("bold")
     bench.tuning.reload(mine)
     assert bench.made.live_params.rig.gaze.scanpath.model == "random"
     bench.tuning.set({"gaze.aversion.min_dwell_s": 0.3})
@@ -342,7 +342,7 @@ def test_the_files_in_use_are_those_that_the_rig_names_now(mine: Path) -> None:
     mine.write_text(text.replace("profile: robot", "profile: mitake"), encoding="utf-8")
     bench.tuning.reload(mine)
     assert [path.name for path in bench.tuning.files()] == ["mine.yaml", "mitake.yaml"]
-    bench.tuning.character("shy")
+    bench.tuning.apply_character("shy")
     assert [p.name for p in bench.tuning.files()] == ["mine.yaml", "mitake.yaml", "shy.yaml"]
     assert bench.tuning.values() == values(bench.made.live_params.rig)
 

@@ -37,12 +37,12 @@ class Head:
     def __init__(self) -> None:
         self.did: list[str] = []
         self.said: list[str] = []
-        self.while_parking: Callable[[], None] = lambda: None
+        self.during_parking: Callable[[], None] = lambda: None
         self.while_off: Callable[[], None] = lambda: None
 
     def park(self, again: Callable[[], bool]) -> str:
         self.did.append("park")
-        self.while_parking()
+        self.during_parking()
         return "not parked (interrupted)" if again() else "parked"
 
     def off(self) -> None:
@@ -74,7 +74,7 @@ def test_parking_that_fails_does_not_keep_the_torque_on(error: BaseException) ->
     def fail() -> None:
         raise error
 
-    head.while_parking = fail
+    head.during_parking = fail
     with head.way_out() as leaving:
         leaving.switch_on(lambda: None)
     assert head.did == ["park", "off"] and head.said[0].startswith("not parked (")
@@ -147,7 +147,7 @@ def ask(clock: Seconds, number: signal.Signals = signal.SIGINT, after_s: float =
 
 def test_a_second_request_skips_parking_and_none_reaches_the_torque_off() -> None:
     head, clock = Head(), Seconds()
-    head.while_parking = lambda: ask(clock)
+    head.during_parking = lambda: ask(clock)
 
     def impatient() -> None:
         for _ in range(5):
@@ -170,7 +170,7 @@ def test_parking_that_hangs_is_broken_off_by_one_more() -> None:
             ask(clock)
         raise AssertionError("nobody broke it off")
 
-    head.while_parking = hang
+    head.during_parking = hang
     with Interrupts(clock) as interrupts, head.way_out(interrupts) as leaving:
         leaving.switch_on(lambda: None)
         ask(clock)
@@ -284,7 +284,7 @@ def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     figures = ran("desk", said, 1.0)
     assert figures["stopped_by"] == "seconds" and figures["ticks"] >= 199 and on(devices[0]) == 0
     assert [line for line in said if "plug-in" in line] == [
-        "the summary failed (RuntimeError: plug-in); the rig runs on without"
+        "the summary failed (RuntimeError: plug-in); the rig continues without it"
     ]
 
 

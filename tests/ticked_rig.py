@@ -58,7 +58,7 @@ def connected(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     """Yield a rig that every client connects to."""
     made = started()
     rig = TickedRig(made)
-    monkeypatch.setattr(LoopMonitor, "taken_up", lambda *_, **__: True)
+    monkeypatch.setattr(LoopMonitor, "wait_for_commands", lambda *_, **__: True)
     monkeypatch.setattr(
         RobotClient, "connect", lambda pid=None, who="": RobotClient(rig, 1)  # type: ignore[arg-type]
     )  # fmt: skip

@@ -53,7 +53,7 @@ class Shafts(SimulatedClock):
         self.angles_rad: list[tuple[float, ...]] = []
         self.looking = True
         self._joints = [
-            (rig.joints[name].made(), rig.joints[name].bus, servo_index(rig, name))
+            (rig.joints[name].make_linkage(), rig.joints[name].bus, servo_index(rig, name))
             for name in rig.names
         ]
 
@@ -241,7 +241,11 @@ class Bench:
             rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s
         )
         self.guard = Guard(
-            rig.guard, limits(rig.joints), self.names, self.body.reach, 1.0 / rig.loop.rate_hz
+            rig.guard,
+            limits(rig.joints),
+            self.names,
+            self.body.configured_limits,
+            1.0 / rig.loop.rate_hz,
         )
         self.period_s = 1.0 / rig.loop.rate_hz
         self.slot = 0

@@ -136,9 +136,11 @@ class Machine:
         self.body = Body(rig_bus(rig, ports), rig.joints, park_rad(rig))
         self.names = self.body.names
         self.limits = limits(rig.joints)
-        self.guard = Guard(rig.guard, self.limits, self.names, self.body.reach, self.period_s)
+        self.guard = Guard(
+            rig.guard, self.limits, self.names, self.body.configured_limits, self.period_s
+        )
         self.setups = servo_configs(rig)
-        self.linkages = [rig.joints[name].made() for name in self.names]
+        self.linkages = [rig.joints[name].make_linkage() for name in self.names]
         self.places = [(rig.joints[name].bus, servo_index(rig, name)) for name in self.names]
         self._kinds = [rig.bus_of(name).kind for name in self.names]
         self.heard: tuple[bool, ...] = ()
@@ -159,7 +161,7 @@ class Machine:
         self._began: tuple[bool, ...] = (False,) * len(goals)
         self._true, self._true_s = self.true_rad(), self._last_s
         for _ in range(round(2.0 / self.period_s)):
-            if all(self.tick()) and not self.guard.gentle:
+            if all(self.tick()) and not self.guard.is_gentle:
                 break
         self.said.clear()
         self.longest_s = 0.0

@@ -348,7 +348,7 @@ class ManualControl:
             slot = max(slot + 1, int((clock.now_s() - start_s) / period))
             clock.sleep_until(start_s + slot * period)
             if gently:
-                self._guard.go_gently()
+                self._guard.start_gently()
             t_s = clock.now_s()
             joints = self.body.read(t_s)
             wanted = desired(joints, t_s, t_s - last_s)

@@ -99,7 +99,7 @@ def telemetry_of(kind: ServoKind, joint: JointParams, values: Mapping[str, int])
         goal,
         degrees(joint.angle_rad(position)),
         position,
-        degrees(velocity_steps_s * joint.made().rate_rad(position)),
+        degrees(velocity_steps_s * joint.make_linkage().rate_rad(position)),
         effort * family.models[joint.model].load_unit,
         values["present_temperature"],
         values["present_input_voltage"] / 10.0,

@@ -165,12 +165,12 @@ class Oculomotor:
         R_world_head, p_head = self._predict_head(state)
         point, velocity, centre_point, toward, moves = self._predict_target(target, p_head, t_s)
         self._base_rad = base = state.base_rad
-        facing = centre = self._geometry.facing(point, base)
+        facing = centre = self._geometry.neck_angles_to(point, base)
         if centre_point is not point:
-            centre = self._geometry.facing(centre_point, base)
+            centre = self._geometry.neck_angles_to(centre_point, base)
         ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
         aside_rad = angle_between(ahead, toward)
-        place, eyes_on = self._gaze, self._geometry.eyes_on
+        place, eyes_on = self._gaze, self._geometry.eye_angles_to
         if target.shift != place.shift:
             off_rad = angle_between(sub(place.point_m, p_head), toward)
             self._record_shift(target, aside_rad, off_rad, t_s)
@@ -178,7 +178,7 @@ class Oculomotor:
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         soon = None
         if moves and (ahead_s := self._head.foresees_s) > 0.0:
-            soon = self._geometry.facing(add(centre_point, scale(velocity, ahead_s)), base)
+            soon = self._geometry.neck_angles_to(add(centre_point, scale(velocity, ahead_s)), base)
         since_s = t_s - place.onset_s
         head = self._head.step(target, centre, facing, aside_rad, since_s, t_s, soon)
         wanted = eyes_on(place.point_m, R_world_head, p_head)
@@ -220,12 +220,12 @@ class Oculomotor:
 
     def reachable_gaze(self, target: Target) -> ReachableGaze:
         """Return the final position of head and eyes for a fixed point."""
-        facing = self._geometry.facing(target.p_world_m, self._base_rad)
+        facing = self._geometry.neck_angles_to(target.p_world_m, self._base_rad)
         head = self._head.destination_rad(target, facing)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
-        exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
+        exact = self._geometry.eye_angles_to(target.p_world_m, R_world_head, p_head)
         point = self._gaze.keep_min_distance(target.p_world_m, p_head)
-        left, right = self._clip_eyes(self._geometry.eyes_on(point, R_world_head, p_head))
+        left, right = self._clip_eyes(self._geometry.eye_angles_to(point, R_world_head, p_head))
         return ReachableGaze(
             (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
         )

@@ -218,7 +218,7 @@ class PlannerScore:
             return {}
         # Of all punches that are over: by how much a guard came before the fist.
         leads, punches = [], 0
-        thrown, openings = self._happened("punch"), self._happened("attack")
+        thrown, openings = self._event_times("punch"), self._event_times("attack")
         for _, end_s, due_s in thrown:
             if end_s > self._last_s:
                 continue
@@ -241,7 +241,7 @@ class PlannerScore:
             "looked_at": sum(one.looked for one in self._attacks),
         }
 
-    def _happened(self, name: str) -> list[_Time]:
+    def _event_times(self, name: str) -> list[_Time]:
         """Return the times of all events of a name: scripted ones, and those of a person."""
         found = []
         for number in range(int(self._last_s // self._round_s) + 1):

@@ -174,7 +174,7 @@ class SaccadeFinder:
         # Relative to the peak until now: a saccade is slow at its beginning, too.
         swings = before_deg_s < _SWING_SHARE * self._peak_deg_s and now > before_deg_s
         self._peak_deg_s = max(self._peak_deg_s, now)
-        if now < self._foot_deg_s() or swings:
+        if now < self._onset_speed_deg_s() or swings:
             jump = self._measure_saccade(len(self._speeds) - (1 if swings else 0))
             self._barrier_s = jump.onset_s + jump.duration_s
             self.is_in_flight = now > THRESHOLD_DEG_S
@@ -188,12 +188,12 @@ class SaccadeFinder:
         """Treat motion that lasts too long for a saccade as slow motion."""
         self.is_in_flight, self._slow, self._barrier_s = False, speed.velocity_1_s, speed.t_s
 
-    def _foot_deg_s(self) -> float:
+    def _onset_speed_deg_s(self) -> float:
         return max(_FOOT_SHARE * self._peak_deg_s, _FOOT_DEG_S)
 
     def _measure_saccade(self, end: int) -> MeasuredSaccade:
         """Measure the saccade that was over with the last of the first ``end`` speeds."""
-        foot, speeds = self._foot_deg_s(), self._speeds
+        foot, speeds = self._onset_speed_deg_s(), self._speeds
         first = end - 1
         while first > 0 and speeds[first - 1].t_s >= self._barrier_s:
             first -= 1

@@ -111,7 +111,7 @@ def true_head_pose(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -
     kinematics = rig_kinematics(rig)
     pairs = coupled_pairs(rig.couplings)
     linkages = {
-        name: rig.joints[name].made()
+        name: rig.joints[name].make_linkage()
         for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}
         & rig.joints.keys()
     }
@@ -160,7 +160,7 @@ def scene_camera(
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
-    faces, moves = own.find_faces(rig.detector), SyntheticMotionDetector(rig.motion)
+    faces, moves = own.make_detector(rig.detector), SyntheticMotionDetector(rig.motion)
     return PixelCamera(drawn, scene, mount, where, faces, rng, moves, locate)
 
 
@@ -267,7 +267,7 @@ def real_camera(
         from gazerig.sim_mock.cameras.video import FilmCamera
 
         film, delay_s = _film_source(options), options.film_delay_s
-        faces, turned = own.find_faces(rig.detector), frame_orientation(placed)
+        faces, turned = own.make_detector(rig.detector), frame_orientation(placed)
         return FilmCamera(film, faces, delay_s, motion=motion(), locate=locate, orientation=turned)
     name = options.camera if isinstance(options.camera, str) else None
     if own.detector is not None and (name is None or is_ours(CAMERA, name)):
@@ -319,7 +319,7 @@ def supervise_source(
     locate: Locate,
 ) -> CameraThread:
     """Return a source of frames with the detector in a thread of this program."""
-    detector = parts.find_faces(rig.detector)
+    detector = parts.make_detector(rig.detector)
     return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
 
 

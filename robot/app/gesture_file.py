@@ -217,7 +217,7 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
     if head[time] == "frame" and fps is None:
         raise SetupError(f"{path}:1: times are frame numbers: give --fps, e.g. 24 or 30")
     table = _Table(path, head, time, 1.0 / fps if head[time] == "frame" and fps else 1.0)
-    found = table.keys(rows)
+    found = table.read_keys(rows)
     if table.faults:
         more = len(table.faults) - _MOST_FAULTS
         shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
@@ -236,14 +236,14 @@ class _Table:
         self._joint = next((i for i, name in enumerate(head) if name in _JOINTS), None)
         self._angle = next((i for i, name in enumerate(head) if name in _ANGLES), None)
 
-    def keys(self, rows: Sequence[Sequence[str]]) -> dict[str, Series]:
+    def read_keys(self, rows: Sequence[Sequence[str]]) -> dict[str, Series]:
         """Return the keys by joint, in the order of their times."""
         found: dict[str, dict[float, float]] = {}
         last_s: dict[str, float] = {}
         for line, row in enumerate(rows[1:], start=2):
             if not any(cell.strip() for cell in row):
                 continue
-            for joint, time_s, angle in self._cells(line, row):
+            for joint, time_s, angle in self._row_keys(line, row):
                 if time_s <= last_s.get(joint, -1.0):
                     self._add_error(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
                 last_s[joint] = time_s
@@ -253,7 +253,7 @@ class _Table:
             for name, keys in found.items()
         }
 
-    def _cells(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
+    def _row_keys(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
         """Yield the keys of one row; an empty cell of a wide table is no key."""
         if len(row) != len(self._head):
             self._add_error(

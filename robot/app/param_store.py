@@ -175,7 +175,7 @@ class ParamStore:
         state = self._state
         return _changes(state.saved, state.rig, state.file_values)
 
-    def differs(self) -> tuple[ParamChange, ...]:
+    def changed_from_defaults(self) -> tuple[ParamChange, ...]:
         """Return the values that differ from the defaults, those of the shipped rig."""
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
@@ -207,7 +207,11 @@ class ParamStore:
             # These do not fit in a single line.
             faults = [
                 ConfigFault(
-                    "", None, key, "", "holds mappings: change it in the file, which is read again"
+                    "",
+                    None,
+                    key,
+                    "",
+                    "contains mappings: change it in the file, which is read again",
                 )
                 for key, value in wanted.items()
                 if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
@@ -234,7 +238,7 @@ class ParamStore:
         now = self.character_name
         return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
 
-    def character(self, name: str) -> tuple[str, ...]:
+    def apply_character(self, name: str) -> tuple[str, ...]:
         """Apply another character to the rig; unsaved values override both.
 
         name: of a shipped one, a path, or "none"

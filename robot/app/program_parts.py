@@ -23,7 +23,7 @@ class ProgramParts(NamedTuple):
     detector: FaceDetector | None = None
     chooser: Chooser | None = None
 
-    def find_faces(self, params: FaceDetectorParams) -> FaceDetector:
+    def make_detector(self, params: FaceDetectorParams) -> FaceDetector:
         """Return the detector: the program's, with ours as a fallback, or the rig's."""
         if self.detector is None:
             return face_detector(params)
@@ -31,7 +31,7 @@ class ProgramParts(NamedTuple):
         label = part_label("detector", self.detector)
         return CheckedDetector(self.detector, label, lambda: mtcnn(params))
 
-    def choose(
+    def make_chooser(
         self, own: TargetChooser, say: Callable[[str], None], simulated: bool
     ) -> TargetChooser:
         """Return the chooser of the target: the program's rule before the rig's own."""

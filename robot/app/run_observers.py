@@ -136,8 +136,8 @@ class RunObservers:
         self._stream = recorder.stream if recorder is not None else TickStream(say)
         self._parking = TickStream(say)
         if self._publisher is not None:
-            self._stream.add("the page", self._publisher.take)
-            self._parking.add("the page", self._publisher.take)
+            self._stream.add_sink("the page", self._publisher.take)
+            self._parking.add_sink("the page", self._publisher.take)
         self._observers = Observers(say)
         self.attach(self._observers)
 
@@ -192,7 +192,7 @@ class RunObservers:
             self._figures = self._timing.figures()
         return RunState(
             errors, *in_force, robot.perception.residual(), start_s,
-            [other.seen() for other in self._made.other_heads], self._figures,
+            [other.describe() for other in self._made.other_heads], self._figures,
         )  # fmt: skip
 
     def _record_world(self, tick: Tick) -> None:
@@ -224,7 +224,7 @@ class RunObservers:
         """Update all observers with a tick; called by a loop that does not update them itself."""
         self._observers.update(tick)
 
-    def busy(self) -> str:
+    def busy_message(self) -> str:
         """Return a message if the computer is too busy, "" if not or if time is simulated."""
         return busy_text(self._timing.figures())
 

@@ -176,7 +176,7 @@ def run(
 class Session:
     """One run, with its observers; arguments as of ``run``.
 
-    stopped_by: reason of its end; a fault unless ``powered``'s block sets another
+    stopped_by: reason of its end; a fault unless ``power_on``'s block sets another
     """
 
     def __init__(
@@ -201,7 +201,7 @@ class Session:
             assembly, options, tried, status, composed.tuning, composed.recorder, browse=browse
         )
         self._summary = Summary() if summarised else None
-        self._faults = JointFaults(tried, self._run_observers.busy)
+        self._faults = JointFaults(tried, self._run_observers.busy_message)
         scene = assembly.scene
         room = assembly.room
         start_s = (lambda: None) if room is None else room.start_s
@@ -234,7 +234,7 @@ class Session:
             raise SetupError(str(error)) from error
         self._observers = observers
         self._longest_s = _longest_s(assembly, options)
-        self._interrupts = Interrupts.of(stopped)
+        self._interrupts = Interrupts.from_stop(stopped)
 
     def _log(self, tick: Tick) -> None:
         """Print the events of a tick."""
@@ -259,7 +259,7 @@ class Session:
         """
         wall = RealClock()
         began_s = wall.now_s()
-        with self.powered() as loop:
+        with self.power_on() as loop:
             while (reason := loop.step()) is None:
                 pass
             self.stopped_by = reason
@@ -278,7 +278,7 @@ class Session:
         return figures
 
     @contextlib.contextmanager
-    def powered(self) -> Iterator[TickLoop]:
+    def power_on(self) -> Iterator[TickLoop]:
         """Switch on, let the block step the loop, shut down like every exit.
 
         Raises:
@@ -296,7 +296,9 @@ class Session:
                 ) as leaving,
             ):
                 leaving.switch_on(
-                    lambda: assembly.robot.start(assembly.clock, self._interrupts.refuse)
+                    lambda: assembly.robot.start(
+                        assembly.clock, self._interrupts.raise_if_requested
+                    )
                 )
                 begun = True
                 self._start_s = assembly.clock.now_s()
@@ -358,7 +360,7 @@ def shut_down(
         assembly, say, interrupts if interrupts is not None else Interrupts()
     )
     leaving.cause = count.stopped_by
-    leaving.leave()
+    leaving.shut_down()
 
 
 def prepare_shutdown(

@@ -43,6 +43,6 @@ def print_gesture_fit(rig_name: str, path: Path, fitted: "FittedGesture") -> Non
     slower = (
         f", slower by {fitted.slowed_by:.2f} for {fitted.slow_joint}" if fitted.slow_joint else ""
     )
-    smaller = "".join(f", {joint} {share:.0%} as far" for joint, share in fitted.smaller)
-    say(f"{path}: {fitted.played.duration_s:.1f} s on {rig_name}{slower}{smaller}")
+    smaller = "".join(f", {joint} {share:.0%} as far" for joint, share in fitted.reduced_joints)
+    say(f"{path}: {fitted.gesture.duration_s:.1f} s on {rig_name}{slower}{smaller}")
     say(f"use it: gesture_files: [{path}] in the rig, then gazerig ctl play {path.stem}")

@@ -69,7 +69,7 @@ def look(
                 rig.look_freely()
                 say("it looks freely")
                 return
-            reply = rig.give(command._replace(who=rig.who, stay=stay))
+            reply = rig.send(command._replace(who=rig.who, stay=stay))
             until = "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
             say(f"{reply.text()}, until: {'gazerig ctl look free' if stay else until}")
             if stay:
@@ -78,15 +78,15 @@ def look(
             clock = RealClock()
             end_s = clock.now_s() + (inf if seconds is None else seconds)
             with contextlib.suppress(KeyboardInterrupt):
-                while rig.leads and clock.now_s() < end_s:
+                while rig.in_control and clock.now_s() < end_s:
                     clock.sleep_until(min(end_s, clock.now_s() + _LEADS_EVERY_S))
-            if rig.leads:
+            if rig.in_control:
                 rig.look_freely()
                 say("it looks freely")
                 return
             now = rig.status()
             stopped = f"it was stopped: {now['stopped']}" if now["stopped"] else "it looks freely"
-            say(f"led by {now['led']}" if now["led"] else stopped)
+            say(f"controlled_by by {now['controlled_by']}" if now["controlled_by"] else stopped)
 
 
 @app.command()

@@ -284,7 +284,7 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
 
 def agreement_text(result: "Resimulation") -> str:
-    """Return a text: how far a rerun agrees with the recorded run."""
+    """Return a text: result far a rerun agrees with the recorded run."""
     text = f"{result.agreeing_ticks} of {result.ticks} ticks are the same to the bit"
     if result.first_difference_s is not None:
         text += f"; the first other one at {result.first_difference_s:.3f} s: {result.difference}"

@@ -103,7 +103,7 @@ def run(
                 told = summary is not None
                 carry_out = partial(session.run, session.compose(asked), summarised=told)
         with record_signals() as stopped:
-            figures = carry_out(stopped, opening.say, shows, opening.saw, browse)
+            figures = carry_out(stopped, opening.say, shows, opening.update, browse)
         if summary is not None:
             text = json.dumps(figures, indent=2) + "\n"
             if summary == "-":
@@ -126,10 +126,10 @@ class StartLine:
 
     def say(self, line: str) -> None:
         """Print a line, after the first."""
-        self.saw(None)
+        self.update(None)
         say(line)
 
-    def saw(self, tick: object) -> None:
+    def update(self, tick: object) -> None:
         """Print the first line once the head runs."""
         if self._line:
             line, self._line = self._line, ""

@@ -62,7 +62,7 @@ def steer(
             say(HELP["gamepad" if with_pad else "keyboard"])
             with contextlib.suppress(KeyboardInterrupt):
                 run_steering(rig, controls, Steering(behind), RealClock(), status)
-            if rig.leads:
+            if rig.in_control:
                 rig.look_freely()
             say("it looks freely")
 
@@ -100,8 +100,8 @@ def run_steering(
                         rig.ask("lids", "wink left")
                     else:
                         rig.play(gesture)
-            if wanted is not None and (wanted != looks or not rig.leads):
-                rig.give(LookAtDirection(wanted, "world", _FAR_M, rig.who))
+            if wanted is not None and (wanted != looks or not rig.in_control):
+                rig.send(LookAtDirection(wanted, "world", _FAR_M, rig.who))
             elif wanted is None and looks is not None:
                 rig.look_freely()
             show("you lead" if wanted is not None else "it looks freely")

@@ -80,7 +80,7 @@ class LineWriter:
             self._status_waits = True
             self._call.begin(self._write_status)
 
-    def unread(self) -> str | None:
+    def lost_reader(self) -> str | None:
         """Return that its reader is gone, None while it may be there."""
         now_s = perf_counter()
         if self._unread is None and now_s - self._look_s > _LOOK_S:
@@ -329,7 +329,7 @@ def _report_thread_error(args: threading.ExceptHookArgs) -> None:
 
 def record_signals() -> Interrupts:
     """Return a block in which Ctrl-C and other requests to end are only noted, by name."""
-    return Interrupts(also=_writer.unread)
+    return Interrupts(also=_writer.lost_reader)
 
 
 @contextlib.contextmanager

@@ -144,7 +144,7 @@ def get(
         values = rig.get(prefix)
         found = [param for param in rig.parameters() if param.key in values]
         if differs:
-            other = {change.key for change in rig.differs()}
+            other = {change.key for change in rig.changed_from_defaults()}
             found = [param for param in found if param.key in other]
         if not found and not differs:
             raise SetupError(f"{prefix}: no key begins so; gazerig ctl get lists all")
@@ -224,8 +224,8 @@ def character(
 ) -> None:
     """Apply another character to the running rig."""
     with clear_errors(), RobotClient.connect(pid) as rig:
-        _print_notes(rig.character(name))
-        say(f"character {name} is in force")
+        _print_notes(rig.apply_character(name))
+        say(f"apply_character {name} is in force")
 
 
 @ctl.command()
@@ -320,7 +320,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
     unsaved = now["unsaved"]
     return [
         *lines,
-        *([f"led by {now['lead']}"] if now["lead"] else []),
+        *([f"control_text by {now['control_text']}"] if now["control_text"] else []),
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         *(f"camera: {text}" for text in now.get("camera", ())),
@@ -356,7 +356,7 @@ def _table(
 
 
 def _rule_text(param: Parameter) -> str:
-    """Return what one parameter is, its range, and when a change takes effect."""
+    """Return description one parameter is, its range, and when a change takes effect."""
     bounds = "" if param.low is None or param.high is None else f"{param.low:g} .. {param.high:g}"
     choices = ", ".join(map(_value_text, param.choices))
     allowed = " ".join(part for part in (bounds, param.unit if bounds else "") if part) or choices

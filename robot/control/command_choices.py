@@ -35,7 +35,7 @@ class Menus:
         self._expressions = expressions
         self._gestures = gestures
 
-    def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
+    def choices(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
         menus = {
             "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),

@@ -89,18 +89,18 @@ class CommandExecutor:
         """Forget the gestures that rules have played."""
         self._trigger.reset()
 
-    def models_take_over(self) -> bool:
+    def models_took_over(self) -> bool:
         """Return once whether the gaze models take control again, from the present pose."""
         taken_over, self._taken_over = self._taken_over, False
         return taken_over
 
-    def end_lapsed(self, t_s: float) -> None:
+    def end_expired(self, t_s: float) -> None:
         """End a client's control that was not renewed or has expired, and expired levels."""
         if self.opponent is not None:
             self.opponent.update(t_s)
         lead, levels = self._lead, self._animation.levels
-        if lead.words and (why := lead.over(t_s)):
-            self._messages.append(f"{lead.words}: {why}, so the gaze leads again")
+        if lead.controlled_by and (why := lead.expiry_reason(t_s)):
+            self._messages.append(f"{lead.controlled_by}: {why}, so the gaze leads again")
             self._change_control(lambda: lead.end(why))
         if t_s >= levels.lapses_s:
             for name in levels.drop_lapsed(t_s):
@@ -114,13 +114,15 @@ class CommandExecutor:
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
             case _ if isinstance(command, ControlCommand):
-                if self._stop.why:
-                    return CommandReply(f"stopped ({self._stop.why}): resume first")
+                if self._stop.stop_reason:
+                    return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 reply = self._take_control(command, t_s)
-                return reply._replace(lead=self._lead.state.number * self._lead.state.active)
+                return reply._replace(
+                    control_number=self._lead.state.number * self._lead.state.active
+                )
             case Play():
-                if self._stop.why:
-                    return CommandReply(f"stopped ({self._stop.why}): resume first")
+                if self._stop.stop_reason:
+                    return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 return self._play(command, t_s)
             case Express(name, strength):
                 return _call_or_refuse(lambda: self._animation.expressions.express(name, strength))
@@ -134,7 +136,7 @@ class CommandExecutor:
                     return CommandReply(f"{command.who or 'you'} lead nothing now")
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
-                self._gestures.drop()
+                self._gestures.drop_present()
                 self._stop.halt(command, self._body, t_s)
             case Resume():
                 return self._resume(command, t_s)
@@ -155,7 +157,7 @@ class CommandExecutor:
                 self._change_control(lambda: self._lead.look(command, point, t_s))
         except ValueError as error:
             return CommandReply(str(error))
-        target = self._lead.chosen(None, t_s)
+        target = self._lead.chosen_target(None, t_s)
         if target is None:  # the gaze is free again
             return CommandReply()
         return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
@@ -163,25 +165,25 @@ class CommandExecutor:
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""
         names = self._body.names
-        if command.angles_rad and (name := self._gestures.drop()):
+        if command.angles_rad and (name := self._gestures.drop_present()):
             self._messages.append(f"gesture {name} ends: the joints are led")
         self._change_control(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
             # A slider may jump from end to end.
-            self._guard.go_gently()
+            self._guard.start_gently()
         return jog_reply(command, names, self._guard.limits)
 
     def _play(self, command: Play, t_s: float) -> CommandReply:
         """Play a gesture on top of the gaze, unless a client holds the joints."""
         if command.gesture and self._lead.pose_rad:
-            return CommandReply(f"{self._lead.words}: the joints are held where they are")
+            return CommandReply(f"{self._lead.controlled_by}: the joints are held where they are")
         reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
         if command.gesture:
             by = f" for {command.who}" if command.who else ""
             self._messages.append(f"gesture{by}: {reply.text()}")
         return reply
 
-    def gesture_by_rule(self, target: Target, t_s: float) -> None:
+    def play_rule_gesture(self, target: Target, t_s: float) -> None:
         """Play the gesture of the present rule when the gaze reaches the rule's target.
 
         Args:
@@ -192,24 +194,24 @@ class CommandExecutor:
         name = self._trigger.step(
             top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
         )
-        if name and not self._stop.why and not self._lead.active:
+        if name and not self._stop.stop_reason and not self._lead.active:
             reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
             if reply.refused:
                 self._messages.append(f"gesture for rule {top_down.behaviour} {reply.text()}")
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change who is in control; the models start slowly if they take joints over."""
-        held, text = bool(self._lead.pose_rad), self._lead.words
+        held, text = bool(self._lead.pose_rad), self._lead.controlled_by
         change()
         if held and not self._lead.pose_rad:
             self._taken_over = True
-            self._guard.go_gently()
-        if self._lead.words and not text:
-            self._messages.append(f"led by {self._lead.words}")
+            self._guard.start_gently()
+        if self._lead.controlled_by and not text:
+            self._messages.append(f"controlled_by by {self._lead.controlled_by}")
 
     def _resume(self, command: Resume, t_s: float) -> CommandReply:
         """Switch the torque on at the present angles; it stays off if a servo refuses."""
-        if not self._stop.why:
+        if not self._stop.stop_reason:
             return CommandReply()
         resumed = self._stop.resume(command, self._body, t_s)
         if isinstance(resumed, CommandReply):

@@ -89,7 +89,7 @@ class ParamAccess(Protocol):
         """Return the present values that are not in the file."""
         ...
 
-    def differs(self) -> Sequence[ParamChange]:
+    def changed_from_defaults(self) -> Sequence[ParamChange]:
         """Return the values that differ from the defaults."""
         ...
 
@@ -105,7 +105,7 @@ class ParamAccess(Protocol):
         """Return the available characters."""
         ...
 
-    def character(self, name: str) -> object:
+    def apply_character(self, name: str) -> object:
         """Apply another character to the rig."""
         ...
 
@@ -113,11 +113,11 @@ class ParamAccess(Protocol):
 class PathGuard(Protocol):
     """Rules for the files that a client may name (``config.allowed_folder.AllowedFolder``)."""
 
-    def file(self, given: str, kind: str = "") -> str:
+    def check_file(self, given: str, kind: str = "") -> str:
         """Return a shipped name or an absolute path; raise if it is not allowed."""
         ...
 
-    def changes(self, changes: Mapping[str, object]) -> None:
+    def check_changes(self, changes: Mapping[str, object]) -> None:
         """Raise if a value names a file that is not allowed."""
         ...
 
@@ -174,7 +174,7 @@ class CommandHandler:
         params: The parameters, None if they cannot be read or changed.
         status: Returns the state of the rig as plain values.
         refusals: Exceptions of ``params`` for a value that breaks a rule, besides ValueError;
-            the attribute contains all exceptions of ``do``.
+            the attribute contains all exceptions of ``handle``.
         saved: Called with each written file.
         paths: Rules for file names, None if any file is allowed.
         fixed: Reason why parameters cannot be changed.
@@ -204,7 +204,7 @@ class CommandHandler:
             ValueError, DriverError, OSError, *refusals,
         )  # fmt: skip
 
-    def do(
+    def handle(
         self, request: object, sign: Callable[[Command], Command] = lambda command: command
     ) -> RequestResult:
         """Handle a request; the patterns are the vocabulary.
@@ -232,10 +232,10 @@ class CommandHandler:
                     raise ValueError(REAL)
                 return QuestionAnswer(self._fault(text))
             case {"do": str(name)} if name in COMMANDS:
-                return self.give(sign(from_json(request)))
+                return self.queue_command(sign(from_json(request)))
         return self._handle_params(request)
 
-    def give(self, command: Command) -> PendingCommand:
+    def queue_command(self, command: Command) -> PendingCommand:
         """Queue a command; parameters are changed by ``set``, which checks their rules.
 
         Raises:
@@ -257,11 +257,11 @@ class CommandHandler:
             case {"do": "characters", **rest} if not rest:
                 return QuestionAnswer(list(self._params.characters()) if self._params else [])
             case {"do": "differs", **rest} if not rest:
-                return QuestionAnswer(as_changes(self._require_params().differs()))
+                return QuestionAnswer(as_changes(self._require_params().changed_from_defaults()))
             case {"do": "set", "changes": dict(changes), **rest} if not rest:
                 params = self._require_params()
                 if self._paths is not None:
-                    self._paths.changes(changes)
+                    self._paths.check_changes(changes)
                 notes = params.set({key: as_value(value) for key, value in changes.items()})
                 return ParamsChanged(_notes(notes))
             case {"do": "save", "path": str() | None as path, **rest} if not rest:
@@ -271,8 +271,8 @@ class CommandHandler:
             case {"do": "character", "name": str(name), **rest} if not rest:
                 params = self._require_params()
                 if self._paths is not None and name not in params.characters():
-                    name = self._paths.file(name, "characters")
-                return ParamsChanged(_notes(params.character(name)))
+                    name = self._paths.check_file(name, "characters")
+                return ParamsChanged(_notes(params.apply_character(name)))
         raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
 
     def _require_params(self) -> ParamAccess:
@@ -292,7 +292,7 @@ class CommandHandler:
     def _save(self, path: str | None) -> RequestResult:
         params = self._require_params()
         if path and self._paths is not None:
-            path = self._paths.file(path)
+            path = self._paths.check_file(path)
         file = Path(path).expanduser() if path else None
         if file is not None and not file.is_absolute():
             raise ValueError(f"{path}: give the absolute path; the rig has its own folder")

@@ -53,8 +53,8 @@ class CommandQueue:
         self._commands.append(waiting)
         return waiting.ticket
 
-    def stops(self) -> list[QueuedCommand]:
-        """Remove and return all stops; refuse waiting commands that would move the head."""
+    def take_stops(self) -> list[QueuedCommand]:
+        """Remove and return all take_stops; refuse waiting commands that would move the head."""
         taken: list[QueuedCommand] = []
         while self._stops:
             taken.append(self._stops.popleft())
@@ -64,7 +64,7 @@ class CommandQueue:
 
     def take(self) -> list[QueuedCommand]:
         """Remove and return the commands of this tick, stops first."""
-        taken = self.stops()
+        taken = self.take_stops()
         tunes, most = 0, len(taken) + MAX_PER_TICK
         while self._commands and len(taken) < most:
             tunes += isinstance(self._commands[0].command, Tune)

@@ -55,7 +55,7 @@ class GazeEvents:
             found.append(GazeChange("blink", "blink", ""))
         was, now = last.gesture, tick.gesture
         if was.name and (was.number, was.name) != (now.number, now.name):
-            ended = now.ended if now.number == was.number else "another gesture"
+            ended = now.end_reason if now.number == was.number else "another gesture"
             text = f"{was.name} has finished" if not ended else f"{was.name} ended: {ended}"
             found.append(GazeChange(text, "gesture_finished", was.name))
         return found + self._people(tick)

@@ -107,7 +107,7 @@ class GestureChoices:
         if isinstance(made, GestureRefused):
             raise ValueError(f"{command.gesture}: {made}")
 
-    def offered(self, limits: Sequence[JointLimit]) -> tuple[GestureInfo, ...]:
+    def all_gestures(self, limits: Sequence[JointLimit]) -> tuple[GestureInfo, ...]:
         """Return all gestures with their fit to this rig.
 
         Args:
@@ -121,7 +121,7 @@ class GestureChoices:
             fitted = self._fit_gesture(name, 0, 1.0, middle, limits)
         except GestureRefused as refused:
             return GestureInfo(name, gesture.description, refused=str(refused))
-        return GestureInfo(name, gesture.description, fitted.played.duration_s, fitted.slowed_by)
+        return GestureInfo(name, gesture.description, fitted.gesture.duration_s, fitted.slowed_by)
 
     def play(
         self, command: Play, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
@@ -140,31 +140,31 @@ class GestureChoices:
         if not command.gesture:
             self._player.play(None, t_s, fade_s, 0.0)
             if self.state.name:
-                self._state = self._state._replace(name="", ended=f"{by} has ended it")
+                self._state = self._state._replace(name="", end_reason=f"{by} has ended it")
             return CommandReply(gesture=GestureReply("", fade_s))
-        base = self._fit.without(commanded_rad, state)
+        base = self._fit.subtract_offset(commanded_rad, state)
         try:
             fitted = self._fit_gesture(command.gesture, command.times, command.speed, base, limits)
         except GestureRefused as refused:
             return CommandReply(f"{command.gesture}: {refused}")
-        wait_s = self._fit.wait_s(state, fade_s, fitted.played, limits, share)
-        self._player.play(fitted.played, t_s, fade_s, wait_s)
+        wait_s = self._fit.wait_s(state, fade_s, fitted.gesture, limits, share)
+        self._player.play(fitted.gesture, t_s, fade_s, wait_s)
         number = self._state.number + 1
         self._state = GestureState(number, command.gesture, who=command.who, since_s=t_s)
         left_out = self._require_motions(command.gesture, command.times).left_out
         return CommandReply(
             gesture=GestureReply(
                 command.gesture,
-                wait_s + fitted.played.duration_s,
+                wait_s + fitted.gesture.duration_s,
                 fitted.slowed_by,
                 fitted.slow_joint,
-                fitted.smaller,
+                fitted.reduced_joints,
                 left_out,
                 self._state.number,
             )
         )
 
-    def drop(self) -> str:
+    def drop_present(self) -> str:
         """Drop the present gesture, as a client holds its joints or the torque is off.
 
         Returns:
@@ -173,7 +173,9 @@ class GestureChoices:
         name = self._player.playing
         self._player.reset()
         if name:
-            self._state = self._state._replace(name="", ended="its joints are led or switched off")
+            self._state = self._state._replace(
+                name="", end_reason="its joints are led or switched off"
+            )
         return name
 
     def _fit_gesture(

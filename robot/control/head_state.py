@@ -173,8 +173,8 @@ class HeadState:
         level: Level of the guard: "ok", "limited", "hold" or "torque_off".
         reasons: Limits applied by the guard, "joint: reason".
         stopped: Reason for a stop, "" while the head moves.
-        led: Client that controls gaze or joints, and its command; "" while the head chooses.
-        lead: State of the newest client's control.
+        controlled_by: Client that controls gaze or joints, and its command; "" while the head chooses.
+        client_control: State of the newest client's control.
         gesture: The newest gesture.
         control_source: Present source of control: gaze models, a client, a gesture, a stop.
         headline: Present activity of the head in one sentence.
@@ -188,8 +188,8 @@ class HeadState:
     level: str
     reasons: tuple[str, ...]
     stopped: str
-    led: str
-    lead: ControlState = field(default=NO_CLIENT_CONTROL)
+    controlled_by: str
+    client_control: ControlState = field(default=NO_CLIENT_CONTROL)
     gesture: GestureState = field(default=NO_GESTURE)
     frame_s: float | None = None
     control_source: ControlSource = field(default=ControlSource())
@@ -209,8 +209,8 @@ def head_state(tick: Tick) -> HeadState:
         tick.guard_result.level,
         tick.guard_result.reasons,
         tick.stopped,
-        tick.led,
-        tick.lead,
+        tick.controlled_by,
+        tick.client_control,
         tick.gesture,
         percept.captured_s if percept is not None else None,
         tick_control_source(tick),
@@ -221,7 +221,7 @@ def head_state(tick: Tick) -> HeadState:
 def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
     named: dict[str, Any] = {
-        "lead": state.lead,
+        "client_control": state.client_control,
         "gesture": state.gesture,
         "control_source": state.control_source,
     }
@@ -247,7 +247,7 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
         )
         for one in data["people"]
     )
-    made["lead"] = ControlState(**_known_fields(ControlState, data["lead"]))
+    made["client_control"] = ControlState(**_known_fields(ControlState, data["client_control"]))
     made["gesture"] = GestureState(**_known_fields(GestureState, data["gesture"]))
     if "control_source" in data:
         made["control_source"] = ControlSource(
@@ -294,7 +294,11 @@ def _values_or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
 def _gaze(tick: Tick) -> GazeReading:
     pose, gaze, does = tick.pose, tick.gaze, head_activity(tick)
     # A client's target is a gaze target; held joints have none.
-    target = target_name(tick.target) if tick.lead.by != "joint" and tick.led else does.target
+    target = (
+        target_name(tick.target)
+        if tick.client_control.kind != "joint" and tick.controlled_by
+        else does.target
+    )
     sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
     return GazeReading(
         target,

@@ -31,7 +31,7 @@ class Interrupts:
     """A recorder of requests to end this program, active inside its block.
 
     The first request is only recorded: the work reads it by calling this object. A second one
-    raises KeyboardInterrupt, because the work may hang, except if ``spared`` forbids it. SIGHUP is
+    raises KeyboardInterrupt, because the work may hang, except if ``is_spared`` forbids it. SIGHUP is
     never a second one: one closed terminal sends it several times.
 
     Args:
@@ -53,13 +53,13 @@ class Interrupts:
         self._more = 0
         self._before: dict[signal.Signals, Any] = {}
         self._depth = 0
-        self.tolerated = 1
+        self.tolerated_requests = 1
         """Number of requests that are recorded before one raises KeyboardInterrupt."""
-        self.spared: Callable[[FrameType | None], bool] = lambda frame: False
+        self.is_spared: Callable[[FrameType | None], bool] = lambda frame: False
         """Returns whether the function of a frame must never be interrupted."""
 
     @classmethod
-    def of(cls, stopped: Callable[[], str | None]) -> "Interrupts":
+    def from_stop(cls, stopped: Callable[[], str | None]) -> "Interrupts":
         """Return ``stopped`` if it is an Interrupts, else a new one."""
         return stopped if isinstance(stopped, Interrupts) else cls()
 
@@ -75,7 +75,7 @@ class Interrupts:
                 # A program started with nohup must outlive the terminal.
                 if number in _HANG_UP and signal.getsignal(number) == signal.SIG_IGN:
                     continue
-                self._before[number] = signal.signal(number, self._note)
+                self._before[number] = signal.signal(number, self._record)
             for number in _BACKGROUND:
                 self._before[number] = signal.signal(number, signal.SIG_IGN)
         return self
@@ -110,11 +110,11 @@ class Interrupts:
         """Return the number of requests to end."""
         return self._more + (self._first is not None)
 
-    def never_raise(self) -> None:
+    def only_record(self) -> None:
         """Only record from now on: the work checks for requests often enough."""
-        self.tolerated = _NEVER
+        self.tolerated_requests = _NEVER
 
-    def refuse(self) -> None:
+    def raise_if_requested(self) -> None:
         """Raise if the end was requested before there is anything to park.
 
         Raises:
@@ -123,7 +123,7 @@ class Interrupts:
         if self() is not None:
             raise KeyboardInterrupt
 
-    def _note(self, number: int, frame: FrameType | None) -> None:
+    def _record(self, number: int, frame: FrameType | None) -> None:
         now_s, last_s = self._now_s(), self._last_s
         self._last_s = now_s
         if self._first is None:
@@ -132,5 +132,5 @@ class Interrupts:
             return
         else:
             self._more += 1
-        if self.requests > self.tolerated and not self.spared(frame):
+        if self.requests > self.tolerated_requests and not self.is_spared(frame):
             raise KeyboardInterrupt

@@ -110,7 +110,7 @@ class JointFaults:
         for key, running in tuple(self._running.items()):
             self._end(key, running)
 
-    def counted(self) -> tuple[JointFault, ...]:
+    def ended_faults(self) -> tuple[JointFault, ...]:
         """Return all faults that have ended, sorted by joint and reason."""
         found = sorted(self._counted.items())
         return tuple(JointFault(*key, times, seconds) for key, (times, seconds) in found)
@@ -118,7 +118,7 @@ class JointFaults:
     def figures(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return these faults as plain values: joint -> reason -> times and seconds."""
         figures: dict[str, dict[str, dict[str, float]]] = {}
-        for fault in self.counted():
+        for fault in self.ended_faults():
             entry = {"times": fault.times, "seconds": round(fault.seconds, 3)}
             figures.setdefault(fault.joint, {})[fault.reason] = entry
         return figures

@@ -119,10 +119,10 @@ class Robot:
     @property
     def stopped(self) -> str:
         """Return the reason for a stop, "" while the robot moves."""
-        return self._stop.why
+        return self._stop.stop_reason
 
     @property
-    def newest(self) -> Tick | None:
+    def newest_tick(self) -> Tick | None:
         """Return the last tick, None before the first."""
         known = self._looks.newest
         return known if isinstance(known, Tick) else None
@@ -154,7 +154,7 @@ class Robot:
         refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
         return self._commands.add(command)
 
-    def let_move(self, opponent: TickClockOpponent) -> None:
+    def set_opponent(self, opponent: TickClockOpponent) -> None:
         """Let commands move a boxer of the emulated world."""
         self._executor.opponent = opponent
 
@@ -174,11 +174,11 @@ class Robot:
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return the choices of ``ask``: menu -> choices, the present one first."""
-        return self._menus.offered(self.attention.top_down)
+        return self._menus.choices(self.attention.top_down)
 
     def gestures(self) -> tuple[GestureInfo, ...]:
         """Return all gestures with their fit to this rig."""
-        return self._gestures.offered(self._guard.limits)
+        return self._gestures.all_gestures(self._guard.limits)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.
@@ -233,12 +233,12 @@ class Robot:
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
-        if self._executor.models_take_over():
+        if self._executor.models_took_over():
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         chosen = self.attention.choose(percept, pose, t_s)
-        self._executor.gesture_by_rule(chosen, t_s)
+        self._executor.play_rule_gesture(chosen, t_s)
         target = self._lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
         target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active, rests_s)
@@ -249,7 +249,7 @@ class Robot:
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
         self._gaze_m = gaze.gaze_point_world_m
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
-        if stopped := self._stop.why:
+        if stopped := self._stop.stop_reason:
             self._stop.keep_released(self.body, joints, t_s)
             guard_result = stopped_result(joints, desired, stopped, self.body.names)
         else:
@@ -262,7 +262,7 @@ class Robot:
         self._messages.clear()
         tick = tuple.__new__(Tick, (
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            stopped, self._lead.words, lead, self._gestures.state, False,
+            stopped, self._lead.controlled_by, lead, self._gestures.state, False,
         ))  # fmt: skip
         self._looks.newest = tick
         return tick
@@ -286,7 +286,7 @@ class Robot:
             again: Returns whether to skip the rest; called at every step.
             watch: Called at every step with the last tick and the changes since.
         """
-        self._guard.go_gently()
+        self._guard.start_gently()
         newest = self._looks.newest
         rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
         end_s = start_s + params.park_s + 0.5 / rate_hz
@@ -297,7 +297,7 @@ class Robot:
             # A slow bus must not prolong parking; missed slots are skipped.
             if t_s > end_s or (again is not None and again()):
                 return False
-            if stops := self._commands.stops():
+            if stops := self._commands.take_stops():
                 for stop in stops:
                     stop.ticket.answer(self._executor.execute(stop.command, t_s))
                 return False
@@ -306,7 +306,7 @@ class Robot:
             self.body.write(guard_result.command_rad)
             if watch is not None and isinstance(newest, Tick):
                 pose, events = self._kinematics.forward(joints), self.body.bus.events()
-                watch(newest.while_parking(t_s, joints, pose, pose_rad, guard_result, events))
+                watch(newest.parking_tick(t_s, joints, pose, pose_rad, guard_result, events))
             errors = zip(pose_rad, joints.position_rad, strict=True)
             if max(abs(desired - now) for desired, now in errors) < radians(2.0):
                 return True
@@ -326,7 +326,7 @@ class Robot:
             command = self._looks.resolve_pixel(waiting.command)
             taken.append(command)
             waiting.ticket.answer(self._executor.execute(command, t_s))
-        self._executor.end_lapsed(t_s)
+        self._executor.end_expired(t_s)
         return tuple(taken)
 
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:

@@ -39,7 +39,7 @@ class PowerDown:
 
     Attributes:
         cause: Reason for the end in the line, "" for none.
-        how: Text of the result, "" before the end.
+        result: Text of the result, "" before the end.
         unreleased: Messages about servos whose torque may still be on.
     """
 
@@ -58,7 +58,7 @@ class PowerDown:
         self._off, self._left, self._quiet = off, left, quiet
         self._starting = self._on = False
         self.cause = ""
-        self.how = ""
+        self.result = ""
         self.unreleased: tuple[str, ...] = ()
 
     def switch_on(self, start: Callable[[], T]) -> T:
@@ -79,7 +79,7 @@ class PowerDown:
     def __enter__(self) -> Self:
         """Start the block."""
         # This file may be interrupted only in its callees.
-        self._interrupts.spared = lambda frame: (
+        self._interrupts.is_spared = lambda frame: (
             frame is not None and frame.f_code.co_filename == __file__
         )
         return self
@@ -91,26 +91,26 @@ class PowerDown:
         elif isinstance(error, Exception) and not isinstance(error, DriverError):
             self.cause = self.cause or f"fault: unexpected {_error_text(error)}"
         if self._on:
-            self.leave()
+            self.shut_down()
         elif self._starting:  # an interrupted start may have left torque on
-            self._interrupts.never_raise()
+            self._interrupts.only_record()
             with contextlib.suppress(BaseException):
                 self._torque_off()
-            self._interrupts.tolerated = max(1, self._interrupts.requests)
+            self._interrupts.tolerated_requests = max(1, self._interrupts.requests)
 
-    def leave(self) -> None:
+    def shut_down(self) -> None:
         """Park, switch the torque off, close, and report the result; never raise."""
         interrupts = self._interrupts
         asked = interrupts.requests
         # The next request skips the rest of parking; a further one interrupts parking that hangs.
-        interrupts.tolerated = asked + 1
+        interrupts.tolerated_requests = asked + 1
         how = ""
         try:
             if self._park is not None:
                 how = f"{self._park(lambda: interrupts.requests > asked)}, "
         except BaseException as error:
             how = f"not parked ({_error_text(error)}), "
-        interrupts.never_raise()
+        interrupts.only_record()
         failed = True
         try:
             self.unreleased = tuple(group_events(self._torque_off() or ()))
@@ -119,11 +119,11 @@ class PowerDown:
             how += f"torque-off could not be sent ({_error_text(error)}){self._left}"
             self.unreleased = (_error_text(error),)
         self._on = self._starting = False
-        self.how = how
+        self.result = how
         with contextlib.suppress(Exception):
             if failed or not self._quiet:
                 self._report(f"stopped by {self.cause}: {how}" if self.cause else how)
-        interrupts.tolerated = max(1, interrupts.requests)
+        interrupts.tolerated_requests = max(1, interrupts.requests)
 
 
 def _error_text(error: BaseException) -> str:

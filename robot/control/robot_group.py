@@ -18,9 +18,9 @@ class NamedRobot(NamedTuple):
     name: str
     robot: Robot
 
-    def seen(self) -> OtherHead:
+    def describe(self) -> OtherHead:
         """Return a description of its present activity."""
-        newest = self.robot.newest
+        newest = self.robot.newest_tick
         if newest is None:
             return OtherHead(self.name, "has not begun")
         return OtherHead(self.name, head_activity(newest).headline, newest.guard_result.level)

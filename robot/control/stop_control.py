@@ -24,7 +24,7 @@ class StopControl:
         self._released_s = 0.0
 
     @property
-    def why(self) -> str:
+    def stop_reason(self) -> str:
         """Return the reason for a stop, "" while the robot moves."""
         return self._latch.why
 

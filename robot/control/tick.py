@@ -21,8 +21,8 @@ class Tick(NamedTuple):
         events: Texts of events on the bus and of the camera.
         commands: Commands executed at the beginning of this tick.
         stopped: Reason for a stop, "" while the robot moves.
-        led: Client that controls gaze or joints, and its command; "" without one.
-        lead: State of the newest client's control, with arrival at its target.
+        controlled_by: Client that controls gaze or joints, and its command; "" without one.
+        client_control: State of the newest client's control, with arrival at its target.
         gesture: The newest gesture and its state.
         parking: The run is over and the head moves to its parking pose; such ticks are only
             displayed.
@@ -40,12 +40,12 @@ class Tick(NamedTuple):
     events: tuple[str, ...] = ()
     commands: tuple[Command, ...] = ()
     stopped: str = ""
-    led: str = ""
-    lead: ControlState = NO_CLIENT_CONTROL
+    controlled_by: str = ""
+    client_control: ControlState = NO_CLIENT_CONTROL
     gesture: GestureState = NO_GESTURE
     parking: bool = False
 
-    def while_parking(
+    def parking_tick(
         self,
         t_s: float,
         joints: JointState,

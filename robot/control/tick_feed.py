@@ -54,7 +54,11 @@ class TickFeed:
     def progress(self) -> Progress:
         """Return the states of control and gesture in the newest tick."""
         tick = self.newest
-        return Progress(tick.lead, tick.gesture, tick.led) if tick is not None else Progress()
+        return (
+            Progress(tick.client_control, tick.gesture, tick.controlled_by)
+            if tick is not None
+            else Progress()
+        )
 
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
         """Return the stored events with numbers above ``after``, the oldest first."""

@@ -55,7 +55,7 @@ class TickRow(NamedTuple):
     Attributes:
         dt_s: Time since the previous tick.
         percept: Number of the percept, None without one.
-        as_desired: Whether ``guard_result.desired_rad`` equals ``desired_rad``.
+        command_is_desired: Whether ``guard_result.desired_rad`` equals ``desired_rad``.
         commands: JSON from ``command_json.as_recorded_json``.
         before: Further inputs of the run, for a recording.
     """
@@ -69,12 +69,12 @@ class TickRow(NamedTuple):
     gaze: GazeCommand
     desired_rad: JointAngles
     guard_result: GuardResult
-    as_desired: bool
+    command_is_desired: bool
     events: tuple[str, ...]
     commands: list[dict[str, Any]]
     stopped: str
-    led: str
-    lead: ControlState
+    controlled_by: str
+    client_control: ControlState
     gesture: GestureState
     parking: bool
     before: list[Any]
@@ -122,7 +122,7 @@ class TickStream:
         self._number = 0
         self._again = False
 
-    def add(self, name: str, take: Callable[[TickBatch], bool]) -> None:
+    def add_sink(self, name: str, take: Callable[[TickBatch], bool]) -> None:
         """Add a sink, which returns False if it loses a batch."""
         self._sinks = (*self._sinks, (name, take))
 
@@ -168,8 +168,8 @@ class TickStream:
                 tick.t_s, dt_s, None if percept is None else self._number, tick.joints, tick.pose,
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
-                [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.led,
-                tick.lead, tick.gesture, tick.parking, before,
+                [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.controlled_by,
+                tick.client_control, tick.gesture, tick.parking, before,
             ))  # fmt: skip
         return encode((percepts, rows))
 

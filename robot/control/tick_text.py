@@ -74,7 +74,7 @@ class Activity(NamedTuple):
 
 def tick_control_source(tick: Tick) -> ControlSource:
     """Return the source of control of the head."""
-    return control_source(tick.stopped, tick.parking, tick.lead, tick.gesture)
+    return control_source(tick.stopped, tick.parking, tick.client_control, tick.gesture)
 
 
 def head_activity(tick: Tick) -> Activity:
@@ -86,7 +86,7 @@ def head_activity(tick: Tick) -> Activity:
     if found.level == "torque_off" and leads.kind not in ("stopped", "parking"):
         limp = f"the torque is off: {' and '.join(found.critical_reasons[:1]) or 'guard'}"
         return Activity(limp, target_name(tick.target), limp, phase)
-    if leads.led:
+    if leads.overrides_gaze:
         phase = {"joint": "held", "stopped": "stopped", "parking": "parking"}.get(leads.kind, phase)
         distance = _distance_text(tick) if leads.kind in ("person", "pointer") else ""
         return Activity(said + distance, control_title(leads), said + distance, phase)
@@ -120,9 +120,13 @@ def control_text(tick: Tick) -> str:
 
     e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
     """
-    if not tick.led:
+    if not tick.controlled_by:
         return ""
-    return tick.led if tick.lead.by == "joint" else tick.led + _distance_text(tick)
+    return (
+        tick.controlled_by
+        if tick.client_control.kind == "joint"
+        else tick.controlled_by + _distance_text(tick)
+    )
 
 
 def _distance_text(tick: Tick) -> str:

@@ -118,7 +118,7 @@ def serve(
     outbox = Outbox(
         feed,
         name=name,
-        leads=browsers.led_by,
+        leads=browsers.give_control,
     )
     pointer = PointerToLook(
         lambda browser: camera_of(server, browser),
@@ -127,8 +127,8 @@ def serve(
         move_opponent=lambda point: outbox.ask(as_json(MoveOpponent(point)), DOOR),
     )
     door = AuthProxy(
-        host, open_port, inside, outbox.hand_on, stop, token, browsers, widgets, pointer.take,
-        outbox.picture, rig,
+        host, open_port, inside, outbox.forward, stop, token, browsers, widgets, pointer.take,
+        outbox.send_picture, rig,
     )  # fmt: skip
     door.open()
     text = []
@@ -154,7 +154,7 @@ def show_until_closed(feed: MessageLink, view: PageView, parent: int, served: Se
         if clock.now_s() >= beat_s:
             # Started here and sent by the door's thread, so both are alive.
             beat_s = clock.now_s() + _BEAT_S
-            door.soon(served.outbox.beat)
+            door.call_soon(served.outbox.send_heartbeat)
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
         if readable:
             live.watched = view.watched()
@@ -200,10 +200,10 @@ def main(arguments: list[str]) -> int:
         except OSError as error:
             sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
             return CANNOT_OPEN
-        served.door.admission.once = os.environ.pop(ONCE_VARIABLE, "")
+        served.door.admission.one_time_token = os.environ.pop(ONCE_VARIABLE, "")
         if served.words is not None:
             feed.send(NOTICE + served.words.encode())
-        view = PageView(served.server, served.door.widgets, served.outbox, served.door.tell)
+        view = PageView(served.server, served.door.widgets, served.outbox, served.door.send_state)
         feed.send(URL + served.url.encode())
         show_until_closed(feed, view, int(parent), served)
         served.door.close()

@@ -93,7 +93,7 @@ class PageView:
 
     def watched(self) -> bool:
         """Return whether any browser shows the page."""
-        return self._widgets.watched or bool(self._server.get_clients())
+        return self._widgets.is_watched or bool(self._server.get_clients())
 
     def show(self, news: News) -> None:
         """Draw the newest data; without a browser it is kept until one connects."""
@@ -114,7 +114,7 @@ class PageView:
                     "emulated": self.emulated,
                     "opponent": self._world_now is not None and has_opponent(self._world_now.shapes),
                     "refused": refused_moves(self._menus, shot.joints),
-                    **headline_json(shot.leader, shot),
+                    **headline_json(shot.control_source, shot),
                 })  # fmt: skip
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
@@ -126,14 +126,14 @@ class PageView:
         self._watched = watched
         if watched or not self._drawn:
             # Browsers receive a snapshot as a whole.
-            with self._server.atomic(), self._widgets.hold():
+            with self._server.atomic(), self._widgets.hold_changes():
                 self._draw()
 
     def _take(self, kind: bytes, data: object) -> None:
         """Apply messages of the rig other than snapshots and frames."""
         if kind == MESSAGE and isinstance(data, list):
             who, text = data
-            self._controls.answered(who)
+            self._controls.record_answer(who)
             if text:
                 client = who.partition(":")[0]
                 self._widgets.notify(
@@ -143,18 +143,18 @@ class PageView:
                     refused=text.startswith(_REFUSED),
                 )
         elif kind == PARAMS and isinstance(data, list):
-            self._controls.params(data)
+            self._controls.add_params(data)
         elif isinstance(data, dict):
             if kind == CHOICES:
                 self._menus = data
                 self._controls.offer(data)
             elif kind == VALUES:
-                self._controls.values(data)
+                self._controls.update_values(data)
             elif kind == REPLAY:
                 if self._replay is None:
                     duration_s = data.get("duration_s")
                     assert isinstance(duration_s, int | float)  # the rig's side writes it first
-                    self._controls.leave()
+                    self._controls.remove_controls()
                     self._tell({"recording": True})
                     self._replay = ReplayView(
                         self._widgets.panel("replay"),
@@ -198,8 +198,8 @@ class PageView:
 def headline_json(leader: ControlSource, shot: Snapshot) -> dict[str, object]:
     """Return the source of control and the activity of the head, for the page's headline."""
     return {
-        "leads": leader.kind,
-        "leads_words": control_sentence(leader, shot.t_s),
+        "control_kind": leader.kind,
+        "control_sentence": control_sentence(leader, shot.t_s),
         "headline": shot.headline,
         "busy": shot.busy,
     }

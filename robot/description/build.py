@@ -47,9 +47,11 @@ def joint_torques_nm(
     """
     own = {}
     for name, joint in joints.items():
-        shaft_nm = joint.facts.stall_torque_nm * (joint.torque_limit or 1.0)
+        shaft_nm = joint.model_facts.stall_torque_nm * (joint.torque_limit or 1.0)
         # Where the turns of the servo for one of the joint are the most.
-        own[name] = shaft_nm * (joint.made().steepest * 2.0 * pi / joint.facts.steps_per_turn)
+        own[name] = shaft_nm * (
+            joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
+        )
     found = dict(own)
     for first, second, coupling in coupled_pairs(couplings):
         if first in joints and second in joints:

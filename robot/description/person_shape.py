@@ -221,7 +221,7 @@ class _EyeParts(NamedTuple):
     eye: list[Painted]
     glint: Painted
     lid: Painted
-    still: list[Painted]
+    fixed_mesh: list[Painted]
 
 
 def _eye_parts(look: PersonLook, fineness: float, around: int = 48) -> _EyeParts:

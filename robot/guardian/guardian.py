@@ -115,11 +115,11 @@ class Guardian:
         """Report to the guardian that a port's torque is off."""
         self._heartbeat.arm(plan, False)
 
-    def releasing(self, plan: int) -> bool:
+    def is_releasing(self, plan: int) -> bool:
         """Return whether the guardian is releasing a plan's servos now."""
         return self._heartbeat.state(plan) == RELEASING
 
-    def released(self, plan: int) -> bool:
+    def is_released(self, plan: int) -> bool:
         """Return whether the guardian has released a plan's servos or is releasing them."""
         return self._heartbeat.state(plan) != IDLE
 
@@ -146,7 +146,7 @@ class Guardian:
             self._process.wait()
         self._close_pipes(self._process)
         for i in range(len(self.plans)):
-            if self.releasing(i):  # the dead guardian cannot finish
+            if self.is_releasing(i):  # the dead guardian cannot finish
                 self._heartbeat.set_state(i, RELEASED)
         if code is None:
             why = "did not respond"
@@ -178,7 +178,7 @@ class Guardian:
             return
         ending, self._process = self._process, None
         self._close_pipes(ending)
-        if any(self._heartbeat.armed(i) for i in range(len(self.plans))):
+        if any(self._heartbeat.is_armed(i) for i in range(len(self.plans))):
             return
         try:
             ending.wait(GOODBYE_S)
@@ -188,8 +188,8 @@ class Guardian:
 
     def _is_hung(self, pid: int, now_s: float) -> bool:
         """Return whether the guardian is suspended or has not read the heartbeat for too long."""
-        if self._heartbeat.looks != self._looks[0]:
-            self._looks = self._heartbeat.looks, now_s
+        if self._heartbeat.checks != self._looks[0]:
+            self._looks = self._heartbeat.checks, now_s
         # A guardian that is still starting has not read yet: its last time is infinity.
         return now_s - self._looks[1] > HUNG_S or child_process.is_suspended(pid)
 
@@ -202,7 +202,7 @@ class Guardian:
     def _start(self) -> None:
         """Start the process."""
         self._ready = False
-        self._looks = self._heartbeat.looks, inf
+        self._looks = self._heartbeat.checks, inf
         self._process = child_process.start(
             _MODULE,
             str(self._fd),
@@ -258,8 +258,8 @@ class GuardedBus:
         """
         self._beat()
         self._guardian.check(now_s)
-        if self._lost_hold or self._guardian.released(self._plan):
-            if self._guardian.releasing(self._plan):
+        if self._lost_hold or self._guardian.is_released(self._plan):
+            if self._guardian.is_releasing(self._plan):
                 return self._silent
             self._restore_torque(now_s)
         feedback = self._bus.read(now_s)
@@ -291,7 +291,7 @@ class GuardedBus:
             ValueError: a goal is not a number, or their number is not that of the servos.
         """
         self._beat()
-        if self._lost_hold or self._guardian.released(self._plan):
+        if self._lost_hold or self._guardian.is_released(self._plan):
             return
         self._bus.write(goals_steps)
 

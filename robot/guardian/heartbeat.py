@@ -57,12 +57,12 @@ class Heartbeat:
         """Return the counter."""
         return self._beats[0]
 
-    def look(self) -> None:
+    def count_check(self) -> None:
         """Count one check of the heartbeat; only the guardian may call it."""
         self._looks[0] += 1
 
     @property
-    def looks(self) -> int:
+    def checks(self) -> int:
         """Return how often a guardian has checked the heartbeat."""
         return self._looks[0]
 
@@ -70,7 +70,7 @@ class Heartbeat:
         """Record whether a plan's servos may be under torque."""
         self._flags[2 * plan] = armed
 
-    def armed(self, plan: int) -> bool:
+    def is_armed(self, plan: int) -> bool:
         """Return whether a plan's servos may be under torque."""
         return self._flags[2 * plan] != 0
 

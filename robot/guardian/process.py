@@ -123,7 +123,7 @@ class ProgramWatch:
     def run(self) -> None:
         """Monitor the program until it ends or closes the pipe, then release armed servos."""
         while not self._is_program_gone():
-            self._heartbeat.look()
+            self._heartbeat.count_check()
             self._release_if_hung(self._clock.now_s())
         self._release_all()
 
@@ -145,7 +145,7 @@ class ProgramWatch:
                 self._release_hung(i)
 
     def _armed_plans(self) -> list[int]:
-        return [i for i in range(len(self._plans)) if self._heartbeat.armed(i)]
+        return [i for i in range(len(self._plans)) if self._heartbeat.is_armed(i)]
 
     def _release_hung(self, i: int) -> None:
         """Release one plan's servos while the program has the port open."""

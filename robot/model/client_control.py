@@ -37,7 +37,7 @@ class ClientControl:
         point: Point to look at, world frame, None without one.
         person: Id of the person to look at, None without one.
         pose_rad: Held joint angles, empty while the models move the joints.
-        words: Client and command as text, "" without a client.
+        controlled_by: Client and command as text, "" without a client.
         state: State at the last tick.
     """
 
@@ -45,7 +45,7 @@ class ClientControl:
         self.point: Vec3 | None = None
         self.person: int | None = None
         self.pose_rad: JointAngles = ()
-        self.words = ""
+        self.controlled_by = ""
         self.state = NO_CLIENT_CONTROL
         self._shifts = 0
         self._jogged: dict[str, float] = {}
@@ -62,12 +62,12 @@ class ClientControl:
     @property
     def active(self) -> bool:
         """Return whether a client is in control."""
-        return bool(self.words)
+        return bool(self.controlled_by)
 
     @property
     def needs_camera(self) -> bool:
         """Return False if a client has chosen a point or joints, which need no camera."""
-        return not self.words or self.person is not None
+        return not self.controlled_by or self.person is not None
 
     def look(self, command: Look, point: Vec3 | None, t_s: float) -> None:
         """Look at a point, or free the gaze; joints are no longer held.
@@ -124,7 +124,7 @@ class ClientControl:
             self._renewed_s = t_s
         return mine
 
-    def over(self, t_s: float) -> str:
+    def expiry_reason(self, t_s: float) -> str:
         """Return the reason for the control to end now, "" if it continues or there is none."""
         if not self.active:
             return ""
@@ -148,12 +148,12 @@ class ClientControl:
         """Return the client's target instead of attention's, if there is one."""
         if self.point is None and self.person is None:
             return target
-        chosen = self.chosen(percept, t_s)
+        chosen = self.chosen_target(percept, t_s)
         if chosen is None:
             return target
         return chosen._replace(shift=target.shift + self._shifts, saliences=target.saliences)
 
-    def chosen(self, percept: Percept | None, t_s: float) -> Target | None:
+    def chosen_target(self, percept: Percept | None, t_s: float) -> Target | None:
         """Return the client's target, None without one."""
         if self.person is None:
             if self.point is None:
@@ -208,7 +208,7 @@ class ClientControl:
         elif not isinstance(command, Jog):
             self._pointer = False
         self._describe()
-        if self.words:
+        if self.controlled_by:
             self.state = self._new_state(self.state.number + 1, t_s)
 
     def _new_state(self, number: int, t_s: float) -> ControlState:
@@ -224,7 +224,13 @@ class ClientControl:
             angles = (f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
             what = ", ".join(angles)
         return ControlState(
-            number, True, by=by, who=self._who, what=what, joints=joints, since_s=self._since_s
+            number,
+            True,
+            kind=by,
+            who=self._who,
+            description=what,
+            joints=joints,
+            since_s=self._since_s,
         )
 
     def _release(self, why: str) -> None:
@@ -233,7 +239,7 @@ class ClientControl:
         self.pose_rad = ()
         self._jogged.clear()
         if self.state.active:
-            self.state = ControlState(self.state.number, arrived=self.state.arrived, ended=why)
+            self.state = ControlState(self.state.number, arrived=self.state.arrived, end_reason=why)
 
     def _describe(self) -> None:
         """Update the text of client and command."""
@@ -243,9 +249,9 @@ class ClientControl:
         elif self.point is not None or self.person is not None:
             what = self._what
         else:
-            self.words = ""
+            self.controlled_by = ""
             return
-        self.words = f"{self._who or 'a client'}: {what}"
+        self.controlled_by = f"{self._who or 'a client'}: {what}"
 
 
 def _target_text(command: Look) -> str:

@@ -229,7 +229,7 @@ Command = (
 )
 
 REPEATED = (Renew, SetLevel, MoveOpponent)
-"""Commands that programs send many times per second; they give no message and no mark."""
+"""Commands that programs send many times per second; they send no message and no mark."""
 
 COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
@@ -272,7 +272,7 @@ class StopLatch:
         return new
 
     @property
-    def by(self) -> str:
+    def stopped_by(self) -> str:
         """Return the clients that stopped, "" if unknown."""
         return " and ".join(sorted(filter(None, self._stoppers)))
 
@@ -289,8 +289,12 @@ class StopLatch:
         if left_s > 0.0:
             return f"a stop holds at least {MIN_HOLD_S:g} s: ask again in {left_s:.1f} s"
         if not command.confirmed and self._stoppers != {command.who}:
-            by = f"stopped by {self.by}" if self.by else "another client stopped it"
-            return f"{by}: another may only resume who confirms that no hand is in the mechanism"
+            stopped_by = (
+                f"stopped stopped_by {self.stopped_by}"
+                if self.stopped_by
+                else "another client stopped it"
+            )
+            return f"{stopped_by}: another may only resume who confirms that no hand is in the mechanism"
         return ""
 
     def lift(self) -> None:

@@ -24,11 +24,11 @@ class ControlState(NamedTuple):
         active: Whether it is active.
         arrived: Whether the measured gaze has reached the point, or the joints their angles.
         error_rad: Measured error of the gaze or of the worst joint, 0 while not active.
-        ended: Reason for its end, "" while it is active.
-        by: Kind while it is active: a person or program that chose the target, a person's mouse
+        end_reason: Reason for its end, "" while it is active.
+        kind: Kind while it is active: a person or program that chose the target, a person's mouse
             pointer, or held joints.
         who: Name of the client.
-        what: Command as text, e.g. "look at 1 0 0.3".
+        description: Command as text, e.g. "look at 1 0 0.3".
         joints: Held joints.
         since_s: Start of the same client's uninterrupted control of this kind.
     """
@@ -37,10 +37,10 @@ class ControlState(NamedTuple):
     active: bool = False
     arrived: bool = False
     error_rad: float = 0.0
-    ended: str = ""
-    by: Literal["person", "pointer", "joint"] = "person"
+    end_reason: str = ""
+    kind: Literal["person", "pointer", "joint"] = "person"
     who: str = ""
-    what: str = ""
+    description: str = ""
     joints: tuple[str, ...] = ()
     since_s: float = 0.0
 
@@ -51,14 +51,14 @@ class GestureState(NamedTuple):
     Attributes:
         number: Number of the gesture since the start, 0 before the first.
         name: Name of the present gesture, "" if there is none.
-        ended: Reason for its end, "" if it is playing or has finished.
+        end_reason: Reason for its end, "" if it is playing or has finished.
         who: Name of the client, "" if unknown.
         since_s: Time of its start.
     """
 
     number: int = 0
     name: str = ""
-    ended: str = ""
+    end_reason: str = ""
     who: str = ""
     since_s: float = 0.0
 
@@ -73,19 +73,19 @@ class ControlSource(NamedTuple):
     Attributes:
         kind: Kind of control.
         who: Name of the client for display, "" for none or unknown.
-        what: E.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, a stop's reason.
+        description: E.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, a stop's reason.
         joints: Held joints.
         since_s: Start of the control on the rig's clock, None if unknown.
     """
 
     kind: ControlKind = "gaze"
     who: str = ""
-    what: str = ""
+    description: str = ""
     joints: tuple[str, ...] = ()
     since_s: float | None = None
 
     @property
-    def led(self) -> bool:
+    def overrides_gaze(self) -> bool:
         """Return whether something other than the gaze models moves or holds the head."""
         return self.kind not in ("gaze", "gesture")
 
@@ -107,7 +107,7 @@ def control_source(
         return ControlSource("parking")
     if lead.active:
         who = lead.who or "a client"
-        return ControlSource(lead.by, who, lead.what, lead.joints, lead.since_s)
+        return ControlSource(lead.kind, who, lead.description, lead.joints, lead.since_s)
     if gesture.name:
         return ControlSource("gesture", gesture.who, gesture.name, (), gesture.since_s)
     return ControlSource()
@@ -125,7 +125,7 @@ def control_title(leader: ControlSource) -> str:
         case "joint":
             return f"{' and '.join(leader.joints) or 'joints'} held"
         case "gesture":
-            return leader.what
+            return leader.description
         case _:
             return leader.kind
 
@@ -141,15 +141,15 @@ def control_sentence(leader: ControlSource, t_s: float) -> str:
         case "gaze":
             return "nobody leads: it chooses by itself what to look at"
         case "person":
-            said = f"{leader.who} makes it {leader.what}"
+            said = f"{leader.who} makes it {leader.description}"
         case "pointer":
             said = f"it looks at the pointer of {leader.who}"
         case "joint":
-            said = f"{leader.who} holds {leader.what}"
+            said = f"{leader.who} holds {leader.description}"
         case "gesture":
-            said = f"it plays {leader.what}" + (f" for {leader.who}" if leader.who else "")
+            said = f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
         case "stopped":
-            return f"stopped: {leader.what}; the torque is off"
+            return f"stopped: {leader.description}; the torque is off"
         case "parking":
             return "it moves to its parking pose, then the torque goes off"
         case "recording":

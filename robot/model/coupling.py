@@ -223,16 +223,16 @@ class MeasuredGrid:
     def joint_rad(self, servos: Pair) -> Pair:
         """Return the joint angles of servo angles."""
         near = self._cells.near(servos)
-        weights = [triangle.inside(servos) for triangle in near]
+        weights = [triangle.least_weight(servos) for triangle in near]
         if not weights or max(weights) < 0.0:  # beyond the grid
-            near, weights = self._triangles, [one.inside(servos) for one in self._triangles]
+            near, weights = self._triangles, [one.least_weight(servos) for one in self._triangles]
         return near[weights.index(max(weights))].joints(servos)
 
     def rates(self, joints: Pair) -> Rates:
         """Return how fast the servos turn for each joint's speed, at joint angles."""
         return self._at(joints).slopes
 
-    def holds(self, joints: Pair) -> bool:
+    def contains(self, joints: Pair) -> bool:
         """Return whether joint angles are within the grid."""
         return (
             self._firsts[0] <= joints[0] <= self._firsts[-1]
@@ -284,7 +284,7 @@ class _Triangle:
         first, second = _multiply(self._back, _subtract(servos, self._base))
         return self.at[0] + first, self.at[1] + second
 
-    def inside(self, servos: Pair) -> float:
+    def least_weight(self, servos: Pair) -> float:
         """Return the least of a point's three weights: negative outside."""
         (u1, v1), (u2, v2), area = self._legs
         assert self._back is not None

@@ -58,9 +58,9 @@ class CouplingParams:
         missing = [key for key in needed if getattr(self, key) is None]
         if self.kind == "parallel" and (missing or self.horn_mm == 0.0):
             raise ValueError(f"a parallel coupling needs {', '.join(missing or ['a horn_mm'])}")
-        self.made()
+        self.make_coupling()
 
-    def made(self) -> Coupling:
+    def make_coupling(self) -> Coupling:
         """Build the coupling.
 
         Raises:
@@ -98,7 +98,9 @@ class CoupledPair(NamedTuple):
 
 def coupled_pairs(couplings: Mapping[str, CouplingParams]) -> tuple[CoupledPair, ...]:
     """Return the coupled pairs of a rig."""
-    return tuple(CoupledPair(one.first, one.second, one.made()) for one in couplings.values())
+    return tuple(
+        CoupledPair(one.first, one.second, one.make_coupling()) for one in couplings.values()
+    )
 
 
 def joint_partners(pairs: Iterable[CoupledPair]) -> dict[str, str]:
@@ -115,14 +117,14 @@ def unreachable_text(pair: CoupledPair, joints: Mapping[str, JointParams]) -> st
     """
     for at in _joint_grid(pair, joints):
         where = f"{pair.first} {degrees(at[0]):g}, {pair.second} {degrees(at[1]):g} deg"
-        if isinstance(pair.coupling, MeasuredGrid) and not pair.coupling.holds(at):
+        if isinstance(pair.coupling, MeasuredGrid) and not pair.coupling.contains(at):
             return f"cannot reach {where}: its points do not go so far"
         try:
             servos = pair.coupling.servo_rad(at)
         except Unreachable as error:
             return f"cannot reach {where}: {error}"
         for name, angle in zip((pair.first, pair.second), servos, strict=True):
-            facts, steps = joints[name].facts, joints[name].steps(angle)
+            facts, steps = joints[name].model_facts, joints[name].steps(angle)
             if not facts.lowest <= steps <= facts.highest:
                 low, high, at_ = (
                     value / facts.unit_steps for value in (facts.lowest, facts.highest, steps)
@@ -157,7 +159,7 @@ def pair_setups(
     accels = [radians(joints[name].max_accel_deg_s2) for name in names]
     found = {}
     for k, name in enumerate(names):
-        joint, linkage = joints[name], joints[name].made()
+        joint, linkage = joints[name], joints[name].make_linkage()
         slopes = [rate[k] for rate in rates]
         fastest = max(_combined_limit(slope, speeds) for slope in slopes)
         quickest = max(_combined_limit(slope, accels) for slope in slopes)

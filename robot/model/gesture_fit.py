@@ -28,7 +28,7 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import further_joints
 
 _SMALLEST = 0.2
-"""A gesture of which a range leaves less than this share is not played, as it is hardly visible."""
+"""A gesture of which a range leaves less than this share is not gesture, as it is hardly visible."""
 _ROUNDING = 1e-6
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -42,16 +42,16 @@ class FittedGesture(NamedTuple):
     """A gesture fitted to this rig.
 
     Attributes:
-        played: The gesture to play.
+        gesture: The gesture to play.
         slowed_by: Factor by which it takes longer than requested.
         slow_joint: Joint that needs this factor.
-        smaller: (joint, remaining share of its motion) for joints whose ranges are too small.
+        reduced_joints: (joint, remaining share of its motion) for joints whose ranges are too small.
     """
 
-    played: PlayedGesture
+    gesture: PlayedGesture
     slowed_by: float = 1.0
     slow_joint: str = ""
-    smaller: tuple[tuple[str, float], ...] = ()
+    reduced_joints: tuple[tuple[str, float], ...] = ()
 
 
 class GestureMotions(NamedTuple):
@@ -146,7 +146,7 @@ class GestureFit:
         self._own = np.where(self._matrix > 0.0, self._matrix, 0.0)
         self._own[[channels.index(lid) for lid in LID_TRACKS]] = 0.0
 
-    def without(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
+    def subtract_offset(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
         """Return commanded joint angles without the offset's part."""
         angles: Floats = np.array(commanded_rad) - state.value @ self._matrix
         return angles

@@ -32,7 +32,7 @@ class JointLimit(NamedTuple):
     lowest_v: float = 0.0
     highest_v: float = inf
 
-    def within(self, reach: "JointLimit") -> "JointLimit":
+    def reduced_to(self, reach: "JointLimit") -> "JointLimit":
         """Return these limits with range and speed reduced to a servo's own limits."""
         return self._replace(
             low_rad=min(max(self.low_rad, reach.low_rad), reach.high_rad),
@@ -203,7 +203,7 @@ class JointParams:
         facts = SERVOS.get(self.model)
         if facts is None:
             return
-        linkage = self.made()
+        linkage = self.make_linkage()
         if self.transmission_points:
             least, most = self.transmission_points[0][0], self.transmission_points[-1][0]
             if not least <= self.min_deg < self.max_deg <= most:
@@ -223,7 +223,7 @@ class JointParams:
                 raise ValueError(f"{key} {angle} {at}")
 
     @property
-    def facts(self) -> ServoModelInfo:
+    def model_facts(self) -> ServoModelInfo:
         """Return the data of its servo model.
 
         Raises:
@@ -234,15 +234,15 @@ class JointParams:
     @property
     def zero(self) -> int:
         """Return the servo position at 0 deg, in the unit of its model."""
-        return self.zero_step if self.zero_step is not None else self.facts.middle
+        return self.zero_step if self.zero_step is not None else self.model_facts.middle
 
-    def made(self) -> Linkage:
+    def make_linkage(self) -> Linkage:
         """Build the linkage between servo and joint.
 
         Raises:
             ValueError: The linkage is impossible.
         """
-        facts = self.facts
+        facts = self.model_facts
         if self.transmission_points:
             angles, places = zip(*self.transmission_points, strict=True)
             return MeasuredLinkage(
@@ -253,15 +253,15 @@ class JointParams:
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""
-        return self.made().steps(angle_rad)
+        return self.make_linkage().steps(angle_rad)
 
     def angle_rad(self, steps: float) -> float:
         """Return the joint angle of a servo position."""
-        return self.made().angle_rad(steps)
+        return self.make_linkage().angle_rad(steps)
 
     def limit(self) -> JointLimit:
         """Return the limits in radians, and those of the servo's own protection."""
-        facts = self.facts
+        facts = self.model_facts
         return JointLimit(
             radians(self.min_deg),
             radians(self.max_deg),
@@ -282,7 +282,7 @@ class JointParams:
             rest_rad: Assumed angle at torque-on of a servo without feedback: the parking pose.
             gentle_deg_s: Highest speed at which a joint outside its range moves inside.
         """
-        linkage, facts = self.made(), self.facts
+        linkage, facts = self.make_linkage(), self.model_facts
         ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))
         own = self.servo_speed_deg_s
         return ServoConfig(

@@ -38,7 +38,7 @@ class Capsule(NamedTuple):
     end_m: Vec3
     radius_m: float
 
-    def holds(self, p_m: Vec3) -> bool:
+    def contains(self, p_m: Vec3) -> bool:
         """Return whether a point is inside."""
         axis = sub(self.end_m, self.start_m)
         along = dot(sub(p_m, self.start_m), axis) / max(dot(axis, axis), 1e-12)
@@ -152,7 +152,7 @@ class Kinematics:
         p = add(self._base, rotate(R_world_base, sub(p, self._base)))
         return compose(R_world_base, R), p
 
-    def own_parts(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
+    def body_volumes(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
         """Return approximate volumes of head and neck in the world.
 
         The head extends from the neck's pitch axis to the point between the eyes, with the eyes'
@@ -162,7 +162,7 @@ class Kinematics:
         head = Capsule(pivot, p_world_head_m, 2.0 * self._half)
         return head, Capsule(self._base, pivot, self._half)
 
-    def facing(self, p_world_m: Vec3, base_rad: Angles2 = _UPRIGHT) -> Angles2:
+    def neck_angles_to(self, p_world_m: Vec3, base_rad: Angles2 = _UPRIGHT) -> Angles2:
         """Return the neck yaw and pitch at which the head's x axis passes through a point.
 
         The axis passes above the pivot by the arm's height, so the pitch is that of the point
@@ -181,7 +181,7 @@ class Kinematics:
             return (atan2(y, x), atan2(z, level))
         return (atan2(y, x), atan2(z, level) - asin(above / distance))
 
-    def eyes_on(
+    def eye_angles_to(
         self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
     ) -> tuple[Angles2, Angles2]:
         """Return left and right (yaw, pitch) in the head that fixate a point.

@@ -29,13 +29,13 @@ class Progress(NamedTuple):
     """The progress of a client's command and of a gesture.
 
     Attributes:
-        lead, gesture: The newest ones.
-        led: Client that controls gaze or joints, and its command; "" without one.
+        client_control, gesture: The newest ones.
+        controlled_by: Client that controls gaze or joints, and its command; "" without one.
     """
 
-    lead: ControlState = NO_CLIENT_CONTROL
+    client_control: ControlState = NO_CLIENT_CONTROL
     gesture: GestureState = NO_GESTURE
-    led: str = ""
+    controlled_by: str = ""
 
 
 def command_outcome(reply: CommandReply, now: Progress) -> tuple[Outcome, str] | None:
@@ -46,16 +46,20 @@ def command_outcome(reply: CommandReply, now: Progress) -> tuple[Outcome, str] |
     if played:
         newest = now.gesture
         if newest.number > played:
-            return "taken over", f"another gesture: {newest.name or newest.ended}"
-        if newest.number < played or newest.name and not newest.ended:
+            return "taken over", f"another gesture: {newest.name or newest.end_reason}"
+        if newest.number < played or newest.name and not newest.end_reason:
             return None
-        return ("taken over", newest.ended) if newest.ended else ("arrived", "")
-    if reply.lead == 0:  # it takes no control: done as soon as accepted
+        return ("taken over", newest.end_reason) if newest.end_reason else ("arrived", "")
+    if reply.control_number == 0:  # it takes no control: done as soon as accepted
         return "arrived", ""
     if reply.error_rad > ARRIVED_RAD:
         return "out of reach", reply.text()
-    if now.lead.number == reply.lead:
-        if now.lead.arrived:
+    if now.client_control.number == reply.control_number:
+        if now.client_control.arrived:
             return "arrived", ""
-        return None if now.lead.active else ("taken over", now.lead.ended)
-    return ("taken over", now.led or now.lead.ended) if now.lead.number > reply.lead else None
+        return None if now.client_control.active else ("taken over", now.client_control.end_reason)
+    return (
+        ("taken over", now.controlled_by or now.client_control.end_reason)
+        if now.client_control.number > reply.control_number
+        else None
+    )

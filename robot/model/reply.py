@@ -50,7 +50,7 @@ class GestureReply(NamedTuple):
         duration_s: Time until everything is at rest again.
         slowed_by: Factor by which it takes longer than requested.
         slow_joint: Joint whose limits need this factor.
-        smaller: (joint, share of its motion that its range leaves).
+        reduced_joints: (joint, share of its motion that its range leaves).
         left_out: Joints of the gesture that the rig lacks.
         number: Number of the gesture (``gazerig.robot.model.control_source.GestureState``).
     """
@@ -59,7 +59,7 @@ class GestureReply(NamedTuple):
     duration_s: float
     slowed_by: float = 1.0
     slow_joint: str = ""
-    smaller: tuple[tuple[str, float], ...] = ()
+    reduced_joints: tuple[tuple[str, float], ...] = ()
     left_out: tuple[str, ...] = ()
     number: int = 0
 
@@ -70,7 +70,7 @@ class GestureReply(NamedTuple):
         parts = [f"{self.name} takes {self.duration_s:.1f} s"]
         if self.slow_joint:
             parts.append(f"slower by {self.slowed_by:.2f} for {self.slow_joint}")
-        parts += [f"{joint} moves {share:.0%} as far" for joint, share in self.smaller]
+        parts += [f"{joint} moves {share:.0%} as far" for joint, share in self.reduced_joints]
         if self.left_out:
             parts.append(f"without {', '.join(self.left_out)}")
         return "; ".join(parts)
@@ -86,7 +86,7 @@ class CommandReply(NamedTuple):
         joints: Joints that cannot reach their angles; for a jog, all commanded joints.
         error_rad: Angle between the point and the line of sight at the end of the motion, of the
             worse eye, or of the mean line of sight if one linkage pans both eyes.
-        lead: Number of the control that it started (``ControlState``),
+        control_number: Number of the control that it started (``ControlState``),
             0 for none.
         gesture: Gesture that is played, None for other commands.
     """
@@ -96,7 +96,7 @@ class CommandReply(NamedTuple):
     done_m: Vec3 | None = None
     joints: tuple[JointReply, ...] = ()
     error_rad: float = 0.0
-    lead: int = 0
+    control_number: int = 0
     gesture: GestureReply | None = None
 
     @property
@@ -120,7 +120,7 @@ class CommandReply(NamedTuple):
             return ends
         if self.error_deg < _ON_POINT_DEG:
             return "it looks there"
-        return f"it looks {self.error_deg:.0f} deg beside it" + (f": {ends}" if ends else "")
+        return f"it looks {self.error_deg:.0f} deg off" + (f": {ends}" if ends else "")
 
     def as_json(self) -> dict[str, object]:
         """Return plain JSON values: angles in deg, lengths in m, text."""
@@ -130,7 +130,7 @@ class CommandReply(NamedTuple):
             "asked_m": self.asked_m,
             "done_m": self.done_m,
             "error_deg": self.error_deg,
-            "lead": self.lead,
+            "control_number": self.control_number,
             "joints": [
                 {
                     "joint": one.joint,
@@ -167,11 +167,13 @@ class CommandReply(NamedTuple):
         asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
         gesture = data.get("gesture")
         if gesture is not None:
-            smaller = tuple((joint, share) for joint, share in gesture["smaller"])
-            changed = {"smaller": smaller, "left_out": tuple(gesture["left_out"])}
+            reduced = tuple((joint, share) for joint, share in gesture["reduced_joints"])
+            changed = {"reduced_joints": reduced, "left_out": tuple(gesture["left_out"])}
             gesture = GestureReply(**{**gesture, **changed})
         error_rad = radians(data["error_deg"])
-        return cls(data["refused"], asked, done, joints, error_rad, data.get("lead", 0), gesture)
+        return cls(
+            data["refused"], asked, done, joints, error_rad, data.get("control_number", 0), gesture
+        )
 
 
 def _point(data: Any) -> Vec3 | None:
@@ -199,4 +201,4 @@ class Ticket:
 
 
 CommandTaker = Callable[[Command], Ticket | None]
-"""Takes a command for the next tick, like Robot.command; returns None if there is no reply."""
+"""Accepts a command for the next tick, like Robot.command; returns None if there is no reply."""

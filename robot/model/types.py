@@ -324,9 +324,9 @@ class Snapshot:
             control, the kind of control, -1 and None.
         character, conversation: Present ones, "" if unknown.
         stopped: Reason for a stop, "" while the robot moves.
-        led: Client in control, its command and how well the head can follow; "" without one.
-        leader: Source of control.
-        leads_words: Source of control in one sentence.
+        control_text: Client in control, its command and how well the head can follow; "" without one.
+        control_source: Source of control.
+        control_sentence: Source of control in one sentence.
         headline: Present activity of the head in one sentence.
         frame_age_s: Age of the newest frame, None before the first.
         commanded_pose: Poses of head and eyes at the desired angles.
@@ -374,9 +374,9 @@ class Snapshot:
     character: str = ""
     conversation: str = ""
     stopped: str = ""
-    led: str = ""
-    leader: ControlSource = ControlSource()
-    leads_words: str = ""
+    control_text: str = ""
+    control_source: ControlSource = ControlSource()
+    control_sentence: str = ""
     headline: str = ""
     frame_age_s: float | None = None
     commanded_pose: CommandedPose | None = None

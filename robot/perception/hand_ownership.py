@@ -130,7 +130,7 @@ def label_own_body(
         parts: of the head, at its exposure. A part around the camera is not visible.
         p_camera: position of the camera.
     """
-    seen = [part for part in parts if not part.holds(p_camera)]
+    seen = [part for part in parts if not part.contains(p_camera)]
     if not seen:
         return things
     return [

@@ -81,9 +81,9 @@ class _MovingPatch:
 
     at_s: last time of a hand's motion; p_face: face of its person; frames: number of frames with it
     hand: the hand at that time
-    large: successive frames in which it was too large for a hand at the person's distance
-    wide: number of frames in which it entered at the side and was too wide for that
-    nearer: its distance over that of the person, by its size or that of the palm
+    large_frames: successive frames in which it was too large for a hand at the person's distance
+    wide_frames: number of frames in which it entered at the side and was too wide for that
+    distance_share: its distance over that of the person, by its size or that of the palm
     palm_s: last time at which a palm was found there
     """
 
@@ -91,9 +91,9 @@ class _MovingPatch:
     p_face: Vec3
     hand: LocalisedDetection
     frames: int = 0
-    large: int = 0
-    wide: int = 0
-    nearer: float = 1.0
+    large_frames: int = 0
+    wide_frames: int = 0
+    distance_share: float = 1.0
     palm_s: float = -inf
 
     def update_distance(self, thing: LocalisedDetection, arm: "_Arm") -> None:
@@ -110,19 +110,19 @@ class _MovingPatch:
             # The first frames decide. An arm that slows down looks thinner, as less of it moves,
             # but does not recede; a later change of its distance would look like motion along the
             # view.
-            self.wide += 1
-            if self.wide <= _WIDE_FRAMES:
-                before = self.nearer if self.wide > 1 else 0.0
-                self.nearer = before + (_WIDE_M / wide_m - before) / self.wide
-        if self.wide:
+            self.wide_frames += 1
+            if self.wide_frames <= _WIDE_FRAMES:
+                before = self.distance_share if self.wide_frames > 1 else 0.0
+                self.distance_share = before + (_WIDE_M / wide_m - before) / self.wide_frames
+        if self.wide_frames:
             return
         large = thing.compact and radius_m > _TOO_LARGE * _ALONE_M
         seen = _ALONE_M / radius_m if large else 1.0
-        self.large = self.large + 1 if large else 0
-        if self.large == _LARGE_FRAMES:
-            self.nearer = min(self.nearer, seen)
-        elif self.large == 0 or self.large > _LARGE_FRAMES:
-            self.nearer += _NEARER_GAIN * (seen - self.nearer)
+        self.large_frames = self.large_frames + 1 if large else 0
+        if self.large_frames == _LARGE_FRAMES:
+            self.distance_share = min(self.distance_share, seen)
+        elif self.large_frames == 0 or self.large_frames > _LARGE_FRAMES:
+            self.distance_share += _NEARER_GAIN * (seen - self.distance_share)
 
 
 class _RestingHand(NamedTuple):
@@ -264,12 +264,12 @@ class Hands:
             if palm is not None:
                 palms.remove(palm)
                 known.palm_s = t_s
-                known.nearer = _horizontal_distance_m(
+                known.distance_share = _horizontal_distance_m(
                     palm.p_world_m, p_camera
                 ) / _horizontal_distance_m(arm.tip_m, p_camera)
             elif t_s - known.palm_s > _PALM_S:
                 known.update_distance(thing, arm)
-            hand = _as_hand(thing, arm, known.nearer, p_camera)
+            hand = _as_hand(thing, arm, known.distance_share, p_camera)
             if palm is not None:
                 hand = replace(hand, p_world_m=palm.p_world_m, along_sd_m=palm.along_sd_m)
             elif t_s - known.palm_s <= _PALM_S:

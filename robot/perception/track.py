@@ -242,12 +242,12 @@ class Track:
     speech: of a face, recent motion of the mouth
     eyes: of a face, last seen state of the eyes
     clothes: of a person, as learned
-    returned: the person whose number a person's new track has got, None for a new number;
-        numbered: whether that is final, as the clothes are known
-    box_m, lower_face: as of a detection, usual values of the face; bare: number of frames with
-        them; lower_var: relative variance from frame to frame
-    covered: number of frames with a covered lower half of the face; covered_s: capture time of the
-        last of them; cover_share: factor of its distance since
+    returned_person: the person whose number a person's new track has got, None for a new number;
+        is_number_final: whether that is final, as the clothes are known
+    box_m, lower_face: as of a detection, usual values of the face
+    uncovered_frames: number of frames with them; lower_var: relative variance between frames
+    covered_frames: number of frames with a covered lower half of the face
+    covered_s: capture time of the last of them; cover_share: factor of its distance since
     """
 
     id: int
@@ -265,13 +265,13 @@ class Track:
     faced_s: float = -inf
     frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)
-    returned: SeenPerson | None = None
-    numbered: bool = False
+    returned_person: SeenPerson | None = None
+    is_number_final: bool = False
     box_m: float = 0.0
     lower_face: float = 0.0
     lower_var: float = _SHAPE_SD * _SHAPE_SD
-    bare: int = 0
-    covered: int = 0
+    uncovered_frames: int = 0
+    covered_frames: int = 0
     covered_s: float = -inf
     cover_share: float = 1.0
 

@@ -120,7 +120,7 @@ def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> No
         if one is not people[k]:
             one.id = number
             one.clothes = KnownClothes(colours, frames, lost_sight=one.clothes.lost_sight)
-            one.returned, one.numbered = None, True
+            one.returned_person, one.is_number_final = None, True
             if one.seen_s < one.at_s and frames < _OWN:
                 tracks.remove(one)  # no new person came: it was this one
 
@@ -195,7 +195,7 @@ class Tracker:
         for i, j in pairs:
             self._update_track(self._tracks[i], detections[j], p_world_camera_m)
         if self._worn is not None:
-            given = {t.id for t in self._tracks if t.is_person and t.returned is None}
+            given = {t.id for t in self._tracks if t.is_person and t.returned_person is None}
             resolve_identities(self._tracks, self._worn, dict(pairs), detections, self._params)
             self._free |= given - {t.id for t in self._tracks}
         taken = {j for _, j in pairs}
@@ -211,9 +211,9 @@ class Tracker:
                     track.id = ids.pop(detection.mark, track.id)
                 self._tracks.append(track)
         for track in self._tracks:
-            if track.is_person and not track.numbered and track.clothes.frames >= _CLOTHED:
+            if track.is_person and not track.is_number_final and track.clothes.frames >= _CLOTHED:
                 self._number(track)
-                track.numbered = True
+                track.is_number_final = True
         kept = [
             t
             for t in self._tracks
@@ -221,7 +221,7 @@ class Tracker:
         ]
         for track in self._tracks:
             if track.is_person and track not in kept:
-                self._leave(track)
+                self._retire_track(track)
         self._tracks = kept
         return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
 
@@ -318,16 +318,16 @@ class Tracker:
     def _number(self, track: Track) -> None:
         """Give a person's new track the number of the person who has come back, or a free one."""
         par, now_s = self._params, track.at_s
-        if track.returned is not None:
-            self._left.append(track.returned)
+        if track.returned_person is not None:
+            self._left.append(track.returned_person)
         gone = [
             one
             for one in self._tracks
             if one.is_person and one is not track and self._is_remembered(one)
         ]
-        before, known = track.returned, [*self._left, *map(_person, gone)]
+        before, known = track.returned_person, [*self._left, *map(_person, gone)]
         recent = [one for one in known if now_s - one.seen_s <= par.remember_person_s]
-        track.returned = back = find_returned(recent, _person(track))
+        track.returned_person = back = find_returned(recent, _person(track))
         if back is None:
             if before is not None or not track.id:
                 track.id = self._new_number()
@@ -347,12 +347,12 @@ class Tracker:
         self._next_person += 1
         return self._next_person - 1
 
-    def _leave(self, track: Track) -> None:
+    def _retire_track(self, track: Track) -> None:
         """Remember a person who left; a false detection gives its number back."""
         if track.frames >= _KNOWN:
             self._left = [*self._left, _person(track)][-_MOST_LEFT:]
-        elif track.returned is not None:
-            self._left.append(track.returned)
+        elif track.returned_person is not None:
+            self._left.append(track.returned_person)
         else:
             self._free.add(track.id)
 
@@ -363,7 +363,7 @@ class Tracker:
         if covered:
             place = _covered_position(track, detection, place, p_camera)
         else:
-            track.covered, track.cover_share = 0, 1.0
+            track.covered_frames, track.cover_share = 0, 1.0
             _learn_shape(track, detection)
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
@@ -401,7 +401,7 @@ class Tracker:
 
 def _person(track: Track) -> SeenPerson:
     """Return the features of the person of a track."""
-    before, worn = track.returned, track.clothes.colours
+    before, worn = track.returned_person, track.clothes.colours
     size = None if track.depth_s is None else track.face_size
     if before is not None:
         size = before.face_size if size is None else size
@@ -414,11 +414,11 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
 
     The network places hidden points nearer to the visible ones: the face seems to be farther away.
     """
-    if found.depth_measured or track.bare < _BARE or not found.lower_face > 0.0:
+    if found.depth_measured or track.uncovered_frames < _BARE or not found.lower_face > 0.0:
         return False
     # The points of a far face jump more than those of a near one.
     least = min(_COVERED, 1.0 - _COVERED_SDS * sqrt(track.lower_var))
-    if found.lower_face < (0.5 + 0.5 * least if track.covered else least) * track.lower_face:
+    if found.lower_face < (0.5 + 0.5 * least if track.covered_frames else least) * track.lower_face:
         track.covered_s = track.at_s
     return track.at_s - track.covered_s <= _COVERED_S
 
@@ -431,8 +431,8 @@ def _covered_position(track: Track, found: LocalisedDetection, place: Vec3, p_ca
     measured = sub(place, p_camera)
     share = sqrt(track.box_m / found.box_m)
     now = track.filter.range_m / (share * max(norm(measured), NEAREST_M))
-    track.covered += 1
-    gain = max(1.0 / track.covered, _COVER_GAIN)
+    track.covered_frames += 1
+    gain = max(1.0 / track.covered_frames, _COVER_GAIN)
     track.cover_share += gain * (min(max(now, 1.0 / _MOST_OFF), _MOST_OFF) - track.cover_share)
     return add(p_camera, scale(measured, share * track.cover_share))
 
@@ -441,13 +441,13 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
     """Learn the sizes of the box and the lower half of a face while nothing covers it."""
     if not (found.box_m > 0.0 and found.lower_face > 0.0):
         return
-    track.bare += 1
-    gain = max(1.0 / track.bare, _SHAPE_GAIN)
+    track.uncovered_frames += 1
+    gain = max(1.0 / track.uncovered_frames, _SHAPE_GAIN)
     track.box_m += gain * (found.box_m - track.box_m)
     off = found.lower_face - track.lower_face
     track.lower_face += gain * off
-    gain = max(1.0 / (track.bare + _BARE), _SHAPE_GAIN)
-    if track.bare > 1:
+    gain = max(1.0 / (track.uncovered_frames + _BARE), _SHAPE_GAIN)
+    if track.uncovered_frames > 1:
         track.lower_var += gain * ((off / track.lower_face) ** 2 - track.lower_var)
 
 

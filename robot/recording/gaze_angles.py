@@ -175,9 +175,9 @@ class GazeAnglesBuilder:
                 self._jogged = bool(command.angles_rad)
             elif isinstance(command, Stop):
                 self._jogged = False
-        if self._led and not tick.led:  # a timeout, for which there is no command
+        if self._led and not tick.controlled_by:  # a timeout, for which there is no command
             self._jogged = False
-        self._led = tick.led
+        self._led = tick.controlled_by
         known = not (tick.stopped or self._jogged)
         movement = _CODE[tick.gaze.phase] if known else 0
         self._codes.extend((movement, tick.gaze.blink and known, self._number(tick)))

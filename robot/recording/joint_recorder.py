@@ -32,9 +32,9 @@ class ForwardingBody(Body):
         """Apply new joint parameters."""
         return self._body.retune(joints, gentle_deg_s)
 
-    def reach(self) -> tuple[JointLimit, ...]:
+    def configured_limits(self) -> tuple[JointLimit, ...]:
         """Return the ranges and speeds that the servos are configured to keep."""
-        return self._body.reach()
+        return self._body.configured_limits()
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo."""

@@ -73,8 +73,8 @@ _DESCRIPTIONS = {
     "measured": "false: the servo reports nothing, this is its goal moved at known speeds; "
     "empty: all are measured",
     "stopped": "why the robot was stopped",
-    "led": "client that controls gaze or joints, and its command",
-    "lead": "the newest command of a client; left out before the first",
+    "controlled_by": "client that controls gaze or joints, and its command",
+    "client_control": "the newest command of a client; left out before the first",
     "gesture": "the newest gesture; left out before the first",
     "plan": "choice of the action planner and its reason; left out without a planner",
     "is_lost": "it is out of sight and its last position is looked at; left out if in sight",
@@ -120,7 +120,7 @@ _TICK["description"] = (
 )
 _TICK["properties"]["guard_result"]["properties"]["desired_rad"]["type"] = ["array", "null"]
 _TICK["properties"]["commands"]["items"] = _ORDER
-for _unwritten in ("as_desired", "parking"):
+for _unwritten in ("command_is_desired", "parking"):
     del _TICK["properties"][_unwritten]
 _PERCEPT = {
     **_object(number=_WHOLE, **type_schema(Percept)["properties"]),

@@ -80,9 +80,9 @@ _BODY_RECORDS: dict[str, type[BodyRecord]] = {
 _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
 _NESTED: dict[str, Any] = {
     "joints": JointState, "pose": GazeState, "target": Target, "gaze": GazeCommand,
-    "guard_result": GuardResult, "lead": ControlState, "gesture": GestureState,
+    "guard_result": GuardResult, "client_control": ControlState, "gesture": GestureState,
 }  # fmt: skip
-_NOTHING = {"lead": list(NO_CLIENT_CONTROL), "gesture": list(NO_GESTURE)}
+_NOTHING = {"client_control": list(NO_CLIENT_CONTROL), "gesture": list(NO_GESTURE)}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
@@ -92,7 +92,7 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     """Return a tick from ``tick_stream.decode_plain`` as JSON.
 
     Fields without information are left out: ``guard_result.desired_rad`` if it equals the
-    tick's (null), ``lead`` and ``gesture`` before the first, ``target.plan`` without a planner,
+    tick's (null), ``client_control`` and ``gesture`` before the first, ``target.plan`` without a planner,
     ``target.is_lost`` of a target in sight.
 
     Args:
@@ -108,7 +108,7 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     target, gaze = data["target"], data["gaze"]
     target["saliences"] = [_name_fields(Salience, one) for one in target["saliences"]]
     gaze["limited"] = [_name_fields(LimitedAngle, one) for one in gaze["limited"]]
-    if data.pop("as_desired"):  # nearly always: written once
+    if data.pop("command_is_desired"):  # nearly always: written once
         data["guard_result"]["desired_rad"] = None
     for name in ("plan", "is_lost"):
         if not target[name]:
@@ -164,8 +164,10 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         tuple(data["events"]),
         tuple([command_from_json(command) for command in data["commands"]]),
         data["stopped"],
-        data["led"],
-        _build(ControlState, data["lead"]) if "lead" in data else NO_CLIENT_CONTROL,
+        data["controlled_by"],
+        _build(ControlState, data["client_control"])
+        if "client_control" in data
+        else NO_CLIENT_CONTROL,
         _build(GestureState, data["gesture"]) if "gesture" in data else NO_GESTURE,
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])

@@ -173,7 +173,7 @@ class ControlHeartbeat:
         self._thread.start()
 
     @property
-    def leads(self) -> bool:
+    def in_control(self) -> bool:
         """Return whether the rig confirmed the last heartbeat."""
         return self._thread.is_alive() and not self._over.is_set()
 
@@ -314,7 +314,7 @@ class RobotClient:
         """Return the present values that differ from the rig's file."""
         return _changes(self._connection.ask("unsaved"))
 
-    def differs(self) -> tuple[ParamChange, ...]:
+    def changed_from_defaults(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the defaults."""
         return _changes(self._connection.ask("differs"))
 
@@ -337,7 +337,7 @@ class RobotClient:
         """Return the names of the characters that can be applied to the rig."""
         return tuple(cast(list[str], self._connection.ask("characters")))
 
-    def character(self, name: str) -> tuple[str, ...]:
+    def apply_character(self, name: str) -> tuple[str, ...]:
         """Apply another character to the rig.
 
         Raises:
@@ -412,7 +412,7 @@ class RobotClient:
         Raises:
             RequestRejected: a coordinate is not finite, or the rig is stopped.
         """
-        return self.give(LookAt((x_m, y_m, z_m), self.who, stay))
+        return self.send(LookAt((x_m, y_m, z_m), self.who, stay))
 
     def fault(self, text: str) -> str:
         """Execute a fault command of the emulated servos; return a description of it.
@@ -427,7 +427,7 @@ class RobotClient:
 
     def look_freely(self) -> None:
         """Let the head choose its targets again."""
-        self.give(LookAt(None, self.who))
+        self.send(LookAt(None, self.who))
 
     def jog(self, joint: str, deg: float, stay: bool = False) -> CommandReply:
         """Hold all joints and move one to an angle.
@@ -441,18 +441,18 @@ class RobotClient:
             RequestRejected: there is no such joint, the angle is outside its range, or the rig is
                 stopped.
         """
-        return self.give(Jog(((joint, radians(deg)),), self.who, stay))
+        return self.send(Jog(((joint, radians(deg)),), self.who, stay))
 
     def jog_free(self) -> None:
         """Return the joints to the gaze models."""
         self._command(Jog((), self.who))
 
     @property
-    def leads(self) -> bool:
+    def in_control(self) -> bool:
         """Return whether this connection renews a manual control that the rig still follows."""
-        return self._heartbeat is not None and self._heartbeat.leads
+        return self._heartbeat is not None and self._heartbeat.in_control
 
-    def give(self, command: Command) -> CommandReply:
+    def send(self, command: Command) -> CommandReply:
         """Send any command; manual control without ``stay`` is renewed from now on.
 
         Raises:
@@ -461,11 +461,11 @@ class RobotClient:
         if command == LookAt(None, self.who):
             self._end_heartbeat()
         reply = self._command(command)
-        if not isinstance(command, ControlCommand) or not reply.lead:
+        if not isinstance(command, ControlCommand) or not reply.control_number:
             return reply
         if command.stay or self._dial is None:
             self._end_heartbeat()
-        elif not self.leads:
+        elif not self.in_control:
             self._end_heartbeat()
             try:
                 self._heartbeat = ControlHeartbeat(self._dial, self.who)

@@ -32,7 +32,7 @@ class Schemas:
     def __init__(self) -> None:
         self.named: dict[str, Schema] = {}
 
-    def of(self, kind: Any) -> Schema:
+    def schema(self, kind: Any) -> Schema:
         """Return the schema of a type; values of a rig file may be anything."""
         origin, inner = get_origin(kind), get_args(kind)
         if kind in _PLAIN:
@@ -42,14 +42,14 @@ class Schemas:
         if origin is Literal:
             return {"enum": list(inner)}
         if origin in (Union, types.UnionType):
-            return {"anyOf": [self.of(one) for one in inner]}
+            return {"anyOf": [self.schema(one) for one in inner]}
         if origin is tuple and inner[-1] is not ...:
-            each = [self.of(one) for one in inner]
+            each = [self.schema(one) for one in inner]
             return {"type": "array", "prefixItems": each, "minItems": len(each), "items": False}
         if origin is tuple:
-            return {"type": "array", "items": self.of(inner[0])}
+            return {"type": "array", "items": self.schema(inner[0])}
         if inner and issubclass(origin, Mapping):
-            return {"type": "object", "additionalProperties": self.of(inner[1])}
+            return {"type": "object", "additionalProperties": self.schema(inner[1])}
         if isinstance(kind, ForwardRef | str):  # the recursive Value
             return {}
         raise TypeError(f"no schema for {kind}")
@@ -74,7 +74,7 @@ class Schemas:
             names = [f.name for f in fields(kind)]
         else:
             optional, names = set(kind._field_defaults), list(kind._fields)
-        found = {name: self.of(hints[name]) for name in names}
+        found = {name: self.schema(hints[name]) for name in names}
         return found, [name for name in names if name not in optional]
 
 
@@ -94,7 +94,7 @@ def message_schemas(schemas: Schemas) -> dict[str, Schema]:
     """Return the schema of each message of a program, by its verb."""
     found = {}
     for name, (text, kinds) in _REQUESTS.items():
-        properties = {field: schemas.of(kind) for field, kind in kinds.items()}
+        properties = {field: schemas.schema(kind) for field, kind in kinds.items()}
         found[name] = _message_schema(name, text, properties, list(properties))
     for name, kind in ORDERS.items():
         found[name] = _message_schema(name, inspect.getdoc(kind) or "", *schemas.fields(kind))
@@ -105,7 +105,11 @@ def message_schemas(schemas: Schemas) -> dict[str, Schema]:
 def api_description(base: str) -> dict[str, Any]:
     """Return the OpenAPI description; ``base`` is the beginning of the paths."""
     schemas = Schemas()
-    state, event, outcome = schemas.of(HeadState), schemas.of(HeadEvent), schemas.of(Outcome)
+    state, event, outcome = (
+        schemas.schema(HeadState),
+        schemas.schema(HeadEvent),
+        schemas.schema(Outcome),
+    )
     requests = message_schemas(schemas)
     text = {"type": "string"}
     answer: Schema = {

@@ -75,7 +75,7 @@ class LoopMonitor:
         """Return the function that stores the newest tick, for the loop."""
         return self._feed.update
 
-    def taken_up(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
+    def wait_for_commands(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
         """Wait until all previous commands are executed; return whether they are.
 
         Args:
@@ -109,10 +109,10 @@ class LoopMonitor:
             "t_s": tick.t_s,
             "age_s": self._clock.now_s() - tick.t_s,
             "stopped": tick.stopped,
-            "led": tick.led,
-            "lead": control_text(tick),
-            "leads": leads.kind,
-            "leads_words": control_sentence(leads, tick.t_s),
+            "controlled_by": tick.controlled_by,
+            "control_text": control_text(tick),
+            "control_kind": leads.kind,
+            "control_sentence": control_sentence(leads, tick.t_s),
             "headline": does.headline,
             "busy": busy_text(self._timing()),
             "limited": [
@@ -212,7 +212,7 @@ class RequestHandler:
             match request:
                 case {"do": "hello", "version": int(version), **rest} if not rest:
                     return {"ok": self._greeting(version), **tag}
-            done = handler.do(request, partial(_set_client, peer))
+            done = handler.handle(request, partial(_set_client, peer))
             return {"ok": self._outcome_json(done), **tag}
         except _CommandRefused as error:
             return {"refused": str(error), "reply": error.reply.as_json(), **tag}
@@ -252,7 +252,7 @@ class RequestHandler:
                 if reply.refused:
                     raise _CommandRefused(reply)
                 if not isinstance(command, REPEATED):
-                    self._pulse.taken_up(ticks=1)  # so that the status includes it
+                    self._pulse.wait_for_commands(ticks=1)  # so that the status includes it
                 return {"notes": [], "reply": reply.as_json()}
 
     def _status(self) -> dict[str, object]:
@@ -265,7 +265,7 @@ class RequestHandler:
 
     def _wait_until_applied(self, notes: tuple[str, ...]) -> dict[str, object]:
         """Wait for the tick that applies the values; return the notes for the user."""
-        if not self._pulse.taken_up():
+        if not self._pulse.wait_for_commands():
             raise ValueError(_HANGS)
         return {"notes": list(notes)}
 

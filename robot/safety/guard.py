@@ -28,14 +28,14 @@ class _Hold(NamedTuple):
     Attributes:
         reason: The reason.
         goal: Angle to move to, None to stop.
-        slowly: Whether to move there slowly.
-        again: How the joint starts afterwards.
+        is_slow: Whether to move there slowly.
+        restart: How the joint starts afterwards.
     """
 
     reason: str
     goal: float | None = None
-    slowly: bool = False
-    again: Literal["at once", "slowly"] = "at once"
+    is_slow: bool = False
+    restart: Literal["at once", "slowly"] = "at once"
 
 
 class Guard:
@@ -85,7 +85,7 @@ class Guard:
         self._gentle_accel = radians(params.soft_start_accel_deg_s2)
         self._late_accel = radians(params.late_accel_deg_s2)
 
-    def pace(self, period_s: float) -> None:
+    def set_period(self, period_s: float) -> None:
         """Set the nominal time between ticks."""
         self._late.period_s = period_s
 
@@ -107,13 +107,13 @@ class Guard:
         self._change.retune(limits)
         self._calm = False
 
-    def recount(self, i: int, factor: float, offset_rad: float) -> None:
+    def rescale_joint(self, i: int, factor: float, offset_rad: float) -> None:
         """Convert a joint's angles after a change of its zero, sign or ratio.
 
         The angle x becomes factor * x + offset_rad. The servo's goal does not change. The
         desired angle may change, so the joint moves slowly.
         """
-        self._motion.recount(i, factor, offset_rad)
+        self._motion.rescale_joint(i, factor, offset_rad)
         self._stuck.forget(i)
         self._retreat[i] = None
         self._slow_down(i)
@@ -129,9 +129,9 @@ class Guard:
         for i, angle in enumerate(command_rad):
             self._change.begin(i, angle)
             self._stuck.forget(i)
-        self.go_gently()
+        self.start_gently()
 
-    def go_gently(self) -> None:
+    def start_gently(self) -> None:
         """Move slowly for some time, and each joint until it first reaches its desired angle."""
         self._calm = False
         for i in range(len(self._limits)):
@@ -145,7 +145,7 @@ class Guard:
         return tuple(self._limits)
 
     @property
-    def gentle(self) -> bool:
+    def is_gentle(self) -> bool:
         """Return whether any joint still moves slowly."""
         return any(self._gentle)
 
@@ -195,7 +195,7 @@ class Guard:
         """Move all joints; nearly every desired angle is passed on unchanged."""
         motion, far = self._motion, self._stuck.far_rad
         if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
-            motion.ease(dt_s)
+            motion.update_easy_range(dt_s)
         command, speed, goal = motion.command, motion.speed, motion.goal
         usual = self._are_all_well(joints) and not no_frame
         stale_s = self._t_s - self._params.joint_timeout_ms / 1e3
@@ -285,11 +285,11 @@ class Guard:
         if fault:  # a joint that still moves is parking
             self._slow_down(i)
         if hold is not None:
-            if hold.again == "slowly":
+            if hold.restart == "slowly":
                 self._slow_down(i)
             if hold.goal is None:
                 self._motion.brake(i, dt_s)
-            elif hold.slowly:
+            elif hold.is_slow:
                 self._seek_gently(i, hold.goal, dt_s)
             else:
                 limit = self._limits[i]
@@ -307,7 +307,7 @@ class Guard:
         if not powered:
             # The command follows the position, so that nothing jumps when the torque comes on.
             self._stuck.forget(i)
-            return _Hold("torque off", position if isfinite(position) else None, again="slowly")
+            return _Hold("torque off", position if isfinite(position) else None, restart="slowly")
         if "encoder" in fault:
             return _Hold(fault)
         if self._is_stalled(i, joints, fresh):
@@ -317,16 +317,18 @@ class Guard:
             return self._retreat_to(i, strain, position, fresh)
         if not fresh:
             return _Hold("stale joints")
-        return _Hold(strain, again="slowly") if strain else None
+        return _Hold(strain, restart="slowly") if strain else None
 
     def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
         """Return the hold of a joint for reasons other than its servo, else None."""
         if i in self._change.waiting:
             return _Hold("new limits")
         if i in self._collisions.exits:
-            return _Hold("self-collision", self._collisions.exits[i], slowly=True, again="slowly")
+            return _Hold(
+                "self-collision", self._collisions.exits[i], is_slow=True, restart="slowly"
+            )
         if i in self._collisions.still:
-            return _Hold("self-collision", again="slowly")
+            return _Hold("self-collision", restart="slowly")
         if i in self._change.outside:
             limit = self._limits[i]
             end = limit.low_rad if self._motion.command[i] < limit.low_rad else limit.high_rad
@@ -356,7 +358,7 @@ class Guard:
         back = self._retreat[i]
         if fresh and (back is None or abs(back - position) > self._stuck.far_rad):
             self._retreat[i] = back = position
-        return _Hold(reason, back, again="slowly")
+        return _Hold(reason, back, restart="slowly")
 
     def _seek_gently(
         self, i: int, goal: float, dt_s: float, top: float = inf, accel: float = inf

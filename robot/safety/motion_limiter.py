@@ -42,7 +42,7 @@ class MotionLimiter:
         self.easy_speed = [0.0] * len(limits)
         self.easy_low, self.easy_high = list(self.low), list(self.high)
 
-    def ease(self, dt_s: float) -> None:
+    def update_easy_range(self, dt_s: float) -> None:
         """Compute the easy range: steps of about this length in it keep every limit."""
         self.easy_s = 0.9 * dt_s  # ticks vary in length
         for i in range(len(self.limits)):
@@ -85,7 +85,7 @@ class MotionLimiter:
         """Discard the speed to regain, as a slow motion starts."""
         self._lost[i], self._slow[i] = 0.0, False
 
-    def recount(self, i: int, factor: float, offset_rad: float) -> None:
+    def rescale_joint(self, i: int, factor: float, offset_rad: float) -> None:
         """Convert a joint's angles: x becomes factor * x + offset_rad."""
         low, high, speed, accel = self.limits[i][:4]
         ends = sorted(factor * end + offset_rad for end in (low, high))
@@ -101,13 +101,13 @@ class MotionLimiter:
         self._lost[i] = 0.0
         self.reset_range(i)
 
-    def take(self, i: int, limit: JointLimit) -> None:
+    def set_limit(self, i: int, limit: JointLimit) -> None:
         """Change the limit."""
         self.limits[i] = limit
         self.goal[i] = self.command[i]
         self.reset_range(i)
 
-    def keeps(self, i: int, limit: JointLimit) -> bool:
+    def keeps_limit(self, i: int, limit: JointLimit) -> bool:
         """Return whether a joint's present motion keeps another limit."""
         p, v = self.command[i], self.speed[i]
         room = limit.high_rad - p if v > 0.0 else p - limit.low_rad
@@ -316,9 +316,9 @@ class LimitChange:
         if self.waiting:
             limits, motion = self._within_reach(), self._motion
             for i in sorted(self.waiting):
-                free = not walls and motion.keeps(i, limits[i])
+                free = not walls and motion.keeps_limit(i, limits[i])
                 if motion.speed[i] == 0.0 or free:
-                    motion.take(i, limits[i])
+                    motion.set_limit(i, limits[i])
                     self.waiting.discard(i)
                     self._update_outside(i)
         for i in sorted(self.outside):
@@ -328,7 +328,7 @@ class LimitChange:
         """Return the wanted limits, reduced to those that the servos keep."""
         if self._reach is None:
             return self._wanted
-        return tuple(map(JointLimit.within, self._wanted, self._reach()))
+        return tuple(map(JointLimit.reduced_to, self._wanted, self._reach()))
 
     def _update_outside(self, i: int) -> None:
         """Update whether a joint is outside its range."""

@@ -119,7 +119,7 @@ class Bench(NamedTuple):
         at = {servo["id"]: servo.get("place", servo.get("position")) for servo in self.servos()}
         park = park_rad(self.rig)
         return max(
-            abs(degrees(j.made().angle_rad(present(at[j.id])) - park.get(name, 0.0)))
+            abs(degrees(j.make_linkage().angle_rad(present(at[j.id])) - park.get(name, 0.0)))
             for name, j in self.rig.joints.items()
         )
 

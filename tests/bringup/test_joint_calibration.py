@@ -727,7 +727,7 @@ def test_the_range_lies_inside_what_was_marked(
     assert made.max_deg >= left - margin - 0.151 and made.min_deg <= margin - right + 0.151
     joint = replace(PAN, **made._asdict())
     assert joint.steps(0.0) == zero * 4
-    assert joint.made().rising == rising
+    assert joint.make_linkage().rising == rising
 
 
 def test_a_lid_ends_where_it_was_marked_and_its_keys_are_its_own() -> None:

@@ -244,7 +244,7 @@ def test_joints_of_three_kinds_move_together(other: Bench) -> None:
     estimated = {part.joint for part in moved.joints if part.estimated}
     joints = other.rig.joints
     assert estimated == {
-        name for name in other.rig.names if not joints[name].facts.measures_position
+        name for name in other.rig.names if not joints[name].model_facts.measures_position
     }
     where = other.where()
     assert {name: where[name] for name in asked} == pytest.approx(asked, abs=2.0)

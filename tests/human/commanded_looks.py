@@ -78,13 +78,13 @@ def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, s
 
 def _seen_and_not_ordered(robot: Any) -> None:
     """Have points taken for things that were seen: what is ordered is looked at exactly."""
-    chosen = robot._lead.chosen
+    chosen = robot._lead.chosen_target
 
     def seen(percept: Percept | None, t_s: float) -> Target | None:
         target: Target | None = chosen(percept, t_s)
         return None if target is None else target._replace(kind="thing")
 
-    robot._lead.chosen = seen
+    robot._lead.chosen_target = seen
 
 
 def _angles(pose: GazeState, plan: Vec3, target: Vec3) -> list[float]:

@@ -90,7 +90,7 @@ RECORDING = (
     Mutant("robot/recording/replay.py", "until - _MOST_KEPT_EVENTS)", "until - 5)",
            "after a leap few events are shown", ("replay",)),
     # ---- exports
-    Mutant("robot/recording/gaze_angles.py", "if self._led and not tick.led:", "if False:",
+    Mutant("robot/recording/gaze_angles.py", "if self._led and not tick.controlled_by:", "if False:",
            "after joints were led no movement is known", ("export",)),
     Mutant("robot/recording/gaze_angles.py",
            "if wanted == _PURSUIT or (before == other and after == other):", "if True:",

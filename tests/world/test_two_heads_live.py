@@ -119,7 +119,7 @@ def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
         if len(seen) % 10 == 0:
             turned.add(shapes.poses(0.0)[head])
             [other] = made.other_heads
-            assert other.seen().headline
+            assert other.describe().headline
         if len(seen) == 100:
             asked.request("the test")
 

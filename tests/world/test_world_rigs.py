@@ -48,7 +48,7 @@ def test_two_servos_move_two_joints_together(kind: str) -> None:
     rig = replace(load_rig("desk"), couplings={"neck": KINDS[kind]})
     bench = WorldBench(rig)
     pair = [bench.servos[name] for name in ("neck_pitch", "neck_roll")]
-    coupling = KINDS[kind].made()
+    coupling = KINDS[kind].make_coupling()
     joints = [rig.joints[name] for name in ("neck_pitch", "neck_roll")]
     for servo in pair:
         arm(servo)

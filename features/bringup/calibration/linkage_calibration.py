@@ -33,7 +33,7 @@ Place = tuple[float, float]
 
 def angle_now(joint: JointParams, position: float) -> float:
     """Return the angle of a position as the rig file has it, to a tenth of a degree."""
-    return round(degrees(joint.angle_rad(position * joint.facts.unit_steps)), 1) + 0.0
+    return round(degrees(joint.angle_rad(position * joint.model_facts.unit_steps)), 1) + 0.0
 
 
 def spread_between(one: float, other: float, count: int) -> list[float]:
@@ -158,7 +158,7 @@ class HobbyMarker:
         hobby, person = self._hobby, self._person
         at_us = hobby.open()
         if at_us is None:
-            rest = self.joint.made().steps(0.0) / self.joint.facts.unit_steps
+            rest = self.joint.make_linkage().steps(0.0) / self.joint.model_facts.unit_steps
             at_us = person.number(
                 f"{hobby.who} gets no pulses, so its position is not known: it goes to the first "
                 "one at once, at its own full speed. Keep your fingers out. "
@@ -285,5 +285,5 @@ def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: 
 def _angle(placer: Marker, person: Jogger, at: float, proposed: float) -> float:
     """Ask for the angle of the joint's present position."""
     towards = f" ({end_names(placer.name)[0]} is +)"
-    asked = f"{placer.name} at {at:g} {placer.joint.facts.unit}: how many degrees{towards}?"
+    asked = f"{placer.name} at {at:g} {placer.joint.model_facts.unit}: how many degrees{towards}?"
     return person.number(asked, proposed, placer.live)

@@ -251,7 +251,7 @@ class SmartServoAccess:
             raise CalibrationStopped(why)
         self._clock.sleep_until(self._at_s + PERIOD_S)
         if goal is not None:
-            if self._guardian is not None and self._guardian.released(0):
+            if self._guardian is not None and self._guardian.is_released(0):
                 raise ServoFault(
                     f"{self.who}: the program stood still, so its guardian switched the torque "
                     "off: start again"

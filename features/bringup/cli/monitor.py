@@ -66,7 +66,9 @@ def monitor(
     """Show the readings of all servos; nothing is written to them, the torque stays as it is."""
     leaving = contextlib.suppress(KeyboardInterrupt)
     with clear_errors(rig, port, mock), record_signals() as stopped, leaving:
-        stopped.tolerated = 0  # nothing to park: what waits for a stopped terminal ends at once
+        stopped.tolerated_requests = (
+            0  # nothing to park: what waits for a stopped terminal ends at once
+        )
         found, clock = load_rig(rig), RealClock()
         refuse_packages(found, "monitor")
         with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:
@@ -133,7 +135,7 @@ def _samples(
 
 def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
     """Lay a sample out as a table."""
-    hobby = any(not joint.facts.measures_position for joint in joints.values())
+    hobby = any(not joint.model_facts.measures_position for joint in joints.values())
     share = sample.unanswered / sample.asked
     caption = (
         f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; "
@@ -149,7 +151,7 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
     table.add_column("id", justify="right", no_wrap=True)
     # The place of a hobby servo is its pulse width in us.
     units = dict.fromkeys(
-        "step" if joint.facts.measures_position else "us" for joint in joints.values()
+        "step" if joint.model_facts.measures_position else "us" for joint in joints.values()
     )
     goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
     for name in (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V"):

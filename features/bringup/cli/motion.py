@@ -164,7 +164,9 @@ def _manual_control(
 
     name: the rig as the user named it, for the commands that messages suggest
     """
-    without_feedback = [name for name in rig.names if not rig.joints[name].facts.measures_position]
+    without_feedback = [
+        name for name in rig.names if not rig.joints[name].model_facts.measures_position
+    ]
     if without_feedback and not mock:
         with clear_errors(name, port):  # before Ctrl-C is only noted
             confirm_safe(

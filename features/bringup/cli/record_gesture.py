@@ -58,7 +58,7 @@ def record_gesture(
         from gazerig.robot.app.gesture_file import gesture_text, write_gesture
 
         loaded = load_rig(rig)
-        measured = [one for one in loaded.names if loaded.joints[one].facts.measures_position]
+        measured = [one for one in loaded.names if loaded.joints[one].model_facts.measures_position]
         if not measured:
             raise SetupError(
                 f"{rig}: hobby servos do not report their position: none can be recorded"

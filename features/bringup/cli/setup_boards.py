@@ -128,10 +128,10 @@ def _walk_channel(
     """
     clock = RealClock()
     with record_signals() as stopped:
-        stopped.never_raise()
+        stopped.only_record()
 
         def sleep_until(t_s: float) -> None:
-            stopped.refuse()
+            stopped.raise_if_requested()
             clock.sleep_until(t_s)
 
         return walk_channel(board, setup, places, sleep_until, *speed_steps_s)
@@ -148,7 +148,7 @@ def _try_channel(
     board: Board, setup: ServoConfig, joint: JointParams, yes: bool, explain: Explain
 ) -> bool:
     """Move one channel's servo until the person recognises it, or skips it."""
-    made, rest = joint.made(), _rest_steps(setup)
+    made, rest = joint.make_linkage(), _rest_steps(setup)
     angle, wiggle = made.angle_rad(rest), radians(WIGGLE_DEG)
     ends = (
         max(radians(joint.min_deg), angle - wiggle),

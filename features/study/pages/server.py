@@ -171,7 +171,7 @@ class StudyServer:
 
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
-            with self._connections.busy(request):
+            with self._connections.mark_busy(request):
                 theirs = request.path.startswith(_EXPERIMENTERS_PATHS)
                 admission = self._admissions[_EXPERIMENTER if theirs else _PARTICIPANT]
                 why_not = admission.refusal(request)
@@ -258,7 +258,7 @@ class StudyServer:
             self._experimenter.trouble = f"the film cannot be read: {error}"
             self._wake()
             return await _nothing(request)
-        self._connections.lasting(request)  # as long as a slow network takes
+        self._connections.mark_websocket(request)  # as long as a slow network takes
         answer = web.Response(body=body, content_type="video/webm", headers=HEADERS)
         answer.force_close()
         await answer.prepare(request)
@@ -283,7 +283,7 @@ class StudyServer:
         beat_s: float,
     ) -> None:
         """Send to a browser now, at news and at an interval, until it disconnects."""
-        self._connections.lasting(request)
+        self._connections.mark_websocket(request)
         news = asyncio.Event()
         self._news.add(news)
         try:

@@ -221,7 +221,7 @@ class HeadGroup:
             if not self._failures:
                 raise
         finally:
-            lead.never_raise()  # the others have yet to park
+            lead.only_record()  # the others have yet to park
             end_all("")
             self._world.leave(0)
             for thread in threads:

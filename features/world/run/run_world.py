@@ -83,19 +83,21 @@ def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus
     # Imports MuJoCo, which only runs in a world need.
     from gazerig.features.world.ideal_bus import WorldIdealBus
 
-    measured = [rig.joints[name].facts.measures_position for name in rig.names]
+    measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
     return WorldIdealBus(servo_configs(rig), world.ideal_shafts(number), measured, world.now_s)
 
 
 def _servo(rig: Rig, name: str) -> ServoInWorld:
     joint = rig.joints[name]
     joints: tuple[str, ...] = (name,)
-    transmission: Transmission = JointTransmission(joint.made())
+    transmission: Transmission = JointTransmission(joint.make_linkage())
     for first, second, coupling in coupled_pairs(rig.couplings):
         if name in (first, second):
             joints = first, second
-            transmission = PairTransmission(coupling, joints.index(name), joint.made())
-    return ServoInWorld(name, joint.bus, joint.id, joints, transmission, joint.facts.steps_per_turn)
+            transmission = PairTransmission(coupling, joints.index(name), joint.make_linkage())
+    return ServoInWorld(
+        name, joint.bus, joint.id, joints, transmission, joint.model_facts.steps_per_turn
+    )
 
 
 COARSE_HZ = 15.0

@@ -257,7 +257,7 @@ def world_camera(
 
     try:
         return world.pixels(
-            lambda: poses.state, poses.head, own.find_faces(rig.detector), True,
+            lambda: poses.state, poses.head, own.make_detector(rig.detector), True,
             SyntheticMotionDetector(rig.motion), locate, poses.begin_s,
         )  # fmt: skip
     except NoRenderer as error:

@@ -46,15 +46,15 @@ function show(now) {
   state = now;
   if (!state.silent) freshAt = performance.now();
   age();
-  const led = state.leads && state.leads !== "gaze";
+  const controlled = state.control_kind && state.control_kind !== "gaze";
   const headline = state.silent ? "nothing comes from the rig"
-    : state.headline || state.leads_words || (state.recording ? "a recording is shown" : "awake");
+    : state.headline || state.control_sentence || (state.recording ? "a recording is shown" : "awake");
   write($("#headline"), headline);
   // A change of control is read out; the target changes three times a second.
-  const leads = (state.leads_words ?? "").replace(LASTING, "");
-  write($("#leads"), headline.startsWith(leads) ? "" : state.leads_words);
-  write($("#announced"), led ? leads : "");
-  document.body.dataset.leads = state.leads ?? "";
+  const control = (state.control_sentence ?? "").replace(LASTING, "");
+  write($("#control"), headline.startsWith(control) ? "" : state.control_sentence);
+  write($("#announced"), controlled ? control : "");
+  document.body.dataset.control = state.control_kind ?? "";
   write($("#busy"), state.busy || "");
   $("#busy").hidden = !state.busy;
   document.title = `${state.stopped ? "■ stopped - " : state.silent ? "! silent - " : ""}gazerig`;
@@ -126,10 +126,10 @@ const pointerGone = () => { pointer = null; held = false; };
 
 setInterval(() => {
   const now = performance.now();
-  if (state.leads === "pointer") takesOver = false;
+  if (state.control_kind === "pointer") takesOver = false;
   if (!pointer || !(following() || boxing()) || document.hidden) return;
   if (!held && now - movedAt > RESTED_MS) return;
-  const free = takesOver || FREE.has(state.leads ?? "");
+  const free = takesOver || FREE.has(state.control_kind ?? "");
   if (state.stopped || state.recording || !(boxing() || free)) return;
   if (!moved && now - sentAt < AGAIN_MS) return;
   moved = false;

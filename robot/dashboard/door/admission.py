@@ -60,7 +60,7 @@ def _bearer(request: web.Request) -> str:
 class Admission:
     """Accepts or refuses requests by one token.
 
-    once: another token, which opens the page one time; "" for none
+    one_time_token: another token, which opens the page one time; "" for none
     """
 
     def __init__(self, host: str, port: int, token: str, cookie: str, otherwise: str) -> None:
@@ -76,7 +76,7 @@ class Admission:
         self._host, self._port = host, port
         self._token, self._cookie = token, cookie
         self._otherwise = otherwise
-        self.once = ""
+        self.one_time_token = ""
 
     def refusal(self, request: web.Request) -> str | None:
         """Return the reason why a request is refused, None if it is accepted."""
@@ -98,11 +98,11 @@ class Admission:
         if hmac.compare_digest(given.encode(errors="replace"), self._token.encode()):
             return None
         if (
-            self.once
+            self.one_time_token
             and not program
-            and hmac.compare_digest(given.encode(errors="replace"), self.once.encode())
+            and hmac.compare_digest(given.encode(errors="replace"), self.one_time_token.encode())
         ):
-            self.once = ""
+            self.one_time_token = ""
             return None
         return f"refused: {_SHOW if program else self._otherwise}"
 

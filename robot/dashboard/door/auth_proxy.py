@@ -146,7 +146,7 @@ class AuthProxy:
         if self._failed is not None:
             raise self._failed
 
-    def soon(self, do: Callable[[], None]) -> None:
+    def call_soon(self, do: Callable[[], None]) -> None:
         """Let the thread that serves browsers call a function.
 
         Raises:
@@ -158,7 +158,7 @@ class AuthProxy:
         """Return whether browsers can connect."""
         return self._thread.is_alive()
 
-    def tell(self, state: Mapping[str, object]) -> None:
+    def send_state(self, state: Mapping[str, object]) -> None:
         """Send the state to all stop buttons; may be called from any thread."""
         if state != self._state:
             self._state = dict(state)
@@ -177,7 +177,9 @@ class AuthProxy:
         self._loop.close()
 
     async def _serve(self) -> None:
-        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
+        app = web.Application(
+            middlewares=[self._admission_middleware()], client_max_size=ASKED_BYTES
+        )
         app.router.add_get("/rig/line", self._handle_line)
         app.router.add_get("/rig/panels", self._panels)
         app.router.add_get("/rig/webcam", self._webcam)
@@ -186,7 +188,7 @@ class AuthProxy:
         self._programs.add_to(app.router, lambda: self._connections)
         app.router.add_get(VIEW, self._relay_view)
         app.router.add_get(f"{VIEW}/{{path:.*}}", self._relay_view)
-        app.router.add_get("/{path:.*}", self._nothing)
+        app.router.add_get("/{path:.*}", self._not_found)
         runner = web.AppRunner(
             app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0, max_line_size=4096
         )
@@ -220,12 +222,12 @@ class AuthProxy:
 
     # --- admission ---------------------------------------------------------------------
 
-    def _doorkeeper(self) -> Middleware:
+    def _admission_middleware(self) -> Middleware:
         """Accept a request, redirect it to an address without token, or refuse it in one line."""
 
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
-            with self._connections.busy(request):
+            with self._connections.mark_busy(request):
                 why_not = self.admission.refusal(request)
                 is_program = request.path.startswith(API)
                 if why_not is not None and is_program:
@@ -252,7 +254,7 @@ class AuthProxy:
     def _name_cookie(self) -> str:
         return f"{self._cookie}_browser"
 
-    def _who(self, request: web.Request) -> str:
+    def _browser_name(self, request: web.Request) -> str:
         return self.browsers.name(request.cookies.get(self._name_cookie))
 
     # --- the stop button ------------------------------------------------------------------
@@ -261,7 +263,7 @@ class AuthProxy:
         """Send a request to the rig; answer whether it was accepted."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
-        who = self._who(request)
+        who = self._browser_name(request)
         status, text = await self._handle(add_client(body, who), who)
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=_HEADERS)
 
@@ -278,7 +280,7 @@ class AuthProxy:
         if not self._asked_rate.take(self._loop.time()):
             return 429, "too many requests; try again"
         if takes_control(asked):
-            self.browsers.led_by(who)
+            self.browsers.give_control(who)
         return (
             (204, "")
             if self._ask(encode_request(asked))
@@ -292,8 +294,8 @@ class AuthProxy:
         """
         line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False, autoping=False)
         await line.prepare(request)
-        self._connections.lasting(request)
-        who = self._who(request)
+        self._connections.mark_websocket(request)
+        who = self._browser_name(request)
         news = asyncio.Event()
         self._news.add(news)
         try:
@@ -323,13 +325,13 @@ class AuthProxy:
             if message.type is aiohttp.WSMsgType.PING:
                 async with asyncio.timeout(TAKES_S):
                     await line.pong(message.data)
-            elif message.type is aiohttp.WSMsgType.PONG and who == self.browsers.leading():
+            elif message.type is aiohttp.WSMsgType.PONG and who == self.browsers.in_control():
                 self._ask(encode_request({"do": "renew", "who": who}))
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
             asked = add_client(message.data, who)
             if asked is not None and "point" in asked:
-                self.browsers.led_by("")  # no control is renewed during pointer control
+                self.browsers.give_control("")  # no control is renewed during pointer control
                 self._point(asked["point"], who)
                 continue
             status, text = await self._handle(asked, who)
@@ -341,17 +343,19 @@ class AuthProxy:
     async def _panels(self, request: web.Request) -> web.StreamResponse:
         """Send the panels to a browser, as fast as it reads them."""
         socket = web.WebSocketResponse(max_msg_size=RECEIVED_BYTES, compress=False)
-        who = self._who(request)
-        return await self._last(
+        who = self._browser_name(request)
+        return await self._keep_open(
             request, socket, self._panel_tabs, lambda: self._panel_socket.serve(socket, who)
         )
 
     async def _webcam(self, request: web.Request) -> web.StreamResponse:
         """Receive the images of a browser's webcam."""
-        socket = self.webcam.prepared()
-        return await self._last(request, socket, self._webcams, lambda: self.webcam.serve(socket))
+        socket = self.webcam.new_socket()
+        return await self._keep_open(
+            request, socket, self._webcams, lambda: self.webcam.serve(socket)
+        )
 
-    async def _last(
+    async def _keep_open(
         self,
         request: web.Request,
         socket: web.WebSocketResponse,
@@ -360,8 +364,8 @@ class AuthProxy:
     ) -> web.StreamResponse:
         """Keep a websocket until it ends, the page closes or its slot is freed."""
         await socket.prepare(request)
-        self._connections.lasting(request)
-        with tabs.take(self._who(request)) as leave:
+        self._connections.mark_websocket(request)
+        with tabs.take(self._browser_name(request)) as leave:
             await until_one_ends(serve(), self._over.wait(), leave.wait())
         await close_socket(socket, request)
         return socket
@@ -380,7 +384,7 @@ class AuthProxy:
         """
         while True:
             await asyncio.sleep(_RENEWED_EVERY_S)
-            if who == self.browsers.leading():
+            if who == self.browsers.in_control():
                 async with asyncio.timeout(TAKES_S):
                     await line.ping()
 
@@ -388,10 +392,10 @@ class AuthProxy:
 
     async def _relay_view(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
-            return await self._view.relay(request, self._who(request), self._over.wait())
+            return await self._view.relay(request, self._browser_name(request), self._over.wait())
         if request.path == VIEW:  # paths in the document are relative to it
             return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
         return await self._view.get(request)
 
-    async def _nothing(self, request: web.Request) -> web.Response:
+    async def _not_found(self, request: web.Request) -> web.Response:
         return web.Response(status=404, text="there is no page at this address\n", headers=_HEADERS)

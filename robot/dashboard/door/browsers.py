@@ -55,11 +55,11 @@ class Browsers:
             with self._lock:
                 self._open[name] -= 1
 
-    def led_by(self, name: str) -> None:
+    def give_control(self, name: str) -> None:
         """Record the browser that controlled the head last."""
         self._leads = name
 
-    def leading(self) -> str:
+    def in_control(self) -> str:
         """Return the browser that controlled the head last, "" if it has disconnected."""
         with self._lock:
             return self._leads if self._leads and self._open[self._leads] > 0 else ""
@@ -135,7 +135,7 @@ class Connections:
         self._trim_soon()
 
     @contextmanager
-    def busy(self, request: web.BaseRequest) -> Iterator[None]:
+    def mark_busy(self, request: web.BaseRequest) -> Iterator[None]:
         """Record that a request is being answered."""
         state = self._states.get(request.protocol)
         if state is None:
@@ -148,7 +148,7 @@ class Connections:
         finally:
             state.busy, state.since_s = False, loop.time()
 
-    def lasting(self, request: web.BaseRequest) -> None:
+    def mark_websocket(self, request: web.BaseRequest) -> None:
         """Record that a request is a websocket, which the browser ends."""
         if (state := self._states.get(request.protocol)) is not None:
             state.lasting = True

@@ -118,7 +118,7 @@ class ProgramSocket:
 
     Attributes:
         news: set when there is something to send; alive: when the program has answered a ping.
-        leading: name under which it controls the head, "" if it does not.
+        controls_as: name under which it controls the head, "" if it does not.
     """
 
     def __init__(self, rate_hz: float, events: bool) -> None:
@@ -129,7 +129,7 @@ class ProgramSocket:
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
         self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
         self.news, self.alive = asyncio.Event(), asyncio.Event()
-        self.leading = ""
+        self.controls_as = ""
 
     def wanted_hz(self) -> float:
         """Return the rate at which it needs the state of the head."""
@@ -214,7 +214,7 @@ class ProgramRoutes:
         router.add_get(f"{BASE}/socket", self._socket)
         router.add_get(f"{BASE}/openapi.json", self._openapi)
         router.add_get(f"{BASE}/", self._page)
-        router.add_route("*", API + "{path:.*}", self._nothing)
+        router.add_route("*", API + "{path:.*}", self._not_found)
 
     def refuse(self, text: str, status: int = 403) -> web.Response:
         """Return an answer that refuses a request."""
@@ -225,7 +225,7 @@ class ProgramRoutes:
     @_answer_refusals
     async def _state(self, request: web.Request) -> web.StreamResponse:
         after = int(parse_rate(request.query.get("after", f"{NEWEST}"), "after", 0, NEWEST))
-        return await self._asked({"do": "state", "after": after})
+        return await self._forward_request({"do": "state", "after": after})
 
     @_answer_refusals
     async def _post(self, request: web.Request) -> web.StreamResponse:
@@ -235,14 +235,14 @@ class ProgramRoutes:
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
                 data += more
         message = _add_client(parse_message(data), request)
-        if message.get("do") != "stop" and not self._takes():
+        if message.get("do") != "stop" and not self._is_within_rate():
             raise MessageRefused(BUSY, 429)
         if takes_control(message) and message.get("for_s") is not None:
             message["stay"] = True  # it ends by its time; a request has no connection to lose
-        return await self._asked(message, wait_s)
+        return await self._forward_request(message, wait_s)
 
-    async def _asked(self, message: dict[str, Any], wait_s: float = 0.0) -> web.Response:
-        answer = await self._do(message)
+    async def _forward_request(self, message: dict[str, Any], wait_s: float = 0.0) -> web.Response:
+        answer = await self._send_to_rig(message)
         match answer:
             case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in _NO_OUTCOME:
                 answer |= await self._outcome(message, CommandReply.from_json(reply), wait_s)
@@ -262,7 +262,7 @@ class ProgramRoutes:
                 found.set_result(end)
 
         self.feed.add(take, lambda: _EVENTS_HZ)
-        renewing = reply.lead and not message.get("stay")
+        renewing = reply.control_number and not message.get("stay")
         end_s = loop.time() + wait_s
         try:
             while (left_s := end_s - loop.time()) > 0.0:
@@ -285,7 +285,7 @@ class ProgramRoutes:
         headers = {**self._headers, **policy}
         return web.Response(text=page, content_type="text/html", headers=headers)
 
-    async def _nothing(self, request: web.Request) -> web.Response:
+    async def _not_found(self, request: web.Request) -> web.Response:
         text = f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/"
         return self.refuse(text, 404)
 
@@ -309,7 +309,7 @@ class ProgramRoutes:
             max_msg_size=4 * REQUEST_BYTES, compress=False, autoping=False
         )
         await socket.prepare(request)
-        self._connections().lasting(request)
+        self._connections().mark_websocket(request)
         orders: asyncio.Queue[dict[str, Any]] = asyncio.Queue(_MOST_QUEUED)
         orders.put_nowait({"do": "hello", "version": VERSION, "tag": "hello"})
         self.feed.add(program.take, program.wanted_hz)
@@ -364,8 +364,8 @@ class ProgramRoutes:
             try:
                 message = _add_client(parse_message(frame.data), request)
                 if message.get("do") == "stop":
-                    program.say(await self._do(message))
-                elif late or orders.full() or not self._takes():
+                    program.say(await self._send_to_rig(message))
+                elif late or orders.full() or not self._is_within_rate():
                     program.say({"refused": BUSY, **_tag(message)})
                 else:
                     orders.put_nowait(message)
@@ -378,14 +378,14 @@ class ProgramRoutes:
         """Send a program's messages to the rig, in their order."""
         while True:
             message = await orders.get()
-            answer = await self._do(message)
+            answer = await self._send_to_rig(message)
             program.say(answer)
             match answer:
                 case {"ok": {"reply": dict(reply)}}:
                     found = CommandReply.from_json(reply)
                     if takes_control(message):
-                        held = found.lead and not message.get("stay")
-                        program.leading = message["who"] if held else ""
+                        held = found.control_number and not message.get("stay")
+                        program.controls_as = message["who"] if held else ""
                     if "tag" in message and message["do"] not in _NO_OUTCOME:
                         program.follow(message["tag"], found)
                         self.feed.wake()
@@ -397,7 +397,7 @@ class ProgramRoutes:
         """
         while True:
             await asyncio.sleep(0.25 * HEARTBEAT_S)
-            if not (who := program.leading):
+            if not (who := program.controls_as):
                 continue
             program.alive.clear()
             async with asyncio.timeout(TAKES_S):
@@ -405,14 +405,14 @@ class ProgramRoutes:
                 await program.alive.wait()
             answer = await self._relay.ask({"do": "renew", "who": who})
             if "refused" in answer and BUSY_WORDS not in answer["refused"]:
-                program.leading = ""  # another client is in control, or none
+                program.controls_as = ""  # another client is in control, or none
 
     # --- the rig ------------------------------------------------------------------------
 
-    def _takes(self) -> bool:
+    def _is_within_rate(self) -> bool:
         return self._rate.take(asyncio.get_running_loop().time())
 
-    async def _do(self, message: Mapping[str, Any]) -> Answer:
+    async def _send_to_rig(self, message: Mapping[str, Any]) -> Answer:
         """Send a message to the rig, a stop by its own channel; return the answer."""
         if message.get("do") != "stop":
             return await self._relay.ask(message)

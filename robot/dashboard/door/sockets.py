@@ -91,7 +91,7 @@ class WebcamSocket:
         self._newest: web.WebSocketResponse | None = None
 
     @staticmethod
-    def prepared() -> web.WebSocketResponse:
+    def new_socket() -> web.WebSocketResponse:
         """Return a websocket that accepts one image at a time."""
         return web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False)
 
@@ -170,4 +170,6 @@ class WidgetSocket:
             if (wait_s := rate.wait_s(loop.time())) > 0.0:
                 await asyncio.sleep(wait_s)
             rate.take(loop.time())
-            await loop.run_in_executor(self._worker, self._widgets.received, client, message.data)
+            await loop.run_in_executor(
+                self._worker, self._widgets.handle_message, client, message.data
+            )

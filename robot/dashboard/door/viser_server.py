@@ -231,7 +231,7 @@ class ViewProxy:
                 compress=0,
             ) as inside:
                 await browser.prepare(request)
-                self._connections.lasting(request)
+                self._connections.mark_websocket(request)
                 await until_one_ends(
                     relay_in(browser, inside), relay_out(inside, browser), over, leave.wait()
                 )

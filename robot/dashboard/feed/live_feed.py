@@ -312,7 +312,7 @@ class LiveFeed:
                 self._percept = percepts.get(row.percept, self._percept)
             tick = Tick(
                 row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
-                row.desired_rad, row.guard_result, row.events, (), row.stopped, row.led, row.lead,
+                row.desired_rad, row.guard_result, row.events, (), row.stopped, row.controlled_by, row.client_control,
                 row.gesture, row.parking,
             )  # fmt: skip
             self._builder.update(tick)

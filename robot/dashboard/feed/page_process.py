@@ -321,7 +321,7 @@ class PageProcess:
     def _handle_loss(self) -> None:
         """Report once that the page has died, and restart it if that can help."""
         process = self._process
-        self._hang_up()
+        self._disconnect()
         text = "it gave no reason"
         if self._errors is not None:
             lines = _read_tail(self._errors).decode(errors="replace").strip().splitlines()
@@ -370,7 +370,7 @@ class PageProcess:
         if self._silent_s >= _HANG_S or child_process.is_suspended(process.pid):
             process.kill()
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         link, self._socket = self._socket, None
         if link is not None:
             link.close()
@@ -386,7 +386,7 @@ class PageProcess:
             ear, self._inbox = self._inbox, None
             if ear is not None:
                 ear.close()
-            self._hang_up()
+            self._disconnect()
             self._end_process()
 
     def _end_process(self) -> None:

@@ -58,7 +58,7 @@ class ParamFeed:
         self._known, self._version = {}, None
 
     @property
-    def pending(self) -> bool:
+    def has_pending(self) -> bool:
         """Return whether data waits to be sent."""
         return bool(self._due) or self._tuning.version != self._version
 
@@ -104,9 +104,9 @@ class ParamThread:
         self._again = self._over = self._failed = False
         self._thread: threading.Thread | None = None
 
-    def look(self) -> None:
+    def request_changes(self) -> None:
         """Request that changes are sent; called by the loop."""
-        if self._feed.pending and not self._wanted.is_set():
+        if self._feed.has_pending and not self._wanted.is_set():
             if self._thread is None:
                 self._thread = threading.Thread(
                     target=self._work, name="page parameters", daemon=True
@@ -208,7 +208,7 @@ class Publisher:
         if self._started == 0:
             return True
         if self._params is not None:
-            self._params.look()
+            self._params.request_changes()
         if not self._rig_sent:
             self._rig_sent = page.send(rig_message(self._rig()))
         if abs(t_s - self._state_s) >= _STATE_S:

@@ -177,7 +177,7 @@ def snapshot(
     field = rig.field if rig is not None else None
     pivot = None
     if rig is not None:
-        pivot = rig.kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)[0].start_m
+        pivot = rig.kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)[0].start_m
     return Snapshot(
         t_s=tick.t_s,
         measured_rad=tick.joints.position_rad,
@@ -198,17 +198,17 @@ def snapshot(
         rate_hz=rate_hz,
         health=health,
         behaviour=behaviour,
-        saliences=() if leads.led else target.saliences,
-        plan="" if leads.led else target.plan,
+        saliences=() if leads.overrides_gaze else target.saliences,
+        plan="" if leads.overrides_gaze else target.plan,
         perception=perception,
         commanded_rad=tick.guard_result.command_rad,
-        target_kind=leads.kind if leads.led else target.kind,
-        target_id=-1 if leads.led else target.id,
-        target_part=None if leads.led else target.part,
+        target_kind=leads.kind if leads.overrides_gaze else target.kind,
+        target_id=-1 if leads.overrides_gaze else target.id,
+        target_part=None if leads.overrides_gaze else target.part,
         stopped=tick.stopped,
-        led=control_text(tick),
-        leader=leads,
-        leads_words=control_sentence(leads, tick.t_s),
+        control_text=control_text(tick),
+        control_source=leads,
+        control_sentence=control_sentence(leads, tick.t_s),
         headline=does.headline,
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,

@@ -42,7 +42,7 @@ def reason_text(snapshot: Snapshot) -> str:
 
     During manual control, or without saliences, it is the rig's own reason.
     """
-    if snapshot.leader.led or not snapshot.saliences:
+    if snapshot.control_source.overrides_gaze or not snapshot.saliences:
         return snapshot.why
     first = snapshot.saliences[0]
     most = max(first.translation, first.looming, first.rotation, first.onset)
@@ -64,7 +64,7 @@ def reason_text(snapshot: Snapshot) -> str:
 
 def salience_bars(snapshot: Snapshot) -> str:
     """Return the saliences by term as HTML, the highest first."""
-    if snapshot.leader.led:
+    if snapshot.control_source.overrides_gaze:
         return ""
     rows = snapshot.saliences
     if not rows:

@@ -29,15 +29,15 @@ class Controls:
     def __init__(self, widgets: Widgets, scene: viser.SceneApi, outbox: Outbox) -> None:
         self._steer, self._tune = widgets.panel("steer"), widgets.panel("tune")
         self._jog = JogPanel(self._steer.section("joints", order=40), outbox)
-        self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.let_go)
+        self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.forget_jogged)
         self._tuning = ParamPanels(widgets, self._tune, outbox)
         self._face = AnimationPanel(self._steer, outbox)
         self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
-    def leave(self) -> None:
+    def remove_controls(self) -> None:
         """Remove all controls: a recording cannot be controlled."""
-        self._lead.leave()
-        self._tuning.leave()
+        self._lead.remove_target()
+        self._tuning.remove_params()
         for place in (self._steer, self._tune):
             place.clear()
             place.html(note("A recording: there is no rig to move or to tune."))
@@ -53,17 +53,17 @@ class Controls:
                 self._lead.offer(name, choices)
                 self._first.offer(name, choices)
 
-    def params(self, params: Sequence[Mapping[str, object]]) -> None:
+    def add_params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned, as the rig describes them."""
-        self._tuning.params(params)
+        self._tuning.add_params(params)
 
-    def values(self, state: Mapping[str, object]) -> None:
+    def update_values(self, state: Mapping[str, object]) -> None:
         """Update the present values: changed and unsaved values, the file, characters."""
-        self._tuning.values(state)
-        self._jog.values(self._tuning.in_force)
+        self._tuning.update_values(state)
+        self._jog.update_ranges(self._tuning.in_force)
         characters = state.get("characters")
         if isinstance(characters, list) and characters:
-            self._lead.characters(characters, str(state.get("character", "")))
+            self._lead.add_characters(characters, str(state.get("character", "")))
             self._first.offer(CHARACTER, characters)
 
     def show(self, snapshot: Snapshot) -> None:
@@ -72,9 +72,9 @@ class Controls:
         self._first.show(self._lead.menus)
         self._jog.show(snapshot)
 
-    def answered(self, who: str) -> None:
+    def record_answer(self, who: str) -> None:
         """Record that the rig has answered a browser's change."""
-        self._tuning.answered(who)
+        self._tuning.record_answer(who)
 
 
 class GazeTargetPanel:
@@ -124,7 +124,7 @@ class GazeTargetPanel:
             if event.client_id is not None and event.phase != "start":
                 self._outbox.command(LookAt((x, y, z)), str(event.client_id))
 
-    def leave(self) -> None:
+    def remove_target(self) -> None:
         """Remove the target."""
         self._gizmo.remove()
 
@@ -148,7 +148,7 @@ class GazeTargetPanel:
 
         menu.on_press(ask)
 
-    def characters(self, names: Sequence[str], present: str) -> None:
+    def add_characters(self, names: Sequence[str], present: str) -> None:
         """Add the menu of characters once, and store the present one."""
         self._character = present
         if CHARACTER in self.menus:
@@ -345,11 +345,11 @@ class JogPanel:
         )
         self.estimated_joints_note = place.html(order=_LAST)
 
-    def let_go(self) -> None:
+    def forget_jogged(self) -> None:
         """Forget the jogged joints; their sliders follow them again."""
         self._held.clear()
 
-    def values(self, in_force: Mapping[str, object]) -> None:
+    def update_ranges(self, in_force: Mapping[str, object]) -> None:
         """Create the sliders, and set their ranges to the joints' limits."""
         keys = [key.split(".") for key in in_force if key.startswith("joints.")]
         for joint in order_joints(path[1] for path in keys if path[2:] == ["min_deg"]):

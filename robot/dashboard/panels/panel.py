@@ -108,7 +108,7 @@ class PanelView:
         """Draw the newest text and, less often, traces, strip and statistics."""
         if (snapshot := self._last) is None:
             return
-        before, self._open = self._open, frozenset(filter(self._widgets.sees, PANELS))
+        before, self._open = self._open, frozenset(filter(self._widgets.is_visible, PANELS))
         if self._open - before:
             self.draw_all()
         if self._shown % _WORDS_EVERY == 0:

@@ -213,7 +213,7 @@ class ParamPanels:
         widgets.on_join(self._greet)
         widgets.on_leave(self._forget)
 
-    def leave(self) -> None:
+    def remove_params(self) -> None:
         """Remove all parameters."""
         with self._lock:
             self._over = True
@@ -232,7 +232,7 @@ class ParamPanels:
         with self._lock:
             self._panels.pop(client, None)
 
-    def params(self, params: Sequence[Mapping[str, object]]) -> None:
+    def add_params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned."""
         with self._lock:
             for data in params:
@@ -241,7 +241,7 @@ class ParamPanels:
             for panel in self._panels.values():
                 panel.offer(self._params)
 
-    def values(self, state: Mapping[str, object]) -> None:
+    def update_values(self, state: Mapping[str, object]) -> None:
         """Update changed values, unsaved values, and the file that save would write."""
         with self._lock:
             self.in_force.update(cast(Mapping[str, object], state.get("values", {})))
@@ -250,13 +250,13 @@ class ParamPanels:
             for panel in self._panels.values():
                 panel.take(self.in_force, self._unsaved, self._path)
 
-    def answered(self, who: str) -> None:
+    def record_answer(self, who: str) -> None:
         """Record that the rig has answered a browser's change."""
         client, _, of_tuning = who.partition(":")
         with self._lock:
             panel = self._panels.get(client)
             if panel is not None and of_tuning:
-                panel.answered()
+                panel.record_answer()
 
 
 class ParamPanel:
@@ -280,7 +280,7 @@ class ParamPanel:
         self._controls: dict[str, ParamControl] = {}
         self._first: dict[str, ParamControl] = {}
         self._unanswered = self._known = 0
-        self._top = place.own(client)
+        self._top = place.for_client(client)
         place = self._top.section(ALL, is_open=False, order=10)
         self._find = place.text("find", on="key", hint="words of a key or its meaning", order=1)
         self._group = place.choice("group", (NOTHING,), order=2)
@@ -324,7 +324,7 @@ class ParamPanel:
         if not self._unanswered:
             self._refresh()
 
-    def answered(self) -> None:
+    def record_answer(self) -> None:
         """Record that the rig has applied or refused a change."""
         self._unanswered = max(0, self._unanswered - 1)
         if not self._unanswered:

@@ -48,9 +48,9 @@ class Outbox:
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:
         """Send a request; ``who`` is returned with the reply."""
-        return self.hand_on(json.dumps(data, separators=(",", ":")).encode(), who)
+        return self.forward(json.dumps(data, separators=(",", ":")).encode(), who)
 
-    def picture(self, jpeg: bytes) -> bool:
+    def send_picture(self, jpeg: bytes) -> bool:
         """Send an image of a browser's webcam; return False if the rig does not accept it."""
         try:
             self._feed.send(PICTURE + jpeg, DONT_WAIT)
@@ -58,12 +58,12 @@ class Outbox:
             return False
         return True
 
-    def beat(self) -> None:
+    def send_heartbeat(self) -> None:
         """Tell the rig that this page is alive."""
         with contextlib.suppress(OSError):  # full, or gone
             self._feed.send(BEAT, DONT_WAIT)
 
-    def hand_on(self, data: bytes, who: str = DOOR) -> bool:
+    def forward(self, data: bytes, who: str = DOOR) -> bool:
         """Send a compact JSON object."""
         message = request_message(who, data)
         with self._lock:

@@ -79,7 +79,7 @@ class PageRequestHandler:
     def _do(self, data: Mapping[str, object]) -> str | None:
         match data:
             case {"do": str(verb)}:
-                match self._handler.do(data, _add_client):
+                match self._handler.handle(data, _add_client):
                     case PendingCommand() as given:
                         return self._reply_text(given)
                     case ParamsSaved(saved):
@@ -107,7 +107,7 @@ class PageRequestHandler:
                 if point is None:
                     return "refused: there is no camera image to look into yet"
                 who = str(rest.get("who") or PAGE)
-                return self._reply_text(self._handler.give(LookAt(point, who)))
+                return self._reply_text(self._handler.queue_command(LookAt(point, who)))
             case {"steer": str(way)} if self._steer is not None:
                 return self._steer(way)
             case {"show": {"depth": bool(on)}} if self._depth is not None:

@@ -160,7 +160,9 @@ class StateFeed:
             case _:  # busy, starting or gone
                 return None
         progress = Progress(
-            ControlState(**state["lead"]), GestureState(**state["gesture"]), state["led"]
+            ControlState(**state["client_control"]),
+            GestureState(**state["gesture"]),
+            state["controlled_by"],
         )
         lines = tuple(_line({"event": event}) for event in events)
         return HeadNews(_line({"state": state}), lines, progress)

@@ -53,13 +53,13 @@ class Finish(NamedTuple):
     shine: how bright its reflection of a light is; tight: how small that is, an exponent
     roughness: below 1 the browser lights every pixel, and lights are seen in the surface the
         smaller the less it is; 1: lit here
-    lit: False shows the colours as they are
+    is_lit: False shows the colours as they are
     """
 
     shine: float = 0.0
     tight: float = 12.0
     roughness: float = 1.0
-    lit: bool = True
+    is_lit: bool = True
 
 
 _SAMPLER = {"magFilter": 9729, "minFilter": 9985, "wrapS": 10497, "wrapT": 10497}
@@ -69,7 +69,7 @@ SKIN = Finish(0.06, 9.0)
 CLOTH = Finish()
 PLASTIC = Finish(0.22, 26.0)
 EYE = Finish(roughness=0.17)
-FLAT = Finish(lit=False)
+FLAT = Finish(is_lit=False)
 
 
 def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
@@ -79,7 +79,7 @@ def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
     from trimesh.exchange.gltf import export_glb
 
     light = np.ones((len(shape.vertices), 3))
-    if finish.lit:
+    if finish.is_lit:
         light = shade_colours(light, shape.normals, finish)
     gain = float(light.max())
     colours = np.ones((len(light), 4))
@@ -124,7 +124,7 @@ def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) ->
     rgba[:, :3] = _to_linear(rgba[:, :3])
     gain = 1.0
     by_browser = finish.roughness < 1.0
-    if finish.lit and not by_browser and normals is not None:
+    if finish.is_lit and not by_browser and normals is not None:
         rgba[:, :3] = shade_colours(
             rgba[:, :3], normals if pose is None else normals @ pose.T, finish
         )

@@ -48,7 +48,7 @@ class _Shadow:
             receive_shadow=False,
         )
 
-    def below(self, p_world_m: Vec3) -> None:
+    def move_below(self, p_world_m: Vec3) -> None:
         set_pose(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.002))
 
     def remove(self) -> None:
@@ -70,7 +70,7 @@ class _Person:
         """Move the person so that the nose is at its detected position."""
         (ahead, _, _), (aside, _, _), _ = face.R_world_face
         x, y, z = face.p_world_m
-        self._shade.below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
+        self._shade.move_below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
         set_pose(self._head, nose_m.tolist())
         set_pose(self._chest, face.p_world_m)
         set_rotation(self._chest, rotation_to((ahead, aside, 0.0)))
@@ -193,7 +193,7 @@ class _BodyView:
         set_pose(self._frame, body.p_world_m)
         set_rotation(self._frame, rotation_to((-x, -y, 0.0)))
         if self._shade is not None:
-            self._shade.below((x, y, z))
+            self._shade.move_below((x, y, z))
         self._shape.scale = round(body.radius_m, 3)
         set_pose(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
         self._label.text = body.kind

@@ -32,13 +32,13 @@ class WidgetPlace(NamedTuple):
 class WidgetPublisher(Protocol):
     """Sender of changes to the browsers; safe to call from any thread."""
 
-    def changed(self, widget: "Widget", props: Mapping[str, object], but: str = "") -> None:
+    def publish_change(self, widget: "Widget", props: Mapping[str, object], but: str = "") -> None:
         """Send changed properties to all viewers of the element, except one client."""
 
-    def removed(self, widget: "Widget") -> None:
+    def publish_removal(self, widget: "Widget") -> None:
         """Remove the element and its children from all browsers."""
 
-    def image_changed(self, widget: "Widget") -> None:
+    def publish_image(self, widget: "Widget") -> None:
         """Send an element's new image."""
 
 
@@ -60,7 +60,7 @@ class Widget:
         new = {name: value for name, value in props.items() if self.props.get(name) != value}
         if new:
             self.props.update(new)
-            self._page.changed(self, new, but)
+            self._page.publish_change(self, new, but)
 
     def _words(self, prop: str) -> tuple[str, ...]:
         """Return a property that is a list of text."""
@@ -70,9 +70,9 @@ class Widget:
 
     def remove(self) -> None:
         """Remove the element from the page."""
-        self._page.removed(self)
+        self._page.publish_removal(self)
 
-    def arrived(self, value: object, client: str) -> None:
+    def receive_input(self, value: object, client: str) -> None:
         """Apply the input of a browser for this element.
 
         Raises:
@@ -101,7 +101,7 @@ class Image(Widget):
         """Show another image."""
         if data != self.data:
             self.data = data
-            self._page.image_changed(self)
+            self._page.publish_image(self)
 
 
 class Chart(Widget):
@@ -159,16 +159,16 @@ class Field(Widget, ABC, Generic[T]):
         self._handlers.append(do)
 
     @abstractmethod
-    def checked(self, value: object) -> T:
+    def check_value(self, value: object) -> T:
         """Return the input of a browser as a value of this field.
 
         Raises:
             ValueError: it is none.
         """
 
-    def arrived(self, value: object, client: str) -> None:
+    def receive_input(self, value: object, client: str) -> None:
         """Apply a value from a browser, show it in the others and call the handlers."""
-        taken = self.checked(value)
+        taken = self.check_value(value)
         self._set(but=client, value=taken)
         for do in self._handlers:
             do(taken, client)
@@ -177,7 +177,7 @@ class Field(Widget, ABC, Generic[T]):
 class Checkbox(Field[bool]):
     """Checkbox."""
 
-    def checked(self, value: object) -> bool:
+    def check_value(self, value: object) -> bool:
         """Return a boolean."""
         if not isinstance(value, bool):
             raise ValueError(f"{self.label} is on or off")
@@ -187,7 +187,7 @@ class Checkbox(Field[bool]):
 class TextField(Field[str]):
     """Line of text, sent ``on`` "enter", also when the focus has "left", or at each "key"."""
 
-    def checked(self, value: object) -> str:
+    def check_value(self, value: object) -> str:
         """Return a text without control characters."""
         if not isinstance(value, str) or len(value) > MOST_TEXT:
             raise ValueError(f"{self.label} is a text of at most {MOST_TEXT} characters")
@@ -211,7 +211,7 @@ class Slider(Field[float]):
     def ends(self, ends: tuple[float, float]) -> None:
         self._set(low=ends[0], high=ends[1])
 
-    def checked(self, value: object) -> float:
+    def check_value(self, value: object) -> float:
         """Return a number between the ends, whole if the slider's step is."""
         low, high = self.ends
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
@@ -238,7 +238,7 @@ class Choice(Field[str]):
         value = self.value if self.value in options else options[0]
         self._set(options=list(options), value=value)
 
-    def checked(self, value: object) -> str:
+    def check_value(self, value: object) -> str:
         """Return one of the options."""
         if not isinstance(value, str) or value not in self.options:
             raise ValueError(f"{self.label} is one of {', '.join(self.options)}")
@@ -276,7 +276,7 @@ class Buttons(Widget):
         """Call ``do`` with the button and the client when one is pressed."""
         self._handlers.append(do)
 
-    def arrived(self, value: object, client: str) -> None:
+    def receive_input(self, value: object, client: str) -> None:
         """Handle a press of one of the buttons."""
         if not isinstance(value, str) or value not in self.options:
             raise ValueError(f"there is a button for each of {', '.join(self.options)}")

@@ -54,7 +54,7 @@ class Container:
         self.page = page
         self._where = (parent, panel, owner)
 
-    def own(self, client: str) -> "Container":
+    def for_client(self, client: str) -> "Container":
         """Return the same container for elements that only one client sees."""
         return Container(self.page, *self._where[:2], client)
 
@@ -241,10 +241,10 @@ class Widgets:
             self._numbers += 1
             widget = make(self, WidgetPlace(self._numbers, *where), kind, props)
             self._widgets[self._numbers] = widget
-            self.changed(widget, widget.props)
+            self.publish_change(widget, widget.props)
             return widget
 
-    def changed(self, widget: Widget, props: Mapping[str, object], but: str = "") -> None:
+    def publish_change(self, widget: Widget, props: Mapping[str, object], but: str = "") -> None:
         """Send changed properties to all viewers of an element, except one client."""
         with self._lock:
             if widget.place.number not in self._widgets:
@@ -256,7 +256,7 @@ class Widgets:
                     waiting.update(props)
             self._wake()
 
-    def removed(self, widget: Widget) -> None:
+    def publish_removal(self, widget: Widget) -> None:
         """Remove an element and its children."""
         with self._lock:
             if self._widgets.pop(widget.place.number, None) is None:
@@ -265,10 +265,10 @@ class Widgets:
                 client.changes[widget.place.number] = None
                 client.images.discard(widget.place.number)
             for one in [w for w in self._widgets.values() if w.place.parent == widget.place.number]:
-                self.removed(one)
+                self.publish_removal(one)
             self._wake()
 
-    def image_changed(self, widget: Widget) -> None:
+    def publish_image(self, widget: Widget) -> None:
         """Send an element's new image."""
         with self._lock:
             for client in self._viewers(widget):
@@ -276,7 +276,7 @@ class Widgets:
             self._wake()
 
     @contextmanager
-    def hold(self) -> Iterator[None]:
+    def hold_changes(self) -> Iterator[None]:
         """Send nothing within the block, so that browsers receive all its changes together."""
         with self._lock:
             self._held += 1
@@ -291,7 +291,7 @@ class Widgets:
         """Remove all elements of a panel or section."""
         with self._lock:
             for one in [w for w in self._widgets.values() if w.place.parent == parent]:
-                self.removed(one)
+                self.publish_removal(one)
 
     def notify(
         self, text: str, client: str = "", browser: str = "", *, refused: bool = False
@@ -309,7 +309,7 @@ class Widgets:
             self._wake()
 
     @property
-    def watched(self) -> bool:
+    def is_watched(self) -> bool:
         """Whether any client is connected."""
         return bool(self._clients)
 
@@ -367,7 +367,7 @@ class Widgets:
             found = self._clients.get(client)
             return found.browser if found is not None else ""
 
-    def sees(self, panel: str) -> bool:
+    def is_visible(self, panel: str) -> bool:
         """Return whether any client shows a panel now."""
         with self._lock:
             return any(panel in client.seen for client in self._clients.values())
@@ -406,7 +406,7 @@ class Widgets:
         text = json.dumps({name: part for name, part in message.items() if part})
         return Outgoing(text if put or gone or notices else "", tuple(images))
 
-    def received(self, client: Client, text: str) -> None:
+    def handle_message(self, client: Client, text: str) -> None:
         """Handle a message of a client: {"set": [number, value]} or {"seen": [names of panels]}.
 
         Input that is not valid is refused by a message to that client.
@@ -425,7 +425,7 @@ class Widgets:
                 if widget is None or widget.place.owner not in ("", client.name):
                     return
                 try:
-                    widget.arrived(value, client.name)
+                    widget.receive_input(value, client.name)
                 except ValueError:
                     # Send a client the present value after another one was refused.
                     with self._lock:

@@ -523,7 +523,7 @@ def moving_neck(
     params = JogParams(speed_deg_s=_GENTLE_DEG_S)
     with (
         rig_ports(rig, mock is not None, port) as wire,
-        holding_rig(rig, wire.paths, params, stopped, Interrupts.of(stopped)) as control,
+        holding_rig(rig, wire.paths, params, stopped, Interrupts.from_stop(stopped)) as control,
     ):
         neck = JoggedNeck(control, mock, stopped)
         neck.rest(0.1)

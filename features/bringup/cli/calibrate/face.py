@@ -164,9 +164,12 @@ def _calibrate(
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
-        interrupts, count = Interrupts.of(stopped), LoopCount(0, 0, "fault: unexpected error")
+        interrupts, count = (
+            Interrupts.from_stop(stopped),
+            LoopCount(0, 0, "fault: unexpected error"),
+        )
         with ExitStack() as closed_last, prepare_shutdown(made, say, interrupts) as leaving:
-            leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
+            leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.raise_if_requested))
             for note in (*made.notes, *group_events(made.robot.body.bus.events())):
                 say(note)
             closed_last.callback(lambda: observers.close(count))

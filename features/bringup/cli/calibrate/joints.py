@@ -119,7 +119,7 @@ def measure(
     for bus in bus_names(bench.rig):
         for name in (name for name in joints_on(bench.rig, bus) if name in names):
             try:
-                measured = bench.rig.joints[name].facts.measures_position
+                measured = bench.rig.joints[name].model_facts.measures_position
                 calibrate = _calibrate_smart_servo if measured else _calibrate_hobby_servo
                 found[name] = calibrate(bench, name, bus)
             except (CalibrationRefused, ServoMissing, ServoFault) as error:
@@ -135,7 +135,9 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
     Raises:
         SetupError: names the joints, and what can be done.
     """
-    without_feedback = [name for name in names if not rig.joints[name].facts.measures_position]
+    without_feedback = [
+        name for name in names if not rig.joints[name].model_facts.measures_position
+    ]
     if how.by is ActuationMode.motion and len(without_feedback) == len(names):
         raise SetupError(
             f"--by motion: hobby servos do not report their position ({', '.join(without_feedback)}), so no "
@@ -145,7 +147,7 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
     other = [
         name
         for name in names
-        if not rig.joints[name].facts.measures_position
+        if not rig.joints[name].model_facts.measures_position
         or servo_kind(rig.joints[name].model).set_middle is None
     ]
     if how.set_middle and other:
@@ -239,7 +241,7 @@ def _torque_off_after(
         None,
         torque_off,
         lambda line: say(f"{who}: {line}"),
-        Interrupts.of(stopped),
+        Interrupts.from_stop(stopped),
         left=": cut the servo power",
         quiet=True,
     ) as way_out:
@@ -310,7 +312,7 @@ def calibrate_joints(
                     one
                     for one in names
                     if loaded.joints[one].transmission_points
-                    or not loaded.joints[one].facts.measures_position
+                    or not loaded.joints[one].model_facts.measures_position
                 ]
                 propose(
                     rig_file(rig),
