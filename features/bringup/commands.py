@@ -53,6 +53,7 @@ CALIBRATE = CommandEntry(
                 "calibrate camera my.yaml --oak --what lens",
                 "the lens as an OAK camera has it in memory",
             ),
+            ("calibrate mass my.yaml --weight-kg 0.9", "the head's balance, from its neck's loads"),
             ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
         )
     },

@@ -141,10 +141,15 @@ def _is_carried(link: Link, built: Description) -> bool:
 
 
 def _whole_kg(params: MassParams, measures: HeadMeasures, rest_kg: float) -> float:
+    made = head_mass_kg(params, measures.interocular_m)
+    return made if params.head.mass_kg is not None else max(made, 2.0 * rest_kg)
+
+
+def head_mass_kg(params: MassParams, interocular_m: float) -> float:
+    """Return the mass of the whole head: that of the rig's file, or of its shapes."""
     if params.head.mass_kg is not None:
         return params.head.mass_kg
-    made = mass.head_mass_kg(measures.interocular_m, mass.density_share(params))
-    return max(made, 2.0 * rest_kg)
+    return mass.head_mass_kg(interocular_m, mass.density_share(params))
 
 
 def _with_counterweights(
