@@ -11,7 +11,9 @@ from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error
 from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.ideal_bus import IdealShaft
-from gazerig.features.world.model import WorldModel
+from gazerig.features.world.joint_play import JointPlay
+from gazerig.features.world.model import RigIndices, WorldModel
+from gazerig.features.world.rig_in_world import ServoInWorld
 from gazerig.features.world.shaft import ShaftAxis, WorldHobbyServo, WorldShaft
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
@@ -82,6 +84,8 @@ class World:
         self._busy = False
         self._devices: list[Device] = []
         self._shafts: list[WorldShaft | IdealShaft] = []
+        self._lead_rad = np.zeros(model.mj.nq)
+        self._play: JointPlay | None = None
         self._actuators: slice | NDArray[np.intp] = slice(0, 0)
         self._pushes: list[_Push] = []
         figures = model.figures
@@ -111,7 +115,7 @@ class World:
 
         def axis(servo_id: int) -> ShaftAxis | None:
             servo = own.get(servo_id)
-            return None if servo is None else ShaftAxis(self._mj, self._data, indices, servo)
+            return None if servo is None else self._axis(indices, servo)
 
         def shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
             at = axis(servo_id)
@@ -142,15 +146,22 @@ class World:
         """Return shafts without servos, in the order of the rig's servos."""
         indices = self.model.rigs[rig]
         shafts = tuple(
-            IdealShaft(ShaftAxis(self._mj, self._data, indices, one), one.steps_per_turn)
-            for one in indices.rig.servos
+            IdealShaft(self._axis(indices, one), one.steps_per_turn) for one in indices.rig.servos
         )
         self._shafts += shafts
         self._join()
         return shafts
 
+    def _axis(self, indices: RigIndices, servo: ServoInWorld) -> ShaftAxis:
+        return ShaftAxis(self._mj, self._data, self._lead_rad, indices, servo)
+
     def _join(self) -> None:
         """Move all shafts from now on."""
+        play_rad: dict[int, float] = {}
+        for one in self._shafts:
+            play_rad |= one.axis.play_rad
+        if play_rad:
+            self._play = JointPlay(self._mj, self._data, self._lead_rad, play_rad)
         numbers = [one.axis.actuator for one in self._shafts]
         first = min(numbers, default=0)
         self._actuators = np.array(numbers, dtype=np.intp)
@@ -208,9 +219,17 @@ class World:
                 wrenches[push.body, 3:] += np.cross(lever, push.force_n)
         if self._people is not None and self._ms % PEOPLE_MS == 0:
             self._people.place(data, self._script_s())
+        play = self._play
+        if play is not None:
+            play.begin()
         mujoco.mj_step(self._mj, data)
         self._ms += 1
-        qpos, qvel = self._qpos.tolist(), self._qvel.tolist()
+        qvel = self._qvel.tolist()
+        if play is None:
+            qpos = self._qpos.tolist()
+        else:
+            play.hold()
+            qpos = (self._qpos + self._lead_rad).tolist()
         for one in shafts:
             axis = one.axis
             slope = axis.slope

@@ -4,16 +4,19 @@ Registers, modes, profiles and protections stay those of the servo. Each millise
 loop computes a torque from the shaft's position. The part that depends on the speed at the end of
 the millisecond (D, part of P and the induced voltage of the motor) goes into MuJoCo's implicit
 step. So the equations are those of ``ShaftMotion``, with the world's inertia, gravity, contacts
-and stops. Left out: play between shaft and joint. The axis of a shaft is its index in MuJoCo's
-arrays.
+and stops. The axis of a shaft is its index in MuJoCo's arrays.
 """
 
 from collections.abc import Sequence
 from math import inf, pi
-from typing import Any, NamedTuple
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.features.world.model import RigIndices, shaft_rad_of
 from gazerig.features.world.rig_in_world import ServoInWorld
+from gazerig.sim_mock.hobby_motor import HOBBY_PHYSICS, hobby_motor
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.integration import RESOLUTION, SLOWEST, SMOOTHING
 from gazerig.sim_mock.smart_servo.motor import Shaft
@@ -46,15 +49,31 @@ class ShaftAxis:
 
     Its position is in steps of an encoder with 4096 a turn, as inside emulated servos.
 
+    Args:
+        mj: the compiled model.
+        data: its state.
+        lead_rad: angle of each joint's shaft beyond the joint (gazerig.features.world.joint_play).
+        rig: indices of its rig.
+        servo: its servo.
+
     Attributes:
         actuator: its number in the model.
         zero, slope: its position at joint angle 0 and the steps per radian, for a linear
             transmission to one joint; slope is None if it depends on the joints' angles.
         qpos, dof: of its first joint.
+        play_rad: half of the play of each joint that it has play with, by the joint's qpos.
     """
 
-    def __init__(self, mj: Any, data: Any, rig: RigIndices, servo: ServoInWorld) -> None:
-        self._mj, self._data, self._servo = mj, data, servo
+    def __init__(
+        self,
+        mj: Any,
+        data: Any,
+        lead_rad: NDArray[np.float64],
+        rig: RigIndices,
+        servo: ServoInWorld,
+    ) -> None:
+        self._mj, self._data, self._lead, self._servo = mj, data, lead_rad, servo
+        self.play_rad: dict[int, float] = {}
         self._tendon = rig.tendon[servo.name]
         self.actuator = rig.actuator[servo.name]
         self._qpos = tuple(rig.qpos[name] for name in servo.joints)
@@ -74,9 +93,14 @@ class ShaftAxis:
 
     # --- every millisecond
 
-    def motion(self, qpos: Sequence[float], qvel: Sequence[float]) -> tuple[float, float]:
-        """Return position in steps and speed in steps a second of a nonlinear transmission."""
-        steps, slopes = self._servo.transmission.at([qpos[at] for at in self._qpos])
+    def motion(self, angles: Sequence[float], qvel: Sequence[float]) -> tuple[float, float]:
+        """Return position in steps and speed in steps a second of a nonlinear transmission.
+
+        Args:
+            angles: of all joints, those with play turned as far as their shafts.
+            qvel: speeds of all joints.
+        """
+        steps, slopes = self._servo.transmission.at([angles[at] for at in self._qpos])
         if slopes != self._slopes:
             self._slopes = slopes
             self._turn_with_joints()
@@ -95,6 +119,11 @@ class ShaftAxis:
 
     def position(self) -> float:
         """Return the position of the shaft, in steps."""
+        angles = self._angles(self._data.qpos + self._lead)
+        return self._unit * self._servo.transmission.at(angles)[0]
+
+    def joint_position(self) -> float:
+        """Return the same of the joint behind the play."""
         return self._unit * self._servo.transmission.at(self._angles(self._data.qpos))[0]
 
     def turn(self, steps: float) -> None:
@@ -108,14 +137,21 @@ class ShaftAxis:
             angle = self._data.qpos[at] + share * slope
             self._data.qpos[at] = min(max(angle, low), high)
 
-    def build(self, rotor_kg_m2: float, friction_nm: float, viscous_nm_s: float) -> None:
+    def build(
+        self, rotor_kg_m2: float, friction_nm: float, viscous_nm_s: float, play_steps: float = 0.0
+    ) -> None:
         """Set the properties of a servo's motor and gear at its shaft.
 
         Args:
             rotor_kg_m2: inertia of the rotor behind its gear.
             friction_nm: dry friction.
             viscous_nm_s: viscous friction, torque per rad/s.
+            play_steps: half of the play between the shaft and the joint of its entry.
         """
+        if play_steps:
+            own = self._servo.joints.index(self._servo.name)
+            half_rad = play_steps / abs(self._unit * self._slopes[own])
+            self.play_rad = {self._qpos[own]: half_rad}
         self._mj.tendon_armature[self._tendon] = rotor_kg_m2
         self._friction_nm = friction_nm
         self.jam(False)
@@ -166,8 +202,18 @@ class WorldShaft(Shaft):
         self._profiled = 0.0
         super().__init__(model, physics, axis.position())
         self._induced_nm_s = stall * self._built.rate * SPEED_UNIT
-        axis.build(physics.rotor_s * stall / top_rad_s, stall * physics.coulomb_share, 0.0)
+        rotor = physics.rotor_s * stall / top_rad_s
+        axis.build(rotor, stall * physics.coulomb_share, 0.0, self._built.play)
         self._brake()
+
+    @property
+    def joint(self) -> float:
+        """Return the position of the joint behind the play, in steps."""
+        return self.axis.joint_position()
+
+    @joint.setter
+    def joint(self, steps: float) -> None:
+        """Do nothing: the world moves the joint."""
 
     # --- from outside
 
@@ -178,7 +224,7 @@ class WorldShaft(Shaft):
 
     def place(self, position_steps: float) -> None:
         """Set the shaft to its position in the world, whatever position is given."""
-        self.x = self.joint = self.axis.position()
+        self.x = self.axis.position()
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
         if isinstance(self.profile, PositionProfile):
             self.profile.rest(self.x)
@@ -187,7 +233,7 @@ class WorldShaft(Shaft):
     def turn(self, steps: float) -> None:
         """Turn the shaft by hand, up to its joint's stops; the controller keeps acting."""
         self.axis.turn(steps)
-        self.x = self.joint = self.axis.position()
+        self.x = self.axis.position()
 
     def jam(self, stuck: bool) -> None:
         """Jam the shaft at its position, or free it."""
@@ -263,7 +309,7 @@ class WorldShaft(Shaft):
         """Set position (steps) and speed (steps/ms) to the results of the world."""
         if -SLOWEST < v < SLOWEST:
             v = 0.0
-        self.x = self.joint = x
+        self.x = x
         self.v = v
         if self._off:
             self.volts = self.supply
@@ -293,25 +339,8 @@ class WorldShaft(Shaft):
         self.u, self.effort = u, t
 
 
-PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, supply_ohm=0.0)
-"""A small motor that reaches full speed in 8 ms without a load; friction of cheap gears [A]. The
-supply is a battery of unknown resistance."""
-
-DAMPING = 1.0
-"""Share of the duty that its controller takes back at full speed, so that a load overshoots only a
-little [A]."""
-
 REST_STEPS_MS = 1e-3
 """Speed below which it counts as resting."""
-
-
-class HobbyMotor(NamedTuple):
-    """Motor and gear of a hobby servo."""
-
-    stall_torque_nm: float
-    no_load_rpm: float
-    stall_current_a: float = 0.0
-    rated_v: float = 5.0
 
 
 class DeadBandShaft(WorldShaft):
@@ -341,12 +370,9 @@ class WorldHobbyServo(HobbyServo):
 
     def __init__(self, spec: HobbySpec, axis: ShaftAxis, steps_per_turn: float) -> None:
         self._unit = STEPS_PER_TURN / steps_per_turn
-        motor = HobbyMotor(spec.stall_torque_nm, 60.0 * spec.speed_steps_s / steps_per_turn)
-        self.shaft = DeadBandShaft(motor, PHYSICS, axis)
+        motor, self._loop = hobby_motor(spec, steps_per_turn)
+        self.shaft = DeadBandShaft(motor, HOBBY_PHYSICS, axis)
         self.shaft.dead = spec.dead_steps * self._unit
-        top = spec.speed_steps_s * self._unit / 1000.0
-        lag_ms = max(1.0, spec.lag_s * 1000.0)
-        self._loop = Loop(p=(1.0 + DAMPING) / (lag_ms * top), d=DAMPING / top, torque_max=inf)
         self._width, self._stuck = 0, False
         super().__init__(spec)
 

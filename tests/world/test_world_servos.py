@@ -1,6 +1,8 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
+from dataclasses import replace
 from functools import partial
+from math import radians
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
 
 mujoco_or_skip()
 
+from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.drivers.errors import SetupError  # noqa: E402
 from gazerig.features.world.physics import WorldUnstable  # noqa: E402
 from gazerig.robot.app import run_bus  # noqa: E402
@@ -61,6 +64,48 @@ def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(
             max(abs(b[nth]) for b in own), rel=0.08
         )
     assert abs(world[-1][0] - STEP) < 6.0
+
+
+@pytest.mark.parametrize(("name", "joint"), [("desk", "left_eye_pan"), ("feetech", "neck_yaw")])
+def test_a_joint_with_play_stays_behind_as_that_of_an_emulated_servo(name: str, joint: str) -> None:
+    rig = load_rig(name)
+    loose = replace(rig.joints[joint], play_deg=2.0)
+    bench = WorldBench(replace(rig, joints={**rig.joints, joint: loose}))
+    half = radians(1.0)
+    for servo in bench.both(joint):
+        arm(servo, loose.gains or ())
+    bench.pass_ms(100)
+    began = round(bench.servos[joint].position_steps)
+    gaps = []
+    for steps in (60, 52, 60, 0, 30):
+        for servo in bench.both(joint):
+            write(servo, "goal_position", began + steps)
+        before = bench.world.joints_rad()[joint]
+        for _ in range(40):
+            bench.pass_ms(10)
+            angle = bench.world.joints_rad()[joint]
+            gaps.append(loose.angle_rad(bench.servos[joint].position_steps) - angle)
+            own = bench.own[joint]
+            behind = own.position_steps + (own.shaft.joint - own.shaft.x)
+            assert angle == pytest.approx(loose.angle_rad(behind), abs=0.15 * half)
+        if steps == 52:  # 0.7 deg back: within the play
+            assert angle == pytest.approx(before, abs=1e-5)
+    assert max(gaps) == pytest.approx(half) and min(gaps) == pytest.approx(-half)
+
+
+def test_play_is_that_of_both_eyes_if_one_servo_turns_them() -> None:
+    bench = _armed("minimal", "eyes_pan")
+    model, data = bench.world.model.mj, bench.world._data
+    write(bench.servos["eyes_pan"], "goal_position", 2200)
+    bench.pass_ms(700)
+    write(bench.servos["eyes_pan"], "goal_position", 2000)
+    for _ in range(100):
+        bench.pass_ms(5)
+        left, right = (
+            data.qpos[model.joint(f"rig_{name}").qposadr[0]]
+            for name in ("eyes_pan", "right_eyes_pan")
+        )
+        assert left == pytest.approx(right, abs=radians(0.1))
 
 
 def test_a_step_reaches_its_goal_in_registers() -> None:
