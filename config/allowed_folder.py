@@ -1,8 +1,7 @@
-"""Files that a browser may name: shipped ones, and those in the rig's folder.
+"""Files that a browser may name: shipped files, and files in the rig's folder.
 
 A page that controls a running rig names characters, walks, profiles and files to save in. The
-program reads and writes them with the rights of its own user, so that only those in one folder
-may be named.
+program reads and writes them with its user's permissions, so only files in one folder may be named.
 """
 
 import os
@@ -19,13 +18,13 @@ _KIND_OF_KEY = {
     "detector.model_file": "",
     "oak.face_model": "",
 }
-"""Keys of a rig that hold a shipped name or a file, and the kind of the names; "": no names."""
+"""Keys of a rig that contain a shipped name or a file, and the kind of the names; "" for none."""
 _MESH_FILE = re.compile(r"meshes\..+\.file")
 _YAML = (".yaml", ".yml")
 
 
 class AllowedFolder:
-    """A folder and all below it, in which files may be named."""
+    """A folder; files in it and below it may be named."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = os.path.realpath(folder)
@@ -33,23 +32,23 @@ class AllowedFolder:
     def check_file(
         self, given: str, kind: str = "", key: str = "", start: Path | None = None
     ) -> str:
-        """Return a shipped name as it is, or the whole path of a check_file in the folder.
+        """Return a shipped name unchanged, or the full path of a file in the folder.
 
         Args:
-            given: a name or a path
-            kind: of the shipped names that are taken, as "characters"; "": none
-            key: what a fault is about
-            start: where relative paths begin; None: in the folder
+            given: Name or path.
+            kind: Kind of the accepted shipped names, e.g. "characters"; "" for none.
+            key: Key for the message of a fault.
+            start: Base of relative paths; None: the folder.
 
         Raises:
-            gazerig.config.load.ConfigError: the file is elsewhere, links followed.
+            gazerig.config.load.ConfigError: the file, after resolving links, is outside the folder.
         """
         if kind and "/" not in given and not given.endswith(_YAML):
             if given in shipped_names(kind):
                 return given
             there = ", ".join(shipped_names(kind))
             raise ConfigError(
-                [ConfigFault("", None, key, repr(given), f"no such name; there is {there}")]
+                [ConfigFault("", None, key, repr(given), f"no such name; available: {there}")]
             )
         if given and "\0" not in given:
             begin = self._folder if start is None else str(start)
@@ -59,13 +58,13 @@ class AllowedFolder:
         rule = f"from the page only files in {self._folder} and below can be named"
         raise ConfigError([ConfigFault("", None, key, repr(given), rule)])
 
-    def check_changes(self, check_changes: Mapping[str, object]) -> None:
-        """Check the files that new values of a rig's keys name.
+    def check_changes(self, changes: Mapping[str, object]) -> None:
+        """Check the files that are named by new values of a rig's keys.
 
-        Relative paths begin in the working folder, as they do where they are opened.
+        Relative paths start at the working folder, as when the files are opened.
 
         Raises:
-            gazerig.config.load.ConfigError: with every file that may not.
+            gazerig.config.load.ConfigError: lists every file that may not be named.
         """
         faults: list[ConfigFault] = []
         for key, value in _assigned_values("", changes):
@@ -84,7 +83,7 @@ class AllowedFolder:
 
 
 def _assigned_values(above: str, value: object) -> Iterator[tuple[str, object]]:
-    """Return each value with its whole dotted key, whether it came dotted or as mappings."""
+    """Return each value with its full dotted key, given as dotted keys or as nested mappings."""
     if not isinstance(value, Mapping):
         yield above, value
         return

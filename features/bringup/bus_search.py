@@ -44,18 +44,19 @@ RATES: Mapping[BusKind, Sequence[int]] = {
 class SearchRound:
     """Result of the search for one kind at one baud rate.
 
-    possible: the adaptor can run at it; junk: bytes that made no sense
-    shared: ids that two servos seem to have; protocol_1: ids that answer to the old protocol
+    is_supported: the adaptor can run at it; unknown_bytes: bytes that made no sense
+    shared_ids: ids that two servos seem to have
+    protocol_1_ids: ids that answer to the old protocol
     board: a Maestro; channels: how many it has, None if unknown
     """
 
     kind: BusKind
     baud: int
-    possible: bool = True
+    is_supported: bool = True
     found: tuple[FoundServo, ...] = ()
-    junk: int = 0
-    shared: tuple[int, ...] = ()
-    protocol_1: tuple[int, ...] = ()
+    unknown_bytes: int = 0
+    shared_ids: tuple[int, ...] = ()
+    protocol_1_ids: tuple[int, ...] = ()
     board: DetectedMaestro | None = None
     channels: int | None = None
 
@@ -123,7 +124,7 @@ def search_bus(
             board = probe(port, replace(MaestroParams(), baud=baud))
             looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
         else:
-            looked = SearchRound(kind, baud, possible=False)
+            looked = SearchRound(kind, baud, is_supported=False)
         met = kind if looked.has_answer else met
         yield looked
 

@@ -35,8 +35,8 @@ MOST_TRIES = 10
 class ChannelPosition(NamedTuple):
     """A commanded place of a channel, and the board's pulse at the end, in steps."""
 
-    asked: int
-    got: int
+    commanded: int
+    reported: int
 
 
 def walk_channel(

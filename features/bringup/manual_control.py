@@ -82,13 +82,13 @@ class Step(NamedTuple):
 class MoveResult(NamedTuple):
     """Result of a movement.
 
-    ended: "arrived", "held back" (by the guard), "not there in time", "torque_off", or the name
-        of what stopped it
+    end_reason: "arrived", "held back" (by the guard), "not there in time", "torque_off", or the
+        reason given by ``stopped``
     level: the guard's last level; events: reports of the bus during it
     last: the last exchange
     """
 
-    ended: str
+    end_reason: str
     seconds: float
     joints: tuple[JointMove, ...]
     level: Level
@@ -98,18 +98,18 @@ class MoveResult(NamedTuple):
     @property
     def arrived(self) -> bool:
         """Return whether every moving joint came near its goal."""
-        return self.ended == "arrived"
+        return self.end_reason == "arrived"
 
     def __str__(self) -> str:
         """Write how it ended, with the reasons joint by joint."""
-        reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable()]
-        return f"{self.ended} ({'; '.join(reasons)})" if reasons else self.ended
+        reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable_joints()]
+        return f"{self.end_reason} ({'; '.join(reasons)})" if reasons else self.end_reason
 
-    def of(self, joint: str) -> JointMove:
+    def joint_move(self, joint: str) -> JointMove:
         """Return one joint's result."""
         return next(part for part in self.joints if part.joint == joint)
 
-    def remarkable(self) -> tuple[JointMove, ...]:
+    def remarkable_joints(self) -> tuple[JointMove, ...]:
         """Return the joints with reasons."""
         return tuple(part for part in self.joints if part.reasons)
 
@@ -127,7 +127,7 @@ class GuardReasons:
             if reason not in PASSING:
                 self._by_joint.setdefault(joint, {})[reason] = None
 
-    def of(self, joint: str) -> tuple[str, ...]:
+    def joint_reasons(self, joint: str) -> tuple[str, ...]:
         """Return the reasons of one joint, with those of all."""
         return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
 
@@ -145,7 +145,9 @@ def move_result(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[
         strict=True,
     )
     return tuple(
-        JointMove(name, degrees(asked), degrees(let), degrees(at), notes.of(name), not tells)
+        JointMove(
+            name, degrees(asked), degrees(let), degrees(at), notes.joint_reasons(name), not tells
+        )
         for name, asked, let, at, tells in rows
     )
 

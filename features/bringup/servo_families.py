@@ -28,7 +28,7 @@ class Setting(NamedTuple):
     value: int
     mask: int = ~0
 
-    def of(self, now: int) -> int:
+    def apply_to(self, now: int) -> int:
         """Return the correct value of the register, whose present value is ``now``."""
         return now & ~self.mask | self.value & self.mask
 
@@ -39,8 +39,8 @@ class CalibrationRegisters(NamedTuple):
     settings: without which its steps do not mean what they should
     offset: register that shifts its position; offset_usable: it keeps to that
     full_drive: a register, and the register of its largest value, which it gets back
-    gentle: makes the registers of a share of full drive and a speed in steps/s; reads registers
-        by name
+    gentle_drive: returns the register values for a share of full drive and a speed in steps/s;
+        reads registers by name
     load: present current as a share of the stall current, of a model by its name
     """
 
@@ -48,7 +48,7 @@ class CalibrationRegisters(NamedTuple):
     offset: str
     offset_usable: bool
     full_drive: tuple[str, str] | None
-    gentle: Callable[[Callable[[str], int], float, float], dict[str, int]]
+    gentle_drive: Callable[[Callable[[str], int], float, float], dict[str, int]]
     load: Callable[[str, int], float]
 
 
@@ -59,7 +59,7 @@ class ServoKind(NamedTuple):
     family: what the engine must know of it
     no_reply: what to check if no servo answers
     notes: what must be known of all of them
-    driving: None if this program does not move a servo of the kind alone
+    calibration: None if this program does not move a servo of the kind alone
     set_middle: makes the present position the middle, None if the kind cannot
     """
 
@@ -68,7 +68,7 @@ class ServoKind(NamedTuple):
     family: Family
     no_reply: str
     notes: tuple[str, ...]
-    driving: CalibrationRegisters | None
+    calibration: CalibrationRegisters | None
     set_middle: Callable[[BusPort, Family, int], int] | None = None
 
 
@@ -104,12 +104,12 @@ DYNAMIXEL = ServoKind(
     no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
     "adaptor's plug the TTL one (3 pins), and the first cable in?",
     notes=(),
-    driving=CalibrationRegisters(
+    calibration=CalibrationRegisters(
         settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
         offset="homing_offset",
         offset_usable=False,
         full_drive=("goal_pwm", "pwm_limit"),
-        gentle=_gentle_dynamixel,
+        gentle_drive=_gentle_dynamixel,
         # Present Current, or Present Load on a model with that register.
         load=lambda model, current: current * dynamixel.MODELS[model].load_unit,
     ),
@@ -125,7 +125,7 @@ FEETECH = ServoKind(
         "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
         "keep the switch of the servo supply at hand",
     ),
-    driving=CalibrationRegisters(
+    calibration=CalibrationRegisters(
         settings=(
             Setting("operating_mode", 0),
             Setting("phase", 0, feetech.MULTI_TURN),
@@ -134,7 +134,7 @@ FEETECH = ServoKind(
         offset="position_offset",
         offset_usable=True,
         full_drive=None,
-        gentle=_gentle_feetech,
+        gentle_drive=_gentle_feetech,
         load=lambda model, current: (
             current * feetech.CURRENT_UNIT_MA / 1000.0 / feetech.MODELS[model].stall_current_a
         ),
@@ -148,7 +148,7 @@ SCS = FEETECH._replace(
     no_reply="is the servo supply on, and its voltage that of the servos (6 V)? is the first "
     "cable in, and the adaptor's jumper set to USB?",
     notes=tuple(note.replace("STS", "SCS") for note in FEETECH.notes),
-    driving=None,
+    calibration=None,
     set_middle=None,
 )
 

@@ -31,8 +31,8 @@ class SetupResult(NamedTuple):
     """Result for one servo: as it was found, as it is now, and what was written."""
 
     before: FoundServo
-    now: FoundServo
-    done: tuple[str, ...]
+    after: FoundServo
+    changes: tuple[str, ...]
 
 
 def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:

@@ -162,13 +162,13 @@ class TelemetrySample(NamedTuple):
 
     at_s, took_s: when it was done and how long it took
     servos: by joint; None if the servo did not answer
-    asked, unanswered: queries since the start, and those without an answer
+    request_count, unanswered: queries since the start, and those without an answer
     """
 
     at_s: float
     took_s: float
     servos: Mapping[str, Telemetry | None]
-    asked: int
+    request_count: int
     unanswered: int
 
 
@@ -256,7 +256,7 @@ def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:
     return {
         "t_s": round(sample.at_s - start_s, 3),
         "took_ms": round(1e3 * sample.took_s, 1),
-        "asked": sample.asked,
+        "asked": sample.request_count,
         "unanswered": sample.unanswered,
         "joints": joints,
     }

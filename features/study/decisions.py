@@ -45,7 +45,7 @@ _LEAST_PEOPLE = 2
 class Decision:
     """The decision on one hypothesis.
 
-    test: the planned test, None without data; also: further tests
+    test: the planned test, None without data; further_tests: further tests
     corrected_p: p value of the planned test, corrected over all hypotheses
     n: participants with all conditions of both sides; standardised: d_z of their differences
     medians, means: of the better and of the other condition; for choices the shares in all direct
@@ -56,7 +56,7 @@ class Decision:
     hypothesis: Hypothesis
     measure: Measure
     test: StatisticalTest | None
-    also: tuple[StatisticalTest, ...]
+    further_tests: tuple[StatisticalTest, ...]
     corrected_p: float
     verdict: Verdict
     n: int

@@ -124,7 +124,7 @@ class TrialMeasured:
 class ParticipationClosed:
     """The session ended: finished, withdrawn, or the experimenter excluded the participant."""
 
-    how: Literal["finished", "withdrawn", "excluded"]
+    outcome: Literal["finished", "withdrawn", "excluded"]
     reason: str
     utc: str
 

@@ -79,7 +79,7 @@ class TrialRow:
 class Participation:
     """All data of one participant.
 
-    how: "finished", "withdrawn", "excluded", or "unfinished"
+    outcome: "finished", "withdrawn", "excluded", or "unfinished"
     left_out: reason of the participant's exclusion, "" without one
     """
 
@@ -89,7 +89,7 @@ class Participation:
     program: str
     opened_utc: str
     simulated: bool
-    how: str
+    outcome: str
     answers: tuple[AnswerRow, ...]
     trials: tuple[TrialRow, ...]
     left_out: str = ""
@@ -161,7 +161,7 @@ def participation(
         for row in rows
     ]
     closed = [r for r in records if isinstance(r, ParticipationClosed)]
-    how = closed[-1].how if closed else "unfinished"
+    how = closed[-1].outcome if closed else "unfinished"
     whole = Participation(
         opened.participant, opened.design_sha256, opened.order, opened.program, opened.utc,
         opened.simulated, how, tuple(rows), trials,
@@ -230,11 +230,11 @@ def _exclusion_reason(
     consents = [r.given for r in records if isinstance(r, ConsentGiven)]
     if not consents or not consents[-1]:
         return "did not consent"
-    if one.how in ("withdrawn", "excluded"):
+    if one.outcome in ("withdrawn", "excluded"):
         last = [r.reason for r in records if isinstance(r, ParticipationClosed)][-1]
-        words = "withdrew" if one.how == "withdrawn" else "excluded by the experimenter"
+        words = "withdrew" if one.outcome == "withdrawn" else "excluded by the experimenter"
         return f"{words}: {last}" if last else words
-    if one.how == "unfinished" and design.exclusion.incomplete == "exclude":
+    if one.outcome == "unfinished" and design.exclusion.incomplete == "exclude":
         return "did not finish"
     ratings = [
         row.value

@@ -35,13 +35,13 @@ class InstructionsScreen:
 class ReadyScreen:
     """Before a presentation, which the participant starts.
 
-    number: of the trial, from 1; among ``of`` trials, or practice trials
+    number: of the trial, from 1; among ``trial_count`` trials, or practice trials
     side: 0, or 1 for the second presentation of a pair
     again: the presentation was cut short before, and is repeated
     """
 
     number: int
-    of: int
+    trial_count: int
     practice: bool
     pair: bool
     side: int
@@ -56,7 +56,7 @@ class PresentationScreen:
     """
 
     number: int
-    of: int
+    trial_count: int
     practice: bool
     pair: bool
     side: int
@@ -81,7 +81,7 @@ class QuestionsScreen:
     """
 
     number: int
-    of: int
+    trial_count: int
     practice: bool
     pair: bool
     once: bool
@@ -105,7 +105,7 @@ class PausedScreen:
 class EndScreen:
     """The last screen; after ``finished`` it explains the study."""
 
-    how: Ending
+    outcome: Ending
 
 
 Screen = (

@@ -276,7 +276,7 @@ class StudySession:
         """Return whether the session has ended permanently."""
         return self._progress.closed is not None
 
-    def agreed(self) -> tuple[bool, bool]:
+    def consent_given(self) -> tuple[bool, bool]:
         """Return whether the participant's gaze may be stored, and camera pictures."""
         said = self._progress.consented
         return (False, False) if said is None else (said.gaze, said.pictures)
@@ -289,13 +289,13 @@ class StudySession:
         known = hmac.compare_digest(token.encode(), self._token("film", place).encode())
         return shown.condition if known else None
 
-    def opened(
+    def open_session(
         self, code: str, design_sha256: str, program: str, utc: str, simulated: bool = False
     ) -> ParticipationOpened:
         """Return the record of the start or resumption of a session."""
         return ParticipationOpened(code, design_sha256, self.order, program, utc, simulated)
 
-    def resumed(self, utc: str) -> tuple[Record, ...]:
+    def resume_session(self, utc: str) -> tuple[Record, ...]:
         """Return the records of a presentation that was interrupted by the end of the program."""
         if self._progress.began is None:
             return ()
@@ -317,7 +317,7 @@ class StudySession:
         camera, kept = self.design.presentation.on == "head", self.design.privacy
         return ConsentScreen(camera and kept.pictures, camera and kept.gaze)
 
-    def go_on(self) -> None:
+    def leave_page(self) -> None:
         """Leave the instructions or a rest, of which nothing is recorded.
 
         Raises:
@@ -445,7 +445,7 @@ class StudySession:
         closed, consented = self._progress.closed, self._progress.consented
         if closed is None:
             return "finished"
-        return "declined" if consented is not None and not consented.given else closed.how
+        return "declined" if consented is not None and not consented.given else closed.outcome
 
     def _number(self, place: StudyPlace) -> tuple[int, int, bool, bool]:
         """Return the trial's number, the number of trials, whether it is practice, and of pairs."""

@@ -189,7 +189,7 @@ class SimulatedParticipant:
             return "first" if chosen_first else "second", ms
         return self._rating(trial, condition, questionnaire, item, asked, rng), ms
 
-    def measured(self, trial: int, condition: str) -> dict[str, float]:
+    def simulate_measures(self, trial: int, condition: str) -> dict[str, float]:
         """Return the objective measures of a trial, each with the population's effect."""
         shift = sqrt(2.0 / self._shown) * self._population.effect
         values = {}

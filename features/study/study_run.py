@@ -120,7 +120,7 @@ class StudyRun:
         self._began_s = 0.0
         self._fetched_s = nan
         self._fault = ""
-        self._keep(session.resumed(utc()))
+        self._store_records(session.resume_session(utc()))
         # The page's time in an earlier run of the program is unknown.
         self._asked_s = nan
 
@@ -149,9 +149,9 @@ class StudyRun:
         """
         with self._lock:
             if page == self._session.page:
-                self._keep(self._session.consent(given, pictures, gaze, self._utc()))
+                self._store_records(self._session.consent(given, pictures, gaze, self._utc()))
 
-    def go_on(self, page: str) -> None:
+    def leave_page(self, page: str) -> None:
         """Leave the instructions or a rest.
 
         Raises:
@@ -159,7 +159,7 @@ class StudyRun:
         """
         with self._lock:
             if page == self._session.page:
-                self._session.go_on()
+                self._session.leave_page()
 
     def begin(self, page: str) -> None:
         """Start the presentation.
@@ -180,7 +180,7 @@ class StudyRun:
             except HeadLost as lost:
                 self._fault, self._session.paused = str(lost), True
                 return
-            self._keep(self._session.begin(self._utc()))
+            self._store_records(self._session.begin(self._utc()))
             self._began_s, self._fetched_s = self._now_s(), nan
 
     def film_fetched(self, token: str) -> None:
@@ -246,7 +246,7 @@ class StudyRun:
         with self._lock:
             if page == self._session.page:
                 longest_ms = 1000.0 * (self._now_s() - self._asked_s)
-                self._keep(self._session.answer(values, ms, self._utc(), longest_ms))
+                self._store_records(self._session.answer(values, ms, self._utc(), longest_ms))
 
     def withdraw(self) -> None:
         """Record the participant's withdrawal.
@@ -255,7 +255,7 @@ class StudyRun:
             WriteFailed: it could not be written.
         """
         with self._lock:
-            self._leave(self._session.withdraw(self._utc()))
+            self._end_with_records(self._session.withdraw(self._utc()))
 
     def film_of(self, token: str) -> str | None:
         """Return the condition of the film that is shown now, None for another name."""
@@ -293,7 +293,7 @@ class StudyRun:
             WriteFailed: it could not be written.
         """
         with self._lock:
-            self._leave(self._session.exclude(reason, self._utc()))
+            self._end_with_records(self._session.exclude(reason, self._utc()))
 
     def _end(self, outcome: Outcome, reason: str, seconds: float = nan) -> None:
         """End the present presentation; seconds: its duration, nan: the time since its start."""
@@ -301,15 +301,15 @@ class StudyRun:
             seconds = self._now_s() - self._began_s
         what = self._presenter.end()
         ended = (outcome, seconds, self._utc(), reason, what.recording, what.span_s)
-        self._keep(self._session.end(*ended))
+        self._store_records(self._session.end(*ended))
 
-    def _leave(self, records: Sequence[Record]) -> None:
+    def _end_with_records(self, records: Sequence[Record]) -> None:
         presenting = isinstance(self._session.screen, PresentationScreen)
-        self._keep(records)
+        self._store_records(records)
         if presenting:
             self._presenter.end()
 
-    def _keep(self, records: Sequence[Record]) -> None:
+    def _store_records(self, records: Sequence[Record]) -> None:
         """Write records to disk, then apply them; write the last record at the end."""
         self._journal.write(records)
         self._session.add(records)

@@ -272,7 +272,7 @@ class BodyMotion:
             holders = object_handover.holders(self.script, self.timelines, thing)
             share = object_handover.holding_share(self.t_s, holders, self.name, name)
             holds = np.maximum(holds, share)
-        held = motions.PostureShares(smooth_rise(self.base.seated), self._guarding(), holds)
+        held = motions.PostureShares(smooth_rise(self.base.seated), self._guard_share(), holds)
         rest = motions.resting_pose(frame, held, self._swing(side), self.person.gloves)
         hand = motions.hand_pose(
             frame, self.t_s, [one for one, _ in mine], [target for _, target in mine], rest
@@ -290,7 +290,7 @@ class BodyMotion:
             ahead = 0.0 * ahead
         return np.asarray(np.clip(1.1 * moving_average(ahead, 30), -0.5, 0.5) + 0.03)
 
-    def _guarding(self) -> Floats:
+    def _guard_share(self) -> Floats:
         total = np.full_like(self.t_s, 0.0)
         for one in self.acts:
             if one.act.do == "guard":

@@ -95,7 +95,7 @@ class Figures:
             rows.append(object_handover.thing_poses(t_s, found, hands, ahead))
         return np.stack(rows, axis=1) if rows else np.zeros((len(t_s), 0, 7))
 
-    def sharing(self, file: Path) -> "Figures":
+    def with_shared_file(self, file: Path) -> "Figures":
         """Return the same people, with their motion in a file once ``share`` has written it."""
         return type(self)(self.script, self.seed, file)
 
@@ -160,7 +160,7 @@ class Figures:
     def _boxer_at(self, row: OpponentRow) -> Floats:
         """Return the boxer's segments (n, 7) as the person moves them; the last rows are kept."""
         if row.number not in self._poses:
-            rows = self._track.following(row)  # a whole array of times takes as long as one
+            rows = self._track.row_after(row)  # a whole array of times takes as long as one
             for one, pose in zip(rows, self._boxer_over(rows), strict=True):
                 self._poses[one.number] = pose
             while len(self._poses) > _KEPT_POSES:

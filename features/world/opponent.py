@@ -58,11 +58,11 @@ class OpponentMotion:
         self._open_s: float | None = None
 
     @property
-    def rests(self) -> bool:
+    def is_at_rest(self) -> bool:
         """Return whether the script alone moves the boxer."""
         return self._share == 0.0
 
-    def order(self, p_m: Vec3, t_s: float) -> None:
+    def set_target(self, p_m: Vec3, t_s: float) -> None:
         """Move the fist to a point from now on."""
         self._target, self._ordered_s = np.array(p_m), t_s
 
@@ -70,7 +70,7 @@ class OpponentMotion:
         """Move by one step; return the row of this number."""
         t_s = number * STEP_S
         held = t_s - self._ordered_s <= HOLD_S
-        if self.rests and held:
+        if self.is_at_rest and held:
             self.spans_s.append((t_s, t_s))
             self._fist, self._speed = self._home, np.zeros(3)
             self._body, self._body_speed = np.zeros(2), np.zeros(2)
@@ -171,7 +171,7 @@ class OpponentTrack:
             return None
         return before, after, min(1.0, t_s / STEP_S - number)
 
-    def following(self, row: OpponentRow) -> list[OpponentRow]:
+    def row_after(self, row: OpponentRow) -> list[OpponentRow]:
         """Return a row and those after it that are written already."""
         after = (self._row(int(row.number) + n) for n in range(1, AHEAD + 1))
         return [row, *(one for one in after if one is not None)]
@@ -210,13 +210,13 @@ class Opponent:
         """Move the fist to a point; t_s: time of the scene."""
         if self._motion is None:
             self._motion = OpponentMotion(self._home())
-        if self._motion.rests:
+        if self._motion.is_at_rest:
             self._next = int(t_s / STEP_S) + 2
-        self._motion.order(p_m, t_s)
+        self._motion.set_target(p_m, t_s)
         self.update(t_s)
 
     def update(self, t_s: float) -> None:
         """Write the rows up to a little after a time, if a person moves it."""
         while self._motion and self._next and self._next <= int(t_s / STEP_S) + AHEAD:
             self._track().write(self._motion.step(self._next))
-            self._next = 0 if self._motion.rests else self._next + 1
+            self._next = 0 if self._motion.is_at_rest else self._next + 1

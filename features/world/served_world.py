@@ -79,7 +79,7 @@ class ServedWorld:
     """The world of all buses of a server.
 
     Attributes:
-        commands: the first words of the commands for ``obey``.
+        commands: the first words of the commands for ``execute``.
 
     Raises:
         SetupError: a user's own world cannot be used.
@@ -88,7 +88,7 @@ class ServedWorld:
     def __init__(self, spec: WorldSpec, state: Path, clock_s: Callable[[], float]) -> None:
         self._clock_s = clock_s
         self.commands = frozenset(COMMANDS.verbs)
-        self.world = World(spec.compiled(), clock_s)
+        self.world = World(spec.compile(), clock_s)
         if spec.figures is not None:
             spec.figures.share()
         self._writer = StateWriter(state, self.world.state().qpos.size)
@@ -104,7 +104,7 @@ class ServedWorld:
         name = bus.rig_bus if bus.rig_bus is not None else bus.name or ""
         return self.world.device(bus.device, name, bus.seed, bus.rig)
 
-    def obey(self, text: str) -> str:
+    def execute(self, text: str) -> str:
         """Carry out a command of the world; return {"ok": ...} or {"error": ...} as JSON."""
         try:
             return json.dumps({"ok": COMMANDS.obey(self.world, text)})

@@ -44,7 +44,7 @@ class SpecShapes(NamedTuple):
         """Return the room, other heads and all segments of people; see ``WorldShapes.parts``."""
         own, rigs = self.spec.rigs, () if self.others is None else self.others.rigs
         spec = self.spec if self.others is None else self.spec._replace(rigs=(own[0], *rigs))
-        model = spec.compiled()
+        model = spec.compile()
         from gazerig.features.world.figure_model import figure_shapes
         from gazerig.features.world.geom_shapes import fixed_parts
 

@@ -146,7 +146,7 @@ class RigFrame(NamedTuple):
         """Return a point of the world in the frame of the rig."""
         return rotate_back(self.R, sub(p_world_m, self.p_m))
 
-    def way(self, v_world: Vec3) -> Vec3:
+    def direction(self, v_world: Vec3) -> Vec3:
         """Return a direction of the world in the frame of the rig."""
         return rotate_back(self.R, v_world)
 
@@ -184,12 +184,12 @@ class HeadsScene:
             ahead = rotate(rotation((yaw, pitch, 0.0)), (1.0, 0.0, 0.0))
             hand = None if person.hand is None else own.point(person.hand)
             found.append(
-                ScenePerson(own.point(person.p_world_face_m), yaw_pitch(own.way(ahead)), hand)
+                ScenePerson(own.point(person.p_world_face_m), yaw_pitch(own.direction(ahead)), hand)
             )
         for face in self._faces:
             R, nose_m = face()
             ahead = rotate(R, (1.0, 0.0, 0.0))
-            found.append(ScenePerson(own.point(nose_m), yaw_pitch(own.way(ahead)), None))
+            found.append(ScenePerson(own.point(nose_m), yaw_pitch(own.direction(ahead)), None))
         return tuple(found)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:

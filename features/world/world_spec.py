@@ -29,7 +29,7 @@ class WorldSpec(NamedTuple):
     rigs: tuple[RigInWorld, ...]
     mjcf_file: Path | None = None
 
-    def compiled(self) -> "WorldModel":
+    def compile(self) -> "WorldModel":
         """Compile the world for MuJoCo; the result is the same in every process.
 
         Raises:
@@ -47,7 +47,7 @@ class WorldSpec(NamedTuple):
 
     def write(self, folder: Path) -> None:
         """Write it for another process of this program, which shares the people's motion."""
-        (folder / _SPEC).write_bytes(pickle.dumps(self.sharing(folder)))
+        (folder / _SPEC).write_bytes(pickle.dumps(self.with_shared_file(folder)))
 
     @staticmethod
     def read(folder: Path) -> "WorldSpec":
@@ -55,11 +55,11 @@ class WorldSpec(NamedTuple):
         found: WorldSpec = pickle.loads((folder / _SPEC).read_bytes())
         return found
 
-    def sharing(self, folder: Path) -> "WorldSpec":
+    def with_shared_file(self, folder: Path) -> "WorldSpec":
         """Return the same world with its people's motion in a file of the folder."""
         if self.figures is None:
             return self
-        return self._replace(figures=self.figures.sharing(folder / _PEOPLE))
+        return self._replace(figures=self.figures.with_shared_file(folder / _PEOPLE))
 
 
 def state_file(folder: Path) -> Path:

@@ -30,7 +30,7 @@ class CouplingParams:
 
     # fmt: off
     kind: Annotated[CouplingKind, "differential: bevel gears; parallel: two push rods; measured: a table of positions"]
-    first: Annotated[str, "the joint that both servos turn the same way, such as neck_pitch; its entry under joints holds servo a, "
+    first: Annotated[str, "the joint that both servos turn the same direction, such as neck_pitch; its entry under joints holds servo a, "
         "of a parallel neck the left one"]
     second: Annotated[str, "the joint that they turn against each other, such as neck_roll; its entry holds servo b"]
     first_ratio: Annotated[float, Bounds(0.05, 50), "differential: turns of the servos for one turn of the first joint"] = 1.0

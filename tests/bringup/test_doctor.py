@@ -538,12 +538,12 @@ def test_remarks_of_a_scan():
     two = (FoundServo(1, 1190, 53, BAUD, "xl330-m077"), FoundServo(1, 1190, 53, BAUD, "xl330-m077"))
     said = " ".join(scan_remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
     assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
-    merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared=(1,))]
+    merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared_ids=(1,))]
     assert "two or more servos have id 1" in " ".join(scan_remarks(merged, "/dev/x"))
     rounds = [
-        SearchRound("dynamixel", 9600, junk=40),
-        SearchRound("dynamixel", 57_600, protocol_1=(5,)),
-        SearchRound("dynamixel", 1, possible=False),
+        SearchRound("dynamixel", 9600, unknown_bytes=40),
+        SearchRound("dynamixel", 57_600, protocol_1_ids=(5,)),
+        SearchRound("dynamixel", 1, is_supported=False),
     ]
     lines = list(scan_remarks(rounds, "/dev/x"))
     assert any("only pieces came" in line for line in lines)

@@ -80,7 +80,7 @@ def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]) -> None:
         assert x == pytest.approx(PARTS_FACE_M[part][0] * 1e3)
         assert abs(y) <= FARTHEST_MM and abs(z) <= FARTHEST_MM
     assert state.step_mm in STEPS_MM
-    assert {key.partition(".")[2] for key in changed_places(state)} == set(state.chosen)
+    assert {key.partition(".")[2] for key in changed_places(state)} == set(state.adjusted_parts)
 
 
 def test_every_part_is_asked_for_once_and_named() -> None:
@@ -132,7 +132,7 @@ def test_steps_end_at_the_largest_and_smallest() -> None:
 
 def test_after_the_last_part_it_has_ended() -> None:
     state = after(*8 * ("enter",))
-    assert state.ended and len(changed_places(state)) == 8
+    assert state.is_ended and len(changed_places(state)) == 8
 
 
 # --- A gaze steered over a face: the nearest one, the eyes on the point, and what is refused
@@ -255,7 +255,7 @@ def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(
         assert steered.is_aimed and degrees(max(left, right)) < AIMED_DEG
         steered.press("enter", made.clock.now_s())
         ticks(made, steered, 0.1)
-        assert part in steered.state.chosen and steered.state.part != part
+        assert part in steered.state.adjusted_parts and steered.state.part != part
 
 
 def test_an_enter_waits_for_eyes_on_their_way(made: Assembly, steered: FaceSteering) -> None:

@@ -844,7 +844,7 @@ class LinkageBench:
     def steer(self, question: str, servo: HobbyMarker) -> None:
         self.said.append(question)
         while answer := self._next():
-            (servo.by if answer[0] in "+-" else servo.to)(float(answer))
+            (servo.move_by_us if answer[0] in "+-" else servo.move_to_us)(float(answer))
             servo.live()
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:

@@ -103,9 +103,9 @@ def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
     moved = bench.control.jog("neck_yaw", 20.0)
     after = bench.where()
     assert moved.arrived
-    assert moved.of("neck_yaw").error == pytest.approx(0.0, abs=2.0)
+    assert moved.joint_move("neck_yaw").error == pytest.approx(0.0, abs=2.0)
     assert after.pop("neck_yaw") == pytest.approx(20.0, abs=2.0)
-    assert moved.of("neck_yaw").reasons == ()
+    assert moved.joint_move("neck_yaw").reasons == ()
     del before["neck_yaw"]
     assert after == pytest.approx(before, abs=0.5)
 
@@ -145,8 +145,8 @@ def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> Non
     with pytest.raises(SetupError, match="50.0 deg is outside its range, -35..35 deg"):
         bench.control.jog("left_eye_pan", 50.0)
     moved = bench.control.pose({"left_eye_pan": 50.0})
-    part = moved.of("left_eye_pan")
-    assert not moved.arrived and moved.ended == "held back"
+    part = moved.joint_move("left_eye_pan")
+    assert not moved.arrived and moved.end_reason == "held back"
     assert part.desired == pytest.approx(50.0) and part.commanded == pytest.approx(35.0)
     assert part.reasons == ("out of range",)
     assert str(part).startswith("left_eye_pan: desired 50.0, measured 3")
@@ -158,28 +158,28 @@ def test_a_stuck_joint_is_named_and_not_pushed(bench: Bench) -> None:
     before = bench.where()["neck_yaw"]
     moved = bench.control.jog("neck_yaw", 30.0)
     assert not moved.arrived
-    assert any("not moving" in reason for reason in moved.of("neck_yaw").reasons)
-    assert moved.of("neck_yaw").commanded == pytest.approx(before, abs=15.0)
+    assert any("not moving" in reason for reason in moved.joint_move("neck_yaw").reasons)
+    assert moved.joint_move("neck_yaw").commanded == pytest.approx(before, abs=15.0)
 
 
 def test_a_silent_servo_is_named(bench: Bench) -> None:
     bench.command("lose 7")
     moved = bench.control.jog("neck_yaw", 30.0)
-    assert not moved.arrived and "stale joints" in moved.of("neck_yaw").reasons
+    assert not moved.arrived and "stale joints" in moved.joint_move("neck_yaw").reasons
     assert bench.where()["neck_yaw"] < 10.0
 
 
 def test_a_latched_fault_ends_it(bench: Bench) -> None:
     bench.at[bench.clock.now_s() + 0.5] = "overload 7"
     moved = bench.control.jog("neck_yaw", 40.0)
-    assert moved.ended == "torque_off" and moved.level == "torque_off"
-    assert any("overload" in reason for reason in moved.of("neck_yaw").reasons)
+    assert moved.end_reason == "torque_off" and moved.level == "torque_off"
+    assert any("overload" in reason for reason in moved.joint_move("neck_yaw").reasons)
 
 
 def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench) -> None:
     bench.why = "SIGINT"
     moved = bench.control.jog("neck_yaw", 40.0)
-    assert moved.ended == "SIGINT" and moved.seconds < 0.1
+    assert moved.end_reason == "SIGINT" and moved.seconds < 0.1
     assert bench.control.park(RIG.park_deg).arrived
     assert bench.where()["neck_pitch"] == pytest.approx(-12.0, abs=2.0)
 
@@ -214,7 +214,7 @@ def test_nonsense_is_refused_before_anything_moves(
 def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench) -> None:
     moved = other.control.pose({"eyes_pan": -15.0, "left_lower_lid": 12.0})
     assert moved.arrived
-    assert str(moved.of("eyes_pan")) == "eyes_pan: desired -15.0, estimated -15.0 deg"
+    assert str(moved.joint_move("eyes_pan")) == "eyes_pan: desired -15.0, estimated -15.0 deg"
     where = other.where()
     assert where["eyes_pan"] == pytest.approx(-15.0, abs=1.0)
     assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
@@ -224,15 +224,15 @@ def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench)
 def test_a_jammed_hobby_servo_cannot_be_known_so_nothing_is_called_measured(other: Bench) -> None:
     other.command("stick 0")
     moved = other.control.jog("eyes_pan", 20.0)
-    assert moved.arrived and moved.of("eyes_pan").estimated
+    assert moved.arrived and moved.joint_move("eyes_pan").estimated
     assert other.where()["eyes_pan"] == pytest.approx(0.0, abs=1.0)
 
 
 @on("feetech")
 def test_sts_servos_are_measured(other: Bench) -> None:
     moved = other.control.jog("neck_yaw", 20.0)
-    assert moved.arrived and not moved.of("neck_yaw").estimated
-    assert str(moved.of("neck_yaw")).startswith("neck_yaw: desired 20.0, measured ")
+    assert moved.arrived and not moved.joint_move("neck_yaw").estimated
+    assert str(moved.joint_move("neck_yaw")).startswith("neck_yaw: desired 20.0, measured ")
     assert other.where()["neck_yaw"] == pytest.approx(20.0, abs=2.0)
 
 

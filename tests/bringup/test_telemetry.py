@@ -156,7 +156,7 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
     bench.monitor.sample()
     sample = bench.monitor.sample()
     assert sample.servos["neck_yaw"] is None and sample.servos["left_eye_pan"] is not None
-    assert (sample.asked, sample.unanswered) == (2 * len(bench.rig.names), 2)
+    assert (sample.request_count, sample.unanswered) == (2 * len(bench.rig.names), 2)
     reported = json.loads(json.dumps(as_json(sample, 0.0)))
     assert reported["joints"]["neck_yaw"] is None and reported["unanswered"] == 2
     assert reported["joints"]["left_eye_pan"]["position_steps"] == 2100
@@ -165,8 +165,8 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
 
 
 def test_load_is_a_share_of_the_stall() -> None:
-    assert present(DYNAMIXEL.driving).load("xl330-m077", -147) == pytest.approx(-0.1)
-    assert present(DYNAMIXEL.driving).load("xl430-w250", 250) == pytest.approx(0.25)
+    assert present(DYNAMIXEL.calibration).load("xl330-m077", -147) == pytest.approx(-0.1)
+    assert present(DYNAMIXEL.calibration).load("xl430-w250", 250) == pytest.approx(0.25)
     assert -100 * FEETECH.family.models["sts3215"].load_unit == pytest.approx(-0.1)
 
 

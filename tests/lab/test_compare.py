@@ -38,7 +38,7 @@ def test_what_differs_is_more_than_chance() -> None:
     (found,) = measure_differences([rates(0.25, 200, 1)], [rates(0.35, 200, 2)])
     assert found.word == "more than chance"
     assert found.low95 < found.difference < found.high95 and found.low95 > 0.0
-    assert found.chance < 0.01 and found.chance_shape < 0.01
+    assert found.p_value < 0.01 and found.shape_p_value < 0.01
 
 
 def test_the_same_is_chance_nineteen_times_of_twenty() -> None:
@@ -54,7 +54,7 @@ def test_another_spread_is_found_where_the_middle_is_the_same() -> None:
     narrow = MeasuredValue("vergence", DICE.normal(0.0, 0.1, 300), median)
     wide = MeasuredValue("vergence", DICE.normal(0.0, 0.6, 300), median)
     (found,) = measure_differences([narrow], [wide])
-    assert found.chance_shape < 0.001 and found.word == "more than chance"
+    assert found.shape_p_value < 0.001 and found.word == "more than chance"
 
 
 def test_too_few_events_tell_nothing() -> None:

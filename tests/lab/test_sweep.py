@@ -213,12 +213,12 @@ def test_a_process_that_dies_costs_its_run_alone_and_the_end_comes_when_asked() 
     with pool:
         outcomes = pool.outcomes([({}, 0), ({}, 1), ({}, 2)])
         apply_changes = next(outcomes)[1]  # "" is no rig's configuration
-        assert apply_changes.failed == "the files of desk changed while the sweep ran"
+        assert apply_changes.failure == "the files of desk changed while the sweep ran"
         os.kill(pool.pids[0], signal.SIGSTOP)
         killed = pool.pids[0]
         os.kill(killed, signal.SIGKILL)
         dead = next(outcomes)[1]
-        assert dead.died and dead.failed.startswith("its process ended (killed by signal 9)")
+        assert dead.has_died and dead.failure.startswith("its process ended (killed by signal 9)")
         ends.append("SIGINT")
         with pytest.raises(SweepInterrupted):
             list(outcomes)

@@ -48,7 +48,7 @@ class Pages:
         session = StudySession(
             study.design, study.questionnaires, participant, b"secret", self.journal.records
         )
-        self.journal.write([session.opened(CODE, study.sha256, "test", UTC)])
+        self.journal.write([session.open_session(CODE, study.sha256, "test", UTC)])
         self.session = session
         self.run = StudyRun(
             CODE, session, self.journal, presenter or FilmPresenter(), self._clock, lambda: UTC

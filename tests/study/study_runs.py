@@ -37,7 +37,7 @@ def run_of(
     journal = Journal(folder)
     known = journal.records
     session = StudySession(study.design, study.questionnaires, number, b"secret", known)
-    journal.write((session.opened(f"P{number:03d}", "0" * 64, "test", UTC),))
+    journal.write((session.open_session(f"P{number:03d}", "0" * 64, "test", UTC),))
     shows = presenter or FilmPresenter()
     now_s = now_s or count(0.0, 60.0).__next__
     return StudyRun(f"P{number:03d}", session, journal, shows, now_s, lambda: UTC), journal
@@ -50,7 +50,7 @@ def step(run: StudyRun, value: int = 2) -> Screen:
         case ConsentScreen():
             run.consent(page, True, True, True)
         case InstructionsScreen() | RestScreen():
-            run.go_on(page)
+            run.leave_page(page)
         case ReadyScreen():
             run.begin(page)
         case PresentationScreen():

@@ -74,7 +74,7 @@ def test_answers_become_rows_and_practice_does_not_count() -> None:
     one = participation([*found[:2], practice, *found[2:]], study, QUESTIONS)
     assert [row.left_out for row in one.answers].count("practice") == 1
     # Two trials of two items, and the remarks at the end.
-    assert len(one.counted) == 5 and one.left_out == "" and one.how == "finished"
+    assert len(one.counted) == 5 and one.left_out == "" and one.outcome == "finished"
     with pytest.raises(ValueError, match="begins with"):
         participation(found[1:], study, QUESTIONS)
 
@@ -217,7 +217,7 @@ def test_hypotheses_are_decided_and_corrected_together() -> None:
     study = design()
     found = decided(study, 24, 1.2)
     assert [one.verdict for one in found] == ["supported", "supported"]
-    assert [t.key for t in found[0].also] == ["chi_square", "rank_sum"]
+    assert [t.key for t in found[0].further_tests] == ["chi_square", "rank_sum"]
     for one in found:
         assert one.test is not None and one.n == 24
         assert one.corrected_p >= one.test.deciding_p and one.means[0] > one.means[1]
@@ -235,13 +235,13 @@ def test_the_figures_are_those_of_scipy_on_the_same_answers() -> None:
     expected = stats.wilcoxon(walk, centre, correction=True, method="asymptotic")
     assert one.test is not None
     assert (one.test.statistic, one.test.p) == (expected.statistic, expected.pvalue)
-    assert one.also[1].p == stats.mannwhitneyu(walk, centre, method="asymptotic").pvalue
+    assert one.further_tests[1].p == stats.mannwhitneyu(walk, centre, method="asymptotic").pvalue
     swapped = stats.permutation_test(
         (walk, centre), lambda a, b, axis: stats.rankdata(
             np.concatenate([a, b], axis=-1), axis=-1)[..., :24].sum(axis=-1),
         permutation_type="samples", n_resamples=4000, rng=np.random.default_rng(1),
     )  # fmt: skip
-    assert one.also[1].exact_p == pytest.approx(swapped.pvalue, abs=0.03)
+    assert one.further_tests[1].exact_p == pytest.approx(swapped.pvalue, abs=0.03)
 
 
 def test_a_difference_of_the_other_sign_is_against_the_hypothesis() -> None:
@@ -273,7 +273,7 @@ def test_a_third_condition_that_differs_decides_nothing_between_two_equal_ones(t
         decide_hypotheses(study, QUESTIONS, people_of(two_above, 24, 1.5, seed))[0]
         for seed in range(4)
     ]
-    assert all(one.also[0].deciding_p < 0.01 for one in found)
+    assert all(one.further_tests[0].deciding_p < 0.01 for one in found)
     assert [one.verdict for one in found] == ["not supported"] * 4
 
 
@@ -642,7 +642,7 @@ def test_the_figures_are_those_of_scipy_on_the_means_of_each_participant() -> No
     assert gaze.means == (pytest.approx(walk.mean()), pytest.approx(centre.mean()))
     blink = mean("naturalness", "walk_blink", "centre_blink")
     stare = mean("naturalness", "walk_stare", "centre_stare")
-    assert lids.also[0].p == stats.mannwhitneyu(blink, stare, method="asymptotic").pvalue
+    assert lids.further_tests[0].p == stats.mannwhitneyu(blink, stare, method="asymptotic").pvalue
     assert gaze.verdict == lids.verdict == "supported"
 
 
@@ -734,4 +734,4 @@ def test_a_factor_alone_names_its_conditions() -> None:
     by_name = Hypothesis("paper.looked_at", "walk", "centre", also=("chi_square",))
     named = replace(study, hypotheses=(by_name,))
     (same,) = decide_hypotheses(named, QUESTIONS, people_of(named, 24, 1.2))
-    assert (one.test, one.also) == (same.test, same.also)
+    assert (one.test, one.further_tests) == (same.test, same.further_tests)

@@ -310,17 +310,17 @@ def test_films_ask_for_no_use_of_a_camera(pages: Pages) -> None:
 
 def test_who_declines_is_thanked_and_has_no_code(pages: Pages, tab: Tab) -> None:
     end = tab.do(tab.page()["page"], do="consent", given=False, uses=[])
-    assert (end["kind"], end["how"], end["code"], end["text"]) == ("end", "declined", "", [])
+    assert (end["kind"], end["outcome"], end["code"], end["text"]) == ("end", "declined", "", [])
 
 
 def test_who_leaves_is_told_nothing_of_the_conditions_and_keeps_the_code(
     pages: Pages, tab: Tab
 ) -> None:
     end = tab.do(to(tab, "presentation")["page"], do="withdraw")
-    assert (end["how"], end["code"], end["text"]) == ("withdrawn", CODE, [])
+    assert (end["outcome"], end["code"], end["text"]) == ("withdrawn", CODE, [])
     ended, closed = pages.journal.records[-2:]
     assert isinstance(ended, TrialEnded) and ended.outcome == "withdrawn"
-    assert isinstance(closed, ParticipationClosed) and closed.how == "withdrawn"
+    assert isinstance(closed, ParticipationClosed) and closed.outcome == "withdrawn"
 
 
 def test_a_film_that_was_not_seen_to_its_end_counts_as_an_attempt(pages: Pages, tab: Tab) -> None:
@@ -585,10 +585,10 @@ def test_who_is_excluded_is_so_for_a_reason(
     assert experimenter.press("exclude", why="  ")[0] == 503
     assert experimenter.press("exclude", why="the fire alarm went off") == (204, "")
     closed = lossy.journal.records[-1]
-    assert isinstance(closed, ParticipationClosed) and closed.how == "excluded"
+    assert isinstance(closed, ParticipationClosed) and closed.outcome == "excluded"
     assert closed.reason == "the fire alarm went off"
-    assert participant.page()["how"] == "excluded"
-    assert experimenter.state()["session"]["how"] == "excluded"
+    assert participant.page()["outcome"] == "excluded"
+    assert experimenter.state()["session"]["outcome"] == "excluded"
     assert b"fire alarm" not in b"".join(participant.traffic)
 
 

@@ -264,7 +264,7 @@ def test_a_connection_that_was_lost_comes_back_with_what_was_answered(
     wait_for(lambda: person.says("document.querySelector('#notice.not_saved') !== null"), "words")
     pages.serve_again()
     person.sees("instructions")
-    assert pages.session.agreed() == (False, False)
+    assert pages.session.consent_given() == (False, False)
     # Somebody else goes on, e.g. the experimenter; the page hears of it by itself.
     pages.run.exclude("the end of the test")
     pages.server.notify()

@@ -257,7 +257,7 @@ def test_objective_measures_have_the_effect_over_repetitions() -> None:
     d = []
     for k in range(1, 401):
         person = SimulatedParticipant(study, QUESTIONS, k, Population(0.8))
-        found = [person.measured(t, c)["mutual_gaze_share"]
+        found = [person.simulate_measures(t, c)["mutual_gaze_share"]
                  for t, c in enumerate(("walk", "walk", "centre", "centre"))]  # fmt: skip
         d.append(found[0] + found[1] - found[2] - found[3])
     assert np.mean(d) / np.std(d) == pytest.approx(0.8, abs=0.2)

@@ -456,7 +456,7 @@ def test_a_torn_line_is_no_record_and_hinders_nothing(tmp_path: Path) -> None:
     journal = data.participant(1) / FILE
     whole = collect_study(tmp_path)
     with journal.open("ab") as file:
-        file.write(b'[{"kind": "ParticipationClosed", "how": "wit')
+        file.write(b'[{"kind": "ParticipationClosed", "outcome": "wit')
     assert collect_study(tmp_path) == whole
 
 

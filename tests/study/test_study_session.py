@@ -561,7 +561,7 @@ def test_simulated_participants_finish_and_the_same_seed_gives_the_same_journals
     for number in one.numbers():
         records = read(one.participant(number))
         assert isinstance(records[0], ParticipationOpened) and records[0].simulated
-        assert isinstance(records[-1], ParticipationClosed) and records[-1].how == "finished"
+        assert isinstance(records[-1], ParticipationClosed) and records[-1].outcome == "finished"
         assert sum(isinstance(record, ItemAnswered) for record in records) == 2 * 2 + 1
 
 

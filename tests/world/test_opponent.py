@@ -86,7 +86,7 @@ def test_jumping_orders_never_break_the_limits() -> None:
     for k in range(2000):
         if k % 3 == 0:
             x, y, z = rng.uniform(low, high).tolist()
-            motion.order((x, y, z), 0.01 * k)
+            motion.set_target((x, y, z), 0.01 * k)
         rows.append(motion.step(k))
     fist = np.array([row.fist_m for row in rows])
     v = np.diff(fist, axis=0) / 0.01
@@ -108,7 +108,7 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
 
 
 def test_another_process_sees_the_same_motion(scene: WorldScene, tmp_path: Path) -> None:
-    shared = scene.figures.sharing(tmp_path / "people.npy")
+    shared = scene.figures.with_shared_file(tmp_path / "people.npy")
     other = Figures(shared.script, shared.seed, shared.shared)
     at = hands(WorldScene("boxing", shared))
     seen = WorldScene("boxing", other).hand("rival", "left", 6.3)

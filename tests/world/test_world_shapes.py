@@ -84,7 +84,7 @@ def _vertices(part: WorldPart) -> np.ndarray:
 
 def test_everybody_is_where_mujoco_has_them() -> None:
     found = pickle.loads(pickle.dumps(shapes("conversation")))
-    figures, model = found.spec.figures, found.spec.compiled().mj
+    figures, model = found.spec.figures, found.spec.compile().mj
     data = mujoco.MjData(model)
     assert [part.name for part in found.parts() if part.moves] == list(figures.names)
     for world_s in (0.0, 12.34, 100.0):
@@ -100,7 +100,7 @@ def test_everybody_is_where_mujoco_has_them() -> None:
 
 def test_limbs_collide_from_joint_to_joint() -> None:
     spec = shapes("conversation").spec
-    figures, model = present(spec.figures), spec.compiled().mj
+    figures, model = present(spec.figures), spec.compile().mj
     data = mujoco.MjData(model)
     PeoplePlacer(model, figures).place(data, 0.0)
     mujoco.mj_kinematics(model, data)

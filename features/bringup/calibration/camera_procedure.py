@@ -149,12 +149,12 @@ class Neck(Protocol):
 class NeckStep(NamedTuple):
     """Contribution of one neck angle.
 
-    number, of: which of how many angles; asked_rad: yaw, pitch, roll requested
+    number, step_count: which of how many angles; asked_rad: yaw, pitch, roll requested
     corners: how many were seen in every frame; view: what counts, or None and why not
     """
 
     number: int
-    of: int
+    step_count: int
     asked_rad: Angles3
     corners: int
     view: NeckView | None

@@ -61,23 +61,23 @@ class FaceCalibration:
     """Progress of a calibration.
 
     starts_mm, places_mm: each part's first and present place in the face frame
-    at: number of the part in ORDER, len(ORDER) after the last
-    chosen: parts that the gaze seemed to look at
+    part_number: number of the part in ORDER, len(ORDER) after the last
+    adjusted_parts: parts that the gaze seemed to look at
     step: number of the present step in STEPS_MM
-    ended: no part is due any more
+    is_ended: no part is due any more
     """
 
     starts_mm: tuple[Vec3, ...]
     places_mm: tuple[Vec3, ...]
-    at: int = 0
-    chosen: frozenset[str] = frozenset()
+    part_number: int = 0
+    adjusted_parts: frozenset[str] = frozenset()
     step: int = 2
-    ended: bool = False
+    is_ended: bool = False
 
     @property
     def part(self) -> str | None:
         """Return the part that is due, None at the end."""
-        return None if self.ended or self.at >= len(ORDER) else ORDER[self.at]
+        return None if self.is_ended or self.part_number >= len(ORDER) else ORDER[self.part_number]
 
     @property
     def step_mm(self) -> float:
@@ -125,14 +125,14 @@ def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
             step = state.step + (1 if key == "larger" else -1)
             return replace(state, step=max(0, min(len(STEPS_MM) - 1, step)))
         case "enter":
-            return _next_part(replace(state, chosen=state.chosen | {part}))
+            return _next_part(replace(state, adjusted_parts=state.adjusted_parts | {part}))
         case "skip":
-            left_alone = _with_place(state, state.starts_mm[state.at])
-            return _next_part(replace(left_alone, chosen=state.chosen - {part}))
+            left_alone = _with_place(state, state.starts_mm[state.part_number])
+            return _next_part(replace(left_alone, adjusted_parts=state.adjusted_parts - {part}))
         case "back":
-            return replace(state, at=max(0, state.at - 1))
+            return replace(state, part_number=max(0, state.part_number - 1))
         case _:
-            return replace(state, ended=True)
+            return replace(state, is_ended=True)
 
 
 def point_world_m(place_mm: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
@@ -152,7 +152,7 @@ def changed_places(state: FaceCalibration) -> dict[str, Vec3]:
     return {
         f"face_parts_mm.{part}": _round_to_tenths(state.place_mm(part))
         for part in ORDER
-        if part in state.chosen
+        if part in state.adjusted_parts
     }
 
 
@@ -168,13 +168,17 @@ def _step_within_range(value: float, by: float) -> float:
 
 
 def _with_place(state: FaceCalibration, place_mm: Vec3) -> FaceCalibration:
-    places = (*state.places_mm[: state.at], place_mm, *state.places_mm[state.at + 1 :])
+    places = (
+        *state.places_mm[: state.part_number],
+        place_mm,
+        *state.places_mm[state.part_number + 1 :],
+    )
     return replace(state, places_mm=places)
 
 
 def _next_part(state: FaceCalibration) -> FaceCalibration:
-    at = state.at + 1
-    return replace(state, at=at, ended=at >= len(ORDER))
+    at = state.part_number + 1
+    return replace(state, part_number=at, is_ended=at >= len(ORDER))
 
 
 AIMED_DEG = 1.0

@@ -178,7 +178,7 @@ class HobbyMarker:
         self._person.steer(f"move {self.name} {where}, then press Enter", self)
         return self._arrive()
 
-    def by(self, us: float) -> None:
+    def move_by_us(self, us: float) -> None:
         """Move the joint by this much."""
         self._hobby.aim(self._hobby.place_us + us)
 
@@ -187,7 +187,7 @@ class HobbyMarker:
         at_us = self._hobby.pulse_us
         self._hobby.aim(min(max(self._hobby.place_us + us, at_us - LEAD_US), at_us + LEAD_US))
 
-    def to(self, us: float) -> None:
+    def move_to_us(self, us: float) -> None:
         """Move the joint to a pulse width."""
         self._hobby.aim(us)
 

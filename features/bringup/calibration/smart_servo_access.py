@@ -68,13 +68,13 @@ class SmartServoAccess:
         self.name, self.joint = name, joint
         self.who = f"{name} (servo {joint.id})"
         self._kind = servo_kind(joint.model)
-        if self._kind.driving is None:
+        if self._kind.calibration is None:
             raise SetupError(
                 f"{self.who}: {self._kind.title} servos are not calibrated by this program: turn "
                 "the joint by hand, read its steps with gazerig monitor, and write zero_step, min_deg "
                 "and max_deg into the YAML"
             )
-        self._driving, self._family = self._kind.driving, self._kind.family
+        self._driving, self._family = self._kind.calibration, self._kind.family
         self.alone = ""
         if self._family.watchdog_unit_s is None:
             self.alone = (
@@ -117,9 +117,9 @@ class SmartServoAccess:
             raise ServoFault(f"{self.who}: {names}: {remedy}")
         for setting in driving.settings:
             now = value(setting.register)
-            if now != setting.of(now):
+            if now != setting.apply_to(now):
                 raise ServoMissing(
-                    f"{self.who}: {setting.register} is {now}, not {setting.of(now)}: "
+                    f"{self.who}: {setting.register} is {now}, not {setting.apply_to(now)}: "
                     "gazerig doctor --fix sets it"
                 )
         offset = value(driving.offset)
@@ -195,7 +195,9 @@ class SmartServoAccess:
             put(self._family.lock_register, 1)
         wanted = {
             **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
-            **driving.gentle(value, params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG),
+            **driving.gentle_drive(
+                value, params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG
+            ),
         }
         was = {name: value(name) for name in wanted}
         found = dict(was)

@@ -39,9 +39,9 @@ class TerminalJogger(TerminalPerson):
                 if not isfinite(us):
                     say(f"{line!r}: {LINES_HELP}")
                 elif line[0] in "+-":
-                    servo.by(us)
+                    servo.move_by_us(us)
                 else:
-                    servo.to(us)
+                    servo.move_to_us(us)
             return
         step = FIRST_STEP
         say(KEYS_HELP)

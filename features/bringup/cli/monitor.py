@@ -136,10 +136,10 @@ def _samples(
 def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
     """Lay a sample out as a table."""
     hobby = any(not joint.model_facts.measures_position for joint in joints.values())
-    share = sample.unanswered / sample.asked
+    share = sample.unanswered / sample.request_count
     caption = (
         f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; "
-        f"{sample.unanswered} of {sample.asked} unanswered ({share:.1%})"
+        f"{sample.unanswered} of {sample.request_count} unanswered ({share:.1%})"
     )
     table = Table(
         box=None,

@@ -141,7 +141,7 @@ def look_at_command(
             say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
         for line in gaze_result_text(looked):
             say(line)
-        for applied in looked.moved.remarkable():
+        for applied in looked.moved.remarkable_joints():
             say(f"limited: {applied}")
         for line in () if good else joints_at_limits(loaded.joints, narrower, looked.moved):
             say(f"limited: {line}")

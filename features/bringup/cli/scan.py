@@ -277,7 +277,7 @@ def scan_remarks(
         count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
         rates: dict[BusKind, list[str]] = {}
         for one in rounds:
-            if one.possible:
+            if one.is_supported:
                 rates.setdefault(one.kind, []).append(str(one.baud))
         named = (f"searched {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
         yield f"{count} on {where}; {'; '.join(named)}"
@@ -300,21 +300,21 @@ def scan_remarks(
 def _unusual_lines(one: SearchRound, heard: Container[int]) -> Iterator[str]:
     """Return what was unusual at one baud rate."""
     twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
-    for servo_id in sorted({*one.shared, *twice}):
+    for servo_id in sorted({*one.shared_ids, *twice}):
         yield (
             f"two or more servos have id {servo_id} at {one.baud} bit/s: connect them one at a "
             "time and run gazerig setup"
         )
     if one.found or one.baud in heard:
         return
-    if one.protocol_1:
-        ids = ", ".join(map(str, one.protocol_1))
+    if one.protocol_1_ids:
+        ids = ", ".join(map(str, one.protocol_1_ids))
         yield (
             f"at {one.baud} bit/s something answers in Protocol 1 as id {ids}: another maker's "
             "servo (gazerig scan --kind feetech), or one whose Protocol Type must be set to 2 with "
             "Dynamixel Wizard 2.0"
         )
-    elif one.junk:
+    elif one.unknown_bytes:
         yield (
             f"at {one.baud} bit/s only pieces came: a wrong rate, a loose plug, or two servos "
             "with one id"

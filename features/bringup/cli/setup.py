@@ -130,9 +130,9 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
         return False
     result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
     clear_progress()
-    done = "; ".join(result.done) or "nothing to change"
+    done = "; ".join(result.changes) or "nothing to change"
     say(
-        f"   {servo_label(wanted)}: {done}; answers as id {result.now.id} at "
-        f"{result.now.baud} bit/s"
+        f"   {servo_label(wanted)}: {done}; answers as id {result.after.id} at "
+        f"{result.after.baud} bit/s"
     )
     return True

@@ -169,7 +169,7 @@ def _try_channel(
             say(f"   {error}")
             continue
         for one in gone:
-            if abs(one.asked - one.got) > FINE_STEPS:
+            if abs(one.commanded - one.reported) > FINE_STEPS:
                 say(f"   {explain(setup, one)}")
                 break
         name = setup.name.replace("_", " ")
@@ -237,7 +237,7 @@ def set_up_maestro(task: SetupTask) -> list[str]:
 
 
 def _explain_maestro(setup: ServoConfig, place: ChannelPosition) -> str:
-    return clipping_text(setup, place.asked, place.got)
+    return clipping_text(setup, place.commanded, place.reported)
 
 
 def _test_ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) -> None:
@@ -257,7 +257,7 @@ def _test_ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) 
         rest = _rest_steps(setup)
         places = (rest, setup.min_steps, setup.max_steps, rest)
         for one in _walk_channel(board, setup, places, QUICK_STEPS_S):
-            if abs(one.asked - one.got) > FINE_STEPS:
+            if abs(one.commanded - one.reported) > FINE_STEPS:
                 cut[_explain_maestro(setup, one)] = None
     for text in cut:
         say(f"   {text}")
@@ -302,7 +302,7 @@ def set_up_pca9685(task: SetupTask) -> list[str]:
 
 
 def _explain_pca9685(setup: ServoConfig, place: ChannelPosition) -> str:
-    sent, got = f"{place.asked / US_STEPS:g} us", f"{place.got / US_STEPS:g} us"
+    sent, got = f"{place.commanded / US_STEPS:g} us", f"{place.reported / US_STEPS:g} us"
     return (
         f"{servo_label(setup)} is sent to {sent} and gets {got}: is another program using the "
         "board? gazerig doctor looks at it"

@@ -95,23 +95,23 @@ ADVICE = {
 class BoardRules(NamedTuple):
     """Differences between makes.
 
-    most_input: a channel that reports at most this pulse is an input; 0: none can be
-    left_on, outside: remedies for pulses inside and outside a joint's range that no program
-        sends; {name} is the joint
+    highest_input: a channel that reports at most this pulse is an input; 0: none can be
+    left_on_remedy, outside_range_remedy: remedies for pulses inside and outside a joint's range
+        that no program sends; {name} is the joint
     note: what no board of the make reports
     """
 
-    most_input: int
-    left_on: str
-    outside: str
+    highest_input: int
+    left_on_remedy: str
+    outside_range_remedy: str
     note: Advice
 
 
 MAESTRO = BoardRules(
-    most_input=MOST_INPUT,
-    left_on="gazerig home ends with its pulses off; for good set 'On startup or error' to Off in "
+    highest_input=MOST_INPUT,
+    left_on_remedy="gazerig home ends with its pulses off; for good set 'On startup or error' to Off in "
     "Pololu's program",
-    outside="switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
+    outside_range_remedy="switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
     note=Advice(
         "note",
         "its channels' own ranges and its serial timeout cannot be read over the serial line",
@@ -120,9 +120,9 @@ MAESTRO = BoardRules(
     ),
 )
 PCA9685 = BoardRules(
-    most_input=0,
-    left_on="gazerig home ends with its pulses off",
-    outside="switch the servo supply off, then gazerig reboot {name} ends its pulses",
+    highest_input=0,
+    left_on_remedy="gazerig home ends with its pulses off",
+    outside_range_remedy="switch the servo supply off, then gazerig reboot {name} ends its pulses",
     note=Advice(
         "note",
         "has no watchdog: when the cable or the computer dies it goes on with its last pulses",
@@ -159,12 +159,14 @@ def examine_channels(
             findings.append(ADVICE["not read"].at(where))
         elif pulse is None:
             findings.append(ADVICE["silent"].at(where))
-        elif 0 < pulse <= rules.most_input:
+        elif 0 < pulse <= rules.highest_input:
             findings.append(ADVICE["input"].at(where))
         elif pulse:
             us, low, high = (one / US_STEPS for one in (pulse, setup.min_steps, setup.max_steps))
             inside = low <= us <= high
-            remedy = (rules.left_on if inside else rules.outside).format(name=setup.name)
+            remedy = (rules.left_on_remedy if inside else rules.outside_range_remedy).format(
+                name=setup.name
+            )
             advice = ADVICE["left on" if inside else "outside"]
             findings.append(advice.at(where, us=us, low=low, high=high, remedy=remedy))
     if not any(finding.level in ("warn", "error") for finding in findings):

@@ -70,8 +70,8 @@ class Protection(NamedTuple):
 class ServoChecks:
     """Properties of a kind of servo that the rules depend on.
 
-    program: the maker's, for settings that this program cannot write
-    manual: the maker's
+    maker_program: the maker's, for settings that this program cannot write
+    maker_manual: the maker's
     registers: those that rules read
     ping_only: Status Return Level 0 means that only pings are answered
     out_of_voltage: effect of a supply outside the limits
@@ -82,14 +82,14 @@ class ServoChecks:
     """
 
     kind: ServoKind
-    program: str
-    manual: str
+    maker_program: str
+    maker_manual: str
     registers: tuple[str, ...]
     ping_only: bool
     out_of_voltage: str
     error_remedies: Mapping[str, str]
     unlimited_at_zero: bool
-    wanted: tuple[WantedSetting, ...]
+    wanted_settings: tuple[WantedSetting, ...]
     protection: Protection
     firmware_notes: Callable[[str], tuple[tuple[int, Advice], ...]]
 
@@ -146,8 +146,8 @@ def _firmware_notes(model: str) -> tuple[tuple[int, Advice], ...]:
 
 _DYNAMIXEL = ServoChecks(
     kind=DYNAMIXEL,
-    program=WIZARD,
-    manual="the e-Manual",
+    maker_program=WIZARD,
+    maker_manual="the e-Manual",
     registers=(
         *COMMON,
         *("hardware_error_status", "bus_watchdog", "drive_mode", "secondary_id", "protocol_type"),
@@ -164,7 +164,7 @@ _DYNAMIXEL = ServoChecks(
         "overload": "free the joint: something holds it or its range is too wide",
     },
     unlimited_at_zero=False,
-    wanted=(
+    wanted_settings=(
         *_common(DYNAMIXEL, 3, {0: "current", 1: "velocity", 4: "extended position",
                                 5: "current-based position", 16: "PWM"}),
         WantedSetting("drive_mode", 0, "warn", _drive_mode),
@@ -205,8 +205,8 @@ HOTTEST_C = 70
 
 _FEETECH = ServoChecks(
     kind=FEETECH,
-    program=FD,
-    manual="Feetech's manual",
+    maker_program=FD,
+    maker_manual="Feetech's manual",
     registers=(
         *COMMON,
         *("status", "lock", "angular_resolution", "phase", "position_offset", "max_torque"),
@@ -224,7 +224,7 @@ _FEETECH = ServoChecks(
         "{setup.id} ends it",
     },
     unlimited_at_zero=True,
-    wanted=(
+    wanted_settings=(
         *_common(FEETECH, 0, {1: "wheel", 2: "open loop", 3: "stepwise"}),
         WantedSetting(
             "angular_resolution", 1, "warn",
@@ -264,7 +264,9 @@ _SCS = replace(
     _FEETECH,
     kind=SCS,
     registers=tuple(name for name in _FEETECH.registers if name in SCS.family.registers),
-    wanted=tuple(one for one in _FEETECH.wanted if one.register in SCS.family.registers),
+    wanted_settings=tuple(
+        one for one in _FEETECH.wanted_settings if one.register in SCS.family.registers
+    ),
     protection=_FEETECH.protection._replace(
         errors={bit: feetech.STATUS_ERRORS[bit] for bit in (0x04, 0x20)}
     ),

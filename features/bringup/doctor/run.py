@@ -60,13 +60,13 @@ ADVICE = {
 class Presence(NamedTuple):
     """Servos that answered at the rig's baud rate, by id, and missing ones.
 
-    strangers: answered, but are not in the YAML; elsewhere: answered at other baud rates
+    unexpected: answered, but are not in the YAML; elsewhere: answered at other baud rates
     corrupt: how many of six answers came in pieces, by id, where any did
     """
 
-    there: dict[int, FoundServo]
+    present: dict[int, FoundServo]
     missing: tuple[ServoConfig, ...]
-    strangers: tuple[FoundServo, ...]
+    unexpected: tuple[FoundServo, ...]
     elsewhere: tuple[FoundServo, ...]
     corrupt: dict[int, int]
 
@@ -118,7 +118,7 @@ def examine_bus(
         BusLost: it has gone away.
     """
     presence = find_servos(port, kind, setups, baud, tell)
-    if presence.missing and not presence.there and not presence.elsewhere:
+    if presence.missing and not presence.present and not presence.elsewhere:
         return [ADVICE["nobody"].at("the bus", baud=baud, kind=kind)]
     at = {found.id: found for found in presence.elsewhere}
     findings = []
@@ -127,13 +127,13 @@ def examine_bus(
         cause = "elsewhere" if other else "pieces" if setup.id in presence.corrupt else "silent"
         findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
     findings += [ADVICE["new"].at("the bus", found=found) for found in at.values()]
-    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.strangers]
+    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.unexpected]
     for setup in setups:
-        if setup.id in presence.there:
+        if setup.id in presence.present:
             tell(f"reading {servo_label(setup)}")
-            found, spoilt = presence.there[setup.id], presence.corrupt.get(setup.id, 0)
+            found, spoilt = presence.present[setup.id], presence.corrupt.get(setup.id, 0)
             findings += examine_servo(port, kind, setup, found, spoilt)
-    if presence.there:
+    if presence.present:
         findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
     return findings
 
@@ -271,13 +271,13 @@ PORT_ADVICE = {
 class PortFacts(NamedTuple):
     """Report of the operating system on one port.
 
-    holders: other programs that hold it; others: the ports there are
+    holders: other programs that hold it; other_ports: the ports there are
     """
 
     device: str
     access: Access
     holders: tuple[str, ...]
-    others: Sequence[SerialPort]
+    other_ports: Sequence[SerialPort]
 
 
 def port_facts(device: str, host: Host) -> PortFacts:
@@ -298,9 +298,9 @@ def examine_port(facts: PortFacts) -> list[Diagnostic]:
     elif facts.holders:
         trouble = "held"
     if trouble:
-        here, holders = name_ports(facts.others), ", ".join(facts.holders)
+        here, holders = name_ports(facts.other_ports), ", ".join(facts.holders)
         return [PORT_ADVICE[trouble].at(device, ports=here, group=access.group, holders=holders)]
-    lasting = next((p.by_id for p in facts.others if p.device == device and p.by_id), None)
+    lasting = next((p.by_id for p in facts.other_ports if p.device == device and p.by_id), None)
     findings = [PORT_ADVICE["well"].at(device)]
     if lasting is not None:
         findings.append(PORT_ADVICE["name"].at(device, name=lasting))

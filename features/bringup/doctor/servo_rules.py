@@ -50,7 +50,7 @@ ADVICE = {
     "weak": Advice("warn", "{limits}; made for {model.rated_v:g} V, it is slow and weak here",
         "measure at the supply and at this servo: thin wires and long chains lose volts"),
     "firmware": Advice("error", "firmware {found.firmware}, the YAML wants {setup.firmware_min}",
-        "update it with {checks.program}"),
+        "update it with {checks.maker_program}"),
     "baud": Advice("warn", "answers at {found.baud} bit/s, but its Baud Rate is {rate}: after its "
         "next start it will not be heard here", "gazerig setup --joint {setup.name}"),
     "unlimited": Advice("warn", "has no position limits of its own and many turns", FIX),
@@ -63,10 +63,10 @@ ADVICE = {
         "feed long chains at both ends; gazerig reboot brings a latched servo back"),
     "overload": Advice("warn", "its overload protection cannot act as meant (Overload Torque "
         "{share} %, Protection Time {seconds:g} s)",
-        "set Overload Torque (36) to 80 and Protection Time (35) to 200 with {checks.program}"),
+        "set Overload Torque (36) to 80 and Protection Time (35) to 200 with {checks.maker_program}"),
     "slower": Advice("note",
         "its Velocity Limit is {limit:.0f} deg/s, the YAML asks for {asked:.0f}",
-        "lower max_speed_deg_s in the YAML or raise the limit with {checks.program}"),
+        "lower max_speed_deg_s in the YAML or raise the limit with {checks.maker_program}"),
     "slow": Advice("note", "the YAML asks its shaft for {asked:.0f} deg/s; without load and at "
         "{model.rated_v:g} V it turns {limit:.0f}", "lower max_speed_deg_s in the YAML"),
 }
@@ -190,7 +190,7 @@ def _errors(state: ServoState) -> Iterator[Diagnostic]:
     family, remedies = state.checks.kind.family, state.checks.error_remedies
     advice = ADVICE["latched" if family.faults_latch else "reported"]
     for error in family.name_errors(state.values[family.error_register] or 0):
-        remedy = remedies.get(error, f"look it up in {state.checks.manual}")
+        remedy = remedies.get(error, f"look it up in {state.checks.maker_manual}")
         if remedy:
             yield state.finding(advice, error=error, remedy=remedy.format(setup=state.setup))
 
@@ -211,7 +211,7 @@ def _voltage(state: ServoState) -> Iterator[Diagnostic]:
 
 def _too_high(state: ServoState, volts: int) -> str:
     """Return the remedy if a model has versions for other voltages that look alike to the bus."""
-    model, raised = state.model, "set Max Voltage (14) to {} with " + state.checks.program
+    model, raised = state.model, "set Max Voltage (14) to {} with " + state.checks.maker_program
     for other in state.checks.kind.family.models.values():
         if other.number != model.number:
             continue
@@ -243,7 +243,7 @@ def _baud(state: ServoState) -> Iterator[Diagnostic]:
 
 
 def _wanted(state: ServoState) -> Iterator[Diagnostic]:
-    for wanted in state.checks.wanted:
+    for wanted in state.checks.wanted_settings:
         value = state.values[wanted.register]
         if value is None or wanted.accepts(value):
             continue

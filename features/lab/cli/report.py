@@ -149,7 +149,7 @@ def compare(
                 a, b = difference.a, difference.b
                 unit = "" if a.band.unit in ("", "share") else f" {a.band.unit}"
                 how = " (the figure may be chance, its distribution is not)"
-                shape = how if difference.chance >= LEVEL else ""
+                shape = how if difference.p_value >= LEVEL else ""
                 say(f"{a.band.title}: {a.value:.3g} and {b.value:.3g}{unit}{shape}")
         count = sum(d.word == "more than chance" for d in made.differences)
         say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")

@@ -132,7 +132,7 @@ def sweep(
                 outcomes = work.run(points, runs)
             _write(spec, folder, outcomes, shown)
             _say_failures(outcomes)
-    if all(one.failed for one in outcomes):
+    if all(one.failure for one in outcomes):
         raise typer.Exit(FAULT)
 
 
@@ -227,7 +227,7 @@ def _write(
     from gazerig.features.lab.sweep.response_figure import PICTURE, response_png
 
     files = [*write_tables(folder, outcomes)]
-    if not all(one.failed for one in outcomes):
+    if not all(one.failure for one in outcomes):
         files.append(folder / PICTURE)
         write_file(files[-1], response_png(spec.axes, outcomes, shown), force=True)
     points = len(outcomes) // len(spec.seeds)
@@ -280,9 +280,9 @@ def _column(name: str) -> str:
 
 def _say_failures(outcomes: "Sequence[Outcome]") -> None:
     """Print the failed runs, each reason once."""
-    reasons = Counter(one.failed for one in outcomes if one.failed)
+    reasons = Counter(one.failure for one in outcomes if one.failure)
     for failed, count in reasons.items():
-        first = next(one for one in outcomes if one.failed == failed)
+        first = next(one for one in outcomes if one.failure == failed)
         where = ", ".join(f"{key}={value}" for key, value in first.point.items())
         more = f" (and {count - 1} more)" if count > 1 else ""
         say(f"failed: {where}, seed {first.seed}{more}: {failed}")

@@ -57,8 +57,8 @@ class MeasureDifference(NamedTuple):
     """One measure of two runs.
 
     difference: b - a; low95, high95: its interval, nan if unknown
-    chance: p value of the difference, corrected; chance_shape: the same for the whole distribution,
-        nan if the measure has none
+    p_value: p value of the difference, corrected
+    shape_p_value: the same for the whole distribution, nan if the measure has none
     """
 
     a: MeasureResult
@@ -66,8 +66,8 @@ class MeasureDifference(NamedTuple):
     difference: float
     low95: float
     high95: float
-    chance: float
-    chance_shape: float
+    p_value: float
+    shape_p_value: float
     word: Word
 
 
@@ -145,12 +145,12 @@ def measure_differences(
 def permutation_p_value(a: MeasuredValue, b: MeasuredValue, rng: np.random.Generator) -> float:
     """Return the p value of the difference of two figures by a permutation test."""
     rows, n = np.concatenate([a.rows, b.rows]), len(a.rows)
-    seen = abs(measured_value(b.of, b.rows) - measured_value(a.of, a.rows))
+    seen = abs(measured_value(b.statistic, b.rows) - measured_value(a.statistic, a.rows))
     as_much = drawn_count = 0
     for _ in range(0, _DRAWS, _AT_ONCE):
         orders = [rng.permutation(len(rows)) for _ in range(_AT_ONCE)]
-        first = measured_values(a.of, rows, [order[:n] for order in orders])
-        dealt = abs(measured_values(a.of, rows, [order[n:] for order in orders]) - first)
+        first = measured_values(a.statistic, rows, [order[:n] for order in orders])
+        dealt = abs(measured_values(a.statistic, rows, [order[n:] for order in orders]) - first)
         drawn_count += int(np.isfinite(dealt).sum())
         as_much += int((dealt >= seen - 1e-12).sum())
     return (as_much + 1.0) / (drawn_count + 1.0)
@@ -171,7 +171,7 @@ def shape_p_value(a: MeasuredValue, b: MeasuredValue) -> float:
 def _numbers(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, object]:
     values = {
         "a": d.a.value, "b": d.b.value, "difference": d.difference, "low95": d.low95,
-        "high95": d.high95, "chance": d.chance, "chance_of_shape": d.chance_shape,
+        "high95": d.high95, "p_value": d.p_value, "shape_p_value": d.shape_p_value,
     }  # fmt: skip
     known = {key: value if isfinite(value) else None for key, value in values.items()}
     events = [d.a.measured.events, d.b.measured.events]
@@ -189,7 +189,7 @@ class ComparedRow(NamedTuple):
     events: str
     difference: str
     interval: str
-    chance: str
+    p_text: str
     word: str
     css: str
 
@@ -200,9 +200,9 @@ _CLASSES = {"more than chance": "more", "may be chance": "same", "too few events
 def _row(difference: MeasureDifference, abouts: tuple[RunHeader, RunHeader]) -> ComparedRow:
     a, b = difference.a, difference.b
     known = isfinite(difference.difference)
-    chances = [f"p {_p_text(difference.chance)}"] if known else []
-    if isfinite(difference.chance_shape):
-        chances.append(f"distribution p {_p_text(difference.chance_shape)}")
+    chances = [f"p {_p_text(difference.p_value)}"] if known else []
+    if isfinite(difference.shape_p_value):
+        chances.append(f"distribution p {_p_text(difference.shape_p_value)}")
     return ComparedRow(
         finding_line(a, abouts[0].styles),
         finding_line(b, abouts[1].styles),

@@ -36,7 +36,7 @@ def _overview(figure: Figure, runs: Sequence[ShownRun]) -> None:
         start = float(onsets[int(np.argmax(many))]) if many else float(t[0])
         part = run.between(start, start + _OVERVIEW_S)
         axes.plot(t[part], run.column("target_yaw")[part], color=HUMAN, lw=1.0, label="target")
-        if run.joints.has("neck_yaw"):
+        if run.joints.has_any("neck_yaw"):
             axes.plot(t[part], run.column("head_yaw")[part], color="#2b8a5a", lw=1.4, label="head")
         axes.plot(t[part], run.column("gaze_yaw")[part], color=shown.colour, lw=1.2, label="gaze")
         label_axes(axes, "time in s", "yaw, deg", shown.name)

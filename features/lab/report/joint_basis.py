@@ -20,19 +20,19 @@ class JointBasis:
     names: tuple[str, ...] = ()
     estimated: tuple[str, ...] = ()
 
-    def has(self, *names: str) -> bool:
+    def has_any(self, *names: str) -> bool:
         """Return whether the rig has any of some joints."""
         return not self.names or not frozenset(names).isdisjoint(self.names)
 
     @property
-    def parallel(self) -> bool:
+    def has_parallel_eyes(self) -> bool:
         """Return whether one linkage turns both eyes sideways."""
         return "eyes_pan" in self.names
 
     @property
     def styles(self) -> frozenset[str]:
         """Return the styles that select notes of the bands."""
-        return frozenset((PARALLEL,)) if self.parallel else frozenset()
+        return frozenset((PARALLEL,)) if self.has_parallel_eyes else frozenset()
 
     def basis(self, group: str) -> Basis:
         """Return the basis of a section of the report: its lids, or eyes and neck."""
@@ -42,7 +42,7 @@ class JointBasis:
     @property
     def whole_basis(self) -> Basis:
         """Return the basis of the whole report."""
-        each = {self.basis(group) for group in GROUPS if group != LIDS or self.has(*UPPER)}
+        each = {self.basis(group) for group in GROUPS if group != LIDS or self.has_any(*UPPER)}
         return each.pop() if len(each) == 1 else "partly estimated"
 
     def left_out(self, key: str) -> str:
@@ -64,32 +64,32 @@ _BLINKS = (
 _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         (*_HEAD_PART, "head_roll", "vor"),
-        lambda joints: not joints.has("neck_yaw", "neck_pitch", "neck_roll"),
+        lambda joints: not joints.has_any("neck_yaw", "neck_pitch", "neck_roll"),
         "This rig has no neck, so it has no head movement.",
     ),
     (
         _HEAD_PART,
-        lambda joints: not joints.has("neck_yaw"),
+        lambda joints: not joints.has_any("neck_yaw"),
         "No joint turns the head sideways: the head's part in gaze shifts is left out.",
     ),
     (
         ("head_roll",),
-        lambda joints: not joints.has("neck_roll"),
+        lambda joints: not joints.has_any("neck_roll"),
         "No joint rolls the head.",
     ),
     (
         ("vor",),
-        lambda joints: not joints.has("neck_yaw", "neck_pitch"),
+        lambda joints: not joints.has_any("neck_yaw", "neck_pitch"),
         "No joint turns the head sideways or up, so the gaze need not be stabilised.",
     ),
     (
         ("vergence", "vergence_ok"),
-        lambda joints: joints.parallel,
+        lambda joints: joints.has_parallel_eyes,
         "One linkage turns both eyes sideways: they stay parallel, and there is no vergence.",
     ),
     (
         _BLINKS,
-        lambda joints: not joints.has(*UPPER),
+        lambda joints: not joints.has_any(*UPPER),
         "This rig has no upper lids, so it has no blinks.",
     ),
     (

@@ -184,7 +184,7 @@ def finding_line(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
     band, value = finding.band, finding.value
     known = isfinite(finding.low95)
     interval = f"{format_number(finding.low95)} to {format_number(finding.high95)}" if known else ""
-    asked = finding.measured.asked
+    asked = finding.measured.commanded_value
     notes = tuple(text for style, text in band.notes if style in styles)
     return TextLine(
         band.title,

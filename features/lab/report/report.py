@@ -141,7 +141,7 @@ def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
     return {
         "key": band.key, "title": band.title, "unit": band.unit,
         "value": _or_none(finding.value), "low95": _or_none(finding.low95),
-        "high95": _or_none(finding.high95), "asked": _or_none(finding.measured.asked),
+        "high95": _or_none(finding.high95), "asked": _or_none(finding.measured.commanded_value),
         "events": finding.measured.events, "least_events": band.min_events,
         "band": [band.low, band.high], "verdict": finding.verdict, "source": band.source,
         "basis": run.joints.basis(band.group),

@@ -30,15 +30,15 @@ _AT_ONCE = 250_000
 class MeasuredValue:
     """The data of one measure in a run.
 
-    key: key of its band; rows: one row an event; of: the statistic
-    asked: the same figure of the models' commands, nan if unknown
+    key: key of its band; rows: one row an event; statistic: the statistic
+    commanded_value: the same figure of the models' commands, nan if unknown
     count: number of events, if a row is not an event
     """
 
     key: str
     rows: Floats
-    of: Statistic
-    asked: float = nan
+    statistic: Statistic
+    commanded_value: float = nan
     count: int | None = None
 
     @property
@@ -82,7 +82,7 @@ def confidence_interval(measured: MeasuredValue) -> tuple[float, float]:
     Shares have the score interval of Wilson (1927), which is valid for few events too; all others
     that of the bootstrap (Efron 1979).
     """
-    rows, of = measured.rows, measured.of
+    rows, of = measured.rows, measured.statistic
     if of is longest:
         return nan, nan
     if of is mean and rows.ndim == 1 and np.isin(rows, (0.0, 1.0)).all():
@@ -109,7 +109,7 @@ def unbiased_interval(spread: Floats, value: float) -> tuple[float, float]:
 
 def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureResult:
     """Compare a figure with its pass band, without an interval; too few events do not pass."""
-    value = measured_value(measured.of, measured.rows)
+    value = measured_value(measured.statistic, measured.rows)
     verdict: VerdictWord = "outside"
     if measured.events < band.min_events or not isfinite(value):
         verdict = "too few events"
@@ -121,7 +121,9 @@ def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureRe
 def bootstrap(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
     """Return the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
     rows, n = measured.rows, len(measured.rows)
-    values = measured_values(measured.of, rows, (rng.integers(0, n, n) for _ in range(draws)))
+    values = measured_values(
+        measured.statistic, rows, (rng.integers(0, n, n) for _ in range(draws))
+    )
     found = values[np.isfinite(values)]
     return found if len(found) else np.array([nan])
 

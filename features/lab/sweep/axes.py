@@ -54,7 +54,7 @@ class Axis:
         """Return whether the axis is a continuous range."""
         return not self.values
 
-    def has(self, value: Value) -> bool:
+    def contains(self, value: Value) -> bool:
         """Return whether a value is on the axis."""
         if self.values:
             return _freeze(value) in self.values

@@ -37,7 +37,7 @@ def search_best(scores: Scores, axes: Sequence[Axis], start: Point, count: int, 
     members = max(_LEAST, 2 * len(axes))
     rng = np.random.default_rng(seed)
     first = latin_shares(len(axes), members, rng)
-    if all(axis.has(start[axis.key]) for axis in axes):
+    if all(axis.contains(start[axis.key]) for axis in axes):
         first[0] = [axis.share(start[axis.key]) for axis in axes]
 
     def many(columns: Floats) -> Floats:
@@ -119,7 +119,7 @@ def counted_measures(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
     Raises:
         SetupError: a run failed, or there are none.
     """
-    failed = next((one.failed for one in outcomes if one.failed), "")
+    failed = next((one.failure for one in outcomes if one.failure), "")
     if failed:
         raise SetupError(f"the rig's own values cannot be run: {failed}")
     judged = Counter(
@@ -136,7 +136,7 @@ def counted_measures(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
 
 def make_trial(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]) -> Trial:
     """Return the score of a point's runs; a failed run makes the worst possible score."""
-    failed = next((one.failed for one in outcomes if one.failed), "")
+    failed = next((one.failure for one in outcomes if one.failure), "")
     if failed:
         return Trial(point, len(counted) + 1.0, float(len(counted)), failed)
     grades = []

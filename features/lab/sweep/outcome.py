@@ -34,15 +34,15 @@ class Outcome(NamedTuple):
         point: its parameters.
         seed: seed of its random generators.
         figures: columns; empty if it failed.
-        failed: reason of a failure, "" otherwise.
-        died: whether its process ended, perhaps for a reason that does not recur.
+        failure: reason of a failure, "" otherwise.
+        has_died: whether its process ended, perhaps for a reason that does not recur.
     """
 
     point: Point
     seed: int
     figures: Figures
-    failed: str = ""
-    died: bool = False
+    failure: str = ""
+    has_died: bool = False
 
 
 def run_figures(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Column]:
@@ -117,7 +117,7 @@ def table_rows(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]
                 for v in map(one.point.get, keys)
             ),
             one.seed,
-            one.failed,
+            one.failure,
             *(one.figures.get(name) for name in figures),
         ]
         for one in outcomes

@@ -45,7 +45,7 @@ def response_png(
     runs = [
         one
         for one in outcomes
-        if not one.failed and all(axis.has(one.point[axis.key]) for axis in axes)
+        if not one.failure and all(axis.contains(one.point[axis.key]) for axis in axes)
     ]
     names = list(shown) or most_responsive(axes, runs, _MOST.get(len(axes), _ROWS))
     heat = len(axes) == 2 and not any(axis.is_range for axis in axes)

@@ -190,7 +190,7 @@ class Sweep:
         progress(done, len(wanted))
         for number, outcome in self._pool.outcomes([wanted[i] for i in missing]):
             found[missing[number]] = outcome
-            if not outcome.died:
+            if not outcome.has_died:
                 self._store.add(outcome)
             done += 1
             progress(done, len(wanted))

@@ -151,7 +151,7 @@ class WorkerPool:
         self._workers.remove(worker)
         failed = worker.death()
         self._close(worker)
-        return Outcome(point, seed, {}, failed, died=True)
+        return Outcome(point, seed, {}, failed, has_died=True)
 
     @staticmethod
     def _close(worker: _Worker) -> None:

@@ -158,7 +158,7 @@ class ExperimenterLine:
             "session": {
                 "participant": now.participant,
                 "doing": _DOING[type(now.screen)],
-                "how": now.screen.how if isinstance(now.screen, EndScreen) else "",
+                "outcome": now.screen.outcome if isinstance(now.screen, EndScreen) else "",
                 "trial": None if now.trial is None else now.trial + 1,
                 "of": now.trials,
                 "condition": shown.condition if shown else "",

@@ -80,17 +80,17 @@ def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
             told: Mapping[str, object] = {"text": design.texts.debriefing, "code": code}
             return {
                 "kind": "end",
-                "how": screen.how,
+                "outcome": screen.outcome,
                 "contact": design.privacy.contact,
-                "code": "" if screen.how == "declined" else code,
-                **(told if screen.how == CONDITIONS_ARE_TOLD else {"text": ()}),
+                "code": "" if screen.outcome == "declined" else code,
+                **(told if screen.outcome == CONDITIONS_ARE_TOLD else {"text": ()}),
             }
 
 
 def _place(screen: ReadyScreen | PresentationScreen | QuestionsScreen) -> Json:
-    step = {"n": screen.number, "of": screen.of, "practice": screen.practice}
+    step = {"n": screen.number, "of": screen.trial_count, "practice": screen.practice}
     side = None if isinstance(screen, QuestionsScreen) or not screen.pair else screen.side
-    return {"step": step if screen.of else None, "side": side}
+    return {"step": step if screen.trial_count else None, "side": side}
 
 
 def _item(number: str, item: Item, language: str) -> Json:
@@ -150,7 +150,7 @@ class _Consent(ParticipantEvent, tag="consent"):
 class _Next(ParticipantEvent, tag="next"):
     def tell(self, run: StudyRun) -> None:
         """Leave the page."""
-        run.go_on(self.page)
+        run.leave_page(self.page)
 
 
 class _Begin(ParticipantEvent, tag="begin"):

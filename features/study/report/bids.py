@@ -101,13 +101,13 @@ def _frame(study: StudyAnalysis, labels: Sequence[str], made_by: str) -> Iterato
         "code": {"Description": "participant's code in the study"},
         "simulated": {"Description": "answers were drawn at random, nobody gave them"},
         "trial_order": {"Description": "conditions in the order in which they were shown"},
-        "how": {"Description": "how the session ended"},
+        "outcome": {"Description": "how the session ended"},
         "left_out": {"Description": "why the analysis does without the participant"},
     }
     rows = [
         [
             f"sub-{label}", one.participant, "yes" if one.simulated else "no",
-            ",".join(one.order) or _MISSING, one.how, _text(one.left_out),
+            ",".join(one.order) or _MISSING, one.outcome, _text(one.left_out),
         ]
         for one, label in zip(study.people, labels, strict=True)
     ]  # fmt: skip

@@ -97,7 +97,7 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
             apa.effect_text(test.effect), test.notes,
         )
         for one in study.decisions
-        for test in (one.test, *one.also)
+        for test in (one.test, *one.further_tests)
         if test is not None
     ]  # fmt: skip
     forest = StudyFigure(

@@ -110,7 +110,7 @@ def results_json(study: StudyAnalysis) -> str:
                 "medians": one.medians,
                 "standardised": one.standardised._asdict() if one.standardised else None,
                 "planned_test": _test(one.test) if one.test else None,
-                "also": [_test(test) for test in one.also],
+                "also": [_test(test) for test in one.further_tests],
                 "assumptions": [check._asdict() for check in one.checks],
             }
             for one in study.decisions

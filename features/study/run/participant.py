@@ -105,10 +105,10 @@ def run_session(
         code = participant_code(plan.number)
         if session.closed:
             raise SetupError(f"{code} has ended the session already: take another participant")
-        journal.write((session.opened(code, sha256, gazerig.__version__, utc_now()),))
+        journal.write((session.open_session(code, sha256, gazerig.__version__, utc_now()),))
         head = None
         if plan.head is not None:
-            head = HeadPresenter(study, plan.head, folder, session.agreed, clock)
+            head = HeadPresenter(study, plan.head, folder, session.consent_given, clock)
         run = StudyRun(code, session, journal, head or FilmPresenter(), clock.now_s, utc_now)
         finished: list[str] = []
 

@@ -66,7 +66,7 @@ def _simulate(
 
     session = StudySession(study.design, study.questionnaires, number, secret)
     code = participant_code(number)
-    journal.write((session.opened(code, sha256, gazerig.__version__, utc(), simulated=True),))
+    journal.write((session.open_session(code, sha256, gazerig.__version__, utc(), simulated=True),))
     run = StudyRun(code, session, journal, FilmPresenter(), lambda: now_s[0], utc)
     person = SimulatedParticipant(study.design, study.questionnaires, number, population)
     for _ in range(_MOST_SCREENS):
@@ -75,10 +75,10 @@ def _simulate(
             case ConsentScreen():
                 run.consent(page, True, True, True)
             case InstructionsScreen():
-                run.go_on(page)
+                run.leave_page(page)
             case RestScreen():
                 now_s[0] += screen.seconds
-                run.go_on(page)
+                run.leave_page(page)
             case ReadyScreen():
                 run.begin(page)
             case PresentationScreen():
@@ -96,7 +96,7 @@ def _simulate(
     if study.design.objective:
         shown = {**dict(enumerate(session.order))}
         journal.write([
-            TrialMeasured(one.trial, shown[one.trial], person.measured(one.trial, shown[one.trial]))
+            TrialMeasured(one.trial, shown[one.trial], person.simulate_measures(one.trial, shown[one.trial]))
             for one in ended
             if one.trial in shown and shown[one.trial] in study.design.conditions
         ])  # fmt: skip

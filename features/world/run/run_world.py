@@ -125,14 +125,14 @@ class RunWorld(NamedTuple):
 
     def computed(self, now_s: Callable[[], float]) -> "World":
         """Return the world in this process."""
-        model = self.spec.compiled()  # imports MuJoCo, whatever library can render here
+        model = self.spec.compile()  # imports MuJoCo, whatever library can render here
         from gazerig.features.world.physics import World
 
         return World(model, now_s)
 
     def served(self, folder: Path) -> "RunWorld":
         """Return the same world, which shares the people's motion with its server."""
-        spec = self.spec.sharing(folder)
+        spec = self.spec.with_shared_file(folder)
         if spec.figures is None:
             return self
         return self._replace(spec=spec, scene=WorldScene(self.scene.name, spec.figures))

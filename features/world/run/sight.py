@@ -194,7 +194,7 @@ def world_view(
     number: int = 0,
 ) -> "SceneView":
     """Return the renderer's view of a world."""
-    model = spec.compiled()
+    model = spec.compile()
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.renderer import RendererParams, WorldPicture
 

@@ -412,7 +412,7 @@ def _measure_mount(
         yaw_deg, pitch_deg, roll_deg = map(degrees, step.asked_rad)
         what = f"{step.corners} corners" if step.view is not None else step.why
         say(
-            f"{step.number}/{step.of}: yaw {yaw_deg:+.0f}, pitch {pitch_deg:+.0f}, "
+            f"{step.number}/{step.step_count}: yaw {yaw_deg:+.0f}, pitch {pitch_deg:+.0f}, "
             f"roll {roll_deg:+.0f}: {what}"
         )
         if step.view is not None:
@@ -476,7 +476,7 @@ class JoggedNeck:
         axes = zip(NECK, head_rad, strict=True)
         goal = {name: degrees(a) for name, a in axes if name in there}
         moved = self._control.pose(goal)
-        if moved.ended == "torque_off":
+        if moved.end_reason == "torque_off":
             raise SetupError(
                 "the torque went off during the move: see gazerig doctor, then start again"
             )

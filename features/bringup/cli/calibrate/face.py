@@ -217,7 +217,7 @@ class _CalibrationSession:
         if (why := self._stopped()) is not None:
             return why
         if steering.state.part is None:
-            return "you" if steering.state.at < len(PART_NAMES_TEXT) else "the last part"
+            return "you" if steering.state.part_number < len(PART_NAMES_TEXT) else "the last part"
         if steering.is_aimed:
             self._ready_s = now_s
         if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
@@ -264,7 +264,7 @@ def status_text(steering: FaceSteering) -> str:
     across = f"{abs(left):g} mm {'left' if left > 0.0 else 'right'}" if left else "0 mm across"
     upright = f"{abs(up):g} mm {'up' if up > 0.0 else 'down'}" if up else "0 mm up"
     return (
-        f"{state.at + 1}/{len(PART_NAMES_TEXT)} {PART_NAMES_TEXT[state.part]}: {across}, {upright}; "
+        f"{state.part_number + 1}/{len(PART_NAMES_TEXT)} {PART_NAMES_TEXT[state.part]}: {across}, {upright}; "
         f"step {state.step_mm:g} mm"
     )
 

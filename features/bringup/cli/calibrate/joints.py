@@ -82,17 +82,17 @@ class CalibrationOptions(NamedTuple):
     """Options of a calibration, as on the command line.
 
     pulses_us: hobby servos are never sent outside
-    more: places of a linkage between each two that are marked
+    extra_marks: places of a linkage between each two that are marked
     """
 
-    by: ActuationMode
+    actuation: ActuationMode
     margin_deg: float
     zero: ZeroReference
     search: StopSearchParams
     clear_offset: bool
     set_middle: bool
     pulses_us: tuple[float, float]
-    more: int
+    extra_marks: int
 
 
 class CalibrationJob(NamedTuple):
@@ -100,8 +100,8 @@ class CalibrationJob(NamedTuple):
 
     rig: Rig
     wire: RigPorts
-    how: CalibrationOptions
-    person: TerminalJogger
+    options: CalibrationOptions
+    operator: TerminalJogger
     stopped: Callable[[], str | None]
 
 
@@ -138,7 +138,7 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
     without_feedback = [
         name for name in names if not rig.joints[name].model_facts.measures_position
     ]
-    if how.by is ActuationMode.motion and len(without_feedback) == len(names):
+    if how.actuation is ActuationMode.motion and len(without_feedback) == len(names):
         raise SetupError(
             f"--by motion: hobby servos do not report their position ({', '.join(without_feedback)}), so no "
             "stop can be found: leave --by away and steer them yourself"
@@ -165,14 +165,14 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
 
 
 def _calibrate_smart_servo(bench: CalibrationJob, name: str, bus: str) -> JointMove:
-    guardian, joint, person = _guardian(bench, name, bus), bench.rig.joints[name], bench.person
+    guardian, joint, person = _guardian(bench, name, bus), bench.rig.joints[name], bench.operator
     with open_port(bench.rig, bench.wire, bus, guardian) as port:
         single = SmartServoAccess(name, joint, port, RealClock(), bench.stopped, guardian)
         person.hand = None
         if (buses := bench.wire.buses) is not None:
             person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
         with _torque_off_after(single.who, single.disable_torque, bench.stopped):
-            return _calibrate(single, bench.how, person)
+            return _calibrate(single, bench.options, person)
 
 
 def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
@@ -197,13 +197,15 @@ def _calibrate(
         )
         say(f"{single.who}: its place is 2048 now (offset {single.set_middle()}); {_VOID}")
     if single.joint.transmission_points:
-        if how.by is ActuationMode.motion:
+        if how.actuation is ActuationMode.motion:
             raise CalibrationRefused(
                 f"{single.name}: its push rod has measured places (transmission_points), which motion cannot "
                 "find: --by hand"
             )
-        return calibrate_by_marks(HandMarker(single, person), person, how.margin_deg, how.more)
-    if how.by is ActuationMode.hand:
+        return calibrate_by_marks(
+            HandMarker(single, person), person, how.margin_deg, how.extra_marks
+        )
+    if how.actuation is ActuationMode.hand:
         return calibrate_by_hand(single, person, how.margin_deg)
     # A heavy head must not move on its own without a confirmation.
     asked = (
@@ -222,14 +224,16 @@ def _calibrate_hobby_servo(bench: CalibrationJob, name: str, bus: str) -> JointM
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
     port = port_at_path(bench.wire.paths[bus], on_traffic=guardian.beat)
-    joint, how, person = bench.rig.joints[name], bench.how, bench.person
+    joint, how, person = bench.rig.joints[name], bench.options, bench.operator
     params = config.maestro if config.kind == "maestro" else config.pca9685
     hobby = HobbyServoAccess(
         name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian
     )
     person.hand = None
     with _torque_off_after(hobby.who, hobby.disable, bench.stopped):
-        return calibrate_by_marks(HobbyMarker(hobby, person), person, how.margin_deg, how.more)
+        return calibrate_by_marks(
+            HobbyMarker(hobby, person), person, how.margin_deg, how.extra_marks
+        )
 
 
 @contextlib.contextmanager

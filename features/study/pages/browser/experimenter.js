@@ -38,9 +38,9 @@ function set(id, text) {
 function draw() {
   const now = session;
   set("participant", now.participant);
-  set("doing", now.how ? ENDED[now.how] : `${now.paused ? "Paused: the participant" : "The participant"} ${now.doing}`);
+  set("doing", now.outcome ? ENDED[now.outcome] : `${now.paused ? "Paused: the participant" : "The participant"} ${now.doing}`);
   set("number", number(now));
-  const done = now.trial === null ? (now.how === "finished" ? now.of : 0) : Math.max(0, now.trial - 1);
+  const done = now.trial === null ? (now.outcome === "finished" ? now.of : 0) : Math.max(0, now.trial - 1);
   element("along").setAttribute("aria-valuemax", now.of);
   element("along").setAttribute("aria-valuenow", done);
   element("along").firstElementChild.style.width = `${100 * done / Math.max(1, now.of)}%`;
@@ -51,13 +51,13 @@ function draw() {
   const shown = now.showing ? `, shown for ${Math.floor(now.showing_s)} s` : "";
   set("attempt", now.condition ? `${now.attempt + 1}${shown}` : "–");
   set("pause", now.paused ? "Go on" : "Pause");
-  for (const id of ["pause", "repeat", "exclude"]) element(id).disabled = Boolean(now.how);
+  for (const id of ["pause", "repeat", "exclude"]) element(id).disabled = Boolean(now.outcome);
   element("repeat").disabled ||= !now.showing;
-  set("end", now.how ? "End …" : "End for now …");
+  set("end", now.outcome ? "End …" : "End for now …");
 }
 
-function number({ trial, of, how }) {
-  if (how) return "Over";
+function number({ trial, of, outcome }) {
+  if (outcome) return "Over";
   if (trial === null) return `${of} trials`;
   return trial > 0 ? `Trial ${trial} of ${of}` : "Practice";
 }
@@ -133,7 +133,7 @@ element("exclude").addEventListener("click", () => {
   );
 });
 element("end").addEventListener("click", () => {
-  if (session?.how) return ask({ do: "end" }, "The program ends.");
+  if (session?.outcome) return ask({ do: "end" }, "The program ends.");
   question(
     "End for now?",
     "The program ends. Everything answered is on disk, and the session goes on where it was when it is started again with the same code.",

@@ -146,8 +146,8 @@ function end(page) {
   ] : [];
   return make(
     "section", {},
-    make("h1", { tabIndex: -1 }, say(page.how === "finished" ? "end.title" : "end.over")),
-    ...paragraphs([...page.text, say(`end.${page.how}`)]), ...code,
+    make("h1", { tabIndex: -1 }, say(page.outcome === "finished" ? "end.title" : "end.over")),
+    ...paragraphs([...page.text, say(`end.${page.outcome}`)]), ...code,
   );
 }
 
