@@ -29,6 +29,7 @@ from gazerig.robot.model.commands import (
     LookAtInHead,
     LookAtPerson,
     LookAtPixel,
+    MoveOpponent,
     Play,
     Resume,
     SetLevel,
@@ -204,6 +205,16 @@ class Head(ABC):
             value: 0..1.
         """
         return self._send(SetLevel(name, value))
+
+    def move_opponent(self, ahead_m: float, left_m: float, up_m: float) -> Order:
+        """Move the leading fist of a boxing world's opponent towards a point for 1 s.
+
+        Args:
+            ahead_m: x of the point, which the opponent's arm can reach.
+            left_m: y of it.
+            up_m: z of it.
+        """
+        return self._send(MoveOpponent((ahead_m, left_m, up_m)))
 
     def converse(self, mode: str) -> Order:
         """Look away and blink as speakers or listeners do.

@@ -128,6 +128,8 @@ def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedH
         (lambda head: head.express("happy", nan), "0..1"),
         (lambda head: head.express("smug"), "no expression 'smug'"),
         (lambda head: head.level("mouth", 2.0), "0..1"),
+        (lambda head: head.move_opponent(9.0, 0.0, 0.0), "fist is moved to"),
+        (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
         (lambda head: head.set({"gaze.head.comfort_deg": 1e9}), "is above 90"),
         (lambda head: head.get("gaze.hed"), "unknown key"),
         (lambda head: head.save(), "comes with"),
