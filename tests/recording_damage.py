@@ -22,9 +22,9 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import run
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+from gazerig.robot.recording.playback import SnapshotIndex
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.replay import SnapshotIndex
 from gazerig.robot.recording.run_info import RunInfo
 
 HEAD = 9

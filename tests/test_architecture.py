@@ -33,7 +33,7 @@ OWNERS = {
         "features.study.pages.participant_page",
     ),
     "matplotlib": ("features.lab.report.plotting",),
-    "pyarrow": ("features.lab.sweep.outcome",),
+    "pyarrow": ("features.lab.sweep.run_outcome",),
     "jinja2": (
         "features.lab.report.",
         "features.study.report.",

@@ -11,7 +11,7 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler
+from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
 
 
 @pytest.fixture

@@ -146,7 +146,7 @@ def webcam_frames() -> Iterator[tuple[bool, ImageArray | None]]:
 def test_the_hand_before_a_webcam_moves_the_fist_of_the_opponent(
     shown: Shown, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opponent = pytest.importorskip("gazerig.features.world.opponent")
+    opponent = pytest.importorskip("gazerig.features.world.opponent_motion")
     drawn, fists = webcam_frames(), []
     head = SimpleNamespace(move_opponent=lambda *at_m: fists.append(at_m))
     camera = SimpleNamespace(read=lambda: next(drawn))

@@ -63,7 +63,7 @@ from gazerig.robot.dashboard.requests.inbox import (
     request_message,
 )
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.requests.request_handler import PAGE, PageRequestHandler
+from gazerig.robot.dashboard.requests.page_requests import PAGE, PageRequestHandler
 from gazerig.robot.dashboard.widgets.widget import Slider, TextField
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.command_json import as_json, from_json

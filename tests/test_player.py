@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.robot.dashboard.feed.page_process import SPEEDS
-from gazerig.robot.recording.replay import STEPS, Mark, PlaybackClock
+from gazerig.robot.recording.playback import STEPS, Mark, PlaybackClock
 
 MARKS = (
     Mark(1.0, "saccade", "saccade to face"),

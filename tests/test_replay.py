@@ -17,7 +17,7 @@ from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
-from gazerig.robot.recording.replay import PlaybackState, Replay, SnapshotIndex, introduction
+from gazerig.robot.recording.playback import PlaybackState, Replay, SnapshotIndex, introduction
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -333,7 +333,7 @@ def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
     assert "is invalid" in (replay.handle_request({"replay": None}) or "")
     assert (
         replay.handle_request({"do": "stop", "why": ""})
-        == "this is a recording: nothing moves here"
+        == "this is a recording: it cannot move a head"
     )
 
 

@@ -14,8 +14,8 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.dashboard.feed.page_process import decode_snapshot
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+from gazerig.robot.recording.playback import SnapshotIndex
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.replay import SnapshotIndex
 
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 

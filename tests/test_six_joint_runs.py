@@ -25,7 +25,7 @@ from gazerig.robot.recording.export_bids import DatasetDescription as Subject
 from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
-from gazerig.robot.recording.replay import SnapshotIndex
+from gazerig.robot.recording.playback import SnapshotIndex
 from gazerig.robot.recording.run_format import HEALTH
 from gazerig.robot.recording.tick_record import as_json, from_json
 from gazerig.robot.remote.request_handler import LoopMonitor

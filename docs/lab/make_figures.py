@@ -10,8 +10,8 @@ import trace_figure  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.features.lab.sweep.axes import Axis, grid  # noqa: E402
-from gazerig.features.lab.sweep.outcome import Outcome  # noqa: E402
 from gazerig.features.lab.sweep.response_figure import response_png  # noqa: E402
+from gazerig.features.lab.sweep.run_outcome import Outcome  # noqa: E402
 from gazerig.features.lab.sweep.worker import figures_at  # noqa: E402
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 

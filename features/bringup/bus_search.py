@@ -26,7 +26,7 @@ from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, scan
-from gazerig.features.bringup.servo_families import KINDS
+from gazerig.features.bringup.servo_kinds import KINDS
 
 BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
 """Rates of a Maestro's serial pins, the usual ones first; on USB any works."""

@@ -8,7 +8,7 @@ import numpy as np
 from gazerig.drivers.errors import DriverError, ServoFault, SetupError
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import TelemetrySample
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.clock import Clock

@@ -7,7 +7,7 @@ from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping, reboot
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.servo_families import ServoKind
+from gazerig.features.bringup.servo_kinds import ServoKind
 
 BACK_S = 3.0
 """Longest wait for a servo after its restart, which takes about 0.4 to 0.8 s."""

@@ -24,7 +24,7 @@ from gazerig.drivers.servo_bus.discovery import (
 )
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.servo_families import ServoKind, Tell
+from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 
 
 class SetupResult(NamedTuple):

@@ -18,7 +18,7 @@ from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.servo_families import ServoKind
+from gazerig.features.bringup.servo_kinds import ServoKind
 from gazerig.robot.model.coupling import joint_rates
 from gazerig.robot.model.coupling_params import CoupledPair
 from gazerig.robot.model.joint import JointParams

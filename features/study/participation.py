@@ -27,8 +27,8 @@ from gazerig.features.study.journal import (
     TrialEnded,
     TrialMeasured,
 )
-from gazerig.features.study.order import PAIR
 from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.trial_order import PAIR
 
 LEAST_SAME = 8
 """Least number of ratings for the rule of equal answers: fewer may well be honest."""

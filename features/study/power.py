@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
-from gazerig.features.study.order import balanced_group_size
 from gazerig.features.study.scores import Measure
 from gazerig.features.study.simulation import (
     BETWEEN_SD,
@@ -27,6 +26,7 @@ from gazerig.features.study.simulation import (
     effect_shift,
     thresholds,
 )  # fmt: skip
+from gazerig.features.study.trial_order import balanced_group_size
 from gazerig.gaze.types import Floats
 
 MOST = 2000

@@ -7,11 +7,16 @@ from pathlib import Path
 import jinja2
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
-from gazerig.features.study.order import PAIR, balanced_group_size, block_trials, participant_order
 from gazerig.features.study.participation import LEAST_SAME
 from gazerig.features.study.power import MOST, PowerClaim, power_claim, power_of
 from gazerig.features.study.questionnaire import Item, Questionnaire, Texts
 from gazerig.features.study.scores import GAZE_MEASURES, design_measures
+from gazerig.features.study.trial_order import (
+    PAIR,
+    balanced_group_size,
+    block_trials,
+    participant_order,
+)
 
 TESTS: Mapping[Test, str] = {
     "signed_rank": "Wilcoxon's signed-rank test of participants' differences, zeros left out",

@@ -6,9 +6,9 @@ Each rule yields (dotted key, broken rule), like the rules between the sections 
 from collections.abc import Collection, Iterator, Mapping
 
 from gazerig.features.study.design import DECIDING, Hypothesis, StudyDesign, Test
-from gazerig.features.study.order import balanced_group_size
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.scores import GAZE_MEASURES, Measure, design_measures
+from gazerig.features.study.trial_order import balanced_group_size
 from gazerig.robot.model.types import JOINT_NAME
 
 Found = Iterator[tuple[str, str]]

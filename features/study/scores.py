@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.features.study.design import StudyDesign
-from gazerig.features.study.order import PAIR
 from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.trial_order import PAIR
 from gazerig.gaze.types import Floats
 
 GAZE_MEASURES: Mapping[str, str] = {

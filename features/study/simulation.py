@@ -20,8 +20,8 @@ from scipy import optimize, special
 
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.journal import AnswerValue
-from gazerig.features.study.order import PAIR
 from gazerig.features.study.questionnaire import Item, Questionnaire
+from gazerig.features.study.trial_order import PAIR
 from gazerig.gaze.types import Floats
 from gazerig.params import Bounds
 

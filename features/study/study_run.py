@@ -14,7 +14,7 @@ from typing import Protocol
 from gazerig.features.study.answers import WrongAnswer
 from gazerig.features.study.journal import AnswerValue, Journal, Outcome, Record
 from gazerig.features.study.screens import PresentationScreen, ReadyScreen, Screen
-from gazerig.features.study.session import ShownTrial, StudySession
+from gazerig.features.study.study_session import ShownTrial, StudySession
 
 
 class HeadLost(Exception):

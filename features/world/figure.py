@@ -20,7 +20,7 @@ from gazerig.features.world.body_motion import BodyMotion, arm_poses
 from gazerig.features.world.gait import RATE_HZ
 from gazerig.features.world.measures import Measures, measures
 from gazerig.features.world.motions import FIST_M, Frame, fist_pose
-from gazerig.features.world.opponent import Opponent, OpponentRow, OpponentTrack
+from gazerig.features.world.opponent_motion import Opponent, OpponentRow, OpponentTrack
 from gazerig.features.world.rotations import quaternions, rotation_matrix, unit
 from gazerig.features.world.time_profiles import smooth_rise
 from gazerig.features.world.timeline import timed_acts

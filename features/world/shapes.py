@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.features.world.figure import Figures
-from gazerig.features.world.opponent import Opponent
+from gazerig.features.world.opponent_motion import Opponent
 from gazerig.features.world.other_heads import OtherHeads
 from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.rotations import rotation_matrix

@@ -9,8 +9,8 @@ import numpy as np
 
 from gazerig.features.world.figure import SIDES, Figures
 from gazerig.features.world.motions import FIST_M, OUT_S
-from gazerig.features.world.opponent import Opponent
-from gazerig.features.world.rotations import rotation_matrix
+from gazerig.features.world.opponent_motion import Opponent
+from gazerig.features.world.rotations import rotation_matrix, rotation_vector
 from gazerig.features.world.timeline import HEAD_M, place_m
 from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub, yaw_pitch
 from gazerig.gaze.types import Floats, Mat3, Vec3
@@ -124,10 +124,8 @@ class WorldScene:
 
     def _spin(self, segment: str, middle: Vec3, t_s: float) -> float:
         """Return the rotation rate about the line of sight, clockwise as seen from the robot."""
-        from scipy.spatial.transform import Rotation  # 24 MB, only needed for hands
-
         before, after = (self._R(segment, t_s + s) for s in (-_SPIN_WITHIN_S, _SPIN_WITHIN_S))
-        turn = Rotation.from_matrix(after @ before.T).as_rotvec() / (2.0 * _SPIN_WITHIN_S)
+        turn = rotation_vector(after @ before.T) / (2.0 * _SPIN_WITHIN_S)
         sight = np.subtract(middle, HEAD_M)
         return float(turn @ sight / max(float(np.linalg.norm(sight)), 1e-6))
 

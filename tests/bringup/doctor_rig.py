@@ -5,9 +5,9 @@ import pytest
 from gazerig.drivers.feetech.memory_table import REGISTERS
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.run import apply_fixes, examine_bus, examine_ports
+from gazerig.features.bringup.doctor.examination import apply_fixes, examine_bus, examine_ports
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
-from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort

@@ -39,8 +39,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
     summarize,
     worst_level,
 )
-from gazerig.features.bringup.doctor.families import CHECKS
-from gazerig.features.bringup.doctor.run import (
+from gazerig.features.bringup.doctor.examination import (
     UDEV_RULE,
     PortFacts,
     apply_fixes,
@@ -49,6 +48,7 @@ from gazerig.features.bringup.doctor.run import (
     find_servos,
     fix_latency,
 )
+from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.maestro_settings import (
     clipping_text,
@@ -58,7 +58,7 @@ from gazerig.features.bringup.maestro_settings import (
     start_limits,
     wide_range,
 )
-from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
+from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.pca9685.bridge import build_bridge

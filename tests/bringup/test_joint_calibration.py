@@ -54,7 +54,7 @@ from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SmartServoAccess,
 )
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
@@ -750,7 +750,11 @@ def test_a_lid_ends_where_it_was_marked_and_its_keys_are_its_own() -> None:
         ("eyes_pan", [(0.0, 1500.0), (1.5, 1600.0), (-20.0, 1300.0)], "0 deg must be within"),
         ("left_lower_lid", [(20.0, 1250.0), (3.0, 1600.0)], "call half open 0"),
         ("eyes_pan", [(0.0, 1500.0), (4.0, 1600.0), (-4.0, 1300.0)], "only 4.0 deg"),
-        ("eyes_pan", [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)], "all rise or all fall"),
+        (
+            "eyes_pan",
+            [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)],
+            "all increase or all decrease",
+        ),
         ("eyes_pan", [(0.0, 1500.0), (0.0, 1700.0), (-20.0, 1300.0)], "must be within|must rise"),
         ("eyes_pan", [(0.0, 1500.0), (20.0, 2900.0), (-20.0, 1300.0)], "outside the servo's"),
     ],
@@ -960,7 +964,7 @@ def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
 
 def test_marks_that_go_back_are_refused_and_it_is_let_go() -> None:
     bench = LinkageBench("eyes_pan", "", "", "1700", "", "20", "1600", "", "-20")
-    with pytest.raises(CalibrationRefused, match="all rise or all fall"):
+    with pytest.raises(CalibrationRefused, match="all increase or all decrease"):
         bench.measure()
     assert bench.pulse() == 0
 

@@ -10,7 +10,7 @@ from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.discovery import FoundServo, has_any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
 from gazerig.features.bringup.servo_reboot import ServoSnapshot, reboot_servo
 from gazerig.features.bringup.servo_setup import assign_servo, find_alone, search_order
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel

@@ -21,7 +21,7 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
 from gazerig.features.bringup.cli.record_gesture import app
 from gazerig.features.bringup.hand_recording import record_hand_motion, switch_off
-from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
+from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.features.bringup.telemetry import (
     Monitor,
     Telemetry,

@@ -43,7 +43,8 @@ from gazerig.features.lab.sweep.fit import (
     search_best,
     yaml_snippet,
 )
-from gazerig.features.lab.sweep.outcome import (
+from gazerig.features.lab.sweep.response_figure import most_responsive, response_png
+from gazerig.features.lab.sweep.run_outcome import (
     OUTSIDE,
     Outcome,
     grade,
@@ -51,7 +52,6 @@ from gazerig.features.lab.sweep.outcome import (
     table_rows,
     write_tables,
 )
-from gazerig.features.lab.sweep.response_figure import most_responsive, response_png
 from gazerig.features.lab.sweep.sweep import RUNS, run_store
 from gazerig.features.lab.sweep.worker import figures_at
 from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool

@@ -19,8 +19,8 @@ from gazerig.features.study.journal import Journal
 from gazerig.features.study.pages.experimenter_line import HeadLink
 from gazerig.features.study.pages.server import StudyServer
 from gazerig.features.study.run.study_file import LoadedStudy
-from gazerig.features.study.session import StudySession
 from gazerig.features.study.study_run import FilmPresenter, Presenter, StudyRun
+from gazerig.features.study.study_session import StudySession
 
 PARTICIPANT, EXPERIMENTER = "participants-token", "experimenters-token"
 CODE = "P007"

@@ -13,9 +13,9 @@ from gazerig.features.study.journal import (
     TrialBegan,
     TrialEnded,
 )
-from gazerig.features.study.order import participant_order
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.simulation import Population, SimulatedParticipant
+from gazerig.features.study.trial_order import participant_order
 
 UTC = "2026-11-23T10:00:00Z"
 NO, YES = {"en": "not at all"}, {"en": "very much"}

@@ -17,8 +17,8 @@ from gazerig.features.study.screens import (
     RestScreen,
     Screen,
 )
-from gazerig.features.study.session import StudySession
 from gazerig.features.study.study_run import FilmPresenter, Presenter, StudyRun
+from gazerig.features.study.study_session import StudySession
 
 UTC = "2026-01-01T00:00:00+00:00"
 

@@ -22,7 +22,9 @@ from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.cli.design import EXAMPLE, design_notes, design_state
 from gazerig.features.study.data_folder import StudyData
 from gazerig.features.study.design import Condition, StudyDesign, Trials
-from gazerig.features.study.order import (
+from gazerig.features.study.run.study_file import LoadedStudy, load_checked_study, load_study
+from gazerig.features.study.shipped import HOME
+from gazerig.features.study.trial_order import (
     PAIR,
     balanced_group_size,
     block_trials,
@@ -30,8 +32,6 @@ from gazerig.features.study.order import (
     practice_trials,
     williams,
 )
-from gazerig.features.study.run.study_file import LoadedStudy, load_checked_study, load_study
-from gazerig.features.study.shipped import HOME
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
 

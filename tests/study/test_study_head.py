@@ -13,8 +13,8 @@ from gazerig.features.study.run.head_presenter import HeadPresenter
 from gazerig.features.study.run.head_process import decode_options, encode_options
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.run.trial_measures import SWITCH_S, measure_presentations
-from gazerig.features.study.session import ShownTrial
 from gazerig.features.study.study_run import HeadLost
+from gazerig.features.study.study_session import ShownTrial
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.read import RunRecording

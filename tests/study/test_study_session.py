@@ -30,7 +30,6 @@ from gazerig.features.study.journal import (
     encode_records,
     read,
 )
-from gazerig.features.study.order import PAIR
 from gazerig.features.study.run.participant import open_journal
 from gazerig.features.study.run.simulated_session import simulate_study
 from gazerig.features.study.run.study_file import LoadedStudy, load_questionnaire, load_study
@@ -44,10 +43,11 @@ from gazerig.features.study.screens import (
     ReadyScreen,
     RestScreen,
 )
-from gazerig.features.study.session import INTERRUPTED, ShownTrial
 from gazerig.features.study.shipped import HOME
 from gazerig.features.study.simulation import Population
 from gazerig.features.study.study_run import HeadLost, PresentationData
+from gazerig.features.study.study_session import INTERRUPTED, ShownTrial
+from gazerig.features.study.trial_order import PAIR
 
 
 def rating(**trials: float) -> LoadedStudy:

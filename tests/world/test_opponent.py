@@ -15,7 +15,7 @@ pytest.importorskip("mujoco")
 
 from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.features.world.figure import Figures  # noqa: E402
-from gazerig.features.world.opponent import (  # noqa: E402
+from gazerig.features.world.opponent_motion import (  # noqa: E402
     HOLD_S,
     MAX_M_S,
     MAX_M_S2,

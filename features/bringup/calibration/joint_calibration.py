@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS

@@ -18,7 +18,7 @@ from gazerig.features.bringup.calibration.endstop_search import (
     find_end_stop,
     move_to_goal,
 )
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams

@@ -26,7 +26,7 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
     setups_on,
 )
-from gazerig.features.bringup.doctor import run as checkup
+from gazerig.features.bringup.doctor import examination as checkup
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
 from gazerig.features.bringup.doctor.camera import LOOK_S, examine_camera
 from gazerig.features.bringup.doctor.diagnostics import (
@@ -40,7 +40,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
     worst_level,
 )
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions

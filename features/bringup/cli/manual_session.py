@@ -7,7 +7,7 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, park_slowly
-from gazerig.features.bringup.servo_families import KINDS
+from gazerig.features.bringup.servo_kinds import KINDS
 from gazerig.robot.app.bus_wiring import bus_names, can_be_released, guarded_rig_bus, has_watchdog
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.app.rig_weight import rest_park_deg

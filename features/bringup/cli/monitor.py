@@ -23,7 +23,7 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
     setups_on,
 )
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import (
     MaestroTelemetry,
     Monitor,

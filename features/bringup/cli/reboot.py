@@ -24,7 +24,7 @@ from gazerig.features.bringup.cli.ports import (
     setups_on,
     unopened_port,
 )
-from gazerig.features.bringup.servo_families import KINDS, ServoKind, servo_kind
+from gazerig.features.bringup.servo_kinds import KINDS, ServoKind, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say

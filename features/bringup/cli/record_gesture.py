@@ -20,7 +20,7 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
 )
 from gazerig.features.bringup.hand_recording import LONGEST_S, record_hand_motion, switch_off
-from gazerig.features.bringup.servo_families import servo_kind
+from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
 from gazerig.robot.cli.gestures import FolderOption, print_gesture_fit
 from gazerig.robot.cli.rig_command import RigCommand

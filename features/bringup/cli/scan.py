@@ -36,8 +36,8 @@ from gazerig.features.bringup.cli.ports import (
     refuse_packages,
     rig_ports,
 )
-from gazerig.features.bringup.doctor.run import name_ports
-from gazerig.features.bringup.servo_families import KINDS, servo_kind
+from gazerig.features.bringup.doctor.examination import name_ports
+from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
 

@@ -29,7 +29,7 @@ from gazerig.features.bringup.cli.setup_boards import (
     set_up_maestro,
     set_up_pca9685,
 )
-from gazerig.features.bringup.servo_families import ServoKind, servo_kind
+from gazerig.features.bringup.servo_kinds import ServoKind, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.run_bus import CHAINS
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say

@@ -15,8 +15,8 @@ from gazerig.drivers.servo_bus.family import Model
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
-from gazerig.features.bringup.doctor.families import CHECKS, FIX, ServoChecks
-from gazerig.features.bringup.servo_families import ServoKind
+from gazerig.features.bringup.doctor.servo_checks import CHECKS, FIX, ServoChecks
+from gazerig.features.bringup.servo_kinds import ServoKind
 
 MOST_NAMED = 6
 TRIPPED = 255

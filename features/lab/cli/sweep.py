@@ -28,7 +28,7 @@ from gazerig.robot.cli.tune import read_value
 if TYPE_CHECKING:
     from gazerig.features.lab.sweep.axes import Point
     from gazerig.features.lab.sweep.fit import SweepFit
-    from gazerig.features.lab.sweep.outcome import Outcome
+    from gazerig.features.lab.sweep.run_outcome import Outcome
     from gazerig.features.lab.sweep.sweep import Progress, Sweep, SweepSpec
 
 
@@ -223,8 +223,8 @@ def _write(
     spec: "SweepSpec", folder: Path, outcomes: "Sequence[Outcome]", shown: Sequence[str]
 ) -> None:
     """Write table and figure, and print their paths."""
-    from gazerig.features.lab.sweep.outcome import write_tables
     from gazerig.features.lab.sweep.response_figure import PICTURE, response_png
+    from gazerig.features.lab.sweep.run_outcome import write_tables
 
     files = [*write_tables(folder, outcomes)]
     if not all(one.failure for one in outcomes):

@@ -1,7 +1,7 @@
 """The parameters that put most of the report's measures inside their bands.
 
 The search minimises the number of measures outside their bands, each graded by its distance
-(``gazerig.features.lab.sweep.outcome.grade``), so that a step towards a band counts, too.
+(``gazerig.features.lab.sweep.run_outcome.grade``), so that a step towards a band counts, too.
 """
 
 import json
@@ -16,7 +16,7 @@ from gazerig.config.save_text import changes_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
-from gazerig.features.lab.sweep.outcome import REPORT, VERDICT, Outcome, grade
+from gazerig.features.lab.sweep.run_outcome import REPORT, VERDICT, Outcome, grade
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.human_norms import BANDS, BY_KEY
 from gazerig.robot.app.options import RunOptions

@@ -16,7 +16,7 @@ from gazerig.features.lab.report.plotting import (
     draw_png,
 )
 from gazerig.features.lab.sweep.axes import Axis
-from gazerig.features.lab.sweep.outcome import OUTSIDE, REPORT, Outcome
+from gazerig.features.lab.sweep.run_outcome import OUTSIDE, REPORT, Outcome
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.human_norms import BANDS, BY_KEY, NormBand
 

@@ -21,7 +21,7 @@ from gazerig.config.save_text import gestures_text, params_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.lab.sweep.axes import Axis, Point
-from gazerig.features.lab.sweep.outcome import Outcome
+from gazerig.features.lab.sweep.run_outcome import Outcome
 from gazerig.features.lab.sweep.worker_pool import Job, Simulation, WorkerPool, processors
 from gazerig.robot.app.options import RunOptions
 

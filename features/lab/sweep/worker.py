@@ -19,7 +19,7 @@ from gazerig.config.save_text import params_text
 from gazerig.errors import Error
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import Point
-from gazerig.features.lab.sweep.outcome import Column, run_figures
+from gazerig.features.lab.sweep.run_outcome import Column, run_figures
 from gazerig.features.lab.sweep.worker_pool import Job
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig

@@ -19,7 +19,7 @@ from typing import BinaryIO, NamedTuple, Self
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.features.lab.sweep.axes import Point
-from gazerig.features.lab.sweep.outcome import Figures, Outcome
+from gazerig.features.lab.sweep.run_outcome import Figures, Outcome
 from gazerig.robot.app.options import RunOptions
 
 _MODULE = "gazerig.features.lab.sweep.worker"

@@ -145,13 +145,13 @@ def design_state(name: str, study: "LoadedStudy", folder: Path) -> None:
 
 def design_summary(name: str, study: "LoadedStudy") -> list[str]:
     """Return a short description of a study, in lines."""
-    from gazerig.features.study.order import participant_order
     from gazerig.features.study.preregistration_text import (
         claims_of,
         hypothesis_sentence,
         minutes,
         size_words,
     )
+    from gazerig.features.study.trial_order import participant_order
 
     design = study.design
     keys = ", ".join(design.conditions)

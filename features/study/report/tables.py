@@ -12,10 +12,10 @@ from math import isfinite
 from typing import Any
 
 from gazerig.features.study.analysis import StudyAnalysis
-from gazerig.features.study.order import PAIR
 from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.report.apa import measure_name
 from gazerig.features.study.statistics.effects import StatisticalTest
+from gazerig.features.study.trial_order import PAIR
 
 ANSWERS = (
     "participant", "simulated", "trial", "condition", "first", "second", "questionnaire", "item",

@@ -15,8 +15,8 @@ from gazerig.drivers.errors import DriverError
 from gazerig.features.study.pages.experimenter_line import HeadReport
 from gazerig.features.study.run.head_process import HeadProcess
 from gazerig.features.study.run.study_file import LoadedStudy
-from gazerig.features.study.session import ShownTrial
 from gazerig.features.study.study_run import HeadLost, PresentationData
+from gazerig.features.study.study_session import ShownTrial
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import Clock

@@ -15,8 +15,8 @@ from gazerig.features.study.pages.server import StudyServer
 from gazerig.features.study.participation import check_records
 from gazerig.features.study.run.head_presenter import HeadPresenter
 from gazerig.features.study.run.study_file import LoadedStudy
-from gazerig.features.study.session import StudySession
 from gazerig.features.study.study_run import FilmPresenter, StudyRun
+from gazerig.features.study.study_session import StudySession
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
 

@@ -18,9 +18,9 @@ from gazerig.features.study.screens import (
     ReadyScreen,
     RestScreen,
 )
-from gazerig.features.study.session import StudySession
 from gazerig.features.study.simulation import Population, SimulatedParticipant
 from gazerig.features.study.study_run import FilmPresenter, StudyRun
+from gazerig.features.study.study_session import StudySession
 
 _BEGAN = datetime(2000, 1, 1, tzinfo=UTC)
 _MOST_SCREENS = 100_000

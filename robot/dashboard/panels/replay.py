@@ -64,7 +64,7 @@ class ReplayView:
         self._tell(client, {"replay": asked})
 
     def show(self, state: Mapping[str, Any]) -> None:
-        """Show the player's state, as gazerig.robot.recording.replay sends it.
+        """Show the player's state, as gazerig.robot.recording.playback sends it.
 
         Once there are also marks, counts along the recording by kind, and events, (at_s, words).
         """

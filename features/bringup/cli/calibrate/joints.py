@@ -52,7 +52,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     refuse_unwritable,
     show_and_write,
 )
-from gazerig.features.bringup.servo_families import KINDS, servo_kind
+from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
 from gazerig.robot.control.interrupts import Interrupts

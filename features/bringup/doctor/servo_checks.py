@@ -10,7 +10,7 @@ from typing import NamedTuple
 from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.features.bringup.doctor.diagnostics import Advice, Level
-from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, SCS, ServoKind
+from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, SCS, ServoKind
 
 FIX = "gazerig doctor --fix"
 

@@ -34,7 +34,7 @@ from gazerig.drivers.servo_bus.discovery import (
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst_level
 from gazerig.features.bringup.doctor.servo_rules import examine_servo
-from gazerig.features.bringup.servo_families import ServoKind, Tell
+from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 

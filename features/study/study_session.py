@@ -28,7 +28,6 @@ from gazerig.features.study.journal import (
     TrialBegan,
     TrialEnded,
 )
-from gazerig.features.study.order import PAIR, participant_order, practice_trials
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.screens import (
     ConsentScreen,
@@ -43,6 +42,7 @@ from gazerig.features.study.screens import (
     RestScreen,
     Screen,
 )
+from gazerig.features.study.trial_order import PAIR, participant_order, practice_trials
 
 Step = Literal["consent", "instructions", "rest", "ready", "presentation", "questions", "end"]
 
