@@ -28,8 +28,8 @@ from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
 from gazerig.robot.dashboard.feed.status_line import StatusLine
+from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
 from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
-from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.model.types import LoopFigures

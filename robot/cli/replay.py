@@ -163,8 +163,8 @@ def _show(
     from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState, rig_message, state_message
     from gazerig.robot.dashboard.feed.page_process import PageProcess
     from gazerig.robot.model.clock import RealClock
+    from gazerig.robot.recording.playback import PlaybackState, Replay, SnapshotIndex
     from gazerig.robot.recording.read import RunRecording, report_bad_contents
-    from gazerig.robot.recording.replay import PlaybackState, Replay, SnapshotIndex
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
