@@ -195,6 +195,6 @@ def test_old_joints_of_a_busy_computer_are_put_down_to_it(running: Running) -> N
         for k, t_s in enumerate(shown_s):
             if not late or k % 4:
                 builder.update(tick._replace(t_s=t_s, guard_result=held))
-        shot = builder.take(SnapshotTexts())
+        shot = builder.build(SnapshotTexts())
         assert shot is not None and bool(shot.busy) is late
         assert shot.reasons == (*last, *([shot.busy] if late else []))

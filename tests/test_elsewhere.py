@@ -241,7 +241,7 @@ def test_a_frame_goes_along_with_its_pixels_where_memory_cannot() -> None:
     image = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
     found = Detections(1.0, 7, 4, 2, (), image=image)
     feed = LiveFeed()
-    assert feed.take(frame_with_pixels(found, image, depth=False, wants_depth=False))
+    assert feed.handle_message(frame_with_pixels(found, image, depth=False, wants_depth=False))
     shown = feed._found
     assert shown is not None and shown.image is not None
     assert np.array_equal(shown.image, image)

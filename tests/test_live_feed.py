@@ -120,7 +120,7 @@ def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> Non
     perception = perception_text(
         tick, ran.made.robot.perception.residual()._replace(speed_deg_s=None)
     )
-    whole = direct.take(SnapshotTexts("bus: lost 3 times", "wait", perception, "shy", "talking"))
+    whole = direct.build(SnapshotTexts("bus: lost 3 times", "wait", perception, "shy", "talking"))
     assert whole is not None and len(whole.events) > 2
     assert events == whole.events and trail == whole.trail
     for field in fields(Snapshot):

@@ -495,7 +495,7 @@ def test_a_place_is_left_by_the_browser_with_the_most() -> None:
         places, left = TabLimits(3), []
         with ExitStack() as stack:
             for name in ("a", "b", "b", "c", "d"):
-                leave = stack.enter_context(places.take(name))
+                leave = stack.enter_context(places.occupy(name))
                 left.append((name, leave))
             return [name for name, leave in left if leave.is_set()]
 

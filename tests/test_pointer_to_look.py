@@ -98,7 +98,7 @@ def test_what_is_no_pointer_is_dropped(asked: object) -> None:
         lambda who: AHEAD_OF_IT, lambda *look: looks.append(look), SimulatedClock()
     )
     to_look.p_world_eyes_m = EYES
-    assert not to_look.take(asked, "ana") and looks == []
+    assert not to_look.look_at_pointer(asked, "ana") and looks == []
 
 
 def test_a_pointer_is_handed_on_with_who_points_and_no_faster_than_a_burst() -> None:
@@ -107,10 +107,10 @@ def test_a_pointer_is_handed_on_with_who_points_and_no_faster_than_a_burst() -> 
     to_look = PointerToLook(known.get, lambda *look: looks.append(look), SimulatedClock())
     asked = {"x": 0.5, "y": 0.5, "aspect": 1, "more": "is passed over"}
     assert parse_pointer(asked) == Pointer(0.5, 0.5, 1.0)
-    assert not to_look.take(asked, "ana")  # it is not known where the head is
+    assert not to_look.look_at_pointer(asked, "ana")  # it is not known where the head is
     to_look.p_world_eyes_m = EYES
-    assert not to_look.take(asked, "bob")  # who does not see the view
-    taken = sum(to_look.take(asked, "ana") for _ in range(int(3 * BURST)))
+    assert not to_look.look_at_pointer(asked, "bob")  # who does not see the view
+    taken = sum(to_look.look_at_pointer(asked, "ana") for _ in range(int(3 * BURST)))
     assert taken == len(looks) == BURST - 1
     assert {who for _, who in looks} == {"ana"}
     assert looks[0][0][0] > EYES[0]
@@ -144,6 +144,10 @@ def test_a_pointer_moves_either_gaze_or_opponent() -> None:
     )
     pointer.p_world_eyes_m = EYES
     at = {"x": 0.5, "y": 0.5, "aspect": 1.0}
-    assert pointer.take({**at, "opponent": True}, "a browser") and not looks and len(moves) == 1
-    assert pointer.take(at, "a browser") and len(looks) == len(moves) == 1
-    assert not pointer.take({**at, "x": nan, "opponent": True}, "a browser")
+    assert (
+        pointer.look_at_pointer({**at, "opponent": True}, "a browser")
+        and not looks
+        and len(moves) == 1
+    )
+    assert pointer.look_at_pointer(at, "a browser") and len(looks) == len(moves) == 1
+    assert not pointer.look_at_pointer({**at, "x": nan, "opponent": True}, "a browser")

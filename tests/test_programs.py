@@ -442,7 +442,7 @@ def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> No
     async def fill() -> None:
         program = programs.ProgramSocket(60.0, True)
         for number in range(1000):
-            program.say({"number": number})
+            program.queue_message({"number": number})
         sent = []
         while text := program.outgoing():
             sent.append(json.loads(text)["number"])
@@ -450,7 +450,7 @@ def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> No
         for rate_hz in (0.0, 10.0, 30.0, 60.0):
             reader, count = programs.ProgramSocket(rate_hz, False), 0
             for k in range(600):  # ten seconds of news at 60 Hz, not quite regular
-                reader.take(
+                reader.add_news(
                     programs.HeadNews(f"{k}", (), Progress()), 5.0 + k / 60.0 + k % 2 * 3e-3
                 )
                 count += bool(reader.outgoing())

@@ -472,7 +472,7 @@ def test_percepts_that_are_over_take_no_memory(recorded: Recorded, tmp_path: Pat
     router, stream = RecordRouter(writer), TickStream(print)
 
     def take(batch: TickBatch) -> bool:
-        router.ticks(batch.data)
+        router.write_ticks(batch.data)
         return True
 
     stream.add_sink("test", take)

@@ -61,14 +61,14 @@ def taken() -> tuple[Snapshot, ...]:
     for number, tick in enumerate(visit()[2]):
         snapshots.update(tick)
         if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
-            shot = snapshots.take(SnapshotTexts("bus ok", "wait", "perception", "shy", "listen"))
+            shot = snapshots.build(SnapshotTexts("bus ok", "wait", "perception", "shy", "listen"))
             assert shot is not None
             out.append(shot)
     return tuple(out)
 
 
 def test_nothing_is_shown_before_the_first_tick() -> None:
-    assert SnapshotBuilder(RATE_HZ).take(SnapshotTexts()) is None
+    assert SnapshotBuilder(RATE_HZ).build(SnapshotTexts()) is None
 
 
 def test_every_eye_movement_is_shown_once() -> None:
@@ -142,7 +142,7 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
     silent = ticks[3].joints._replace(missing=("neck_yaw",))
     for tick in (*ticks[:3], ticks[3]._replace(joints=silent)):
         snapshots.update(tick)
-    shot = snapshots.take(SnapshotTexts())
+    shot = snapshots.build(SnapshotTexts())
     assert shot is not None and shot.servos.limits is not None
     assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in GAZE_JOINTS)
     hottest = rig.joints["neck_yaw"].limit().hottest_c
@@ -157,10 +157,10 @@ def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     short = calm[1]._replace(guard_result=calm[1].guard_result._replace(level="hold"))
     for tick in (calm[0], short, calm[2]):
         snapshots.update(tick)
-    shot = snapshots.take(SnapshotTexts())
+    shot = snapshots.build(SnapshotTexts())
     assert shot is not None and (shot.level, shot.worst) == ("ok", "hold")
     snapshots.update(calm[3])
-    after = snapshots.take(SnapshotTexts())
+    after = snapshots.build(SnapshotTexts())
     assert after is not None and after.worst == "ok"
 
 
@@ -169,11 +169,11 @@ def test_a_clock_set_back_begins_anew() -> None:
     snapshots = SnapshotBuilder(RATE_HZ)
     for tick in (*ticks[:300], *ticks[:300]):
         snapshots.update(tick)
-    shot = snapshots.take(SnapshotTexts())
+    shot = snapshots.build(SnapshotTexts())
     once = SnapshotBuilder(RATE_HZ)
     for tick in ticks[:300]:
         once.update(tick)
-    alone = once.take(SnapshotTexts())
+    alone = once.build(SnapshotTexts())
     assert shot is not None and alone is not None
     assert shot.timing == alone.timing
     assert shot.trail == alone.trail * 2
@@ -200,7 +200,7 @@ def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
     snapshots = SnapshotBuilder(RATE_HZ, made.shown_rig())
     for tick in ticks:
         snapshots.update(tick)
-    shot = snapshots.take(SnapshotTexts())
+    shot = snapshots.build(SnapshotTexts())
     assert shot is not None
     return ticks, shot
 
@@ -251,8 +251,8 @@ def test_ticks_that_a_busy_page_did_not_take_make_no_busy_computer() -> None:
     snapshots = SnapshotBuilder(RATE_HZ)
     for tick in (*ticks[:50], *ticks[-300:]):
         snapshots.update(tick)
-    own = snapshots.take(SnapshotTexts())
+    own = snapshots.build(SnapshotTexts())
     assert own is not None and own.timing is not None and own.busy  # nothing better is known
     figures = own.timing._replace(overruns=0, late_share=0.0, latest_ms=0.4)
-    told = snapshots.take(SnapshotTexts(timing=figures))
+    told = snapshots.build(SnapshotTexts(timing=figures))
     assert told is not None and told.timing == figures and not told.busy

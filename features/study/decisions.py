@@ -136,23 +136,23 @@ class _Sides:
     than: tuple[str, ...]
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def have_data(self) -> NDArray[np.bool_]:
         """Return which participants have all conditions of both sides, (participants,)."""
-        found: NDArray[np.bool_] = np.isfinite(self.found.column(*self.better, *self.than))
+        found: NDArray[np.bool_] = np.isfinite(self.found.condition_means(*self.better, *self.than))
         return found
 
     @property
     def means(self) -> tuple[Floats, Floats]:
         """Return the means of the better side and of the other one, (known,) each."""
-        return self.found.column(*self.better)[self.known], self.found.column(*self.than)[
-            self.known
-        ]
+        return self.found.condition_means(*self.better)[self.have_data], self.found.condition_means(
+            *self.than
+        )[self.have_data]
 
     @property
     def better_first(self) -> NDArray[np.bool_]:
         """Return which of them saw the better side first, (known,)."""
         first, second = self.found.first_seen(*self.better), self.found.first_seen(*self.than)
-        found: NDArray[np.bool_] = (first < second)[self.known]
+        found: NDArray[np.bool_] = (first < second)[self.have_data]
         return found
 
 

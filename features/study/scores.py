@@ -89,23 +89,25 @@ class Scores:
     places: Floats
     single: Floats
 
-    def columns(self, conditions: Sequence[str]) -> list[int]:
+    def condition_columns(self, conditions: Sequence[str]) -> list[int]:
         """Return the columns of conditions."""
         return [self.conditions.index(condition) for condition in conditions]
 
-    def column(self, *conditions: str) -> Floats:
+    def condition_means(self, *conditions: str) -> Floats:
         """Return the means over one or more conditions, (participants,); nan if incomplete."""
-        found: Floats = self.means[:, self.columns(conditions)].mean(axis=1)
+        found: Floats = self.means[:, self.condition_columns(conditions)].mean(axis=1)
         return found
 
     def answers(self, *conditions: str) -> Floats:
         """Return every single answer on these conditions."""
-        found: Floats = self.single[np.isin(self.single[:, 1], self.columns(conditions)), 2]
+        found: Floats = self.single[
+            np.isin(self.single[:, 1], self.condition_columns(conditions)), 2
+        ]
         return found
 
     def first_seen(self, *conditions: str) -> Floats:
         """Return the position at which the first of these conditions was seen, (participants,)."""
-        found: Floats = self.places[:, self.columns(conditions)].min(axis=1)
+        found: Floats = self.places[:, self.condition_columns(conditions)].min(axis=1)
         return found
 
 

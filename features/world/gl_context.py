@@ -59,7 +59,7 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
                     context.free()
                     raise
             except Exception as error:  # each library has errors of its own
-                why[backend] = _line(error)
+                why[backend] = _one_line(error)
                 _forget_opengl()
                 continue
         _chosen = backend
@@ -96,7 +96,7 @@ def import_mujoco() -> ModuleType:
             return import_module("mujoco")
         except ImportError as error:
             hint = install_command("world")
-            raise SetupError(f"a world needs MuJoCo ({_line(error)}): {hint}") from error
+            raise SetupError(f"a world needs MuJoCo ({_one_line(error)}): {hint}") from error
 
 
 @contextmanager
@@ -139,7 +139,7 @@ def _forget_opengl() -> None:
 _OWN_PLATFORM = "PYOPENGL_PLATFORM" in os.environ
 
 
-def _line(error: Exception) -> str:
+def _one_line(error: Exception) -> str:
     """Return an error as one short line."""
     if isinstance(error, AttributeError) and "NoneType" in str(error):
         return "its library is not here"  # PyOpenGL's own message names neither

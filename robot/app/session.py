@@ -224,7 +224,7 @@ class Session:
             observers.add("the planner's score", self._score.planner.update)
         if self._face_gaze is not None:
             observers.add("the heat map", self._face_gaze.update)
-        observers.add("the log", self._log)
+        observers.add("the log", self._print_events)
         if watch is not None:
             observers.add("the program", watch)
         try:
@@ -236,7 +236,7 @@ class Session:
         self._longest_s = _longest_s(assembly, options)
         self._interrupts = Interrupts.from_stop(stopped)
 
-    def _log(self, tick: Tick) -> None:
+    def _print_events(self, tick: Tick) -> None:
         """Print the events of a tick."""
         events = tick.events
         if events:

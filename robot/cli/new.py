@@ -63,14 +63,16 @@ def new(
             raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
         refuse_existing(file, force=force)
         asked = Questions(sys.stdin.isatty())
-        chosen = asked.choice("Which board drives the servos?", "board", board, BOARDS, _BOARD)
+        chosen = asked.ask_choice("Which board drives the servos?", "board", board, BOARDS, _BOARD)
         mechanisms = {name: one.summary for name, one in MECHANISMS.items()}
-        wanted = asked.choice(
+        wanted = asked.ask_choice(
             "Which joints do the servos move? (a mechanism, or names of joints: eyes_pan,eyes_tilt,jaw)",
             "joints", joints, mechanisms, _JOINTS, others=True,
         )  # fmt: skip
-        seen = asked.choice("Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA)
-        distance = asked.number(
+        seen = asked.ask_choice(
+            "Which camera does the head use?", "camera", camera, CAMERAS, _CAMERA
+        )
+        distance = asked.ask_number(
             "What is the distance between the eyes, in mm?", "eyes-mm", eyes_mm, _EYES_MM
         )
         rig = NewRig(
@@ -97,7 +99,7 @@ class Questions:
     def __init__(self, terminal: bool) -> None:
         self._terminal = terminal
 
-    def choice(
+    def ask_choice(
         self, question: str, option: str, given: str | None, choices: Mapping[str, str],
         usual: str, others: bool = False,
     ) -> str:  # fmt: skip
@@ -133,7 +135,7 @@ class Questions:
                 return answer
             say(f"{answer!r} is not a choice: give a number from 1 to {len(names)}, or a name")
 
-    def number(self, question: str, option: str, given: float | None, usual: float) -> float:
+    def ask_number(self, question: str, option: str, given: float | None, usual: float) -> float:
         """Return a length in mm.
 
         Raises:

@@ -127,7 +127,7 @@ def serve(
         move_opponent=lambda point: outbox.ask(as_json(MoveOpponent(point)), DOOR),
     )
     door = AuthProxy(
-        host, open_port, inside, outbox.forward, stop, token, browsers, widgets, pointer.take,
+        host, open_port, inside, outbox.forward, stop, token, browsers, widgets, pointer.look_at_pointer,
         outbox.send_picture, rig,
     )  # fmt: skip
     door.open()

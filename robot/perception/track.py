@@ -149,7 +149,7 @@ class KnownClothes:
     lost_sight: bool = False
     doubts: dict[int, float] = field(default_factory=dict)
 
-    def miss(self, unseen_s: float) -> None:
+    def record_absence(self, unseen_s: float) -> None:
         """Start the confirmation again if the person was out of sight, for a time in seconds."""
         if unseen_s > _GAP_S:
             self.confirmed, self.lost_sight = 0.0, True

@@ -369,7 +369,7 @@ class Tracker:
         _correct_velocity(track, detection)
         if track.is_person:
             track.filter.slow_to(_FASTEST_M_S)
-        track.clothes.miss(track.at_s - track.seen_s)
+        track.clothes.record_absence(track.at_s - track.seen_s)
         track.seen_s = track.at_s
         track.frames += 1
         track.clothes.learn(detection.clothing)

@@ -222,7 +222,7 @@ class SnapshotIndex:
             said = SnapshotTexts(
                 "recorded", detector.behaviour, perception, character, detector.conversation
             )
-            if (shown := snapshots.take(said)) is not None:
+            if (shown := snapshots.build(said)) is not None:
                 self._events += shown.events
                 self._events_at.extend([len(self._packed)] * len(shown.events))
                 self._times.append(at_s)

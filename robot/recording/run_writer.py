@@ -59,7 +59,7 @@ class RunWriter:
             self._file.keep()
 
     @property
-    def written(self) -> WrittenFile:
+    def written_file(self) -> WrittenFile:
         """Return the numbers of ticks, frames and bytes in the file."""
         count = self._counts.get
         return WrittenFile(count(fmt.TICK, 0), count(fmt.FRAME, 0), self._file.tell())
@@ -86,7 +86,7 @@ class RunWriter:
             at_ns, data = self.time_ns(message.at_s), msgspec.json.encode(message.data)
             self._writer.add_message(channel, at_ns, data, at_ns, self._counts[topic])
 
-    def world(self, about: Mapping[str, str]) -> None:
+    def write_world(self, about: Mapping[str, str]) -> None:
         """Write the run's simulated world from ``run_info.as_text``."""
         if not self.failed:
             with self._error_handling():

@@ -47,7 +47,7 @@ class RecordRouter:
         self._written = 0
         self._finite = False
 
-    def ticks(self, data: bytes) -> None:
+    def write_ticks(self, data: bytes) -> None:
         """Write the ticks of a ``tick_stream.TickBatch``, each percept before the first with it."""
         percepts, rows = decode_plain(data)
         self._finite = all_finite(data)
@@ -85,7 +85,7 @@ class RecordRouter:
                 fmt.SCENE, viewers.scene_message(pose, gaze.gaze_point_world_m, self._faces, now_ns)
             )
 
-    def frame(self, captured_s: float, image: ImageArray) -> None:
+    def write_frame(self, captured_s: float, image: ImageArray) -> None:
         """Write a camera image as JPEG."""
         from gazerig.robot.dashboard.feed.camera_overlay import encode  # loads OpenCV
 
@@ -93,7 +93,7 @@ class RecordRouter:
         exposed_ns = self._writer.time_ns(captured_s - first_s)
         self._add(fmt.FRAME, viewers.image_message(encode(image), captured_s, exposed_ns))
 
-    def health(self, bus: BusHealth, lost: int) -> None:
+    def write_health(self, bus: BusHealth, lost: int) -> None:
         """Write the bus counts and the servos' readings of the newest tick."""
         servos = {}
         if self._newest is not None:
@@ -145,7 +145,9 @@ def main(socket_fd: int, file_fd: int) -> None:
         writer = RunWriter(file_fd, about, started_ns)
         end = _write(messages, writer, rig, RealClock())
         writer.close(end)
-        _send_reply(rig, FAILED if writer.failed else DONE, writer.failed or tuple(writer.written))
+        _send_reply(
+            rig, FAILED if writer.failed else DONE, writer.failed or tuple(writer.written_file)
+        )
 
 
 def _write(
@@ -161,15 +163,15 @@ def _write(
         if kind == END:
             end = RunEnd(**decode_plain(body))
         elif kind == WORLD:
-            writer.world(decode_plain(body))
+            writer.write_world(decode_plain(body))
         elif kind == TICKS:
-            router.ticks(body)
+            router.write_ticks(body)
         elif kind == FRAME:
             captured_s, shape, dtype = decode_plain(body)
-            router.frame(captured_s, take_image(PassedImage(fd, tuple(shape), dtype)))
+            router.write_frame(captured_s, take_image(PassedImage(fd, tuple(shape), dtype)))
         elif kind == HEALTH:
             counts, lost = decode_plain(body)
-            router.health(BusHealth(*counts), lost)
+            router.write_health(BusHealth(*counts), lost)
         now_s = clock.now_s()
         if now_s - flushed_s >= _FLUSH_S:
             flushed_s = now_s

@@ -69,9 +69,9 @@ class Debouncer:
     """Detects when a file has new content that no longer changes."""
 
     def __init__(self, first: FileState | None) -> None:
-        self.known(first)
+        self.mark_known(first)
 
-    def known(self, now: FileState | None) -> None:
+    def mark_known(self, now: FileState | None) -> None:
         """Treat the present content of the file as read."""
         self._known = now.digest if now is not None else b""
         self._last = now
@@ -141,7 +141,7 @@ class FileWatch:
         with self._lock:
             known = [one for one in self._watched if one.resolve() == same]
             for watched in known:
-                self._watched[watched].known(read_file_state(watched))
+                self._watched[watched].mark_known(read_file_state(watched))
             if not known:
                 self._watched[path] = Debouncer(read_file_state(path))
 

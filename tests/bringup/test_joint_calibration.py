@@ -674,7 +674,7 @@ class Reader(Bench):
 
     angles: list[float | None]
 
-    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
         self.said.append(question)
         live()
         said = self.angles.pop(0)
@@ -851,7 +851,7 @@ class LinkageBench:
             (servo.move_by_us if answer[0] in "+-" else servo.move_to_us)(float(answer))
             servo.live()
 
-    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
         self.said.append(question)
         live()
         answer = self._next()

@@ -523,8 +523,8 @@ def test_a_latin_hypercube_falls_once_into_each_part_of_every_axis(n: int, seed:
 @settings(deadline=None, max_examples=60)
 @given(st.floats(0.0, 1.0), st.sampled_from(OTHER_AXES))
 def test_a_share_of_an_axis_is_a_value_of_it_and_back(share: float, axis: Axis) -> None:
-    value = axis.at(share)
-    assert axis.at(axis.share(value)) == value
+    value = axis.value_at(share)
+    assert axis.value_at(axis.share(value)) == value
     assert 0.0 <= axis.share(value) <= 1.0
 
 

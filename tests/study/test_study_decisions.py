@@ -198,7 +198,7 @@ def test_repetitions_are_averaged_and_counted_one_by_one() -> None:
         tuple(study.conditions), QUESTIONS,
     )  # fmt: skip
     assert table.means.shape == (4, 2) and len(table.answers("walk")) == 12
-    assert table.column("walk").mean() == pytest.approx(table.answers("walk").mean())
+    assert table.condition_means("walk").mean() == pytest.approx(table.answers("walk").mean())
 
 
 def test_objective_measures_come_from_the_trials() -> None:
@@ -231,7 +231,7 @@ def test_the_figures_are_those_of_scipy_on_the_same_answers() -> None:
     table = measure_scores(design_measures(study, QUESTIONS)["paper.looked_at"], people, ("walk", "centre"),
                    QUESTIONS)  # fmt: skip
     (_, one) = decide_hypotheses(study, QUESTIONS, people)
-    walk, centre = table.column("walk"), table.column("centre")
+    walk, centre = table.condition_means("walk"), table.condition_means("centre")
     expected = stats.wilcoxon(walk, centre, correction=True, method="asymptotic")
     assert one.test is not None
     assert (one.test.statistic, one.test.p) == (expected.statistic, expected.pvalue)
@@ -671,7 +671,9 @@ def test_simulated_participants_have_the_effect_between_levels() -> None:
             tuple(study.conditions),
             QUESTIONS,
         )
-        d = found.column(*study.side(one.better)) - found.column(*study.side(one.than))
+        d = found.condition_means(*study.side(one.better)) - found.condition_means(
+            *study.side(one.than)
+        )
         # The standard error of d_z (Hedges & Olkin 1985) is sqrt(1/n + d^2/2n).
         assert d.mean() / d.std() == pytest.approx(0.6, abs=3 * sqrt(1 / 240 + 0.18 / 240))
 

@@ -227,7 +227,7 @@ def test_a_whole_study_has_the_effect_on_items_and_on_scales() -> None:
     known = design_measures(study, QUESTIONS)
     for name in ("paper.naturalness", "calmness.ease"):
         found = measure_scores(known[name], people, tuple(study.conditions), QUESTIONS)
-        d = found.column("walk") - found.column("centre")
+        d = found.condition_means("walk") - found.condition_means("centre")
         # The standard error of d_z (Hedges & Olkin 1985) is sqrt(1/n + d^2/2n).
         assert d.mean() / d.std() == pytest.approx(0.6, abs=3 * sqrt(1 / 240 + 0.18 / 240))
 

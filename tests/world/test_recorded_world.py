@@ -142,8 +142,8 @@ def test_the_page_shows_the_world_at_the_time_of_what_is_replayed(
     _, world = recorded
     feed = LiveFeed()
     made = compose(ASKED).assembly
-    feed.take(rig_message(LiveRig(200.0, made.shown_rig(), world=world)))
-    feed.take(state_message(RunState({}, "", "", "", (None, None, 0), 2.0)))
+    feed.handle_message(rig_message(LiveRig(200.0, made.shown_rig(), world=world)))
+    feed.handle_message(state_message(RunState({}, "", "", "", (None, None, 0), 2.0)))
     assert feed.world() is None
     feed.shown_s = 9.5  # of a snapshot
     now = feed.world()

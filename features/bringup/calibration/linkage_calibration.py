@@ -114,7 +114,7 @@ class Jogger(Operator, Protocol):
         """
         ...
 
-    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
         """Return their number, or the proposed one if they agree to it."""
         ...
 
@@ -133,7 +133,7 @@ class Marker(Protocol):
         """Let the user move the joint to a position; return it."""
         ...
 
-    def bring(self, place: float) -> float:
+    def move_to(self, place: float) -> float:
         """Bring it to about that place; return the place reached."""
         ...
 
@@ -159,7 +159,7 @@ class HobbyMarker:
         at_us = hobby.open()
         if at_us is None:
             rest = self.joint.make_linkage().steps(0.0) / self.joint.model_facts.unit_steps
-            at_us = person.number(
+            at_us = person.ask_number(
                 f"{hobby.who} gets no pulses, so its position is not known: it goes to the first "
                 "one at once, at its own full speed. Keep your fingers out. "
                 "At which pulse width (us) shall it begin?",
@@ -191,14 +191,14 @@ class HobbyMarker:
         """Move the joint to a pulse width."""
         self._hobby.aim(us)
 
-    def bring(self, place: float) -> float:
+    def move_to(self, place: float) -> float:
         """Move it slowly to a pulse width in us; return the width reached."""
         self._hobby.aim(place)
         return self._arrive()
 
     def leave(self, place: float) -> None:
         """Move it slowly to a place at which friction shall hold it."""
-        self.bring(place)
+        self.move_to(place)
 
     def _arrive(self) -> float:
         at_us = self._hobby.arrive()
@@ -235,7 +235,7 @@ class HandMarker:
         self._person.wait(f"turn {self.name} {where}, then press Enter", self.live)
         return float(self._watched.steps())
 
-    def bring(self, place: float) -> float:
+    def move_to(self, place: float) -> float:
         """Let the user turn the joint to about a position in steps; return the position reached."""
         return self.mark(f"until it reads about step {place:.0f}")
 
@@ -273,7 +273,7 @@ def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: 
     all_places = list(marked)
     for one, other in zip(marked, marked[1:], strict=False):
         for place in spread_between(one[1], other[1], more):
-            at = placer.bring(place)
+            at = placer.move_to(place)
             likely = likely_angle(placer.joint, at, one, other)
             all_places.append((_angle(placer, person, at, likely), at))
     made = fit_linkage(placer.name, all_places, placer.joint, margin_deg)
@@ -286,4 +286,4 @@ def _angle(placer: Marker, person: Jogger, at: float, proposed: float) -> float:
     """Ask for the angle of the joint's present position."""
     towards = f" ({end_names(placer.name)[0]} is +)"
     asked = f"{placer.name} at {at:g} {placer.joint.model_facts.unit}: how many degrees{towards}?"
-    return person.number(asked, proposed, placer.live)
+    return person.ask_number(asked, proposed, placer.live)

@@ -165,14 +165,14 @@ def _apply_fixes(
             config = rig.bus_named(bus)
             line.setBaudRate(config.baud)
 
-            def write(
+            def write_fix(
                 one: Fix, bus: str = bus, line: BusPort = line, config: BusConfig = config
             ) -> str:
                 if one.servo_id == BOARD:
                     return stop_script(line, config.maestro)
                 return apply_fix(line, servo_kind(setups_on(rig, bus)[0].model), one)
 
-            done += checkup.apply_fixes(write, findings[bus])
+            done += checkup.apply_fixes(write_fix, findings[bus])
             line.closePort()
     for one in done:
         tell(str(one))

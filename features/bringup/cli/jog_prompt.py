@@ -62,7 +62,7 @@ class TerminalJogger(TerminalPerson):
                 elif key in ("down", "smaller"):
                     step = max(step - 1, 0)
 
-    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
         """Return the typed number, Enter is the proposed one; see Jogger."""
         asked = f"{question} [{proposed:g}]"
         say(asked)

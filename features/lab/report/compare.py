@@ -108,7 +108,7 @@ def compare(
     ]
     figures = draw_figures(shown, progress)
     page = compare_page(abouts, runs, differences, figures)
-    written = write_all(out, page, figures, [_numbers(d, runs) for d in differences], force)
+    written = write_all(out, page, figures, [_difference_json(d, runs) for d in differences], force)
     return Comparison(differences, out, *written, mixed_basis_warning(abouts, runs))
 
 
@@ -168,7 +168,7 @@ def shape_p_value(a: MeasuredValue, b: MeasuredValue) -> float:
         return float(stats.ks_2samp(a.rows, b.rows).pvalue)
 
 
-def _numbers(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, object]:
+def _difference_json(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, object]:
     values = {
         "a": d.a.value, "b": d.b.value, "difference": d.difference, "low95": d.low95,
         "high95": d.high95, "p_value": d.p_value, "shape_p_value": d.shape_p_value,

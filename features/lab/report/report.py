@@ -73,7 +73,7 @@ def make_report(
     findings = judge_run(run)
     figures = draw_figures([ShownRun(about.name, run, COLOURS[0], about.model)], progress)
     page = report_page(about, run, findings, figures, gaze)
-    numbers = [_numbers(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
+    numbers = [_finding_json(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
     written = write_all(out, page, figures, numbers, force)
     return Report(findings, out, *written)
 
@@ -132,7 +132,7 @@ def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[Figure, 
     return tuple(figures)
 
 
-def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
+def _finding_json(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
     """Return a finding as plain JSON; unknown values are null.
 
     basis: "measured", "partly estimated" or "estimated"

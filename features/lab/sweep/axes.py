@@ -64,7 +64,7 @@ class Axis:
         """Return the index of a level."""
         return self.values.index(_freeze(value))
 
-    def at(self, share: float) -> Value:
+    def value_at(self, share: float) -> Value:
         """Return the value at a share 0 <= share <= 1 of the axis."""
         if self.values:
             return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
@@ -238,7 +238,7 @@ def latin_shares(dimensions: int, samples: int, rng: np.random.Generator) -> Flo
 
 def point_at(axes: Sequence[Axis], shares: Iterable[float]) -> Point:
     """Return the point at shares 0..1 of the axes."""
-    return {axis.key: axis.at(float(share)) for axis, share in zip(axes, shares, strict=True)}
+    return {axis.key: axis.value_at(float(share)) for axis, share in zip(axes, shares, strict=True)}
 
 
 def check_points(rig: Rig, axes: Sequence[Axis], points: Sequence[Point]) -> None:

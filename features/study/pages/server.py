@@ -287,7 +287,7 @@ class StudyServer:
         news = asyncio.Event()
         self._news.add(news)
         try:
-            with self._tabs.take(who) as leave, suppress(ConnectionError, TimeoutError):
+            with self._tabs.occupy(who) as leave, suppress(ConnectionError, TimeoutError):
                 while not (self._over.is_set() or leave.is_set()):
                     news.clear()
                     await tell()

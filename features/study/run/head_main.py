@@ -32,14 +32,16 @@ def main() -> int:
     threading.Thread(target=wait, daemon=True).start()
     try:
         composed = session.compose(options)
-        figures = session.run(composed, lambda: ended[0] if ended else None, _say, summarised=False)
+        figures = session.run(
+            composed, lambda: ended[0] if ended else None, _print_line, summarised=False
+        )
     except Error as error:
-        _say(str(error))
+        _print_line(str(error))
         return 1
     return 1 if str(figures["stopped_by"]).startswith("fault") else 0
 
 
-def _say(line: str) -> None:
+def _print_line(line: str) -> None:
     sys.stderr.write(f"{line}\n")
     sys.stderr.flush()
 

@@ -299,7 +299,7 @@ class AuthProxy:
         news = asyncio.Event()
         self._news.add(news)
         try:
-            with self.browsers.connected(who), self._lines.take(who) as leave:
+            with self.browsers.connected(who), self._lines.occupy(who) as leave:
                 await until_one_ends(
                     self._send_state(line, news, who),
                     self._receive_line(line, who),
@@ -365,7 +365,7 @@ class AuthProxy:
         """Keep a websocket until it ends, the page closes or its slot is freed."""
         await socket.prepare(request)
         self._connections.mark_websocket(request)
-        with tabs.take(self._browser_name(request)) as leave:
+        with tabs.occupy(self._browser_name(request)) as leave:
             await until_one_ends(serve(), self._over.wait(), leave.wait())
         await close_socket(socket, request)
         return socket

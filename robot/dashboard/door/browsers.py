@@ -76,7 +76,7 @@ class TabLimits:
         self._taken: dict[asyncio.Event, str] = {}  # oldest first
 
     @contextmanager
-    def take(self, name: str) -> Iterator[asyncio.Event]:
+    def occupy(self, name: str) -> Iterator[asyncio.Event]:
         """Occupy a slot; the event is set when the slot must be freed."""
         leave = asyncio.Event()
         self._taken[leave] = name

@@ -135,7 +135,7 @@ class ProgramSocket:
         """Return the rate at which it needs the state of the head."""
         return max(self._rate_hz, _EVENTS_HZ if self._events or self._open else 0.0)
 
-    def take(self, news: HeadNews, now_s: float) -> None:
+    def add_news(self, news: HeadNews, now_s: float) -> None:
         """Take news that it wants."""
         period_s = self._period_s
         if period_s and now_s >= self._due_s - 0.25 * period_s:  # early is better than much later
@@ -150,13 +150,13 @@ class ProgramSocket:
             if (end := command_outcome(reply, news.progress)) is None:
                 self._open.append((tag, reply))
             else:
-                self.say({"outcome": end[0], "why": end[1], "tag": tag})
+                self.queue_message({"outcome": end[0], "why": end[1], "tag": tag})
 
     def follow(self, tag: object, reply: CommandReply) -> None:
         """Send the outcome of an order when it is known."""
         self._open.append((tag, reply))
 
-    def say(self, message: Mapping[str, object]) -> None:
+    def queue_message(self, message: Mapping[str, object]) -> None:
         """Send a message as soon as the program reads it."""
         self._out.append(json.dumps(message, separators=(",", ":")))
         self.news.set()
@@ -312,9 +312,9 @@ class ProgramRoutes:
         self._connections().mark_websocket(request)
         orders: asyncio.Queue[dict[str, Any]] = asyncio.Queue(_MOST_QUEUED)
         orders.put_nowait({"do": "hello", "version": VERSION, "tag": "hello"})
-        self.feed.add(program.take, program.wanted_hz)
+        self.feed.add(program.add_news, program.wanted_hz)
         try:
-            with self._limits.take(request.remote or "") as leave:
+            with self._limits.occupy(request.remote or "") as leave:
                 await until_one_ends(
                     self._send(socket, program),
                     self._receive(socket, program, orders, request),
@@ -324,7 +324,7 @@ class ProgramRoutes:
                     leave.wait(),
                 )
         finally:
-            self.feed.remove(program.take)
+            self.feed.remove(program.add_news)
         await close_socket(socket, request)
         return socket
 
@@ -354,23 +354,23 @@ class ProgramRoutes:
                 program.alive.set()
                 continue
             if frame.type is not aiohttp.WSMsgType.TEXT:
-                program.say({"refused": "not text: one JSON object in each message"})
+                program.queue_message({"refused": "not text: one JSON object in each message"})
                 continue
             late = not rate.take(loop.time())
             if late and '"stop"' not in frame.data[:REQUEST_BYTES]:
-                program.say({"refused": BUSY})
+                program.queue_message({"refused": BUSY})
                 await asyncio.sleep(_FLOOD_PAUSE_S)
                 continue
             try:
                 message = _add_client(parse_message(frame.data), request)
                 if message.get("do") == "stop":
-                    program.say(await self._send_to_rig(message))
+                    program.queue_message(await self._send_to_rig(message))
                 elif late or orders.full() or not self._is_within_rate():
-                    program.say({"refused": BUSY, **_tag(message)})
+                    program.queue_message({"refused": BUSY, **_tag(message)})
                 else:
                     orders.put_nowait(message)
             except MessageRefused as error:
-                program.say({"refused": str(error)})
+                program.queue_message({"refused": str(error)})
 
     async def _carry_out(
         self, program: ProgramSocket, orders: "asyncio.Queue[dict[str, Any]]"
@@ -379,7 +379,7 @@ class ProgramRoutes:
         while True:
             message = await orders.get()
             answer = await self._send_to_rig(message)
-            program.say(answer)
+            program.queue_message(answer)
             match answer:
                 case {"ok": {"reply": dict(reply)}}:
                     found = CommandReply.from_json(reply)

@@ -222,7 +222,7 @@ class ViewProxy:
         browser = web.WebSocketResponse(
             protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
         )
-        with self._tabs.take(who) as leave:
+        with self._tabs.occupy(who) as leave:
             async with self._client.ws_connect(
                 _address("ws", request),
                 protocols=offered,

@@ -203,7 +203,7 @@ class LiveFeed:
         self._newest: Tick | None = None
         self._new_ticks = self._new_frame = False
 
-    def take(self, message: bytes, fd: int = -1) -> bool:
+    def handle_message(self, message: bytes, fd: int = -1) -> bool:
         """Handle a message of one of the kinds above; return False for others.
 
         Only ever fed by the process that started this one.
@@ -243,7 +243,7 @@ class LiveFeed:
         seen = perception_text(tick, ResidualFigures(*state.residual))
         perception = " | ".join(filter(None, (seen, self._detector)))
         health = health_text(BusHealth(0, 0, state.errors))
-        return self._builder.take(
+        return self._builder.build(
             SnapshotTexts(
                 health,
                 state.behaviour,
@@ -477,7 +477,7 @@ def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
         elif kind in (CHOICES, PARAMS, VALUES, MESSAGE, REPLAY):
             others.append((kind, json.loads(body)))
         else:
-            live.take(message, fd)
+            live.handle_message(message, fd)
     if (newest := live.snapshot()) is not None:
         snapshots.append(newest)
     return News(

@@ -81,7 +81,7 @@ class SnapshotTexts(NamedTuple):
 class SnapshotBuilder:
     """Creates snapshots of a running rig, with all events since the previous one.
 
-    ``update`` only keeps the tick; ``take`` does the work.
+    ``update`` only keeps the tick; ``build`` does the work.
     """
 
     def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
@@ -108,7 +108,7 @@ class SnapshotBuilder:
         """Add a tick."""
         self._ticks.append(tick)
 
-    def take(self, said: SnapshotTexts) -> Snapshot | None:
+    def build(self, said: SnapshotTexts) -> Snapshot | None:
         """Return a snapshot of the newest tick, None before the first."""
         trail: list[Trail] = []
         events: list[SeenEvent] = []

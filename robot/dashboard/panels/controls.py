@@ -119,7 +119,7 @@ class GazeTargetPanel:
 
         # A coroutine: viser runs these in order, plain functions in any order.
         @self._gizmo.on_update
-        async def _(event: viser.TransformControlsEvent) -> None:
+        async def look_at_gizmo(event: viser.TransformControlsEvent) -> None:
             x, y, z = map(float, event.target.position)
             if event.client_id is not None and event.phase != "start":
                 self._outbox.command(LookAt((x, y, z)), str(event.client_id))

@@ -225,7 +225,7 @@ class ParamPanels:
                 return
             panel = ParamPanel(self._widgets, client, self._place, self._outbox, self._lock)
             panel.offer(self._params)
-            panel.take(self.in_force, self._unsaved, self._path)
+            panel.update_values(self.in_force, self._unsaved, self._path)
             self._panels[client] = panel
 
     def _forget(self, client: str) -> None:
@@ -248,7 +248,7 @@ class ParamPanels:
             self._unsaved = frozenset(cast(Iterable[str], state.get("unsaved", ())))
             self._path = str(state.get("path") or "")
             for panel in self._panels.values():
-                panel.take(self.in_force, self._unsaved, self._path)
+                panel.update_values(self.in_force, self._unsaved, self._path)
 
     def record_answer(self, who: str) -> None:
         """Record that the rig has answered a browser's change."""
@@ -308,7 +308,9 @@ class ParamPanel:
         groups = tuple(dict.fromkeys(param_group(param) for param in params.values()))
         self._group.options = (NOTHING, UNSAVED, DIFFERENT, *groups)
 
-    def take(self, values: Mapping[str, object], unsaved: frozenset[str], path: str) -> None:
+    def update_values(
+        self, values: Mapping[str, object], unsaved: frozenset[str], path: str
+    ) -> None:
         """Update the present values; a control that is being moved keeps its value."""
         self._values, self._unsaved = values, unsaved
         some = f"<b>● {len(unsaved)} not saved</b>" if unsaved else "all saved"

@@ -120,7 +120,7 @@ class PointerToLook:
         self._rate = TokenBucket(PER_S, BURST)
         self.p_world_eyes_m: Vec3 | None = None
 
-    def take(self, asked: object, who: str) -> bool:
+    def look_at_pointer(self, asked: object, who: str) -> bool:
         """Send the target of a browser's pointer; return False if there is none.
 
         A pointer with "opponent" moves the opponent of a boxing world instead of the gaze.

@@ -141,7 +141,7 @@ class Viewpoints:
 
     def _greet(self, client: viser.ClientHandle) -> None:
         @client.camera.on_update
-        def _(camera: viser.CameraHandle) -> None:
+        def fit_field(camera: viser.CameraHandle) -> None:
             name = self._views.get(client.client_id, FACE)
             _fit_field(camera, named_view(name, self._snapshot))
 
