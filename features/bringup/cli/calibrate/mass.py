@@ -60,7 +60,7 @@ def calibrate_mass(
             refuse_unwritable(rig, out)
         statics = statics_of(loaded, of_neck=True)
         recorder = LoadRecorder(statics)
-        params = JogParams(speed_deg_s=speed, near_deg=3.0)
+        params = JogParams(speed_deg_s=speed, near_deg=3.0, timeout_s=5.0)
         try:
             with (
                 rig_ports(loaded, mock, port) as wire,
