@@ -18,7 +18,7 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glow_disc, painted_glb
-from gazerig.robot.dashboard.view.head_view import head_dimensions, lid_edges, with_shown_lids
+from gazerig.robot.dashboard.view.head_view import head_dimensions, lid_edges, with_shown_face
 from gazerig.robot.dashboard.view.scene_node import pitch_up
 from gazerig.robot.dashboard.view.viewpoints import BOTH, FACE, SHOULDER, View, named_view
 from gazerig.robot.description import head_mesh
@@ -122,7 +122,7 @@ def covered(opening: float, lower: float) -> Floats:
         (np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1
     ).reshape(-1, 3)
     hidden = np.zeros(len(rays), bool)
-    edges = lid_edges(with_shown_lids(shape_of(load_rig("maker"))))  # all lids move
+    edges = lid_edges(with_shown_face(shape_of(load_rig("maker"))))  # all lids move
     for upper, edge_rad in (
         (True, edges.elevation_rad("left_upper_lid", opening)),
         (False, edges.elevation_rad("left_lower_lid", lower)),

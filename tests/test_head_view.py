@@ -16,6 +16,9 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.overlays import CommandedPoseView
+from gazerig.robot.description import head_mesh
+from gazerig.robot.description.mesh_params import MeshParams
+from gazerig.robot.description.own_meshes import OwnMesh
 from gazerig.robot.model.types import CommandedPose, JointState, Snapshot
 
 
@@ -136,8 +139,6 @@ def test_a_head_without_a_neck_stands_on_a_base_below_it(server: viser.ViserServ
 
 def test_the_chin_opens_with_the_jaw_about_its_hinge(server: viser.ViserServer) -> None:
     view, rig = HeadView(server.scene), load_rig("expressive")
-    view.show(SHOT)
-    assert "jaw_link" not in view.links  # and the mouth of such a rig stays shut
     view.shape = shape_of(rig)
     rest = replace(SHOT, joints=tuple(rig.names), measured_rad=(0.0,) * len(rig.names))
     view.show(rest)
@@ -148,3 +149,42 @@ def test_the_chin_opens_with_the_jaw_about_its_hinge(server: viser.ViserServer) 
     assert tuple(frame.position) == hinge and tuple(chin.position) == (0.0, 0.0, 0.0)
     turned = shut.inverse() @ _in_world(view, "jaw_link").rotation()
     assert turned.log() == pytest.approx((0.0, 0.2, 0.0), abs=1e-3)
+
+
+def _turned_deg(view: HeadView, link: str) -> float:
+    """Return how far a part of the face is turned about its axis across the head, upwards."""
+    _, y, _ = transforms.SO3(np.array(view.links[link].frame.wxyz)).log()
+    return -degrees(y)
+
+
+def test_a_rig_without_brows_and_jaw_shows_expressions_drawn_only(
+    server: viser.ViserServer,
+) -> None:
+    view = HeadView(server.scene)
+    view.show(SHOT)
+    assert _turned_deg(view, "left_brow_link") == _turned_deg(view, "jaw_link") == 0.0
+    both = ("surprised", "happy")  # a gesture comes before the expression beneath it
+    angles = []
+    for k in range(1, 21):
+        view.show(replace(SHOT, t_s=SHOT.t_s + 0.05 * k, expressed=both))
+        angles.append(_turned_deg(view, "left_brow_link"))
+    assert angles[-1] == pytest.approx(18.0, abs=0.1)
+    assert np.all(np.diff(angles) >= 0.0) and max(np.diff([0.0, *angles])) < 6.0  # without a jump
+    assert _turned_deg(view, "right_brow_link") == angles[-1]
+    assert _turned_deg(view, "jaw_link") == pytest.approx(-12.0, abs=0.1)
+    view.show(replace(SHOT, t_s=SHOT.t_s + 3.0, expressed=("", "neutral")))
+    assert _turned_deg(view, "left_brow_link") == pytest.approx(0.0, abs=0.01)
+
+
+def test_joints_of_the_rig_and_meshes_of_its_own_are_shown_as_they_are(
+    server: viser.ViserServer,
+) -> None:
+    view, rig = HeadView(server.scene), load_rig("expressive")
+    view.shape = shape_of(rig)
+    rest = replace(SHOT, joints=tuple(rig.names), measured_rad=(0.0,) * len(rig.names))
+    view.show(replace(rest, t_s=5.0, expressed=("surprised", "")))
+    assert all(_turned_deg(view, f"{name}_link") == 0.0 for name in ("left_brow", "jaw"))
+    mesh = OwnMesh("head", MeshParams("skull.stl"), head_mesh.cap())
+    view.shape = shape_of(load_rig("desk"))._replace(meshes=(mesh,))
+    view.show(replace(SHOT, t_s=6.0, expressed=("surprised", "")))
+    assert "jaw_link" not in view.links

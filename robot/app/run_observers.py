@@ -181,10 +181,10 @@ class RunObservers:
         if not start_s and self._made.room is not None:
             start_s = self._made.room.start_s()
         in_force: tuple[str, str, str]
+        menus = robot.menus()
         if self._steer is not None:
             in_force = self._steer.status_text(), "", ""
         else:
-            menus = robot.menus()
             character = self._tuning.character_name if self._tuning is not None else ""
             in_force = menus["behaviour"][0], menus["conversation"][0], character
         self._states += 1
@@ -193,6 +193,7 @@ class RunObservers:
         return RunState(
             errors, *in_force, robot.perception.residual(), start_s,
             [other.describe() for other in self._made.other_heads], self._figures,
+            menus.get("expression", ("",))[0],
         )  # fmt: skip
 
     def _record_world(self, tick: Tick) -> None:

@@ -344,6 +344,7 @@ class Snapshot:
         plan: Choice of the action planner and its reason, "" without one or under a client's
             control.
         others: The other heads of the same world.
+        expressed: Names of the present gesture and expression, "" for none.
     """
 
     t_s: float
@@ -394,3 +395,4 @@ class Snapshot:
     p_world_pivot_m: Vec3 | None = None
     plan: str = ""
     others: tuple[OtherHead, ...] = ()
+    expressed: tuple[str, ...] = ()

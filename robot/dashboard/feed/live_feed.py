@@ -93,6 +93,7 @@ class RunState(NamedTuple):
     others: the other heads of the same world, as fields of ``OtherHead``
     timing: the loop's own figures, as fields of ``LoopFigures``; None: unknown. Ticks that a busy
         page did not take would look late in the page's own.
+    expression: the present one, "" without any
     """
 
     errors: dict[str, int]
@@ -103,6 +104,7 @@ class RunState(NamedTuple):
     scene_start_s: float | None = None
     others: Sequence[tuple[str, str, Level]] = ()
     timing: Sequence[Any] | None = None
+    expression: str = ""
 
 
 class FrameHeader(NamedTuple):
@@ -252,6 +254,7 @@ class LiveFeed:
                 state.conversation,
                 tuple(OtherHead(*other) for other in state.others),
                 LoopFigures(*state.timing) if state.timing is not None else None,
+                state.expression,
             )
         )
 

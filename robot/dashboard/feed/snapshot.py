@@ -67,6 +67,7 @@ class SnapshotTexts(NamedTuple):
 
     others: the other heads of the same world
     timing: the loop's own figures; None: those of the ticks that arrived
+    expression: the present one, "" without any
     """
 
     health: str = ""
@@ -76,6 +77,7 @@ class SnapshotTexts(NamedTuple):
     conversation: str = ""
     others: tuple[OtherHead, ...] = ()
     timing: LoopFigures | None = None
+    expression: str = ""
 
 
 class SnapshotBuilder:
@@ -156,6 +158,7 @@ class SnapshotBuilder:
             trail=tuple(trail),
             events=tuple(events),
             others=said.others,
+            expressed=(self._newest.gesture.name, said.expression),
         )
 
 

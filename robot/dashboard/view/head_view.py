@@ -1,7 +1,7 @@
 """Draw the rig's head on the page as measured: the links of its description, and lines of sight."""
 
 from collections.abc import Mapping
-from math import dist, radians
+from math import dist, exp, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +52,21 @@ _LIT_LOWER_LID: Mat3 = rotation((0.0, radians(12.0), 0.0))
 """Rotation by which lower lids are lit as if a little higher; otherwise they look tired."""
 
 
+_FACES_DEG: Mapping[str, tuple[float, float]] = {
+    "happy": (6.0, 4.0),
+    "sad": (-10.0, 0.0),
+    "surprised": (18.0, 12.0),
+    "angry": (-16.0, 0.0),
+    "sleepy": (-4.0, 3.0),
+    "laugh": (5.0, 9.0),
+}
+"""Brows up and jaw down in an expression or a gesture of this name, as of the rig expressive."""
+_DRAWN_ONLY = ("left_brow", "right_brow", "jaw")
+"""Joints that are drawn even if the rig does not have them."""
+_FACE_TAU_S = 0.15
+"""Time constant of joints that are drawn only."""
+
+
 class _Node(NamedTuple):
     """Link in the scene: its frame, and one file for each of its materials."""
 
@@ -81,6 +96,7 @@ class HeadView:
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
         self.lid_edges = LidEdges({}, {})
+        self._face_rad, self._face_s = (0.0, 0.0), 0.0
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
@@ -93,7 +109,7 @@ class HeadView:
             sight: with the lines of sight.
             camera: with the camera's housing, which else is left out of the face.
         """
-        shape = with_shown_lids(self.shape) if self.shape is not None else None
+        shape = with_shown_face(self.shape) if self.shape is not None else None
         if shape is None:
             seen = snapshot.joints, head_dimensions(snapshot)
             shape = self._drawn if seen == self._seen else shape_of(*seen, snapshot)
@@ -105,6 +121,8 @@ class HeadView:
         assert description is not None and shape is not None  # fitted
         angles = description.angles(snapshot.joints, snapshot.measured_rad)
         angles |= lid_angles(shape, snapshot.lids, snapshot.lower_lids or (0.0, 0.0))
+        drawn = zip(_DRAWN_ONLY, self._blend_face(snapshot), strict=True)
+        angles |= {name: angle for name, angle in drawn if name not in snapshot.joints}
         for link in description.links:
             if link.joint is not None:
                 R = compose(link.R, turn_about(link.joint.axis, angles[link.joint.name]))
@@ -121,6 +139,18 @@ class HeadView:
             if colour != self._colour:
                 line.colors = np.array(colour, np.uint8)
         self._colour = colour
+
+    def _blend_face(self, snapshot: Snapshot) -> tuple[float, float, float]:
+        """Return the angles of brows and jaw that are drawn only, in radians."""
+        share = 1.0 - exp(-max(0.0, snapshot.t_s - self._face_s) / _FACE_TAU_S)
+        self._face_s = snapshot.t_s
+        known = (_FACES_DEG[name] for name in snapshot.expressed if name in _FACES_DEG)
+        goal = next(known, (0.0, 0.0))
+        brows, jaw = (
+            now + share * (radians(to) - now) for now, to in zip(self._face_rad, goal, strict=True)
+        )
+        self._face_rad = brows, jaw
+        return brows, brows, jaw
 
     def _draw(self, description: Description, shape: RigShape) -> None:
         """Draw a rig; if it has the same links, only those that look different."""
@@ -252,9 +282,14 @@ def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot
     )
     lids = dict.fromkeys((name for name in LIDS if name in joints), (0.0, 0.0))
     shape = RigShape("rig", geometry, dict.fromkeys(joints, _JOINT), lids, {}, CameraParams())
-    return with_shown_lids(shape)
+    return with_shown_face(shape)
 
 
-def with_shown_lids(shape: RigShape) -> RigShape:
-    """Return a rig whose lids have the rotation that is shown."""
+def with_shown_face(shape: RigShape) -> RigShape:
+    """Return a rig whose lids have the rotation that is shown, and whose brows and jaw move.
+
+    A rig with meshes of its own gets no joints that it does not have.
+    """
+    drawn = {} if shape.meshes else dict.fromkeys(_DRAWN_ONLY, _JOINT)
+    shape = shape._replace(joints=drawn | dict(shape.joints))
     return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})
