@@ -13,7 +13,7 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 
 
 def gaze_point(tick: Tick) -> Vec3:
-    """Return where the measured eyes look, as far away as what they look at."""
+    """Return the point of the measured gaze, at the distance of its target."""
     left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
     eye = scale(add(left, right), 0.5)
     return add(eye, scale(cyclopean_direction(tick), norm(sub(tick.target.p_world_m, eye))))

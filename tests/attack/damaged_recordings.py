@@ -1,4 +1,4 @@
-"""Damage recordings in many ways and use them: python tests/attack/damaged_recordings.py 20000.
+"""Damage recordings and use them: python tests/attack/damaged_recordings.py 20000.
 
 Prints how many were refused with one line, gave the whole run, or its beginning with a note,
 and every other outcome; with the longest and the memory that it took.

@@ -2,7 +2,7 @@
 
     python tests/attack/exits.py [--rig desk] [--interface python] [--exit SIGKILL]
 
-Servos are emulated on pseudo-terminals of another process, and asked there what they really do.
+Servos are emulated on pseudo-terminals of another process, which reports their true state.
 Before the blow, each case waits until every servo has its torque and the loop sends packets; a case
 in which that does not come is counted as void. A servo that has its torque 20 s after the blow
 counts as powered.
@@ -198,7 +198,7 @@ INTERFACES = ("command", "python", "daemon thread", "two heads", "study")
 
 
 def meets(interface: str, exit_: str) -> bool:
-    """Return whether an interface can end that way."""
+    """Return whether an interface can end like that."""
     if exit_ in OWN:
         return interface in ("python", "two heads")
     if exit_ == "the main thread ends":
@@ -279,7 +279,7 @@ def _holds(program: "subprocess.Popen[bytes]", benches: list[Bench]) -> bool:
 
 
 class Row(NamedTuple):
-    """What became of a case; void: why it proves nothing, ""."""
+    """Outcome of a case; void: reason why it proves nothing, or ""."""
 
     powered: int
     of: int

@@ -1,7 +1,7 @@
-"""What befalls a running servo bus, and torque-on itself: python tests/attack/hostile_bus.py
+"""Faults of a running servo bus and during torque-on: python tests/attack/hostile_bus.py
 
 Each row is one run of 1000 cycles on simulated time, or one brown-out with every packet of
-torque-on in turn. Wrong: values given as fresh that were not true. Outside: ticks in which a
+torque-on, one after the other. Wrong: false values reported as fresh. Outside: ticks in which a
 joint was beyond its range. Recover: time until all is well after the end of the fault.
 A bus that does not run before its fault ends the script.
 """
@@ -44,7 +44,7 @@ def brown_out(kind: str) -> str:
 
 
 def torque_on(kind: str) -> tuple[int, int, int, float, float]:
-    """Let servo 3 brown out with each packet of torque-on in turn, as many as there are.
+    """Let servo 3 brown out at each packet of torque-on, one packet per run.
 
     Returns: packets, times refused, ticks outside, farthest outside, slowest recovery
     """

@@ -1,7 +1,7 @@
 """Noise on every kind of servo bus: python tests/attack/line_noise.py [--cycles 100000]
 
-Each row is one run on simulated time: so many cycles in which a share of all bytes, to the
-servos and back, is changed, lost or doubled; or in which the answers of before arrive again
+Each row is one run on simulated time: n cycles in which a share of all bytes, to the
+servos and back, is changed, lost or doubled; or in which earlier answers arrive again
 first. Wrong: values given as fresh that were not true. Outside: ticks in which a joint was
 beyond its range. Recover: time until all is well once the line is quiet.
 """

@@ -4,9 +4,9 @@
 
 A simulated rig runs in a process of its own, its page on the loopback. Each attack runs in
 another process; meanwhile the loop's rate is counted, then STOP is pressed 20 times as the
-page's script does, over the connection that stands, and then over a new one each time. "taken"
+page's script does, over an open connection, and then over a new one each time. "taken"
 counts those that the rig acknowledged at the first try, "slowest" is from the press to that;
-"loop" is the rate beside that without an attack, "page" and "rig" are the most memory in MB.
+"loop" is the rate next to that without an attack, "page" and "rig" are the most memory in MB.
 An attack counts only if its loop ticked and was not stopped before it, its first request was
 answered as it should be, and it was still going on at the end; any other ends the script.
 """
@@ -102,7 +102,7 @@ def stops(visitor: Visitor) -> None:
 
 
 def silent(visitor: Visitor) -> None:
-    """200 connections that say nothing, opened again as they are ended."""
+    """200 silent connections, opened again whenever they are closed."""
     _hold(visitor, b"")
 
 
@@ -279,7 +279,7 @@ def megabytes(pid: int | None) -> float:
 
 
 def press(visitor: Visitor, standing: ClientConnection) -> tuple[list[float], int]:
-    """Press STOP over a connection that stands, and over new ones; times in ms, and failures."""
+    """Press STOP over an open connection, and over new ones; times in ms, and failures."""
     took, failed = [], 0
     for number in range(PRESSES):
         began = time.monotonic()
@@ -359,7 +359,7 @@ def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
 
 
 def main(seconds: float, names: list[str]) -> None:
-    """Attack in every way."""
+    """Run every attack."""
     rig = Rig()
     print("attack             STOP taken, slowest  obeyed     loop page MB  rig MB  page")
     try:

@@ -2,7 +2,7 @@
 
 Run by hand: ``python tests/attack/remote_flood.py [seconds]``. A loop on the host's clock before
 an emulated bus in this process; other processes flood its socket. Prints a table. It ends with an
-error where the loop does not drive its joints before the flood, or a flooder gets no answer.
+error if the loop does not drive its joints before the flood, or a flooder gets no answer.
 """
 
 import os

@@ -98,7 +98,7 @@ class Watch:
     def _note(self) -> list[list[float]]:
         """Record the true state now; return the possible angles of each joint.
 
-        A second servo with the id of a joint counts as well: no driver can tell them apart.
+        A second servo with the id of a joint counts as well: no driver can distinguish them.
         """
         machine, now_s = self._machine, self._machine.clock.now_s()
         true, around = [[angle] for angle in machine.true_rad()], list[list[tuple[float, float]]]()
@@ -169,7 +169,7 @@ class Watch:
 
 
 def _between(angle: float, seen: Sequence[tuple[float, float]], room: float) -> bool:
-    """Return whether a joint was at an angle on its way from one place to the next."""
+    """Return whether a joint was at an angle between one place and the next."""
     return any(low - room <= angle <= high + room for low, high in seen)
 
 
@@ -185,7 +185,7 @@ def mix(kind: str, dice: random.Random, only: str = "") -> Case:
     some = [case for case in some if "script {i}" in case.name] or some
     begins = tuple(text for case in some for text in case.begins)
     ends = tuple(text for case in some for text in case.ends)
-    # Where a script has left a servo whose pulses then ended is not known to anybody.
+    # The position of a servo after its script and its pulses have ended is unknown.
     lost = len(some) > 1 and any("script on" in case.begins for case in some)
     return Case(begins, ends, lost or any(case.own_speed or case in STATIC for case in some))
 

@@ -1,10 +1,10 @@
-"""Every way out of every command that switches torque on: how many servos stay on?
+"""Every exit of every command that switches torque on: how many servos stay on?
 
     python tests/attack/ways_out.py [--rig desk] [--command run] [--way SIGHUP]
 
-Servos are emulated on a pseudo-terminal, and asked there what they really do. A row is one
-command on one rig that was ended one way: servos left on, how far the joints are from their
-parking pose, seconds until the program was gone, its exit code and the last line that it said. A
+Servos are emulated on a pseudo-terminal, which reports their true state. A row is one
+command on one rig, and how it was ended: servos left on, how far the joints are from their
+parking pose, seconds until the program was gone, its exit code and the last line that it printed. A
 command that takes longer than 20 s to end counts as hanging and is killed. A case proves nothing,
 and is counted as void, unless torque was on and the program spoke to its servos right before the
 blow, and the program told of a blow that it can tell of.
@@ -111,7 +111,7 @@ class Bench(NamedTuple):
         return wait_until(lambda: self._read_bytes() > before, 2.0)
 
     def _read_bytes(self) -> int:
-        """Return what the emulator has read so far; a status that is asked for counts too."""
+        """Return what the emulator has read until now, including requests for its status."""
         return int(Path(f"/proc/{self.buses.pid}/io").read_text().split()[1])
 
     def off_park_deg(self) -> float:
@@ -137,7 +137,7 @@ class Started(NamedTuple):
     """A command at work.
 
     errors: where its standard error can be read, -1 nowhere; master: of its terminal, or -1
-    reader: who reads what it says, where that is another process
+    reader: process that reads its output, None for this one
     """
 
     process: "subprocess.Popen[bytes]"
@@ -164,7 +164,7 @@ def fresh(words: list[str], breaks: str = "", **options: Any) -> "subprocess.Pop
 
 
 def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
-    """Start a command the way that its end needs."""
+    """Start a command as its end requires."""
     env = {**os.environ, "COLUMNS": "100"}
     breaks = BROKEN.get(way, "")
     command = typed(words, breaks)
@@ -231,7 +231,7 @@ def wait_until(true: Callable[[], bool], within_s: float = 60.0, master: int = -
         if master < 0:
             time.sleep(0.05)
         elif select.select([master], [], [], 0.05)[0]:
-            with contextlib.suppress(OSError):  # nobody is there any more
+            with contextlib.suppress(OSError):  # no process is left
                 os.read(master, 65536)
     return False
 
@@ -252,7 +252,7 @@ def close_tty(run: Started) -> None:
 
 
 def stop_tty(run: Started) -> None:
-    """Ctrl-S, a while of lines that nobody takes, then a request to end."""
+    """Ctrl-S, lines that no one reads for a while, then a request to end."""
     slave = os.open(f"/proc/{run.pid}/fd/2", os.O_RDWR | os.O_NOCTTY)
     termios.tcflow(slave, termios.TCOOFF)
     time.sleep(2.0)
@@ -280,7 +280,7 @@ def children(pid: int) -> list[int]:
 
 
 def nothing(run: Started) -> None:
-    """It ends by itself."""
+    """It ends without a request."""
 
 
 def later(run: Started) -> None:
@@ -343,7 +343,7 @@ class Row(NamedTuple):
 
 
 def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
-    """Start a command, wait for the torque, end it one way, look at the servos."""
+    """Start a command, wait for torque, end it, and inspect the servos."""
     words = [*commands(at.name, at.file)[name], "--port", at.port]
     folder = TemporaryDirectory()
     if way == "page killed":
@@ -356,7 +356,7 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
         with contextlib.suppress(OSError):
             os.write(keys, b"1500\n+40\n")
     needs = 0 if name == "monitor" else 1
-    # What takes the memory away counts ticks; everything else comes when the program is at work.
+    # A lack of memory is timed by ticks; everything else starts when the program works.
     ended = lambda: run.process.poll() is not None  # noqa: E731
     ticks = lambda: at.on() >= needs and at.busy() and at.on() >= needs  # noqa: E731
     up = wait_until(lambda: ticks() or ended(), master=run.master)

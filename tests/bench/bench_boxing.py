@@ -1,4 +1,4 @@
-"""How well the boxing match goes: python tests/bench/bench_boxing.py [--eyes EYE ...] [--seeds N]
+"""Quality of the boxing match: python tests/bench/bench_boxing.py [--eyes EYE ...] [--seeds N]
 
 One round (44 s of simulated time) a seed through each eye: ``scene``, the ideal detector on the
 scene of points; ``drawn``, its drawn pictures before the real detectors; ``world``, the ideal

@@ -1,8 +1,8 @@
-"""What the servo driver costs and survives: python tests/bench/bench_bus.py [--seconds 20]
+"""Costs and faults of the servo driver: python tests/bench/bench_bus.py [--seconds 20]
 
 One run, nine emulated servos: the rate against the wire's own limit and a silent servo on a
 simulated line; a silent servo side by side with the maker's SDK and rustypot; an unplugged
-adapter, and faults by the dice with a count of stale values. Rates and processor time beside
+adapter, and faults by the dice with a count of stale values. Rates and processor time next to
 the others are in bench_bus_peers.py. Nothing here passes or fails: machines differ and are
 shared, so compare figures of one run with each other.
 """

@@ -1,7 +1,7 @@
-"""What a tick costs on every kind of servo bus: python tests/bench/bench_bus_kinds.py
+"""Cost of a tick on every kind of servo bus: python tests/bench/bench_bus_kinds.py
 
 One run, six servos each: our drivers for Dynamixel, Feetech STS and a Maestro, all three as
-one bus of two servos each, and beside them the clients that others wrote, where there are
+one bus of two servos each, and next to them clients of other projects, if there are
 any. A tick is one reading of all servos and one packet of goals, tick after tick without a
 pause. First in this process, where the emulator's arithmetic is part of a tick; then over
 pseudo-terminals, with the emulator in a process of its own and the bytes' time on the wire
@@ -142,7 +142,7 @@ def clients() -> list[Client]:
 
 
 def a_round(tick: Cycle, ticks: int, count: int, step: Callable[[], None]) -> Spans:
-    """Run one round; ``step`` lets time pass where a clock has to be moved."""
+    """Run one round; ``step`` lets time pass if a clock must be moved."""
     spans, lost = [], 0
     cpu = time.process_time()
     for k in range(ticks):
@@ -160,7 +160,7 @@ def a_round(tick: Cycle, ticks: int, count: int, step: Callable[[], None]) -> Sp
 def take_turns(
     ticking: Mapping[str, tuple[Cycle, int, Callable[[], None]]], rounds: int, ticks: int
 ) -> dict[str, list[Spans]]:
-    """Let all run rounds in turn; the first, to warm up, is not counted."""
+    """Run rounds of all alternately; the first, to warm up, is not counted."""
     found: dict[str, list[Spans]] = {name: [] for name in ticking}
     for nth in range(rounds + 1):
         for name, (tick, count, step) in ticking.items():
@@ -217,7 +217,7 @@ def over_terminals(rounds: int, ticks: int) -> dict[str, list[Spans]]:
 
 
 def _no_wait() -> None:
-    """Let the clock on the wall go by itself."""
+    """Use real time."""
 
 
 def _set_up(kind: str, path: str, ids: tuple[int, ...]) -> None:

@@ -1,7 +1,7 @@
-"""Where the time of a bus cycle goes: python tests/bench/bench_bus_layers.py [--rounds 12]
+"""Time of each part of a bus cycle: python tests/bench/bench_bus_layers.py [--rounds 12]
 
 Nine servos on a pseudo-terminal, without the bytes' time on the wire. Each row does what the one
-above it does and a layer more, up to a whole cycle; the bare client and rustypot beside them. All
+above it does and a layer more, up to a whole cycle; the bare client and rustypot next to them. All
 take turns in one run, and the least of the rounds is given. Looks inside the driver.
 """
 

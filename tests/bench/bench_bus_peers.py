@@ -1,4 +1,4 @@
-"""The servo bus beside others' clients, in one run: python tests/bench/bench_bus_peers.py
+"""The servo bus and clients of other projects in one run: python tests/bench/bench_bus_peers.py
 
 Nine servos; a cycle is one (fast) sync read of all and one sync write of goals, cycle after
 cycle without a pause, over pseudo-terminals with the emulator in a process of its own. Rounds
@@ -81,7 +81,7 @@ def a_round(cycle: Cycle, count: int) -> Spans:
 
 
 def in_turns(cycles: Mapping[str, Cycle], rounds: int, count: int) -> dict[str, list[Spans]]:
-    """Let all run rounds in turn; the first, to warm up, is not counted."""
+    """Run rounds of all alternately; the first, to warm up, is not counted."""
     found: dict[str, list[Spans]] = {name: [] for name in cycles}
     for nth in range(rounds + 1):
         for name, cycle in cycles.items():

@@ -1,7 +1,7 @@
-"""What joints cost a tick, by kind of bus: python tests/bench/bench_bus_tick.py [--rounds 4]
+"""Cost of joints per tick, by kind of bus: python tests/bench/bench_bus_tick.py [--rounds 4]
 
 Nine joints through ``Body``: angles and speeds are read, angles are written, on pseudo-terminals
-without the bytes' time on the wire, beside rustypot's clients where there are any. Twice:
+without the bytes' time on the wire, next to rustypot's clients if installed. Twice:
 
     warm    tick after tick without a pause
     200 Hz  the loop's rate: between ticks this process sleeps, and after reading as before sleeping
@@ -137,7 +137,7 @@ def churn() -> None:
 
 
 def a_round(client: Client, ticks: int, cold: bool) -> list[Spans]:
-    """Tick so often, at the loop's rate where caches are to be cold."""
+    """Run n ticks, at the loop's rate if caches must be cold."""
     now_ns, found = time.thread_time_ns, []
     due_s = time.monotonic()
     for k in range(ticks):

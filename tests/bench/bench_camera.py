@@ -1,6 +1,6 @@
-"""What a camera costs the control loop: python tests/bench/bench_camera.py [FILM]
+"""Cost of a camera for the control loop: python tests/bench/bench_camera.py [FILM]
 
-A 200 Hz loop with absolute deadlines runs beside the search for faces and motion flat out, in
+A 200 Hz loop with absolute deadlines runs during an uninterrupted search for faces and motion, in
 turns: alone, with a camera thread, with a camera process (as shipped: one processor is left to
 the loop), and with one whose OpenCV may use all; lateness of the loop, and what the search got
 through. Then what a recording costs for each picture. Compare figures of one run with each other.

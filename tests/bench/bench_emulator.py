@@ -1,9 +1,9 @@
-"""What the emulated bus costs and how true its wire time is: python tests/bench/bench_emulator.py
+"""Cost of the emulated bus and error of its wire time: python tests/bench/bench_emulator.py
 
 One run prints how fast the shipped rigs run on emulated and on ideal servos, what the emulated
 side costs a tick, packets per second in this process and through a pseudo-terminal, simulated
 seconds per second of processor time of nine servos, and the cycle time on a line
-with wire time beside the formula. What runs in this process alone is measured in processor
+with wire time next to the formula. Work in this process alone is measured in processor
 time, the rest in real time. Nothing here passes or fails: machines differ and are shared, so
 compare figures of one run with each other.
 """

@@ -1,7 +1,7 @@
 """Faults injected and survived, by kind of bus: python tests/bench/bench_faults.py [--rates 100]
 
 Every fault of tests/struck_rigs.py strikes the shipped rig of each kind with all its joints
-for a second while it moves under its guard, in simulated time. A fault is survived where no
+for a second while it moves under its guard, in simulated time. A fault is survived if no
 servo left its limits, none was faster than it may, and in the end all joints move as before
 or those that do not are limp or still and named with their cause.
 """

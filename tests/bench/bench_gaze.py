@@ -1,7 +1,7 @@
-"""What the gaze models cost: python tests/bench/bench_gaze.py
+"""Cost of the gaze models: python tests/bench/bench_gaze.py
 
 Prints the time of one whole gaze step (choose, wander, plan) with 2 faces and 20 bodies as
-a share of a 5 ms tick, its growth with the number of bodies, and beside both, in the same
+a share of a 5 ms tick, its growth with the number of bodies, and next to both, in the same
 run, one step of ruckig's trajectory generator as a known quantity. Nothing here passes or
 fails.
 """

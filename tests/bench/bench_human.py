@@ -1,4 +1,4 @@
-"""How human the running product is: python tests/bench/bench_human.py [--rows 1 7] [--save FILE]
+"""Human-likeness of the running product: python tests/bench/bench_human.py [--rows 1 7] [--save FILE]
 
 Measures every row of tests/human (from the shipped scene to measured joints of byte-true emulated
 servos, in simulated time) and prints what is wanted, what was measured, and whether it is inside;
@@ -16,7 +16,7 @@ from human.measured_run import MeasuredRun, measured_run  # isort: skip
 
 
 def told(*args: Any, **named: Any) -> MeasuredRun:
-    """Return a measured run, and say on standard error that it is made."""
+    """Return a measured run, and report its start on standard error."""
     scene = args[0] if isinstance(args[0], str) else args[0].name
     rest = ", ".join(map(str, (*args[1:], *(f"{k}={v}" for k, v in named.items()))))
     progress(f"  {scene} ({rest})")

@@ -1,10 +1,10 @@
-"""What finding motion costs: python tests/bench/bench_motion.py
+"""Cost of motion detection: python tests/bench/bench_motion.py
 
 Prints milliseconds of processor time a picture (p50, p95) of each step at 320x240 and 640x400, and
-beside them, in the same run, the plain OpenCV calls that one would otherwise write: the flow alone
+next to them, in the same run, the plain OpenCV calls of a simpler program: the flow alone
 (DIS at the picture's own size), and background subtraction (MOG2), which needs a camera that
 stands. The picture: a head that turns at 20 deg/s before ground on which two people move; then one
-that stands before one, three and twenty. Nothing here passes or fails.
+that does not move before one, three and twenty. Nothing here passes or fails.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""What pauses between ticks cost on this machine: python tests/bench/bench_pacing.py [--rounds 6]
+"""Cost of pauses between ticks on this machine: python tests/bench/bench_pacing.py [--rounds 6]
 
 The same simulated tick (desk rig, visitor, ideal bus), the same step of ruckig and the same loop of
 a thousand additions, each run one after the other, after 5 ms of sleep and after 5 ms of spinning

@@ -1,11 +1,11 @@
-"""What the live page costs the control loop, and how fast a hand on it is felt.
+"""Cost of the live page for the control loop, and its reaction time.
 
     python tests/bench/bench_page.py [SECONDS]
 
 A simulated rig in real time, its servos behind a pseudo-terminal, with the page off and with
 0, 1 and 5 browsers that take all that comes. Printed a run: how far ticks are off their slots,
 skipped slots, and the processor time of the rig's and of the page's process, in per cent of
-one core. Then, with one browser, seconds in which nobody tunes, the door is knocked at ten
+one core. Then, with one browser, seconds without tuning, the door is knocked at ten
 times a second, a parameter is changed ten times a second, another program sets a value ten times
 a second, or it reads all of them as often, in turn. Then the time until the page can be opened,
 until a browser has its first picture, and from a slider that is moved (and from a stop) to the
@@ -173,7 +173,7 @@ def flat_out(seconds: float) -> None:
 
 
 def cpu_s(pid: int | None) -> float:
-    """Processor time of a process so far."""
+    """Processor time of a process until now."""
     if pid is None:
         return 0.0
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
@@ -247,7 +247,7 @@ def tuned(how: str, url: str) -> "subprocess.Popen[bytes]":
 
 
 def tuning_rows(bench: Bench, url: str, rounds: int) -> None:
-    """What tuning costs: a second of each in turn, as a machine is never quiet for long."""
+    """Cost of tuning: alternating seconds of each, as a machine is never quiet for long."""
     hands = {how: tuned(how, url) for how in HANDS}
     time.sleep(3.0)  # until they have started
     for hand in hands.values():

@@ -1,4 +1,4 @@
-"""What one tick of six servos costs on a PCA9685: this driver beside Adafruit's library.
+"""Cost of one tick of six servos on a PCA9685: this driver and Adafruit's library.
 
 Both over smbus2's methods on the emulated bus. Adafruit's library is not installed with this
 project: pip install --no-deps --target DIR adafruit-circuitpython-pca9685

@@ -1,4 +1,4 @@
-"""What recording costs: the loop's jitter and processor time with it and without, bytes, reading.
+"""Cost of recording: the loop's jitter and processor time with it and without, bytes, reading.
 
 Usage: .venv/bin/python tests/bench/bench_recording.py [SECONDS] [SIMULATED_SECONDS]
 

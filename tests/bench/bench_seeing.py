@@ -1,4 +1,4 @@
-"""How far and how truly the head sees: python tests/bench/bench_seeing.py [--rows 1 3] [--full]
+"""Range and errors of perception: python tests/bench/bench_seeing.py [--rows 1 3] [--full]
 
 Measures every row of tests/seeing (range, motion of the camera, faces, who looks at the head) and
 prints what is wanted, what was measured, and whether it is inside; with --against a file that

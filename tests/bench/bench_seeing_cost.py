@@ -1,4 +1,4 @@
-"""What seeing costs: python tests/bench/bench_seeing_cost.py [--scene boxing]
+"""Cost of perception: python tests/bench/bench_seeing_cost.py [--scene boxing]
 
 Processor time of the thread in the camera, the perception and the attention of the desk rig, in
 simulated time with emulated servos. Every round is the same run, so each call counts with

@@ -1,4 +1,4 @@
-"""How late ticks are with a slow rule of attention: none, one that sleeps, one that computes.
+"""Lateness of ticks with a slow rule of attention: none, a sleeping and a computing rule.
 
     PYTHONPATH=.links python tests/bench/bench_slow_rule.py [--seconds S]
 
@@ -40,7 +40,7 @@ RULES = {
 
 
 def lateness_s(rule: str, seconds: float) -> tuple[list[float], int, list[str]]:
-    """Return how late each tick began, how many slots were missed, and what was said."""
+    """Return the lateness of each tick, the missed slots and the messages."""
     rig = load_rig("desk")
     if rule:
         rig = apply_changes(rig, {"gaze.chooser": "slow"})

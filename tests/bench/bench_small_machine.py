@@ -1,12 +1,12 @@
-"""What fits on a small computer: python tests/bench/bench_small_machine.py [--seconds 20]
+"""Limits of a small computer: python tests/bench/bench_small_machine.py [--seconds 20]
 
 One core is slowed to three quarters, a half and a quarter, and runs are pinned to it. How:
 
     --by spinner   a process of real-time priority takes the rest of every millisecond of that core;
-                   all else there, the kernel too, advances as on a core so much slower, but timers
+                   all else there, the kernel too, advances as on a slower core, but timers
                    ring up to one pause late, which they would not there (default)
-    --by quota     a control group may use so much of every 10 ms: it has its share at full speed
-                   and then stands still, with the kernel's accuracy of some milliseconds
+    --by quota     a control group may use a share of every 10 ms at full speed
+                   and then pauses, with the kernel's accuracy of some milliseconds
 
 The loop runs as ``gazerig run --mock`` does, real time, scene visitor, profile small at several
 rates; the process that emulates the servos, which are real ones on a robot, stays on the other

@@ -1,4 +1,4 @@
-"""How long a start takes: python tests/bench/bench_start.py [--before /path/to/other/.links]
+"""Duration of a start: python tests/bench/bench_start.py [--before /path/to/other/.links]
 
 Processor time of the processes, the least of rounds that take turns with those of another version:
 help, a command to a running rig, and ``gazerig run --mock`` until its first tick has written goals

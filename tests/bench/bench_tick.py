@@ -1,4 +1,4 @@
-"""What one tick costs, stage by stage: python tests/bench/bench_tick.py [--seconds 60]
+"""Cost of one tick, stage by stage: python tests/bench/bench_tick.py [--seconds 60]
 
 The run is that of ``gazerig run --mock`` without a page: real time, 200 Hz, the scene visitor,
 servos behind a pseudo-terminal that a process of their own emulates. Stages are given in processor
@@ -9,7 +9,7 @@ the loop, in the same process and at the same rate, ruckig computes a step of ni
 rustypot reads and writes nine servos.
 
     --save FILE        keeps the figures as JSON
-    --against FILE     prints them beside those kept before, or beside another version's:
+    --against FILE     prints them next to stored ones, or those of another version:
                        PYTHONPATH=/path/to/other/.links python tests/bench/bench_tick.py --save FILE
     --table            also prints them as rows of docs/measurements/performance.md
     --page             with the live page, watched by Chromium, or with --browsers N by N clients
@@ -72,7 +72,7 @@ def peers(kind: str, rate_hz: float, seconds: float) -> dict[str, list[float]]:
 
 @contextmanager
 def absent(name: str) -> Iterator[None]:
-    """Say in one line that somebody is not there to compare with."""
+    """Report in one line that a program for comparison is missing."""
     try:
         yield
     except ImportError as error:
@@ -80,7 +80,7 @@ def absent(name: str) -> Iterator[None]:
 
 
 def ruckig_step() -> Callable[[int], object]:
-    """Return one update of ruckig, nine axes, under way without end."""
+    """Return one update of ruckig, with nine axes in constant motion."""
     from ruckig import InputParameter, OutputParameter, Ruckig
 
     otg, given, found = Ruckig(9, 0.005), InputParameter(9), OutputParameter(9)
@@ -113,7 +113,7 @@ def rustypot_cycle(kind: str) -> Iterator[Callable[[int], object]]:
 
 @contextmanager
 def watched(run: session.Session, browsers: int | None) -> Iterator[str]:
-    """Let the page be looked at by Chromium, or by so many clients that take all that comes."""
+    """Open the page in Chromium, or in n clients that accept all messages."""
     page: Any = run._run_observers._page
     if page is None:
         yield ""
@@ -276,7 +276,7 @@ def simulated(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def show(figures: dict[str, Any], before: dict[str, Any] | None) -> None:
-    """Print the tables, where there is something to compare with as "before -> now"."""
+    """Print the tables, with stored figures as "before -> now"."""
     print(json.dumps(figures["about"]))
     if before is not None:
         print(f"before: {json.dumps(before['about'])}")
@@ -316,7 +316,7 @@ def table(figures: dict[str, Any], before: dict[str, Any] | None) -> Iterator[st
 
 
 def number(before: float | None, now: float) -> str:
-    """Return one figure, behind that of before."""
+    """Return one figure, after the former one."""
     digits = 3 if abs(now) < 10 and now != int(now) else 1
     old = f"{before:8.{digits}f} -> " if before is not None else ""
     return f"{old}{now:8.{digits}f}"

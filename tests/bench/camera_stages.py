@@ -158,7 +158,7 @@ def rate_hz(case: Case, seconds: float) -> float:
         looks.look(shot)
     count, began = 0, time.monotonic()
     while time.monotonic() - began < seconds:
-        # To and fro without a gap: the order of the shots begins where it ends.
+        # Forward and backward without a gap: the order of the shots ends at its start.
         shot = taken[(8 + count) % len(taken)]
         looks.look(shot._replace(captured_s=(8 + count) / most_hz, number=9 + count))
         count += 1

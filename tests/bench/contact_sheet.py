@@ -1,4 +1,4 @@
-"""What the head looked at in a film, on one sheet: contact_sheet.py FILM SHEET.png [--seconds 20]
+"""Targets of the head in a film, on one sheet: contact_sheet.py FILM SHEET.png [--seconds 20]
 
     PYTHONPATH=.links python tests/bench/contact_sheet.py film.avi sheet.png
 

@@ -1,6 +1,6 @@
-"""A drawn scene before a camera that stands still: real flow, true faces, and the truth of hands.
+"""A drawn scene before a stationary camera: real flow, true faces, and the truth of hands.
 
-Faces come from the truth (with the noise of a detector), since finding them is not what is asked
+Faces come from the truth (with the noise of a detector), since their detection is not tested
 here and costs most.
 """
 
@@ -56,7 +56,7 @@ class _Later:
 
 
 class _TrueFaces:
-    """A detector that is told the faces."""
+    """A detector with given faces."""
 
     found: tuple[DetectedFace, ...] = ()
 
@@ -66,7 +66,7 @@ class _TrueFaces:
 
 
 class Frame(NamedTuple):
-    """What one frame showed; hands: where they truly were."""
+    """Content of one frame; hands: their true positions."""
 
     t_s: float
     percept: Percept

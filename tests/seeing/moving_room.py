@@ -1,8 +1,8 @@
 """A room in front of a camera that shakes, is bumped or turns: rendered, with what really moves.
 
 Walls and furniture are textured boards at several distances; people are textured figures that
-walk to and fro. The lens sits some way from the point the camera turns about, as on a table or a
-neck. Films and photos are shaken the same way, seen through a part of them.
+walk back and forth. The lens is off the camera's axis of rotation, as on a table or a
+neck. Films and photos are shaken the same, seen through a part of them.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ _NOISE_LEVELS = 2.0
 
 
 class Pose(NamedTuple):
-    """How the camera is moved: degrees to the right, up, clockwise, and metres right, down."""
+    """Motion of the camera: degrees to the right, up, clockwise, and metres right, down."""
 
     yaw_deg: float = 0.0
     pitch_deg: float = 0.0
@@ -114,7 +114,7 @@ class Seen(NamedTuple):
 class Board:
     """An upright textured board that faces the camera; ``speed_m_s`` along x, to and fro.
 
-    centre_m, half_m: where it is, and half its width and height
+    centre_m, half_m: its centre, and half its width and height
     figure: cut out as a person is
     """
 
@@ -143,7 +143,7 @@ ROOM = (
     Board((2.0, 0.6, 3.0), (0.5, 0.9), 2),
     Board((0.3, 1.1, 2.2), (0.6, 0.3), 3),
 )
-# Still things nearer than most of the room, which pass it where the lens moves aside.
+# Still things nearer than most of the room, which pass it as the lens moves aside.
 NEAR = (*ROOM, Board((-0.45, 0.35, 0.9), (0.12, 0.15), 1), Board((0.5, 0.4, 1.3), (0.15, 0.2), 2))
 PEOPLE = (
     Board((1.3, 0.5, 4.2), (0.28, 0.9), 4, True, 1.0, 0.9),
@@ -151,7 +151,7 @@ PEOPLE = (
 )
 # Somebody so close that they fill most of the image at times.
 CLOSE = (Board((0.0, 0.35, 0.9), (0.42, 0.75), 4, True, 0.5, 0.4),)
-# A wall without texture, and somebody before it.
+# A wall without texture, and a person before it.
 PLAIN: tuple[Board, ...] = ()
 BEFORE_PLAIN = (Board((0.0, 0.4, 1.4), (0.35, 0.8), 5, True, 0.5, 0.5),)
 
@@ -191,7 +191,7 @@ def frames(
     seed: int = 1,
     from_s: float = 0.0,
 ) -> Iterator[Seen]:
-    """Yield what the camera sees, frame by frame, for so long from a time on."""
+    """Yield the camera's images, frame by frame, from a time on."""
     rng, first = np.random.default_rng(seed), round(from_s * RATE_HZ)
     for k in range(first, first + round(seconds * RATE_HZ)):
         yield frame(motion(k / RATE_HZ), k / RATE_HZ, (*room, *people), rng)
@@ -221,7 +221,7 @@ def frame(pose: Pose, t_s: float, boards: tuple[Board, ...], rng: np.random.Gene
 def _painted(
     image: NDArray[np.float32], board: Board, centre: Floats, R: Floats, lens: Floats
 ) -> Mask:
-    """Paint a board into the image; return where it is."""
+    """Paint a board into the image; return its place."""
     signs = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
     seen = (centre + signs * (*board.half_m, 0.0) - lens) @ R
     corners = seen[:, :2] / seen[:, 2:] * FOCAL_PX + (0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1))
@@ -286,7 +286,7 @@ def looked_through(
 def street(
     film: Path, motion: Motion, first: int, count: int, rate_hz: float = 10.0
 ) -> Iterator[Seen]:
-    """Yield a film of a camera that stands, shaken; what moves is what differs from its ground.
+    """Yield a shaken film of a stationary camera; what differs from its background moves.
 
     first, count: frames of the film
     """

@@ -27,7 +27,7 @@ _OVAL = [
     10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377,
     152, 148, 176, 149, 150, 136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
 ]  # fmt: skip
-# The mesh's own axes look so much below those of a face (eyes above the mouth).
+# Offset of the mesh's axes below those of a face (eyes above the mouth).
 _TILT_RAD = np.radians(6.2)
 _PUPILS_M = 0.0619
 _BALL_M, _BALL_SD_M, _IRIS_OUT_M = 0.006, 0.0008, 0.0105

@@ -1,4 +1,4 @@
-"""Range of moving things without depth: it stays where it is assumed, and so does the gaze."""
+"""Range of moving things without depth: it stays at its assumed value, like the gaze."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -69,11 +69,11 @@ class _Neck(StandIn):
 
 
 def still_thing(noise_deg: float, swings: bool, pictures: int, seed: int) -> NDArray[np.float64]:
-    """Return the range over the assumed one, picture by picture, of a thing that stands still.
+    """Return the range over the assumed one, picture by picture, of a stationary thing.
 
     Args:
-        noise_deg: standard deviation of its direction, each way, cut off at the picture's edge.
-        swings: the camera turns by 20 deg each way, and so moves by 7 cm.
+        noise_deg: standard deviation of its direction on each axis, cut off at the picture's edge.
+        swings: the camera turns by 20 deg to both sides, and so moves by 7 cm.
         pictures: how many.
         seed: of the noise.
     """
@@ -114,10 +114,10 @@ class Walkers:
         self._newest: Detections | None = None
 
     def open(self) -> None:
-        """Nothing is to be opened."""
+        """Open nothing."""
 
     def close(self) -> None:
-        """Nothing is to be closed."""
+        """Close nothing."""
 
     def events(self) -> tuple[str, ...]:
         """Return what happened: nothing."""
@@ -151,7 +151,7 @@ class Walkers:
 
 
 class Believed(NamedTuple):
-    """What a run believed of things, and where its gaze was."""
+    """Estimates of things in a run, and its gaze."""
 
     ranges_m: NDArray[np.float64]
     ahead: NDArray[np.bool_]
@@ -175,7 +175,7 @@ class Believed(NamedTuple):
 def believed(
     seconds: float, size: tuple[int, int], seed: int = 0, film: Path | None = None
 ) -> Believed:
-    """Run the whole robot before a film or walkers, with a camera that stands still."""
+    """Run the whole robot before a film or walkers, with a stationary camera."""
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     if film is not None:
@@ -229,7 +229,7 @@ def _eye(tick: Tick) -> Vec3:
 
 
 def _gaze_point(tick: Tick) -> Vec3:
-    """Return where the measured eyes look, as far away as what they look at."""
+    """Return the point of the measured gaze, at the distance of its target."""
     eye = _eye(tick)
     return add(eye, scale(cyclopean_direction(tick), norm(sub(tick.target.p_world_m, eye))))
 

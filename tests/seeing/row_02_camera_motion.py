@@ -80,9 +80,9 @@ _NEAR_PX = 9
 
 
 class Score(NamedTuple):
-    """What was found in a film.
+    """Detections in a film.
 
-    false: things where nothing moves; right: things where something does
+    false: things although nothing moves; right: things that move
     moving: what moves, counted in each picture; noticed: what of it had a thing on it
     """
 
@@ -105,7 +105,7 @@ class Score(NamedTuple):
 
 
 def measured_head(motion: Motion) -> PoseBuffer:
-    """Return what a head's joints have told of its camera over seven seconds."""
+    """Return the motion of a head's camera by its joints over seven seconds."""
     poses = PoseBuffer()
     for k in range(500):
         t_s = 0.016 * k - 1.0
@@ -121,7 +121,7 @@ def judged(
 ) -> Score:
     """Let the detector look, as the program uses it, and compare with the truth.
 
-    turn_of: returns what the camera's own gyro says of a time
+    turn_of: returns the gyro's rotation at a time
     """
     source = MotionSource(MotionParams(), None, field, turns)
     pictures = false = right = moving = noticed = 0
@@ -149,7 +149,7 @@ def judged(
 
 
 def _on(blob: MovingBlob, mask: Mask) -> bool:
-    """Return whether the point of a thing that is looked at lies there."""
+    """Return whether the point of the target is there."""
     assert blob.centre_px is not None
     x, y = (round(v) for v in blob.centre_px)
     height, width = mask.shape

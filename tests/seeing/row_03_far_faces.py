@@ -1,4 +1,4 @@
-"""How far faces are found, with the default settings, 640 x 400 at 69 deg."""
+"""Range of face detection with the default settings, 640 x 400 at 69 deg."""
 
 import time
 

@@ -49,7 +49,7 @@ def hard_faces(params: FaceDetectorParams) -> float:
 
 
 def hard_portraits() -> Iterator[ImageArray]:
-    """Yield the portraits made hard to find in twelve ways, and frames of the film in three."""
+    """Yield the portraits with twelve kinds of difficulties, and frames of the film with three."""
     rng = np.random.default_rng(0)
     changes: tuple[Callable[[ImageArray], np.ndarray], ...] = (
         lambda image: image * 0.2,
@@ -108,7 +108,7 @@ def placing_error(frames: int) -> float:
 
 
 def shown(film: Path, step: int, count: int | None = None) -> float:
-    """Return the share of a film's frames with so many faces; None: with any."""
+    """Return the share of a film's frames with n faces; None: with any."""
     video, detector = cv2.VideoCapture(str(film)), face_detector(FaceDetectorParams())
     found: list[bool] = []
     for number in range(10**6):

@@ -39,7 +39,7 @@ _FACING = np.array([(0, 1, 0), (0, 0, -1), (-1, 0, 0)], float)
 
 
 def person(rng: np.random.Generator, laughter: float) -> np.ndarray:
-    """Return the five points of a person who laughs so much: 0 calm, 1 as in the photo."""
+    """Return the five points of a laughing person: 0 calm, 1 as in the photo."""
     face = CALM_M + laughter * LAUGH_M
     face = face * rng.normal(1.0, (0.06, 0.0, 0.05))
     face[3:] *= (1.0, rng.normal(1.0, 0.06), 1.0)

@@ -1,9 +1,9 @@
-"""Who looks at me: five points, and dense meshes with irises.
+"""Recognition of looks at the head: five points, and dense meshes with irises.
 
 Measured on rendered heads of two photographed people, .4-1.2 m away (seeing.rendered_heads): half
-of them look at the camera, half 15 to 40 deg past it; heads take .6 to 1 of the way and are off by
+of them look at the camera, half 15 to 40 deg past it; heads take .6 to 1 of the angle, off by
 5 deg of habit, faces differ by 6 % in depth and 4 % in height, eyeballs by .8 mm. AUC: how often
-one who looks at the camera is ranked before one who does not, by the angle off it.
+people who look at the camera are ranked before others, by the angle off it.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Several people who stand still: everybody is looked at, for as long as salience says."""
+"""Several standing people: each is looked at for a time that follows from salience."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -35,7 +35,7 @@ WANTED = {
 
 
 class StillPeople:
-    """People who stand on an arc before the robot, look at it and hardly move."""
+    """People on an arc before the robot, who look at it and hardly move."""
 
     name = "still-people"
     round_s = 3600.0
@@ -62,7 +62,7 @@ class StillPeople:
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Return none: all that is asked is measured here."""
+        """Return none: all figures are measured here."""
         return ()
 
 

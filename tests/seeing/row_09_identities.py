@@ -64,12 +64,12 @@ WANTED = {
 
 
 def walk(start_m: float, speed_m_s: float, away_m: float, turns_s: float = 1e9) -> Way:
-    """Return a straight way, or one that is gone back from a time on."""
+    """Return a straight path, or one with a return from a time on."""
     return lambda t: (start_m + speed_m_s * (t if t < turns_s else 2.0 * turns_s - t), 0.0, away_m)
 
 
 def stroll(rng: np.random.Generator, away_m: float) -> Way:
-    """Return a slow way to and fro that never repeats, of somebody of any height."""
+    """Return a slow path back and forth that never repeats, of a person of any height."""
     pace, phase = rng.uniform(0.25, 0.6, 2), rng.uniform(0.0, 6.28, 3)
     wide, below = 0.45 * away_m, rng.normal(0.0, 0.08)
     return lambda t: (
@@ -80,7 +80,7 @@ def stroll(rng: np.random.Generator, away_m: float) -> Way:
 
 
 def to_and_fro(rng: np.random.Generator, away_m: float) -> Way:
-    """Return a way from one side of the view to the other and back, of somebody of any height."""
+    """Return a path from one side of the view to the other and back, of a person of any height."""
     wide, speed = 0.45 * away_m, rng.uniform(0.5, 1.2)
     begun, below = rng.uniform(0.0, 4.0 * wide), rng.normal(0.0, 0.08)
     return lambda t: (abs((begun + speed * t) % (4.0 * wide) - 2.0 * wide) - wide, below, away_m)
@@ -247,7 +247,7 @@ def _in_view(p: NDArray[np.float64]) -> bool:
 
 
 def _hidden(p: NDArray[np.float64], others: Iterable[NDArray[np.float64]]) -> bool:
-    """Return whether a nearer face lies before this one; of two as near, the left one does."""
+    """Return whether a nearer face covers this one; of two as near, the left one does."""
     for q in others:
         nearer = q[2] < p[2] or (q[2] == p[2] and q[0] < p[0])
         if nearer and np.hypot(*(p[:2] / p[2] - q[:2] / q[2])) < _HIDDEN_M / q[2]:
@@ -263,7 +263,7 @@ def detected(p: NDArray[np.float64], rng: np.random.Generator) -> DetectedFace:
 
 
 def perception() -> tuple[Perception, PoseHistory]:
-    """Return what sees through a camera that stands still at the origin."""
+    """Return the perception of a stationary camera at the origin."""
     poses = PoseHistory(None)  # type: ignore[arg-type]
     poses.head_pose = lambda t_s: (tuple(map(tuple, np.eye(3).tolist())), (0.0, 0.0, 0.0))  # type: ignore
     mount = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
@@ -299,7 +299,7 @@ def idf1(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: bool 
 def _matched(
     people: dict[int, NDArray[np.float64]], tracks: list[tuple[int, Vec3]]
 ) -> Iterator[tuple[int | None, int]]:
-    """Yield who each track is in one picture, None for nobody, and its number."""
+    """Yield the person of each track in one picture, None for no one, and its number."""
     p = np.array(list(people.values())).reshape(-1, 3)
     q = np.array([(-y, -z, x) for _, (x, y, z) in tracks]).reshape(-1, 3)
     far, believed = np.linalg.norm(p, axis=1), np.linalg.norm(q, axis=1)
@@ -379,7 +379,7 @@ class _Found:
 
 
 def went_on(film: Film, rng: np.random.Generator) -> tuple[int, int]:
-    """Return how many identities went on after a cut, and how many ended where there was none."""
+    """Return how many identities continued after a cut, and how many ended without a cut."""
     see, poses = perception()
     frames, ids = FrameAnalyzer(_Found(rng)), []
     for k, image in enumerate(film.images):

@@ -1,4 +1,4 @@
-"""What faces in full HD cost: only what a network reads is converted."""
+"""Cost of faces in full HD: only the input of a network is converted."""
 
 import tracemalloc
 

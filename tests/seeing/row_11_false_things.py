@@ -1,6 +1,6 @@
-"""A still camera: what compression, light and shadows do to a room that stands is no thing.
+"""A stationary camera: compression, light and shadows in a room are no things.
 
-Figures: share of the pictures with a thing where nothing moves (false), and of what moves, the
+Figures: share of the pictures with a thing although nothing moves (false), and of what moves, the
 share on which a thing is reported (recall). Rendered people walk through a rendered room that is
 then compressed, lit or shaded; the films at hand are of webcams on a tripod.
 """
@@ -44,7 +44,7 @@ TRIPOD = {"webcam_sign_1.mkv": True, "webcam_sign_2.mkv": False, "webcam_sign_3.
 
 
 def jpeg(quality: int, seen: Iterator[Seen]) -> Iterator[Seen]:
-    """Compress each frame by itself."""
+    """Compress each frame separately."""
     for one in seen:
         _, data = cv2.imencode(".jpg", one.image, (cv2.IMWRITE_JPEG_QUALITY, quality))
         yield one._replace(image=_decoded(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)))

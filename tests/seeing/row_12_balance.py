@@ -2,8 +2,8 @@
 
 The time in which a frontal face within 1.5 m is there, and the share of it in which the measured
 gaze is on a face, that one or another. Looks away from a face, which end mutual gaze after some
-seconds as people do, are left out. And the share of the time in which the target lies outside the
-picture of a film, whose camera stands still: nothing can be seen there. Looks away beside that
+seconds as people do, are left out. And the share of the time in which the target is outside the
+picture of a film, whose camera is stationary: nothing is visible there. Looks away from that
 picture are planned, and counted apart.
 """
 
@@ -69,12 +69,12 @@ class Share(NamedTuple):
 
     @property
     def away_outside_percent(self) -> float:
-        """Return looks away beside the picture as a share of the other ticks."""
+        """Return looks outside the picture as a share of the other ticks."""
         return 100.0 * self.away_outside / max(1, self.ticks)
 
 
 def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
-    """Return how far beside the outline of a face the measured gaze is."""
+    """Return the distance of the measured gaze from the outline of a face."""
     way = sub(face.p_world_m, eye)
     off = acos(max(-1.0, min(1.0, dot(cyclopean_direction(tick), unit(way)))))
     return degrees(off - atan(FACE_M / norm(way)))
@@ -138,7 +138,7 @@ def conversation(seed: int, seconds: float) -> Share:
 
 
 def measure(full: bool) -> dict[str, float]:
-    """Return the figures; full: on the films beside the project, and five seeds."""
+    """Return the figures; full: on the films next to the project, and five seeds."""
     talks = film(carphone(), 8.0)
     figures = {"talks in a car, % on the face": talks.percent}
     films = [talks]

@@ -1,4 +1,4 @@
-"""What a study keeps when it is killed: python tests/study/bench_study_kills.py --kills 100."""
+"""Data that a killed study keeps: python tests/study/bench_study_kills.py --kills 100."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""How often simulated studies are significant: with no effect, and beside the claimed power.
+"""Share of significant simulated studies: without an effect, and next to the claimed power.
 
 Run by hand: ``nice -n 10 python tests/study/bench_study_power.py``. Each of 2,000 studies takes the
 path of all: participants answer, their records become rows, the design's rules leave some out, the
@@ -51,7 +51,7 @@ TWO, THREE = ("walk", "centre"), ("walk", "centre", "random")
 class Planned(NamedTuple):
     """A study to be simulated.
 
-    study: its hypotheses say which conditions lie higher
+    study: its hypotheses define which conditions are higher
     tested: the hypothesis that is decided, None: the study's first
     """
 

@@ -125,7 +125,7 @@ class Tab:
             return answer.status, data
 
     def state(self) -> dict[str, Any]:
-        """What the experimenter's page is told."""
+        """State on the experimenter's page."""
         with connect(
             f"ws{self.url.removeprefix('http')}/rig/line",
             origin=Origin(self.url),
@@ -141,7 +141,7 @@ class Tab:
         return status, words.decode()
 
     def page(self) -> dict[str, Any]:
-        """What the page shows now."""
+        """Content of the page."""
         status, data = self.get("/study/page")
         assert status == 200
         page: dict[str, Any] = json.loads(data)
@@ -161,7 +161,7 @@ class Tab:
         return shown
 
     def goes_through(self, page: dict[str, Any]) -> dict[str, Any]:
-        """Do on a page what leads to the next one."""
+        """Do what opens the next page."""
         name, kind = page["page"], page["kind"]
         if kind == "consent":
             return self.do(name, do="consent", given=True, uses=page["uses"])

@@ -1,7 +1,7 @@
-"""A study's program killed again and again while somebody answers; what was kept is counted.
+"""A study's program killed repeatedly while a participant answers; kept answers are counted.
 
 A participant answers through HTTP as a browser does, sends again what was not answered, and notes
-every page that was said to be kept. The program is killed (SIGKILL) at random moments and started
+every page that was confirmed. The program is killed (SIGKILL) at random moments and started
 again.
 """
 
@@ -45,9 +45,9 @@ Page = tuple[str, ...]
 
 
 class Kills(NamedTuple):
-    """What became of the answers.
+    """Fate of the answers.
 
-    kept: answers that the participant was told are kept; lost: those that are not in the journal
+    kept: confirmed answers; lost: those that are not in the journal
     twice: answers that are there more than once
     participants: who finished meanwhile
     """
@@ -71,7 +71,7 @@ def write_study(folder: Path) -> Path:
 
 
 def killed(folder: Path, kills: int, seed: int = 0, longest_s: float = 0.6) -> Kills:
-    """Kill a session's program so often, each time at a random moment.
+    """Kill a session's program n times, each time at a random moment.
 
     Args:
         folder: an empty one.
@@ -95,7 +95,7 @@ def killed(folder: Path, kills: int, seed: int = 0, longest_s: float = 0.6) -> K
 
 
 def _ended(folder: Path, number: int) -> bool:
-    """Whether a participant's session is over, though nobody was told."""
+    """Whether a participant's session is over, though it was not reported."""
     place = folder / "data" / "participants" / f"P{number:03d}"
     return place.exists() and any(isinstance(one, ParticipationClosed) for one in read(place))
 
@@ -165,7 +165,7 @@ def _answers_until_gone(url: str, told: list[Page]) -> bool:
 
 
 def _answered(tab: Tab, page: dict[str, Any], told: list[Page]) -> dict[str, Any]:
-    """Answer a page; note its answers once the program has said that they are kept."""
+    """Answer a page; note its answers once the program has confirmed them."""
     said = answers(page, 1 + len(told) % 5)
     status, following = tab.send(page["page"], do="answer", answers=said)
     if status == 200:
@@ -177,7 +177,7 @@ def _answered(tab: Tab, page: dict[str, Any], told: list[Page]) -> dict[str, Any
 
 
 def _counted(folder: Path, told: dict[int, list[Page]], kills: int) -> Kills:
-    """Compare what participants were told with their journals.
+    """Compare the confirmations to participants with their journals.
 
     A journal may hold a page whose confirmation was cut off by the kill, but none less, none twice,
     and all in their order.

@@ -32,7 +32,7 @@ def run_of(
 ) -> tuple[StudyRun, Journal]:
     """Return a session that is begun or resumed, and its open journal.
 
-    now_s: its clock, None: one that is a minute later at each look
+    now_s: its clock, None: a clock that advances by a minute per call
     """
     journal = Journal(folder)
     known = journal.records

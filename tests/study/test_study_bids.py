@@ -1,4 +1,4 @@
-"""A study as a BIDS data set: its tables, the head's recordings beside them, the validator."""
+"""A study as a BIDS data set: its tables, the head's recordings, the validator."""
 
 import csv
 import json

@@ -350,7 +350,7 @@ PINGOUIN = importlib.util.find_spec("pingouin") is not None
 
 
 def ours(rows: np.ndarray) -> dict[str, float]:
-    """Return what this program says under the names of the golden file."""
+    """Return this program's results under the names of the golden file."""
     a, b = rows[:, 0].astype(float), rows[:, 1].astype(float)
     table = chi_square([counts_of(a, 5), counts_of(b, 5)])
     out = {

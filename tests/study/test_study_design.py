@@ -276,7 +276,7 @@ def test_pairs_are_seen_both_ways_round_equally_often_in_every_place(n: int) -> 
     for order in every:
         unordered = [frozenset(one.split(PAIR)) for one in order]
         assert len(set(unordered)) == pairs
-    if n > 2:  # nobody could learn that the first is always the same one
+    if n > 2:  # no participant could learn that the first is always the same
         assert all(len({one in block_trials(design) for one in order}) == 2 for order in every)
 
 
@@ -316,7 +316,7 @@ def test_practice_shows_what_counts_later_and_is_not_the_first_trial_for_all() -
     assert practice_trials(design_of(3, practice=0), 1) == ()
 
 
-# --- A study's hash is of what it says, and of nothing else
+# --- A study's hash depends on its content only
 
 
 PORT = re.compile(r"port: \S+")

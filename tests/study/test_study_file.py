@@ -74,7 +74,7 @@ def test_what_participants_read_before_names_no_condition(name: str) -> None:
     said = " ".join(line for lines in every for line in lines).lower()
     for key, one in design.conditions.items():
         names = (key, one.profile, one.character, one.scanpath, one.label)
-        for name in {*filter(None, names)} - {"robot"}:  # what everybody calls it
+        for name in {*filter(None, names)} - {"robot"}:  # the usual name
             assert name.replace("_", " ") not in said, f"{name} is told before"
 
 
@@ -401,7 +401,7 @@ def test_what_takes_the_head_s_place_needs_films(shown: str, tmp_path: Path) -> 
     assert any("the head itself is shown; write presentation.on: film" in one for one in said)
 
 
-# --- Whatever stands in a study's file by mistake is told with file and line, or it is right
+# --- Every mistake in a study's file is reported with file and line
 
 
 WRONG: tuple[object, ...] = (
@@ -471,7 +471,7 @@ def test_whatever_stands_in_a_study_is_right_or_told_with_file_and_line(
         assert all(fault.file == str(file) and fault.line for fault in error.faults)
 
 
-# --- The texts of a study's pages: in every language, and each of them said somewhere
+# --- The texts of a study's pages: in every language, and each of them used
 
 
 def test_every_text_is_there_in_every_language_with_the_same_places() -> None:

@@ -1,4 +1,4 @@
-"""Films of conditions: as long as a presentation, of the head, with names that say nothing."""
+"""Films of conditions: as long as a presentation, of the head, with meaningless names."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The head shows a study's conditions: no jump at a switch; a lost bus is told and mended."""
+"""The head shows a study's conditions: no jump at a switch; a lost bus is reported and mended."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("branched_children")
 
 @pytest.fixture(scope="module")
 def study() -> LoadedStudy:
-    """The second shipped study, which shows a head; the objective measures are asked for."""
+    """The second shipped study, which shows a head, with its objective measures."""
     found = load_study("nakamoto_2")
     objective = ("mutual_gaze_share", "participant_gaze_share", "first_look_s", "rest_median")
     return replace(found, design=replace(found.design, objective=objective))

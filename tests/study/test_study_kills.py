@@ -1,4 +1,4 @@
-"""A study's program that is killed loses no answer that it said was kept."""
+"""A killed study's program loses no confirmed answer."""
 
 from pathlib import Path
 

@@ -130,7 +130,7 @@ def test_the_traffic_is_the_same_byte_by_byte_whatever_the_conditions_are(
     )
     traffic, debriefing = whole_session(study, tmp_path / "one")
     assert whole_session(other, tmp_path / "other")[0] == traffic
-    # Only then does it say what was studied, in the words of the design.
+    # Only then does it explain the study, in the words of the design.
     assert study.design.debriefing[0].encode() in b"".join(debriefing)
     assert study.design.debriefing[0].encode() not in b"".join(traffic)
 
@@ -300,7 +300,7 @@ def consented(pages: Pages, asked: list[str], ticked: list[str]) -> tuple[bool, 
 def test_uses_that_were_not_ticked_are_not_consented_to(
     studies: dict[str, LoadedStudy], tmp_path: Path
 ) -> None:
-    with serving(studies["nakamoto_2"], tmp_path / CODE, {}) as pages:  # pictures are not asked for
+    with serving(studies["nakamoto_2"], tmp_path / CODE, {}) as pages:  # no consent to pictures is requested
         assert consented(pages, ["gaze"], ["pictures"]) == (True, False, False)
 
 
@@ -433,7 +433,7 @@ def test_who_is_to_come_in_is_given_an_address_that_leads_here(host: str, there:
 
 
 class Head:
-    """A head that obeys, and says what was asked of it."""
+    """A head that obeys and records its commands."""
 
     def __init__(self) -> None:
         self.asked: list[str] = []

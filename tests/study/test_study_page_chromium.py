@@ -74,7 +74,7 @@ def on_a_phone(tab: Browser) -> Iterator[Browser]:
 
 
 class Participant:
-    """Who sits at the browser."""
+    """The person at the browser."""
 
     def __init__(self, tab: Browser) -> None:
         self.tab = tab
@@ -265,7 +265,7 @@ def test_a_connection_that_was_lost_comes_back_with_what_was_answered(
     pages.serve_again()
     person.sees("instructions")
     assert pages.session.consent_given() == (False, False)
-    # Somebody else goes on, e.g. the experimenter; the page hears of it by itself.
+    # Another person continues, e.g. the experimenter; the page is notified.
     pages.run.exclude("the end of the test")
     pages.server.notify()
     person.sees("end")

@@ -161,7 +161,7 @@ def test_a_hypothesis_gets_its_share_of_the_false_alarms() -> None:
     assert power_claim(alone, one, known[one.measure]).question.alpha == 0.05
 
 
-# --- Tests of simulated participants: the effect is there as it was asked for, and nothing drifts
+# --- Tests of simulated participants: the effect has the given size, and nothing drifts
 
 
 @pytest.mark.parametrize("points", [2, 5, 7, 11])
@@ -188,7 +188,7 @@ def test_means_of_scales_and_repetitions_have_it_too(items: int, repetitions: in
 
 @pytest.mark.parametrize(("people", "effect"), [(12, 0.8), (24, 0.6), (40, 0.5)])
 def test_500_studies_find_as_often_as_their_design_claims(people: int, effect: float) -> None:
-    """tests/study/bench_study_power.py lets 500 studies go the whole way, for each test."""
+    """tests/study/bench_study_power.py runs 500 whole studies for each test."""
     rows = differences(effect, (500, people), np.random.default_rng(5))
     share = np.mean([exact_signed_rank(row) <= 0.05 for row in rows])
     claimed = power_of(PowerQuestion("signed_rank", effect, 0.05), people)

@@ -1,4 +1,4 @@
-"""Tests of a study's report: what its sentences, page and tables say."""
+"""Tests of a study's report: the content of its sentences, page and tables."""
 
 import csv
 import json
@@ -225,7 +225,7 @@ def test_scales_have_their_reliability_and_the_counts_of_their_items() -> None:
     said = text_of(page)
     assert "mean of 3 items, reversed ones turned round" in said
     assert re.search(r"reliability α = \.\d\d, 95% CI", said)
-    assert page.count("<h2>") == 6  # the items stand with their scale
+    assert page.count("<h2>") == 6  # the items are with their scale
 
 
 def test_a_study_without_hypotheses_is_a_description() -> None:

@@ -1,4 +1,4 @@
-"""A participant's session: its screens, and that it goes on where it was cut off."""
+"""A participant's session: its screens, and its continuation after an interruption."""
 
 import errno
 import json
@@ -97,7 +97,7 @@ def test_rests_come_after_every_so_many_trials_and_never_before_the_first(tmp_pa
 
 
 def test_a_session_that_is_cut_off_anywhere_goes_on_at_that_screen(tmp_path: Path) -> None:
-    """Each step is done by another program; only a presentation under way begins again."""
+    """Each step is done by another program; only an interrupted presentation begins again."""
     study = pairs(rest_every=2, practice=1)
     whole, journal = run_of(study, tmp_path / "whole")
     expected = [(type(one), one) for one in screens(whole)]
@@ -425,7 +425,7 @@ def test_a_response_time_on_a_page_of_an_earlier_program_is_not_known(tmp_path: 
     journal.close()
 
 
-# --- The journal of a participant: on disk before anybody goes on, whole or not at all
+# --- The journal of a participant: on disk before the next screen, whole or not at all
 
 
 ALL: tuple[Record, ...] = (

@@ -3,7 +3,7 @@
 Prints, as Markdown:
 - the same moves of servos with mechanics of their own and in a world: overshoot, time until within
   1 deg, error at the end, peaks of speed and torque
-- a run of each rig in both: gaze error, peaks of speed and torque beside what the servos can
+- a run of each rig in both: gaze error, peaks of speed and torque next to the limits of the servos
 - what a simulated millisecond costs with each world, in processor time (least of rounds)
 
     --seconds 30   of each run

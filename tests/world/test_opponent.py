@@ -73,7 +73,7 @@ def test_the_fist_follows_within_its_limits(scene: WorldScene) -> None:
     at = hands(scene)
     m_s = np.linalg.norm(np.diff(at, axis=0), axis=2) / 0.01
     assert m_s.max(axis=0) == pytest.approx([2.65, 2.5, 0.25], abs=0.2) and m_s.max() < MAX_M_S
-    # The leading fist is where it was ordered; a low one takes the other hand along.
+    # The front fist is at its ordered place; a low one takes the other hand along.
     assert at[245, 0] == pytest.approx(HIT, abs=0.05)
     assert at[390, 0] == pytest.approx(LOW, abs=0.06)
     assert at[390, 1, 2] < -0.25 < at[240, 1, 2]
