@@ -1,7 +1,7 @@
 """A program in a branch of this process: it has all that a process has, only its start is saved.
 
 It has its own id, standard streams, signals and exit status, and what it imports has been imported
-already: Python and the whole program take .8 s of a processor to start, in every process anew.
+already: Python and the whole program take .8 s of a processor to start, in every process again.
 Tests of the start itself (test_cli_start.py, command_line.gazerig) have processes of their own.
 """
 

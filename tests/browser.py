@@ -1,4 +1,4 @@
-"""A headless Chromium that is told what to do through its debugging port."""
+"""A headless Chromium, controlled through its debugging port."""
 
 import base64
 import itertools
@@ -82,14 +82,14 @@ class Browser:
         self.ask("Page.navigate", url=url)
 
     def words(self) -> str:
-        """Everything there is to read on the page, and in the frame of the view."""
+        """All text on the page and in the frame of the view."""
         frames = "[document, document.querySelector('#view')?.contentDocument]"
         script = f"{frames}.map(d => d?.body?.innerText ?? '').join('\\n')"
         answer = self.ask("Runtime.evaluate", expression=script)
         return str(answer["result"].get("value", ""))
 
     def run(self, script: str) -> None:
-        """Do what a script says."""
+        """Run a script."""
         self.ask("Runtime.evaluate", expression=script)
 
     def photograph(self) -> bytes:

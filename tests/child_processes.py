@@ -59,7 +59,7 @@ def _descendants(pid: int) -> Iterator[int]:
 
 
 def _command(pid: int) -> str:
-    """Return how a process was started; nothing where it has ended and is only not reaped."""
+    """Return the command line of a process; nothing if it has ended and is not yet reaped."""
     with suppress(OSError):
         return (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
     return ""

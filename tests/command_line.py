@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from gazerig.robot.cli.main import app, main
 
-# Each call in one process would build all commands anew, which one typed in a shell does once.
+# Each call in one process would build all commands again; a shell builds them once.
 _once = functools.cache(typer.main.get_command)
 for _module, _name in ((typer.main, "get_command"), (typer.testing, "_get_command")):
     setattr(_module, _name, _once)
@@ -34,7 +34,7 @@ def gazerig(*words: str, timeout: float = 120.0) -> subprocess.CompletedProcess[
 
 
 def typed(*words: str) -> int:
-    """Run a command in this process; give its exit code. What it writes goes to capfd."""
+    """Run a command in this process; return its exit code. Its output goes to capfd."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["gazerig", *words])
         try:
@@ -46,7 +46,7 @@ def typed(*words: str) -> int:
 
 
 class Invoked(NamedTuple):
-    """What a command left: its exit code, standard output and standard error."""
+    """Result of a command: its exit code, standard output and standard error."""
 
     code: int
     out: str

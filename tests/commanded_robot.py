@@ -18,7 +18,7 @@ YAW = GAZE_JOINTS.index("neck_yaw")
 
 @dataclass
 class Running:
-    """A simulated rig that ticks on when asked."""
+    """A simulated rig that ticks on request."""
 
     made: Assembly
     ticks: list[Tick] = field(default_factory=list)

@@ -84,7 +84,7 @@ class OnTerminal:
             return True
         try:
             data = os.read(self.fd, 4096)
-        except OSError:  # Linux says so when the other side has closed
+        except OSError:  # Linux reports this when the other side has closed
             return False
         self.said += data.decode(errors="replace")
         return bool(data)

@@ -1,4 +1,4 @@
-"""What all tests share: steady examples, compiled modules, one thread a process.
+"""Shared by all tests: steady examples, compiled modules, one thread a process.
 
 Property tests draw the same examples every time; HYPOTHESIS_PROFILE=search draws others. None has a
 deadline: a busy machine is no fault.
@@ -25,7 +25,7 @@ settings.register_profile("steady", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 
-# Where Python is told to keep no compiled modules, every program that a test starts compiles
+# If Python keeps no compiled modules, every program that a test starts compiles
 # the whole source again: one second of processor time each, in more than a hundred programs.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
@@ -38,7 +38,7 @@ for number in (signal.SIGQUIT, signal.SIGHUP):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, signal.SIG_DFL)
 
-# What the user of this machine has fetched is no test's.
+# Tests do not use files that the user of this machine has fetched.
 os.environ["GAZERIG_MODELS"] = os.path.join(os.devnull, "models")
 
 # Tests run side by side, one worker a core: threads of a numeric library in each of them would
@@ -67,7 +67,7 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
     """Share compiling among processes, and let what is imported lie.
 
     It stays, and looking it through takes a third of the time. Garbage of the tests is looked for
-    less often than Python does by itself: that takes a twentieth of the time of them all. Nor
+    less often than by default: that takes a twentieth of the time of them all. Nor
     does a robot that starts in real time look through it all, half a second for each of them;
     test_garbage.py has that done.
     """
@@ -92,7 +92,7 @@ _PTY = {"PtyBus", "PtyBuses", "TerminalLine", "commands_started", "hear", "pty"}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what needs a browser or pseudo-terminals; what is slow is marked where it stands."""
+    """Mark tests that need a browser or pseudo-terminals; slow tests have their own mark."""
     for item in items:
         if "tab" in getattr(item, "fixturenames", ()):
             item.add_marker("browser")

@@ -26,7 +26,7 @@ ANGLE_RAD, PLACE_M = 1e-9, 1e-6
 
 
 class Expected(NamedTuple):
-    """Where the program has the parts of a rig: its own geometry, and the camera's pose."""
+    """Places of a rig's parts by the program: its own geometry, and the camera's pose."""
 
     state: GazeState
     camera: tuple[Floats, Floats]
@@ -47,7 +47,7 @@ Poses = Mapping[str, tuple[Floats, Floats]]
 
 
 def compare(rig: Rig, angles: Mapping[str, float], poses: Poses) -> None:
-    """Assert that links are where the program has them."""
+    """Assert that links are at the places of the program's geometry."""
     state, camera = expected(rig, angles)
     _same(poses["head"], (np.array(state.R_world_head), np.array(state.p_world_head_m)))
     _same(poses["camera_optical_frame"], camera)

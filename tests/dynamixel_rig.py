@@ -13,7 +13,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
 class Rig(MovingBus):
-    """A bus of emulated servos, read in one of several ways."""
+    """A bus of emulated servos, read by one of several methods."""
 
     def __init__(self, fast=True, indirect=True, check_baud=False, servo_baud=None, **params):
         super().__init__()

@@ -1,4 +1,4 @@
-"""Tests that need the features that the package ships: skipped where a folder was deleted."""
+"""Tests that need the features that the package ships: skipped if a folder was deleted."""
 
 from collections.abc import Callable
 from functools import cache
@@ -36,7 +36,7 @@ def skip_without(command: str) -> None:
 
 
 def need_every_feature() -> None:
-    """Skip a test of the whole program where a feature was deleted."""
+    """Skip a test of the whole program if a feature was deleted."""
     for part in _PARTS:
         skip_without_part(part)
 

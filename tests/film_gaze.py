@@ -20,7 +20,7 @@ def gaze_point(tick: Tick) -> Vec3:
 
 
 def in_picture(made: Assembly, point: Vec3, width_px: int, height_px: int) -> tuple[float, float]:
-    """Return where the film shows a point of the world: its camera stands still."""
+    """Return the pixel of a point of the world in the film, whose camera is stationary."""
     ahead = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     R, p = made.mount.pose(ahead, (0.0, 0.0, 0.0))
     lens = intrinsics_of_lens(None, radians(made.horizontal_field_deg), width_px, height_px)

@@ -176,7 +176,7 @@ def _serve(session: pytest.Session, line: Connection) -> NoReturn:
 
 @dataclass
 class _Teller:
-    """What pytest says in a fork, sent to the parent."""
+    """Reports of pytest in a fork, sent to the parent."""
 
     config: pytest.Config
     line: Connection
@@ -185,7 +185,7 @@ class _Teller:
 
     @property
     def _all_of_them(self) -> bool:
-        """Whether somebody asks how a test was set up and taken down though all went well."""
+        """Whether reports of setup and teardown are requested although all passed."""
         option = self.config.option
         return option.durations is not None or option.xmlpath is not None
 

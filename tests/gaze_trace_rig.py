@@ -48,7 +48,7 @@ class Trace(NamedTuple):
 
 
 class Rig:
-    """A head that does at once what it is told."""
+    """A head that follows its commands immediately."""
 
     def __init__(
         self,

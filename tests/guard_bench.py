@@ -1,4 +1,4 @@
-"""The guard built from source, one piece of it changed, and joints that do as they are told."""
+"""The guard built from source, one piece of it changed, and joints that follow commands."""
 
 import sys
 from functools import cache
@@ -29,7 +29,7 @@ def _source(name: str) -> tuple[str, CodeType]:
 
 
 def built(part: str = "", old: str = "", new: str = "") -> ModuleType:
-    """Load the guard's files from source, one of them changed, beside the real ones."""
+    """Load the guard's files from source, one of them changed, next to the real ones."""
     real = {name: sys.modules.get(f"gazerig.robot.safety.{name}") for name in PARTS}
     try:
         for name in PARTS:
@@ -50,7 +50,7 @@ def built(part: str = "", old: str = "", new: str = "") -> ModuleType:
 
 
 class Bench:
-    """One guard and joints that do as they are told; every command is checked on its way."""
+    """One guard and joints that follow commands; every command is checked."""
 
     def __init__(self, m: ModuleType, start_deg: float = 0.0, gentle: bool = False, **params: Any):
         limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)

@@ -247,7 +247,7 @@ def not_moving(m: ModuleType) -> None:
 
 def reckoned(m: ModuleType) -> None:
     bench = Bench(m)
-    for _ in range(200):  # a servo that tells nothing is never found not moving
+    for _ in range(200):  # a servo without feedback is never found stalled
         bench.tick(0.4, at=0.0, measured=False)
         assert bench.why != "not moving"
 

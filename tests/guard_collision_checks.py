@@ -35,7 +35,7 @@ def collision(m: ModuleType) -> None:
                 bench.tick(target)
                 places.append(tuple(degrees(bench.path[-1][j]) for j in (PITCH, LID)))
         for (p, q), (r, s) in pairwise(places):
-            # The margin of 1 deg counts as well: there the walls stand.
+            # The margin of 1 deg counts as well: the walls are there.
             apart = min(p, r) > -9.001 or max(p, r) < -20.999
             apart = apart or min(q, s) > 20.999 or max(q, s) < 9.001
             assert apart, (p, q, r, s)

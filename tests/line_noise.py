@@ -45,12 +45,12 @@ OUTSIDE_STEPS = 30
 
 @dataclass
 class Outcome:
-    """What came of a run.
+    """Result of a run.
 
     damaged: answers of servos, or of the board, that were spoilt or stayed out
     fresh: values given as measured; wrong: those that were not true; worst: by how many steps
     outside: ticks in which a joint was outside its range; farthest: by how many steps
-    ended: a reason for which a run would have ended, "" where there was none
+    ended: a reason for which a run would have ended, "" without one
     recover_s: from the end of the noise to all servos fresh, under torque and near their goals
     fastest: largest speed of a joint as a multiple of what was armed
     """
@@ -94,7 +94,7 @@ class Noisy:
         self.now = max(self.now, t_s)
 
     def _tap(self, data: bytes) -> None:
-        """Note where the joints are when anything is asked: an answer tells one of these."""
+        """Record the joints' positions at each request: an answer contains one of these."""
         self._seen.append(self.truth())
         self._writes += 1
         if self._strike is not None and self._writes == self._strike[0]:
@@ -112,7 +112,7 @@ class Noisy:
     def _emulated(self, kind: str) -> Emulated:
         middle = (self.low + self.high) // 2
         if self._make == "maestro":
-            # The channels' own ranges are set as gazerig setup says.
+            # The channels' own ranges are set as gazerig setup requires.
             specs = [HobbySpec(i, middle, min_steps=self.low, max_steps=self.high) for i in IDS]
             return MaestroLine(12, servos=tuple(specs))
         if self._make == "pca9685":
@@ -151,7 +151,7 @@ class Noisy:
         return SmartServoBus(DYNAMIXEL, self.port, setups, params)
 
     def truth(self) -> tuple[float, ...]:
-        """Return where the joints truly are."""
+        """Return the true positions of the joints."""
         places = self.device.positions_steps()
         if self._make in BOARDS:
             return tuple(places[i] for i in IDS)
@@ -166,7 +166,7 @@ class Noisy:
         ]
 
     def _led(self, readings: Sequence[Row | None], goals: Sequence[int]) -> list[int]:
-        """Return goals as a guard does: from where a servo was taken back, no faster than armed."""
+        """Return goals like a guard's: from the position of a recovered servo, no faster than armed."""
         most = SPEED_STEPS_S[self._make] * TICK_S
         for k, reading in enumerate(readings):
             if reading is not None and reading.rearmed:
@@ -180,7 +180,7 @@ class Noisy:
         self._command = [float(goal) for goal in self.bus.enable_torque()]
 
     def start(self) -> None:
-        """Open the bus, switch torque on and lead all joints to their first goals."""
+        """Open the bus, switch torque on and move all joints to their first goals."""
         self.bus.open()
         self.enable_torque()
         self.bus.events()
@@ -247,7 +247,7 @@ class Noisy:
             outcome.wrong += off > WRONG_STEPS
 
     def _recover(self, timeout_s: float) -> float | None:
-        """Tick until every servo is fresh, near where it was sent and powered."""
+        """Tick until every servo is fresh, near its goal and powered."""
         began = self.now
         while self.now - began < timeout_s:
             tick = self.now

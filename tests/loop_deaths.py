@@ -37,7 +37,7 @@ def slow(kind: str, watchdog: bool = True) -> Rig:
 
 
 def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
-    """Drive all joints slowly to their ends, 100 ticks a second, and say what happens."""
+    """Drive all joints slowly to their ends, 100 ticks a second, and print events."""
     rig = slow(kind, watchdog)
     paths = bus_ports(rig, path)
     bus = (
@@ -108,7 +108,7 @@ class Driven(NamedTuple):
         return [bool(one.get("target", one.get("torque"))) for one in self._servos()]
 
     def places(self) -> list[float]:
-        """Return where the servos truly are."""
+        """Return the true positions of the servos."""
         return [one.get("place", one.get("position", 0.0)) for one in self._servos()]
 
     def _servos(self) -> list[dict[str, float]]:

@@ -1,4 +1,4 @@
-"""What stands in for depthai with one camera: its device, queue and messages."""
+"""Stand-ins for depthai with one camera: its device, queue and messages."""
 
 from datetime import timedelta
 from types import SimpleNamespace
@@ -24,7 +24,7 @@ def info(device_id="14442C10", name="1.2", status=None):
 
 
 def sdk(free=(), connected=()):
-    """Stand in for what depthai says of the devices there are."""
+    """Stand in for depthai's list of devices."""
 
     def everything(state, skipInvalidDevices):  # noqa: N803
         assert skipInvalidDevices is False
@@ -39,7 +39,7 @@ def sdk(free=(), connected=()):
 
 
 class Device:
-    """The part of a device that is asked before a pipeline is made."""
+    """The part of a device that is used before a pipeline is made."""
 
     def __init__(self, speed) -> None:
         self.speed = speed
@@ -112,7 +112,7 @@ class Queue:
 
     def __init__(self) -> None:
         self.fed: list = []
-        self.lying = False  # one message is there whenever it is asked for anew
+        self.lying = False  # one message is there at every new request
         self.taken = False
 
     def get(self, timeout):

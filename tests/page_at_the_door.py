@@ -27,7 +27,7 @@ OPENED: list[str] = []
 
 
 class Rig:
-    """A door with a server behind it, and what was asked through it."""
+    """A door with a server behind it, and the requests through it."""
 
     def __init__(self, host: str, folder: Path) -> None:
         self.asked: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""What a person could not read, reach or see on the page, measured in a browser."""
+"""Unreadable, unreachable or invisible elements of the page, measured in a browser."""
 
 import json
 from functools import cache
@@ -73,7 +73,7 @@ BOXES = """(() => Object.fromEntries(['stage', 'camera', 'drawer', 'rig-stop', '
 
 
 def value(browser: Browser, script: str) -> Any:
-    """What a script says, once what it promises has come."""
+    """Result of a script, once its promise is fulfilled."""
     answer = browser.ask(
         "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
     )
@@ -82,13 +82,13 @@ def value(browser: Browser, script: str) -> Any:
 
 
 def faults(browser: Browser) -> list[str]:
-    """What is cut off, covered, outside of the window or written too small."""
+    """Elements that are cut off, covered, outside the window or too small."""
     found: list[str] = value(browser, MEASURE)
     return found
 
 
 def boxes(browser: Browser) -> dict[str, tuple[float, float, float, float] | None]:
-    """Left, top, right and bottom of the page's parts, None where one is not shown."""
+    """Left, top, right and bottom of the page's parts, None for a hidden one."""
     found: dict[str, Any] = value(browser, BOXES)
     return found
 

@@ -85,7 +85,7 @@ class Rig:
 
 
 class Person:
-    """Who sits at the browser: looks for things by what they say, clicks and types."""
+    """A person at the browser, who finds elements by their text, clicks and types."""
 
     def __init__(self, tab: Browser) -> None:
         self.tab = tab
@@ -100,7 +100,7 @@ class Person:
         return all(word in said for word in words)
 
     def place(self, element: str, across: float = 0.5) -> tuple[float, float] | None:
-        """Where an element is; None: not there, or something lies over it and it is scrolled."""
+        """Place of an element; None: missing, or covered, so that it is scrolled."""
         found = self.run(
             f"(() => {{ const e = {element}; if (!e || !e.getClientRects().length) return null;"
             f"const r = e.getBoundingClientRect(), x = r.x + r.width * {across};"
@@ -112,11 +112,11 @@ class Person:
         return None if found is None else (found[0], found[1])  # type: ignore[index]
 
     def click(self, element: str, across: float = 0.5) -> None:
-        """Click on an element once it can be seen and stays where it is."""
+        """Click on an element once it is visible and does not move."""
         wait_for(lambda: self.clicked(element, across), f"a place to click: {element}")
 
     def clicked(self, element: str, across: float = 0.5) -> bool:
-        """Click on an element if it can be seen and stays where it is; was it so?"""
+        """Click on an element if it is visible and does not move; return whether it was."""
         first = self.place(element, across)
         if first is None or first != self.place(element, across):
             return False
@@ -127,7 +127,7 @@ class Person:
         return True
 
     def fill(self, field: str, text: str) -> None:
-        """Put a text in the place of what stands in a field; again, if the field moved away.
+        """Replace the text of a field; again, if the field moved away.
 
         The page sends one message every 50 ms, the newest: who goes on sooner takes the place of
         what was typed.
@@ -170,7 +170,7 @@ class Person:
         self._mouse("mouseReleased", to_x, to_y, "left")
 
     def wait_for_frames(self, count: int) -> None:
-        """Wait until the browser has drawn so often: what was sent to it is then to be seen."""
+        """Wait until the browser has drawn n times, so that messages to it are visible."""
         self.run(
             "window.framesDrawn = 0; (function more() { window.framesDrawn += 1;"
             f"if (window.framesDrawn < {count}) requestAnimationFrame(more); }})()"
@@ -215,7 +215,7 @@ def everywhere(kind: str) -> str:
 
 
 def saying(words: str, kind: str = "button, [role=tab], label") -> str:
-    """The element that says so, whatever is written smaller beside it."""
+    """The element with this text, without smaller text next to it."""
     return (
         f"{everywhere(kind)}.find("
         f"e => e.textContent.trim() === {json.dumps(words)} && e.getClientRects().length)"
@@ -245,17 +245,17 @@ STOP = "document.querySelector('#rig-stop')"
 
 
 def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
-    """Switch a stopped rig on again by the page: asked once more, and until it goes on."""
+    """Switch a stopped rig on again by the page, with confirmation, until it continues."""
     assert rig.newest is not None
     held_s = rig.newest.t_s + 2.1
     rig.pace_s = 0.001
     wait_for(lambda: present(rig.newest).t_s > held_s, "the time that a stop holds at least")
     rig.pace_s = PACE_S
     person.click(saying("Resume …"))
-    assert rig.robot.stopped  # not without being asked again
+    assert rig.robot.stopped  # not without a second question
     wait_for(lambda: person.reads(question), "the question")
 
-    # A stop that was sent twice holds for longer, and the rig refuses: then it is asked again.
+    # A stop that was sent twice lasts longer, and the rig refuses: then the request is repeated.
     def goes_on() -> bool:
         if rig.robot.stopped and not person.clicked(saying("Yes, resume")):
             person.clicked(saying("Resume …"))

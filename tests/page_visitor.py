@@ -17,7 +17,7 @@ from websockets.typing import Origin, Subprotocol
 PATIENCE_S = 180.0  # how long a slow machine is waited for, not how long it takes
 VISER = Subprotocol(f"viser-v{viser.__version__}")
 
-# The page counts a browser as there when it has said where it looks from.
+# The page counts a browser as connected when it has sent its viewpoint.
 LOOKING = msgspec.msgpack.encode(
     {
         "type": "ViewerCameraMessage",
@@ -35,14 +35,14 @@ LOOKING = msgspec.msgpack.encode(
 
 
 def unpacked(data: bytes) -> Any:
-    """What viser sent: sizes, then packed messages."""
+    """Data of viser: sizes, then packed messages."""
     size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
     plain = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
     return msgspec.msgpack.decode(plain)
 
 
 def said(data: bytes) -> str:
-    """What viser sent, as text."""
+    """Data of viser, as text."""
     return str(unpacked(data))
 
 
@@ -82,7 +82,7 @@ class Visitor:
         self.headers = {"Cookie": pairs, "Origin": self.url}
 
     def get(self, path: str = "/") -> bytes:
-        """What is at a path."""
+        """Content of a path."""
         request = urllib.request.Request(self.url + path, headers=self.headers)
         with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
             body: bytes = answer.read()
@@ -114,7 +114,7 @@ class Visitor:
         )
 
     def state(self) -> dict[str, Any]:
-        """What the stop button is told first."""
+        """First message to the stop button."""
         with self.open("/rig/line") as line:
             state: dict[str, Any] = json.loads(line.recv(timeout=PATIENCE_S))["state"]
             return state

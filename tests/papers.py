@@ -1,4 +1,4 @@
-"""README and docs, read: their code, and what stands between back-ticks."""
+"""README and docs: their code, and the text between back-ticks."""
 
 import re
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ def prose(paper: Path) -> str:
 
 
 def spans(paper: Path) -> list[str]:
-    """Return what stands between single back-ticks, each on one line."""
+    """Return the texts between single back-ticks, each on one line."""
     return [" ".join(span.split()) for span in re.findall(r"`([^`]+)`", prose(paper))]
 
 

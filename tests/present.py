@@ -1,4 +1,4 @@
-"""What may be nothing by its type, and by the test may not."""
+"""Values that may be None by their type, but not in the test."""
 
 from typing import TypeVar
 
@@ -6,6 +6,6 @@ T = TypeVar("T")
 
 
 def present(thing: T | None) -> T:
-    """Return the thing; fail where it is None."""
+    """Return the value; fail if it is None."""
     assert thing is not None
     return thing

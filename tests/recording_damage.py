@@ -1,4 +1,4 @@
-"""Recordings as disks, cables and hostile hands leave them, and what the program says of each."""
+"""Recordings damaged by disks, cables and attackers, and the program's message for each."""
 
 import io
 import random
@@ -100,7 +100,7 @@ def shuffled(data: bytes, rng: random.Random) -> bytes:
 
 
 def hostile_chunk(data: bytes, rng: random.Random) -> bytes:
-    """Write a chunk's sizes as nobody should, with a right check sum or none."""
+    """Write wrong sizes of a chunk, with a right check sum or none."""
     chunks = [(at, length) for kind, at, length in records(data) if kind == Opcode.CHUNK]
     at, length = rng.choice(chunks)
     made = Chunk.read(ReadDataStream(io.BytesIO(data[at + HEAD : at + HEAD + length])))
@@ -123,7 +123,7 @@ _BOMBS: dict[int, bytes] = {}
 
 
 def with_bomb(data: bytes, size: int, honest: bool) -> bytes:
-    """Put a chunk of ``size`` zero bytes in place of the first; honest: it says its size."""
+    """Put a chunk of ``size`` zero bytes in place of the first; honest: with its true size."""
     if size not in _BOMBS:
         packer = zstandard.ZstdCompressor(level=1).compressobj()
         piece = bytes(1 << 20)
@@ -200,7 +200,7 @@ USES: dict[str, Callable[[Path], object]] = {
 
 @dataclass
 class Tally:
-    """What came of many damaged files."""
+    """Results of many damaged files."""
 
     refused: int = 0
     right: int = 0
@@ -209,9 +209,9 @@ class Tally:
 
 
 def judge(data: bytes, folder: Path, count: int, seed: int, uses: tuple[str, ...]) -> Tally:
-    """Damage a recording in ``count`` ways and use each; every one must be refused or right.
+    """Damage a recording ``count`` times and use each; every one must be refused or right.
 
-    Right is the whole run, or, where the file says that it is not whole, its beginning.
+    Right is the whole run, or its beginning if the file is marked as incomplete.
     """
     whole, file, tally = folder / "whole.mcap", folder / "damaged.mcap", Tally()
     whole.write_bytes(data)
@@ -234,7 +234,7 @@ def judge(data: bytes, folder: Path, count: int, seed: int, uses: tuple[str, ...
             if made == truth[name]:
                 tally.right += 1
             elif RunRecording(file).note or damage is hostile_chunk:
-                tally.partly += 1  # a killed run, or values that somebody chose
+                tally.partly += 1  # a killed run, or chosen values
             else:
                 tally.wrong.append(f"{what}: another result and no word")
     return tally

@@ -26,6 +26,6 @@ def why_not() -> str:
 
 @pytest.fixture(scope="session")
 def renders() -> None:
-    """Skip the test where nothing can render."""
+    """Skip the test without a renderer."""
     if reason := why_not():
         pytest.skip(reason)

@@ -58,7 +58,7 @@ def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
 
 
 class Judge:
-    """Asserts of every command, in servo steps, that it keeps the limits in force."""
+    """Asserts of every command, in servo steps, that it keeps the present limits."""
 
     def __init__(self, running: Running) -> None:
         self.running = running
@@ -114,7 +114,7 @@ class Judge:
             self.steps, self.speed = steps, speed
 
 
-# What is not a parameter but what the running parts have come to know and do.
+# State of the running parts, which is not a parameter.
 STATE = {
     "_motion", "_limits", "_gentle", "_gentle_until_s", "waiting", "outside", "_set_up",
     "_next_s", "_until_s", "_search_until_s", "_redraw", "_left", "_shown", "_retuned_s",
@@ -172,6 +172,6 @@ def fresh(rig: Rig) -> Assembly:
 
 
 def put(made: Assembly, rig: Rig) -> tuple[str, ...]:
-    """Put a rig in force at once."""
+    """Apply a rig immediately."""
     live = made.live_params
     return live(live.prepare(live.rig, rig), 0.0)

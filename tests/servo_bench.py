@@ -45,16 +45,16 @@ class Bench:
         self.chain = self.build(specs or [(1, self.model, 2048.0)], lambda: self.now_s, **options)
 
     def span(self, address, length):
-        """Return address and length as they stand in a packet."""
+        """Return address and length as in a packet."""
         return address.to_bytes(self.words, "little") + length.to_bytes(self.words, "little")
 
     def span_of(self, name):
-        """Return where the driver has a register, as it stands in a packet."""
+        """Return the driver's address of a register, as in a packet."""
         register = self.registers[name]
         return self.span(register.address, register.size)
 
     def head_of(self, name):
-        """Return a register's address as it stands in a packet."""
+        """Return a register's address as in a packet."""
         return self.span_of(name)[: self.words]
 
     def read_of(self, name, servo_id=1):
@@ -84,7 +84,7 @@ class Bench:
         return error
 
     def read(self, servo_id, address, size=1, sign=None):
-        """Read a register; ``sign``: the bit of its sign where it has a magnitude besides."""
+        """Read a register; ``sign``: the bit of its sign, for a sign and a magnitude."""
         [(answered, _, data)] = self.ask(servo_id, READ, self.span(address, size))
         assert (answered, len(data)) == (servo_id, size)
         raw = int.from_bytes(data, "little")
@@ -123,7 +123,7 @@ class Bench:
         return error
 
     def wait(self, seconds, steps=1):
-        """Let time pass, in so many looks."""
+        """Let time pass in n reads."""
         begin = self.now_s
         for k in range(1, steps + 1):
             self.now_s = begin + seconds * k / steps

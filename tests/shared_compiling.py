@@ -32,7 +32,7 @@ def compile_in_two(config: pytest.Config) -> None:
 
 
 def compile_missing(worker: str, config: pytest.Config) -> None:
-    """Write what pytest and Python would write for each module, where there is nothing yet."""
+    """Write the compiled files of pytest and Python for each module without them."""
     tests = ROOT.glob("tests/**/test_*.py")
     for file in order_of(worker, tests):
         cached = rewrite.get_cache_dir(file) / (file.stem + rewrite.PYC_TAIL)

@@ -1,4 +1,4 @@
-"""What a page is shown of a rig of six hobby servos: no neck, one linkage a way for both eyes."""
+"""Snapshots of a rig of six hobby servos: no neck, one linkage per axis for both eyes."""
 
 from dataclasses import replace
 from math import radians
@@ -17,7 +17,7 @@ TELLS_NOTHING = Servos(
 
 
 def of_six(shot: Snapshot, estimated: tuple[str, ...] = SIX) -> Snapshot:
-    """Show the same of such a rig; estimated: which of its servos tell nothing."""
+    """Show the same for such a rig; estimated: its servos without feedback."""
     ghost = shot.commanded_pose
     return replace(
         shot,

@@ -26,7 +26,7 @@ _STEAL = 8
 def waited_s() -> float:
     """Return for how long some process has waited for a processor, since the machine started.
 
-    Infinite time passes between two looks where the kernel does not tell (built without PSI).
+    Infinite time passes between two looks if the kernel was built without PSI.
     """
     stolen = int(_STAT.read_text(encoding="ascii").split("\n", 1)[0].split()[_STEAL])
     try:
@@ -45,7 +45,7 @@ def _unknown() -> float:
 
 
 def eventually(check: Callable[[], object], timeout_s: float = 20.0) -> bool:
-    """Wait for something to become true; False where it does not."""
+    """Wait for a condition; return False if it does not become true."""
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         if check():
@@ -55,7 +55,7 @@ def eventually(check: Callable[[], object], timeout_s: float = 20.0) -> bool:
 
 
 class Attempts:
-    """How often one test may be tried."""
+    """Number of attempts of one test."""
 
     def __init__(self) -> None:
         self._left = ATTEMPTS
@@ -68,6 +68,6 @@ class Attempts:
         self._before_s = waited_s()
 
     def again(self) -> bool:
-        """Return whether an attempt that failed says nothing, and there is another."""
+        """Return whether a failed attempt proves nothing, and another one is left."""
         in_time = self._left > 0 and time.monotonic() < self._end_s
         return in_time and waited_s() - self._before_s >= SHORTEST_TIMEOUT_S

@@ -40,7 +40,7 @@ class SteppedShaft:
         self.profile = PositionProfile(self.x)
 
     def run(self, ms: int) -> None:
-        """Move on by so many milliseconds, one after the other."""
+        """Advance by n milliseconds, one after the other."""
         for _ in range(ms):
             before = self.profile.r
             (r,) = self.profile.advance(1)

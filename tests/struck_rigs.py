@@ -1,4 +1,4 @@
-"""What befalls the buses of our kinds, and the shipped rigs that it befalls."""
+"""Faults of the buses of our kinds, and the shipped rigs that have them."""
 
 from dataclasses import replace
 from typing import Any

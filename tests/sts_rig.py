@@ -14,7 +14,7 @@ SPEED = 3000.0
 
 
 class Rig(MovingBus):
-    """A bus of emulated STS servos; its chain may hold others that the driver is not told of."""
+    """A bus of emulated STS servos; its chain may contain others, unknown to the driver."""
 
     alone = False
 

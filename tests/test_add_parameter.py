@@ -1,4 +1,4 @@
-"""The paper's "Adding a parameter", done as it stands there, on a copy of the model's room."""
+"""The docs' "Adding a parameter", followed to the letter, on a copy of the package."""
 
 import json
 import os
@@ -38,7 +38,7 @@ print(json.dumps({
 
 
 def patched(text: str, hunk: str) -> str:
-    """Return a text with one hunk of a diff applied; what it takes away stands there once."""
+    """Return a text with one hunk of a diff applied; the removed text occurs once."""
     old = "\n".join(line[1:] for line in hunk.splitlines() if line[:1] in " -")
     new = "\n".join(line[1:] for line in hunk.splitlines() if line[:1] in " +")
     assert text.count(old) == 1, old

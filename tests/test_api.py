@@ -1,4 +1,4 @@
-"""What a program asks of a head in simulated time: orders and their ends, values, parameters."""
+"""Requests of a program to a head in simulated time: orders and their ends, values, parameters."""
 
 from collections.abc import Iterator
 from math import cos, degrees, nan, radians, sin
@@ -69,7 +69,7 @@ def test_a_point_out_of_reach_is_told_at_once_and_the_head_goes_as_far_as_it_can
 def test_what_rests_within_the_tolerance_of_arrival_is_in_reach(
     head: gazerig.SimulatedHead, beside_deg: float, outcome: str
 ) -> None:
-    """The direction at which the rig looks so far beside the point, found by bisection."""
+    """The direction with a given error of the gaze, found by bisection."""
     low, high = 20.0, 170.0
     while high - low > 1e-3:
         middle = radians(0.5 * (low + high))
@@ -87,7 +87,7 @@ def test_the_next_order_takes_over_and_the_first_says_by_whom(head: gazerig.Simu
     assert first.wait() == "taken over" and "look in direction -10.0 5.0" in first.why
     assert second.wait() == "arrived"
     assert head.gaze.direction_deg == pytest.approx((-10.0, 5.0), abs=1.0)
-    # What has arrived has arrived, whatever comes after.
+    # An arrived order stays so, whatever follows.
     head.look_freely().wait()
     assert second.outcome == "arrived" and not second.active
 
@@ -295,7 +295,7 @@ def test_what_does_not_fit_is_one_line_of_one_family(
 
 
 class OwnCamera:
-    """Sees one face that stands still."""
+    """Detects one stationary face."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -329,7 +329,7 @@ class BadRule:
 
 
 class OwnDetector:
-    """Finds nobody, and counts the frames."""
+    """Finds no one, and counts the frames."""
 
     frames = 0
 

@@ -1,4 +1,4 @@
-"""A head beside its program in real time: however its block ends, it parks and lets go."""
+"""A head next to its program in real time: however its block ends, it parks and releases."""
 
 import asyncio
 import os
@@ -32,7 +32,7 @@ pytestmark = [
 
 @pytest.fixture
 def own_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have sockets where no other test's rigs are found."""
+    """Have sockets in a folder without rigs of other tests."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
 
 
@@ -361,7 +361,7 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         assert not far.resume().refused
         led = far.look_towards(10.0, 0.0)
         assert led.active
-    order = mine  # hung up: the lead of the other program lapses
+    order = mine  # disconnected: the control of the other program expires
     for state in head.states(rate_hz=50.0):
         if not state.controlled_by:
             break

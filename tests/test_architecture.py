@@ -1,4 +1,4 @@
-"""Who may import whom: the contracts of pyproject.toml, and the owners of vendor packages."""
+"""Allowed imports: the contracts of pyproject.toml, and the owners of vendor packages."""
 
 import ast
 import os
@@ -112,7 +112,7 @@ def test_no_class_name_stands_for_two_things() -> None:
 
 
 def linted(folder: Path) -> subprocess.CompletedProcess[str]:
-    """Check the contracts on the package ``gazerig`` that lies in a folder."""
+    """Check the contracts on the package ``gazerig`` in a folder."""
     command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()"]
     return subprocess.run(
         [*command, "--no-cache", "--config", str(ROOT / "pyproject.toml")],
@@ -156,7 +156,7 @@ WRONG = (
 
 @pytest.fixture(scope="module")
 def found_wrong(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """What is said of a package with all of the wrong arrows, each in a module of its own."""
+    """Report on a package with all wrong imports, each in a module of its own."""
     folder = tmp_path_factory.mktemp("wrong")
     top = package(folder)
     for room in ROOMS:

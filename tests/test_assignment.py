@@ -1,4 +1,4 @@
-"""Pairs that cost least together, against every other way of pairing."""
+"""Pairs with the least total cost, against every other pairing."""
 
 from itertools import permutations
 from math import inf
@@ -25,7 +25,7 @@ COSTS = st.tuples(st.integers(1, 4), st.integers(1, 4)).flatmap(
 
 
 def cheapest(costs: np.ndarray) -> tuple[int, float]:
-    """Try all pairings: the most pairs that can be, and the least that so many cost."""
+    """Try all pairings: the highest possible number of pairs at the least cost."""
     if costs.shape[0] > costs.shape[1]:
         costs = costs.T
     ways = []
@@ -85,7 +85,7 @@ def test_a_cost_that_is_no_number_is_a_pair_that_cannot_be() -> None:
 
 
 def test_a_pair_too_many_is_not_made_at_the_cost_of_others() -> None:
-    """Somebody new beside one who is seen where expected, and another who is hidden."""
+    """A new person next to one at the expected place, and another one who is hidden."""
     costs = [[0.0, 28.0], [28.0, FORBIDDEN]]
     assert assign(costs) == [(0, 1), (1, 0)]
     assert assign(costs, unpaired=30.0) == [(0, 0)]

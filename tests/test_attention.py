@@ -272,7 +272,7 @@ def test_retinal_form_is_relative_to_the_moving_eye() -> None:
     model = BottomUp(UNBOUNDED)
     seen = bodies(body(1, "x", (2, 0, 0), (0, 1, 0)), body(2, "x", (2, 0, 0)))
     with_it = salience(model, seen, (0, 0, 0), 0.0, (0, 1, 0))
-    assert with_it.total.tolist() == [0.0, 1.0]  # what stands still slides by 0.5 rad/s
+    assert with_it.total.tolist() == [0.0, 1.0]  # what is stationary slides by 0.5 rad/s
     coming = salience(model, seen, (0, 0, 0), 0.0, (2, 0, 0))
     assert coming.looming.tolist() == [2.0, 2.0]
 
@@ -283,7 +283,7 @@ def test_the_heads_own_motion_makes_what_stands_still_slide() -> None:
     model.choose(percept(0.0, FACE), here, 0.0)
     moved = model.choose(percept(0.05, FACE), there, 0.05)
     assert moved.saliences[0].translation == pytest.approx(0.2 / 0.5, rel=0.01)
-    model.choose(percept(1.0, FACE), here, 1.0)  # too long ago to tell a speed
+    model.choose(percept(1.0, FACE), here, 1.0)  # too long ago for a speed
     assert model.choose(percept(1.0, FACE), here, 1.0).saliences[0].translation == 0.0
 
 

@@ -1,4 +1,4 @@
-"""What is attended to: rules, decisions as they are recorded, and a boxing match."""
+"""Attention: rules, recorded decisions, and a boxing match."""
 
 from collections.abc import Callable
 from math import hypot, pi, sin

@@ -94,7 +94,7 @@ def test_only_faces_are_looked_away_from() -> None:
 
 
 def angles_and_ways(model: Aversion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far away the stays are and which way, 0 right and 90 up, degrees."""
+    """Return distance and direction of the stays, 0 right and 90 up, degrees."""
     to_face = unit(sub(FACE, HEAD))
     found = [s.place for s in stays(model, seconds, 0.1) if s.kind == "away"]
     far = [degrees(angle_between(to_face, sub(p, HEAD))) for p in found]
@@ -138,7 +138,7 @@ def test_a_look_away_leaves_when_the_rest_on_a_part_is_over() -> None:
         assert model.step(face(), HEAD, 0.01 * k, rests_until_s=inf).kind == "face"
     assert model.step(face(), HEAD, 40.0, rests_until_s=40.1).kind == "face"
     assert model.step(face(), HEAD, 40.1, rests_until_s=40.1).kind == "away"
-    # It comes back when its own time is over, whatever the walk over the face says.
+    # It returns when its own time is over, whatever the walk over the face chooses.
     later = [model.step(face(), HEAD, 40.1 + 0.01 * k, rests_until_s=inf).kind for k in range(400)]
     assert later.index("face") > 15
 

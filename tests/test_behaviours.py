@@ -291,7 +291,7 @@ def test_a_feint_draws_the_gaze_for_less_than_a_second(boxing: Lived) -> None:
 
 
 class Distracted:
-    """A still person, and a raised hand beside that moves for 0.3 s now and then."""
+    """A still person, and next to it a raised hand that moves for 0.3 s now and then."""
 
     name = "distracted"
     round_s = 20.0

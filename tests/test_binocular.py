@@ -41,7 +41,7 @@ class Followed(NamedTuple):
 def aim(
     yaw_deg: float, speed_deg_s: float = 0.0, distance: float = FAR_M, t: float = 0.0
 ) -> Target:
-    """Return a target in a frame of now that goes round the head."""
+    """Return a target in a present frame that moves around the head."""
     p = scale(direction((radians(yaw_deg), 0.0)), distance)
     v = scale((-p[1], p[0], 0.0), radians(speed_deg_s))
     return Target(p, v, t, "thing", 1, 0.2, False, None, 1, "")
@@ -190,7 +190,7 @@ def test_e27_both_eyes_meet_on_the_target() -> None:
 
 
 def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> None:
-    # One camera sees for both eyes: the one that is stopped goes on with the other.
+    # One camera sees for both eyes: a stopped eye continues with the other.
     rig = Rig(params=NO_SACCADES, pursuit=MITAKE.pursuit)
     span = (-1.0, 1.0)
     limits = ((span, span), ((-1.0, radians(-1.0)), span))
@@ -295,7 +295,7 @@ def test_e58_a_lost_target_fades() -> None:
     def after(s: float) -> float:
         return float(speeds[round((2.0 + s) / DT)])
 
-    # What was seen last is known a delay after, and one missed frame is not yet a loss.
+    # The last observation arrives after a delay, and one missed frame is not yet a loss.
     assert after(0.1) == pytest.approx(20.0, abs=0.5)
     assert after(0.3) == pytest.approx(9.6, abs=2.0)
     assert after(0.6) / after(0.3) == pytest.approx(np.exp(-1.0), rel=0.05)

@@ -1,4 +1,4 @@
-"""What cannot be right about a board of hobby servos: one line with its cure, and nothing moves."""
+"""Wrong settings of a board of hobby servos: one line with its cure, and nothing moves."""
 
 import errno
 import json
@@ -20,7 +20,7 @@ PULSES = "hobby servos without pulses go to their parking place"
 
 
 def jog(rig: str, *words: str) -> str:
-    """Type a jog that must be refused; return what is said, in one line."""
+    """Type a jog that must be refused; return the message, which has one line."""
     pytest.importorskip("gazerig.features.bringup")
     result = CliRunner().invoke(app, ["jog", rig, "eyes_pan", "5", "--yes", *words])
     assert result.exit_code == 2, result.output

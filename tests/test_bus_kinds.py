@@ -1,4 +1,4 @@
-"""What every kind of servo bus promises, over both twins: the suite that packages run on theirs."""
+"""Promises of every kind of servo bus, over both twins: the suite that packages run on theirs."""
 
 import pytest
 from bus_kinds import KINDS, ON_EITHER, in_process, twin_of

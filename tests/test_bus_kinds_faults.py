@@ -1,4 +1,4 @@
-"""What befalls every kind of bus while a head moves on it, and how each of it ends."""
+"""Faults of every kind of bus while a head moves on it, and their ends."""
 
 from dataclasses import replace
 from functools import cache
@@ -74,7 +74,7 @@ class TestPca9685(_OfKind):
 def test_a_servo_that_cannot_be_set_up_again_is_named_and_keeps_no_other_waiting():
     rig, machine = copied(of_kind("dynamixel"))
     bus, i, j = pair_of(rig, "dynamixel")
-    # A second servo has its id, which only shows where both stand apart without torque.
+    # A second servo has its id, which only shows if both are apart without torque.
     again = ("collide {i}", "unplug", "brown-out {i}", "brown-out {j}")
     outcome = machine.apply_fault(bus, i, j, Case(again, ("plug",)))
     assert outcome.end == "left, named", outcome

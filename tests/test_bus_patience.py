@@ -1,4 +1,4 @@
-"""Patience, views in turn, back-off, health and names: the driver's small parts."""
+"""Patience, alternating views, back-off, health and names: the driver's small parts."""
 
 import pytest
 from hypothesis import given

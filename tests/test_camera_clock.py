@@ -61,7 +61,7 @@ def test_single_late_pictures_are_no_jump():
 def test_clock_that_stood_still_a_while_is_noticed_after_a_second():
     bridge = ClockSync(0.02)
     run(bridge, 30.0, offset_s=0.0, start_s=0.0)
-    # Device time goes on from where it was; the host is 5 s further.
+    # Device time continues from its last value; the host is 5 s further.
     errors = run(bridge, 20.0, offset_s=30.0, start_s=35.0, seed=3)
     assert bridge.jumps == 1
     assert np.abs(errors[90:]).max() < 0.001

@@ -1,4 +1,4 @@
-"""What a camera gives goes into a file and comes out the same, whatever happens to the writer."""
+"""A camera's frames are the same after recording, whatever happens to the writer."""
 
 import contextlib
 import json
@@ -268,7 +268,7 @@ def test_replay_counts_on_and_repeats(file):
 
 
 class Clock(StandIn):
-    """A clock that goes on as somebody waits; ``late_s`` is added to every wait."""
+    """A clock that advances with each wait; ``late_s`` is added to every wait."""
 
     def __init__(self) -> None:
         self.now_s = 70.0

@@ -1,4 +1,4 @@
-"""What every camera promises to the loop, on ours: the suite that packages run on theirs."""
+"""Promises of every camera to the loop, on ours: the suite that packages run on theirs."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""Characters and rule sets as shipped: they load, they differ, and they mean what they say."""
+"""Shipped characters and rule sets: they load, differ, and have the described effects."""
 
 from dataclasses import replace
 from math import pi, sin

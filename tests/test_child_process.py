@@ -1,4 +1,4 @@
-"""Processes of the program's own code: one way to start them."""
+"""Processes of the program's own code: one function starts them."""
 
 import os
 import subprocess

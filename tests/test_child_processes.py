@@ -1,4 +1,4 @@
-"""What the tests themselves hold to: a process that one of them leaves is found and ended."""
+"""Rules for the tests themselves: a process that a test leaves is found and ended."""
 
 import os
 import select
@@ -16,7 +16,7 @@ def test_a_process_and_what_it_has_started_are_found_and_ended() -> None:
     found = child_processes.running().keys() - before.keys()
     assert found == {process.pid}
     child_processes.end(found)
-    # The end of the file comes when nobody holds the other side any more.
+    # The end of the file comes when no process holds the other side.
     assert select.select([reads], [], [], 60.0)[0] and os.read(reads, 100) == b""
     os.close(reads)
     assert child_processes.running().keys() <= before.keys()

@@ -1,4 +1,4 @@
-"""What people type to record a camera, and what they read."""
+"""Commands to record a camera, and their output."""
 
 import pytest
 from fakes.films import write_film

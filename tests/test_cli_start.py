@@ -1,4 +1,4 @@
-"""``gazerig`` alone says what to do next; help has examples that parse; errors are one line."""
+"""``gazerig`` alone suggests next steps; help has examples that parse; errors are one line."""
 
 import json
 import logging

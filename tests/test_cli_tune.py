@@ -50,7 +50,7 @@ def as_before(rig: Running, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 class Done(NamedTuple):
-    """What a command wrote."""
+    """Output of a command."""
 
     returncode: int
     stdout: str
@@ -331,7 +331,7 @@ def there_is_none() -> None:
 
 
 def completing(words: tuple[str, ...]) -> dict[str, str]:
-    """Return what a shell says to a command whose words it completes."""
+    """Return a shell's completions of a command."""
     return {
         "_GAZERIG_COMPLETE": "complete_bash",
         "COMP_WORDS": " ".join(("gazerig", *words)),

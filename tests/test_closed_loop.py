@@ -88,7 +88,7 @@ def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen
 
 @pytest.fixture(scope="module")
 def step() -> Seen:
-    """Return somebody who steps aside, pictures placed by the pose at their capture."""
+    """Return a person who steps aside, with pictures placed by the pose at their capture."""
     return watched("steps-aside", ARRIVED_S + 1.6)
 
 
@@ -100,7 +100,7 @@ def step_by_newest() -> Seen:
 
 @pytest.fixture(scope="module")
 def walk() -> Seen:
-    """Return somebody who walks past."""
+    """Return a person who walks past."""
     return watched("walks-past", 3.2)
 
 

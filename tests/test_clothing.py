@@ -1,4 +1,4 @@
-"""Colours of clothes below a face: what they tell, and of which part of a picture they are."""
+"""Colours of clothes below a face: their use, and their part of a picture."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""What people ask of a running robot: checked, obeyed at the next tick, and safe."""
+"""Commands to a running robot: checked, executed at the next tick, and safe."""
 
 from collections.abc import Iterator
 from math import degrees, inf, nan, pi, radians
@@ -244,10 +244,10 @@ def test_one_change_of_parameters_a_tick(running: Running) -> None:
     assert [len(tick.commands) for tick in running.go(0.021)] == [1, 1, 1, 0]
 
 
-# Who may end a stop, and who leads the head for how long
+# Clients that may end a stop, and the duration of control
 
 
-# Who may resume, and when
+# Clients that may resume, and the time
 
 
 def replied(running: Running, order: Command, seconds: float = 0.006) -> str:
@@ -312,7 +312,7 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
     assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
 
 
-# Who leads, and for how long
+# The client in control, and the duration
 
 
 def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None:

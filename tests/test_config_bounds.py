@@ -218,7 +218,7 @@ def test_stand_ins_lie_at_the_ends_of_what_may_stand_there(
     assert (eye.id, eye.name, eye.kind, eye.lid.shut_ms) == (id_, name, kind, shut_ms)
     assert eye.gains == {"a": gain, "b": 0.0}
     assert eye.offset_m == (1.0, float(high), 3.0)
-    assert (eye.lid.open_ms, eye.baud) == (150.0, 57_600)  # defaults where nothing is wrong
+    assert (eye.lid.open_ms, eye.baud) == (150.0, 57_600)  # defaults if nothing is wrong
 
 
 def test_a_faulty_list_or_mapping_has_no_stand_in() -> None:

@@ -1,4 +1,4 @@
-"""What the terminal shows of a run: little, plain, and nothing of what is not there."""
+"""Output of a run on the terminal: little, plain, and nothing about missing parts."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Who leads the head is one value, said in the same words to everybody."""
+"""The source of control of the head is one value with the same words everywhere."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Human-likeness of the running product: python tests/bench/bench_human.py [--rows 1 7] [--save FILE]
+"""Likeness to people of a run: python tests/bench/bench_human.py [--rows 1 7] [--save FILE]
 
 Measures every row of tests/human (from the shipped scene to measured joints of byte-true emulated
 servos, in simulated time) and prints what is wanted, what was measured, and whether it is inside;

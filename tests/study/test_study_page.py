@@ -300,7 +300,7 @@ def consented(pages: Pages, asked: list[str], ticked: list[str]) -> tuple[bool, 
 def test_uses_that_were_not_ticked_are_not_consented_to(
     studies: dict[str, LoadedStudy], tmp_path: Path
 ) -> None:
-    with serving(studies["nakamoto_2"], tmp_path / CODE, {}) as pages:  # no consent to pictures is requested
+    with serving(studies["nakamoto_2"], tmp_path / CODE, {}) as pages:  # no pictures
         assert consented(pages, ["gaze"], ["pictures"]) == (True, False, False)
 
 
