@@ -1,4 +1,4 @@
-"""The command describe: files that others read, and what it says where it cannot write them."""
+"""The command describe: files that other programs read, and errors if it cannot write them."""
 
 import io
 import json
@@ -51,7 +51,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_files_are_read_by_others(written: Path) -> None:
     model = mujoco.MjModel.from_xml_path(str(written / "scene.xml"))
-    assert model.njnt == 11 and model.nu == 9
+    assert model.njnt == 11 and model.nu == 27
     robot = yourdfpy.URDF.load(str(written / "expressive.urdf"), load_collision_meshes=True)
     assert robot.validate() and robot.errors == []
     looks = [visual.name for link in _links("expressive") for visual in link.visuals]
@@ -199,7 +199,7 @@ def test_gltf_is_valid(name: str, tmp_path: Path) -> None:
     assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"][:5]
 
 
-# A rig's description moves as the program's own geometry says, for everybody who reads it
+# A rig's description moves by the program's own geometry in every reader
 
 
 def _own(description: Description, angles: Mapping[str, float]) -> Poses:
@@ -287,7 +287,7 @@ def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
     assert model.ncam == 1
     looks = [visual.name for link in description.links for visual in link.visuals]
     assert len(set(looks)) == len(looks) == model.nmesh
-    # Nothing touches with all joints where the rig parks or looks straight ahead.
+    # Nothing touches in the parking pose and straight ahead.
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon == 0
@@ -332,7 +332,7 @@ def test_a_head_weighs_what_its_file_says() -> None:
 def test_a_skull_weighs_as_its_mesh_does() -> None:
     skin = head_mesh.skin()
     mesh = merge_meshes([skin.head, skin.jaw]).mesh
-    # The walls beside the jaw are not of the shell.
+    # The walls next to the jaw are not part of the shell.
     walls = np.isclose(np.abs(mesh.vertices[:, 1]), JAW_HALF)[mesh.faces].all(axis=1)
     mesh = mesh._replace(faces=mesh.faces[~walls])
     for unit in (0.03, 0.0619, 0.15):

@@ -35,9 +35,11 @@ def describe(
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
         from gazerig.robot.app.rig_description import description_of, mesh_faults
+        from gazerig.robot.app.servo_drives import servo_drives
         from gazerig.robot.description.files import FORMATS, description_files, file_name
 
-        description = description_of(load_rig(rig, further=[mesh_faults]))
+        loaded = load_rig(rig, further=[mesh_faults])
+        description = description_of(loaded).with_drives(servo_drives(loaded))
         asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
         wanted = [name for name, one in asked.items() if one] or list(FORMATS)
         folder = out or Path(f"{file_name(description.name)}_description")

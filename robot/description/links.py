@@ -64,6 +64,28 @@ class LinkageFollower(NamedTuple):
     ratio: float = 1.0
 
 
+class ServoDrive(NamedTuple):
+    """A servo as it acts at its joint, all values per rad of the joint.
+
+    armature_kg_m2: inertia of its rotor behind the gear
+    friction_nm, damping_nm_s: dry and viscous friction of motor and gear
+    kp_nm_rad, kv_nm_s: gains of its controller on the errors of position and speed
+    force_nm: largest torque of its controller, at standstill
+    back_emf_nm_s: torque that the motor's induced voltage takes from it, per rad/s; none while it
+        is switched off
+    smoothing_s: time constant with which its controller adopts the speed of a goal
+    """
+
+    armature_kg_m2: float
+    friction_nm: float
+    damping_nm_s: float
+    kp_nm_rad: float
+    kv_nm_s: float
+    force_nm: float
+    back_emf_nm_s: float
+    smoothing_s: float
+
+
 class LinkJoint(NamedTuple):
     """The hinge between a link and its parent.
 
@@ -73,6 +95,7 @@ class LinkJoint(NamedTuple):
     awake_rad: its angle while the head is awake and looks straight ahead
     friction_nm: dry friction of its bearings, without that of a servo
     spring_nm_rad, spring_rest_rad: stiffness of its spring, and the angle at which that is relaxed
+    drive: its servos; None if they are not part of the description, or unknown
     """
 
     name: str
@@ -86,6 +109,7 @@ class LinkJoint(NamedTuple):
     friction_nm: float = 0.0
     spring_nm_rad: float = 0.0
     spring_rest_rad: float = 0.0
+    drive: ServoDrive | None = None
 
 
 class Link(NamedTuple):
@@ -144,6 +168,15 @@ class Description(NamedTuple):
     def without_looks(self) -> "Description":
         """Return the same mechanism without anything to see."""
         return self._replace(links=tuple(link._replace(visuals=()) for link in self.links))
+
+    def with_drives(self, drives: Mapping[str, ServoDrive]) -> "Description":
+        """Return the same with the servos at its joints, by the joints' names."""
+        links = []
+        for link in self.links:
+            if link.joint is not None and link.joint.name in drives:
+                link = link._replace(joint=link.joint._replace(drive=drives[link.joint.name]))
+            links.append(link)
+        return self._replace(links=tuple(links))
 
     def angles(self, names: Sequence[str], position_rad: Sequence[float]) -> dict[str, float]:
         """Return the angle of every joint, those that follow others included.

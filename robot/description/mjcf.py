@@ -53,6 +53,8 @@ def mjcf(
         description = description.without_looks()
     root = ET.Element("mujoco", model=prefix + description.name)
     compiler = ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    # The time step of the servos' control loops; their gains are too high for larger ones.
+    ET.SubElement(root, "option", timestep="0.001", integrator="implicitfast")
     if folder:
         compiler.set("meshdir", folder)
         compiler.set("texturedir", folder)
@@ -76,7 +78,7 @@ def mjcf(
     for one, other in description.may_touch:
         ET.SubElement(contacts, "exclude", body1=prefix + one, body2=prefix + other)
     _add_linkages(ET.SubElement(root, "equality"), description, prefix)
-    _add_motors(ET.SubElement(root, "actuator"), description, prefix)
+    _add_servos(root, description, prefix)
     ET.indent(root)
     return Mjcf(ET.tostring(root, encoding="unicode") + "\n", assets)
 
@@ -115,8 +117,16 @@ def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
             body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
             range=numbers((joint.low_rad, joint.high_rad)),
         )  # fmt: skip
-        if joint.friction_nm:
-            element.set("frictionloss", numbers((joint.friction_nm,)))
+        friction = joint.friction_nm
+        if joint.drive is not None:
+            friction += joint.drive.friction_nm
+            element.set("armature", numbers((joint.drive.armature_kg_m2,)))
+            element.set("damping", numbers((joint.drive.damping_nm_s,)))
+        if friction:
+            element.set("frictionloss", numbers((friction,)))
+            # Stiff, so that a load below the friction does not creep.
+            element.set("solreffriction", "0.002 1")
+            element.set("solimpfriction", "0.9999 0.9999 0.001 0.5 2")
         if joint.spring_nm_rad:
             element.set("stiffness", numbers((joint.spring_nm_rad,)))
             element.set("springref", numbers((joint.spring_rest_rad,)))
@@ -161,11 +171,40 @@ def _add_linkages(parent: ET.Element, description: Description, prefix: str) -> 
             )  # fmt: skip
 
 
-def _add_motors(parent: ET.Element, description: Description, prefix: str) -> None:
+def _add_servos(root: ET.Element, description: Description, prefix: str) -> None:
+    """Add a servo to each joint, or a motor if the data of its servo are unknown.
+
+    The two gains of a servo act on a tendon that turns with its joint and limits the torque of
+    both together. The induced voltage brakes the joint in addition.
+    """
+    tendons, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
+    speeds: list[dict[str, str]] = []
+    brakes: list[dict[str, str]] = []
     for joint in description.joints:
-        if joint.follows is None:
-            torque = joint.max_torque_nm
-            ET.SubElement(
-                parent, "motor", name=prefix + joint.name, joint=prefix + joint.name,
-                ctrlrange=numbers((-torque, torque)),
-            )  # fmt: skip
+        name, drive = prefix + joint.name, joint.drive
+        if joint.follows is not None:
+            continue
+        if drive is None:
+            torque = numbers((-joint.max_torque_nm, joint.max_torque_nm))
+            ET.SubElement(actuators, "motor", name=name, joint=name, ctrlrange=torque)
+            continue
+        force = numbers((-drive.force_nm, drive.force_nm))
+        shaft = ET.SubElement(tendons, "fixed", name=name, actuatorfrcrange=force)
+        ET.SubElement(shaft, "joint", joint=name, coef="1")
+        ET.SubElement(
+            actuators, "position", name=name, tendon=name, kp=numbers((drive.kp_nm_rad,)),
+            ctrlrange=numbers((joint.low_rad, joint.high_rad)),
+        )  # fmt: skip
+        speed = joint.max_speed_rad_s
+        kv = numbers((drive.kv_nm_s,))
+        speeds.append({
+            "name": f"{name}.speed", "tendon": name, "gainprm": kv, "biastype": "affine",
+            "biasprm": f"0 0 -{kv}", "ctrlrange": numbers((-speed, speed)),
+            "dyntype": "filterexact", "dynprm": numbers((drive.smoothing_s,)), "actearly": "true",
+        })  # fmt: skip
+        brakes.append({
+            "name": f"{name}.back_emf", "joint": name, "gainprm": "0", "biastype": "affine",
+            "biasprm": f"0 0 {numbers((-drive.back_emf_nm_s,))}",
+        })  # fmt: skip
+    for one in (*speeds, *brakes):
+        ET.SubElement(actuators, "general", one)
