@@ -166,7 +166,7 @@ class Noisy:
         ]
 
     def _led(self, readings: Sequence[Row | None], goals: Sequence[int]) -> list[int]:
-        """Return goals like a guard's: from the position of a recovered servo, no faster than armed."""
+        """Return goals like a guard's: from a recovered servo's position, no faster than armed."""
         most = SPEED_STEPS_S[self._make] * TICK_S
         for k, reading in enumerate(readings):
             if reading is not None and reading.rearmed:

@@ -25,7 +25,7 @@ def _area_vector_and_area(one: Painted) -> tuple[np.ndarray, float]:
 def test_the_two_parts_of_a_cut_are_the_whole(at: float, axis: int) -> None:
     within, rest = cut_mesh(BALL, BALL.mesh.vertices[:, axis] - at)
     whole, parts = _area_vector_and_area(BALL), _area_vector_and_area(merge_meshes([within, rest]))
-    # The same surface, turned the same way.
+    # The same surface, with the same rotation.
     assert np.allclose(whole[0], parts[0], atol=1e-12)
     assert parts[1] == pytest.approx(whole[1], rel=1e-9)
     assert (within.mesh.vertices[:, axis] <= at + 1e-12).all()

@@ -70,7 +70,7 @@ def turned(*frames: tuple[float, int, int]) -> list[Percept]:
 def test_a_head_that_turned_sees_another_part_of_the_same_room(
     turned_deg: float, ends: bool
 ) -> None:
-    """Pictures of a saccade are as unlike as those about a cut; the joints tell which it was."""
+    """Pictures of a saccade are as unlike as those about a cut; the joints distinguish them."""
     percepts = turned((0.0, 0, 0), (0.0, 0, 0), (turned_deg, 1, 0))
     ids = [[face.id for face in percept.faces] for percept in percepts]
     assert ids[0] == ids[1] and len(ids[2]) == 1
@@ -78,7 +78,7 @@ def test_a_head_that_turned_sees_another_part_of_the_same_room(
 
 
 def test_a_camera_process_that_was_started_again_shows_another_scene() -> None:
-    """Each process counts from 0; where the head has turned meanwhile, there is no saccade."""
+    """Each process counts from 0; a turn of the head meanwhile is no saccade."""
     percepts = turned((0.0, 2, 0), (0.0, 0, 1), (0.0, 0, 1), (30.0, 0, 2))
     ids = [percept.faces[0].id for percept in percepts]
     assert ids[1] == ids[2] and len({*ids}) == 3

@@ -1,4 +1,4 @@
-"""What README and docs tell to type works: commands, options, the emulator's words, Python."""
+"""The examples of README and docs work: commands, options, the emulator's words, Python."""
 
 import ast
 import importlib

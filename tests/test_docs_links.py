@@ -1,4 +1,4 @@
-"""Links of README and docs lead somewhere; those to a feature that was deleted are left out."""
+"""Links of README and docs have targets; those to a deleted feature are left out."""
 
 import re
 from pathlib import Path

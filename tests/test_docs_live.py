@@ -49,7 +49,7 @@ def copy(rig: str, to: Path, more: str = "") -> None:
 
 
 def works(words: str, answers: str = "") -> str:
-    """Type a command that ends by itself; return what it wrote."""
+    """Type a command that ends without a request; return its output."""
     done = invoked(*shlex.split(words), answers=answers)
     assert done.code == 0, f"{words}: {done.out}{done.err}"
     return done.out + done.err

@@ -17,7 +17,7 @@ def documented(path: Path) -> Iterator[Documented]:
 
 
 def arguments(node: Documented) -> set[str] | None:
-    """Return the arguments of a function or of a class's constructor; None where it has none."""
+    """Return the arguments of a function or of a class's constructor; None without any."""
     if isinstance(node, ast.ClassDef):
         made = [n for n in node.body if isinstance(n, ast.FunctionDef) and n.name == "__init__"]
         if not made:

@@ -1,4 +1,4 @@
-"""A drawn scene in real time: the camera's process draws and looks, the loop says where it is."""
+"""A drawn scene in real time: the camera's process draws and detects, the loop sends the pose."""
 
 import threading
 from dataclasses import replace

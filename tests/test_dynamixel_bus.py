@@ -38,7 +38,7 @@ SETUPS = tuple(ServoConfig(s.id, s.model, 1000, 3000, SPEED) for s in SPECS)
 
 
 class Twin(NamedTuple):
-    """A bus with its port and its way to let time pass."""
+    """A bus with its port and a function that lets time pass."""
 
     port: BusPort
     wait: Callable[[float], None]

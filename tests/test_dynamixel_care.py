@@ -47,7 +47,7 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
     rig.bus.enable_torque()
     rig.now_s += 1.0
     rig.bus.write([2500] * 3)
-    # Whoever plans goals has not heard of it yet: no goal goes out before a read has told.
+    # The planner of goals does not know it yet: no goal is sent before the next read.
     rig.bus.write([2500] * 3)
     rig.now_s += 0.1
     assert all(

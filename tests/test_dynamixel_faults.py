@@ -1,4 +1,4 @@
-"""What the servo driver does when bytes, servos or the whole line misbehave."""
+"""The servo driver under faults of bytes, servos or the whole line."""
 
 import struct
 from typing import Any

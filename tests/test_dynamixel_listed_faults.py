@@ -1,4 +1,4 @@
-"""What only Dynamixel servos suffer, injected; what all smart servos do is in test_servo_faults."""
+"""Injected faults of Dynamixel servos only; those of all smart servos are in test_servo_faults."""
 
 import json
 
@@ -124,7 +124,7 @@ def test_a_watchdog_that_tripped_unnoticed_is_found_where_servos_were_read_witho
         rig.tick()
     rig.bus.enable_torque()
     rig.until_all()
-    # As where packets get lost on the way to one servo, and the host has sent them in time.
+    # Packets to one servo get lost, although the host has sent them in time.
     rig.chain[2].memory.set("bus_watchdog", 255)
     for _ in range(600):
         rig.tick([2000] * 4)

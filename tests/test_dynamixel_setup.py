@@ -1,4 +1,4 @@
-"""Finding and preparing servos: what is checked, written, asked again and refused."""
+"""Finding and preparing servos: checks, writes, repeated queries and refusals."""
 
 import pytest
 from dynamixel_sdk import PacketHandler

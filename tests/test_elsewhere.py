@@ -1,4 +1,4 @@
-"""Where a system lacks what POSIX and Linux have, the emulated head runs all the same.
+"""The emulated head runs on systems without the functions of POSIX and Linux.
 
 tests/elsewhere/sitecustomize.py hides it from gazerig's modules, in every process beneath.
 """

@@ -29,7 +29,7 @@ COMMAND = [sys.executable, "-c", "from gazerig.robot.cli.emulate import app; app
 
 
 class Emulator:
-    """The command beside the test: in a process of its own, or in a branch of this one."""
+    """The command next to the test: in a process of its own, or in a fork of this one."""
 
     def __init__(self, *options, command=None, stdin=subprocess.PIPE, stderr=None):
         start: Any = partial(Branch, partial(app, options))
@@ -188,7 +188,7 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
 def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():
     emulator = Emulator("maker")
     assert emulator.ready == {"path": emulator.path, "baud": None}
-    # The rig's board wants a check byte: it says nothing to whoever sends none.
+    # The rig's board requires a check byte: it does not answer packets without one.
     plain, checked = MaestroCodec().position(0), MaestroCodec(crc=True).position(0)
     assert asked(emulator.path, plain + bytes(1), 2, 115_200) == b""
     status = emulator.type("status")

@@ -1,4 +1,4 @@
-"""What every emulated chain of servos does, whatever its make: framing, groups, ids, faults."""
+"""Common behaviour of emulated chains of servos of every make: framing, groups, ids, faults."""
 
 import json
 

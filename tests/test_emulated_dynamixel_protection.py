@@ -1,4 +1,4 @@
-"""What the emulated servo does about heat, load and voltage."""
+"""Protections of the emulated servo against heat, load and voltage."""
 
 import pytest
 from present import present

@@ -1,4 +1,4 @@
-"""What goes wrong with emulated STS servos: error bits, protections, restarts, their line."""
+"""Faults of emulated STS servos: error bits, protections, restarts, their line."""
 
 import pytest
 from servo_bench import ALL, READ, SYNC_READ, FeetechBench

@@ -1,4 +1,4 @@
-"""How emulated STS servos move: closed forms of the profile, modes, limits, origin, torque."""
+"""Motion of emulated STS servos: closed forms of the profile, modes, limits, origin, torque."""
 
 import pytest
 from servo_bench import CALIBRATE, RESET_TURNS, WRITE, FeetechBench
@@ -23,7 +23,7 @@ def command(bench, goal, speed=0, acceleration=0, time_ms=0):
 
 
 def led_to(bench):
-    """Return where the servo's profile is now."""
+    """Return the present position of the servo's profile."""
     profile, drive = bench.chain.find_servo(1).shaft.profile, bench.chain[1].drive
     return profile.r + drive.position_steps - drive.shaft.x
 
@@ -201,7 +201,7 @@ def test_load_and_current_at_a_stop_are_those_of_the_stall():
     assert bench.position() == 2100
     assert bench.read(1, 60, 2, 10) == 1000
     assert bench.read(1, 69, 2, 15) * 0.0065 == pytest.approx(2.7, rel=0.01)
-    # the path comes back from where it had led to
+    # the path returns from its former end
     bench.enable_torque(goal=2000)
     bench.wait(0.25)
     assert bench.read(1, 60, 2, 10) < 0

@@ -1,4 +1,4 @@
-"""The profile generator: shapes, times, new goals on the way."""
+"""The profile generator: shapes, times, new goals in motion."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""What emulated servos of every make have in common: who answers, kept writes, groups, restarts."""
+"""Common behaviour of emulated servos of every make: answers, kept writes, groups, restarts."""
 
 import pytest
 from servo_bench import (
@@ -256,7 +256,7 @@ def test_without_torque_a_joint_stays_or_falls_to_its_stop(make):
     assert (stays.position(), sinks.position()) == (2048, 700)
 
 
-# --- what befalls them
+# --- faults
 
 
 def test_servos_that_are_given_one_id_answer_at_once(make):

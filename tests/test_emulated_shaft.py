@@ -329,7 +329,7 @@ CASES: dict[str, tuple[Motor, Loop, Physics, float, float]] = {
 
 
 class Both:
-    """One shaft in spans and one in steps, led to the same goals."""
+    """One shaft in spans and one in steps, moved to the same goals."""
 
     def __init__(self, case: str) -> None:
         model, loop, physics, *self.pace = CASES[case]

@@ -1,4 +1,4 @@
-"""Emulators that nobody asks for an hour: the next packet is answered at once, and truly."""
+"""Emulators without queries for an hour: the next packet is answered immediately and correctly."""
 
 import pytest
 from maestro_world import World, acceleration, speed, target

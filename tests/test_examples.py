@@ -107,7 +107,7 @@ def test_the_second_head_looks_where_the_first_does(shown: Shown) -> None:
     lines = shown("two_heads.py")
     yaws = [numbers(line.split("yaw")[1]) for line in lines[10:]]
     assert len(yaws) > 20
-    # The second stands to the left, so what is ahead of the first lies to its right.
+    # The second is on the left, so what is ahead of the first is to its right.
     assert all(other < one - 10.0 for one, other in yaws)
     assert max(one for one, _ in yaws) - min(one for one, _ in yaws) > 10.0
     assert max(other for _, other in yaws) - min(other for _, other in yaws) > 8.0

@@ -1,4 +1,4 @@
-"""Exports say what was measured, and tools that others wrote read them and see the same."""
+"""Exports contain the measured values, and tools of other projects read the same."""
 
 import csv
 from collections import Counter
@@ -39,7 +39,7 @@ SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slo
 
 @pytest.fixture(scope="module")
 def face() -> Run:
-    """Twenty-five seconds in front of somebody."""
+    """Twenty-five seconds in front of a person."""
     return Run(seen("face-to-face", 25.0))
 
 
@@ -151,7 +151,7 @@ LONG, SHORT = 40, 12
 @pytest.mark.parametrize(
     ("planned", "found"),
     [
-        # However short it is, what lies between two saccades is a fixation.
+        # The interval between two saccades is a fixation, however short.
         ((("fixation", LONG), ("saccade", 8), ("fixation", SHORT), ("saccade", 8),
           ("fixation", LONG)), None),
         # A flicker of the target's velocity is part of what is around it.
@@ -164,7 +164,7 @@ LONG, SHORT = 40, 12
 def test_short_movements_are_what_they_are(
     face: Run, planned: tuple[tuple[str, int], ...], found: tuple[tuple[str, int], ...] | None
 ) -> None:
-    """A gaze that stands still has no lag; movements are planned as (what, ticks)."""
+    """A still gaze has no lag; movements are planned as (kind, ticks)."""
     movement = [code for what, ticks in planned for code in [MOVEMENTS.index(what)] * ticks]
     still = collect_gaze_angles(face.ticks[: len(movement)])
     trace = still._replace(
@@ -174,7 +174,7 @@ def test_short_movements_are_what_they_are(
     stretches = find_intervals(trace, label_samples(trace))
     wanted = found or planned
     assert [s.event for s in stretches] == [what for what, _ in wanted]
-    # Each lasts to where the next begins, the last one as long as its ticks, too.
+    # Each lasts until the next begins, the last one as long as its ticks.
     assert [s.duration_s for s in stretches] == pytest.approx([0.005 * n for _, n in wanted])
 
 
@@ -327,7 +327,7 @@ def test_the_fixations_are_what_fit_scanpath_reads(face: Run, tables: tuple[Path
     assert isinstance(table, reader.FixationTable) and table.labelled
     stays = [row for row in table.rows if row.part is not None]
     assert len(stays) > 40
-    # Stays follow each other: nobody counts one look twice.
+    # Stays follow each other: no look is counted twice.
     ends = [row.start_s + row.duration_s for row in table.rows]
     assert all(end <= row.start_s + 1e-6 for end, row in zip(ends, table.rows[1:], strict=False))
     # All of the run's time that is no saccade is a stay.
@@ -403,6 +403,6 @@ def test_pymovements_takes_both_eyes_and_the_cyclopean(tables: tuple[Path, ...])
     gaze = judged(tables[0], [*eyes, "x_deg", "y_deg"])
     assert gaze.n_components == 6
     position = np.array(gaze.samples["position"].to_list())
-    # Eyes converge on somebody in front: the left one looks further to the right.
+    # Eyes converge on a person in front: the left one looks further to the right.
     assert np.median(position[:, 2] - position[:, 0]) > 1.0
     assert np.allclose(position[:, 4], (position[:, 0] + position[:, 2]) / 2, atol=0.1)

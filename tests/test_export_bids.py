@@ -24,7 +24,7 @@ ABOUT = DatasetDescription(
 
 @pytest.fixture(scope="module")
 def face() -> Run:
-    """Twelve seconds in front of somebody."""
+    """Twelve seconds in front of a person."""
     return Run(seen("face-to-face", 12.0))
 
 

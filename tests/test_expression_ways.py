@@ -1,4 +1,4 @@
-"""Expressions and levels asked for from the command line, from Python and on the page."""
+"""Expressions and levels from the command line, from Python and on the page."""
 
 from collections.abc import Iterator
 

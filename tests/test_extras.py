@@ -1,4 +1,4 @@
-"""What is installed only as an extra: the program does without, and names it where it is needed."""
+"""Packages of extras: the program runs without them, and names the extra if it is needed."""
 
 import re
 import tomllib
@@ -43,7 +43,7 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LightPython]:
 def without_extras(
     python: LightPython, folder: Path, *commands: tuple[str, ...], absent: Sequence[str] = OF_EXTRAS
 ) -> tuple[list[str], list[str]]:
-    """Run commands where packages are absent; return their exit codes and all they said."""
+    """Run commands without some packages; return their exit codes and output."""
     code = _WITHOUT.replace("COMMANDS", repr(commands)).replace("ABSENT", repr(absent))
     out, err = python.run(code, folder)
     return re.findall(r"^exit (\d+)$", out, re.MULTILINE), err.splitlines()

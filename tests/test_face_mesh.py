@@ -1,4 +1,4 @@
-"""Dense meshes: what is read from their points, the networks' files, and the way to the percept."""
+"""Dense meshes: values from their points, the networks' files, and the percept."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -162,7 +162,7 @@ def test_speech_is_a_mouth_that_opens_and_closes_again_and_again() -> None:
     assert pause[55] and not any(pause[110:])
 
 
-# ---- the way to the percept ---------------------------------------------------------------
+# ---- from mesh to percept -----------------------------------------------------------------
 
 
 def seen_faces(meshes: list[FaceMesh]) -> list[Face]:

@@ -31,7 +31,7 @@ STARTS = [1800, 2048, 2300]
 
 
 class Twin:
-    """A bus with its port and its way to let time pass."""
+    """A bus with its port and a function that lets time pass."""
 
     def __init__(self, port, wait):
         self.port, self.wait = port, wait

@@ -1,4 +1,4 @@
-"""What only STS servos suffer, injected; what all smart servos do is in test_servo_faults."""
+"""Injected faults of STS servos only; those of all smart servos are in test_servo_faults."""
 
 import random
 from types import SimpleNamespace

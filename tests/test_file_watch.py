@@ -1,4 +1,4 @@
-"""A file edited by hand counts once it is whole, whichever way the editor writes it."""
+"""A file edited by hand counts once it is whole, however the editor writes it."""
 
 import os
 import threading
@@ -13,7 +13,7 @@ NEW = "name: new\n"
 
 
 class Rig:
-    """One watched file, and what was told of it."""
+    """One watched file, and the reports about it."""
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / "rig.yaml"
@@ -173,7 +173,7 @@ def test_an_edit_right_after_a_file_was_saved_under_a_new_name_is_heard(tmp_path
     two.write_text(OLD, encoding="utf-8")
     watch.saved(two)
     files[:] = [two]
-    two.write_text(NEW, encoding="utf-8")  # before anybody has looked
+    two.write_text(NEW, encoding="utf-8")  # before the first look
     for _ in range(5):
         watch.look()
     assert reported == [two]
@@ -200,7 +200,7 @@ def threads_named(name: str) -> list[threading.Thread]:
 
 
 def test_saved_may_be_called_while_somebody_is_told(rig: Rig) -> None:
-    """A save waits for the tuning, the tuning for nobody who waits for the save."""
+    """A save waits for the tuning, which waits for no one that waits for the save."""
     done: list[bool] = []
 
     def changed(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What tests do in forks comes back as from one process; a fork that dies is a failed test."""
+"""Tests in forks report as from one process; a fork that dies is a failed test."""
 
 import os
 import subprocess
@@ -67,7 +67,7 @@ def test_passes(broken, tmp_path):
 
 
 def told(folder: Path, *options: str) -> str:
-    """Run the tests of a folder; return what pytest says."""
+    """Run the tests of a folder; return pytest's output."""
     conftest = CONFTEST.format(tests=str(TESTS))
     (folder / "conftest.py").write_text(conftest, encoding="utf-8")
     (folder / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")

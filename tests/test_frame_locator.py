@@ -1,4 +1,4 @@
-"""Faces and things are located beside the detector; the tick only places and associates them."""
+"""Faces and things are located next to the detector; the tick only places and associates them."""
 
 import pickle
 import threading

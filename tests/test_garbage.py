@@ -1,4 +1,4 @@
-"""What is set aside from the garbage collector, when, and that it does not stay for ever."""
+"""Objects excluded from garbage collection, and their later release."""
 
 import gc
 import weakref

@@ -108,7 +108,7 @@ def test_what_was_found_before_stays_between_the_edges() -> None:
         (8.1, True, True), (11.9, True, True), (12.1, True, False),
     ]:  # fmt: skip
         assert looks_at_head(params, radians(off_deg), sd, False, before) is looks
-    # A turn known less well needs more to change the answer; one not known at all says nothing.
+    # A less certain turn needs more to change the answer; an unknown one has no effect.
     assert looks_at_head(params, radians(7.9), radians(14.0), False, False) is False
     assert looks_at_head(params, radians(12.1), radians(14.0), False, True) is True
     assert looks_at_head(params, 0.0, radians(16.8), False, True) is None

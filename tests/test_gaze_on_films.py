@@ -1,7 +1,7 @@
 """People walk in a square, too far off for faces: the gaze is on what moves.
 
 Judged by a mask that knows nothing of flow: what differs from the median of the film's
-pictures, and what lies within a degree of it.
+pictures, and the share within a degree of it.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ SECONDS, BEGIN_S, RATE_HZ = 18.0, 1.0, 10.0
 WIDTH, HEIGHT = 768, 576
 SHRINK = 2
 DIFFERS = 25  # grey levels
-STILL_RAD_S = radians(40.0)  # as an eye tracker tells fixations
+STILL_RAD_S = radians(40.0)  # as an eye tracker finds fixations
 GLANCE_S = 0.1
 
 

@@ -1,4 +1,4 @@
-"""Gestures asked for from the command line, from Python, on the page, from menus and by rules."""
+"""Gestures from the command line, from Python, on the page, from menus and by rules."""
 
 from collections.abc import Iterator
 

@@ -46,7 +46,7 @@ def apart_deg(A, B):
 
 
 class Base:
-    """A camera on a table that is bumped, as its gyro tells it.
+    """A camera on a table that is bumped, as measured by its gyro.
 
     angle_deg: rotation vector (deg) of the camera, in its axes at the start, at a time; small
     """
@@ -230,7 +230,7 @@ def test_still_face_stays_where_it_is_while_the_table_shakes():
 
 
 def gyro_of(motion, seconds):
-    """Return what the gyro of a camera that is moved so says of a time."""
+    """Return the gyro's rotation of a moved camera at a time."""
     rng, bias = np.random.default_rng(3), (0.5, -0.3, 0.2)
     R = [rotation(motion(k / 200.0)) for k in range(round(200 * seconds) + 8)]
     steps = [cv2.Rodrigues(a.T @ b)[0].ravel() for a, b in zip(R[:-1], R[1:], strict=True)]
@@ -281,7 +281,7 @@ def test_turn_of_the_gyro_goes_before_that_of_the_joints():
 
 
 class Spinning(QuietCamera):
-    """A camera of a program whose gyro turns while the head stands."""
+    """A camera of a program whose gyro turns while the head is still."""
 
     def latest(self, now_s: float) -> Detections:
         number = int(now_s * HZ)

@@ -334,7 +334,7 @@ def test_a_hand_that_was_near_and_moves_again_at_the_person_leaves_none_behind()
 def test_e91_a_hand_that_reaches_in_beside_the_camera_is_believed_near(
     start_s: float, side: float
 ) -> None:
-    """The event of the scene: within .25 m of where the hand comes in, .5 m ahead."""
+    """The event of the scene: within .25 m of the hand's entry, .5 m ahead."""
     place = (HEAD_M[0] + 0.46, HEAD_M[1] + side * 0.316, HEAD_M[2])
     near = [
         any(dist(p, place) < 0.25 for _, p in frame.seen(HAND))

@@ -116,7 +116,7 @@ def test_an_eye_held_aside_is_relieved_slowly() -> None:
 
 
 def aimed(params: HeadParams, centre: float, point: float, top_down: bool = False) -> float:
-    """Return where the head (eye range 20 deg) ends for a far centre and a point, in degrees."""
+    """Return the head's end (eye range 20 deg) for a far centre and a point, in degrees."""
     model = HeadModel(params, radians(20.0), NECK)
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, top_down, None, 1, "")
     facing, gaze, yaw = (radians(centre), 0.0), (radians(point), 0.0), 0.0

@@ -108,7 +108,7 @@ def test_eyes_on_one_linkage_point_between_what_each_would_need(angle: float, fa
     left, right = ONE_PAN.eye_angles_to(point, R, p)
     assert left == right
     off = abs(left[0] - angle)
-    # Beside the head one eye is nearer, so the mean is not quite that of the middle.
+    # Next to the head one eye is nearer, so the mean is not quite that of the middle.
     assert min(off, 2.0 * pi - off) < 0.01 / far
 
 

@@ -99,7 +99,7 @@ def test_other_views_show_as_much_from_side_to_side_in_any_window(name: str) -> 
 
 
 def met(mesh: Mesh, rays: Floats) -> np.ndarray:
-    """Which rays from the origin meet a triangle (Moeller and Trumbore)."""
+    """Return which rays from the origin meet a triangle (Moeller and Trumbore)."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     one, other = b - a, c - a
     found = np.zeros(len(rays), bool)
@@ -116,7 +116,7 @@ def met(mesh: Mesh, rays: Floats) -> np.ndarray:
 
 
 def covered(opening: float, lower: float) -> Floats:
-    """Which directions of the visible eye the lids hide; rows from below to above."""
+    """Return which directions of the visible eye the lids hide; rows from below to above."""
     up, aside = np.meshgrid(np.radians(np.arange(-60, 61, 8)), np.radians(np.arange(-60, 61, 12)))
     rays = np.stack(
         (np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1
@@ -140,7 +140,7 @@ def test_lids_shut_fully_and_open_as_far_as_measured() -> None:
     assert covered(0.0, 1.0).mean() < 1.0  # the lower lid takes its part of the shutting
     opened = [covered(opening, opening).mean() for opening in (0.0, 0.3, 0.6, 1.0)]
     assert opened == sorted(opened, reverse=True) and opened[-1] < 0.45
-    # A lid lies outside the eyeball, cornea and all, wherever the eye looks.
+    # A lid is outside the eyeball with its cornea, wherever the eye looks.
     tallest = np.linalg.norm(head_mesh.eye().mesh.vertices, axis=1).max()
     assert 1.0 < tallest < min(UPPER_LID, LOWER_LID) - 0.01
 
@@ -165,7 +165,7 @@ def test_the_skin_about_an_eye_comes_from_the_lids_and_ends_in_the_face() -> Non
     assert (np.linalg.norm(off[1:], axis=2) > EYE_RADIUS * UPPER_LID).all()
     from_axis = np.degrees(np.arctan2(np.hypot(off[..., 1], off[..., 2]), off[..., 0]))
     assert from_axis[1:].min() > 50.0  # an upper lid opens to 48
-    # Nothing of it gapes: the skin goes on where it ends, and lies below it before.
+    # There are no gaps: the skin continues at its end and is below it before.
     assert (field(points[-1]) < 0.0).all() and (field(points[1:-1].reshape(-1, 3)) > 0.0).all()
 
 
@@ -176,7 +176,7 @@ def test_the_head_is_as_wide_at_the_jaw_as_a_face_is() -> None:
 
 
 def _half_width(z: float) -> float:
-    """How far aside the head goes at a height, before its neck."""
+    """Return the half width of the head at a height, in front of its neck."""
     x, y = np.meshgrid(np.linspace(-0.9, 0.3, 40), np.linspace(0.0, 1.4, 100))
     at = np.stack((x.ravel(), y.ravel(), np.full(x.size, z)), axis=1)
     return float(at[field(at) < 0.0, 1].max())
@@ -235,7 +235,7 @@ def test_the_skin_about_the_eyes_faces_outwards() -> None:
 def test_the_dark_of_a_mouth_is_hidden_by_the_skin_until_it_opens() -> None:
     vertices = head_mesh.mouth().mesh.vertices
     below_eyes = vertices[vertices[:, 2] < -0.5]
-    assert (field(below_eyes) < 0.03).all()  # the lips themselves lie as far outside the skin
+    assert (field(below_eyes) < 0.03).all()  # the lips themselves are as far outside the skin
 
 
 def test_the_head_is_drawn_of_few_triangles() -> None:

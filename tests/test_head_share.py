@@ -1,4 +1,4 @@
-"""How far the head goes from any start to any target: never past it."""
+"""Travel of the head from any start to any target: never past it."""
 
 from math import degrees, radians
 from typing import Literal

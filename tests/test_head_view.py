@@ -47,7 +47,7 @@ def test_the_head_has_the_lids_that_the_rig_has(server: viser.ViserServer) -> No
         return found
 
     def edge_deg(lid: str) -> float:
-        """How high a lid's edge stands above the eye's equator, by the mesh as it is turned."""
+        """Return the elevation of a lid's edge above the eye's equator, by the turned mesh."""
         frame, (look,) = view.links[f"{lid}_link"]
         turn = transforms.SO3(np.array(frame.wxyz)) @ transforms.SO3(np.array(look.wxyz))
         x, _, z = turn.apply(np.array((1.0, 0.0, 0.0)))
@@ -78,7 +78,7 @@ def _wanted(shot: Snapshot) -> CommandedPose:
 
 
 def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
-    """Every link stands in its parent as kinematics say, at any angles of a shipped rig."""
+    """Every link is in its parent by the kinematics, at any angles of a shipped rig."""
     rig = load_rig("desk")
     kinematics, view = rig_kinematics(rig), HeadView(server.scene)
     view.shape = shape_of(rig)
@@ -99,7 +99,7 @@ def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
 
 
 def _in_world(view: HeadView, link: str) -> transforms.SE3:
-    """Where a link is in the scene, through the frames that it is in."""
+    """Return the pose of a link in the scene, through its frames."""
     path = view.links[link].frame.name
     found = transforms.SE3.identity()
     for one in view.links.values():

@@ -1,4 +1,4 @@
-"""Commands for several heads: what one of them refuses is told, whatever the first has done."""
+"""Commands for several heads: the refusal of one is reported, whatever the first has done."""
 
 from typing import cast
 
@@ -11,7 +11,7 @@ from gazerig.robot.model.reply import CommandReply, Ticket
 
 
 class Head:
-    """A head that gives one and the same reply, None for none, to all that it is told."""
+    """A head that gives the same reply, None for none, to all commands."""
 
     def __init__(self, reply: CommandReply | None, full: bool = False) -> None:
         self._reply, self._full = reply, full

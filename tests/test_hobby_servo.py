@@ -8,7 +8,7 @@ from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 
 
 def run(servo, width, steps):
-    """Send a pulse width for so many steps of 10 ms; gives the places after each."""
+    """Send a pulse width for n steps of 10 ms; return the places after each."""
     servo.width_steps = width
     places = []
     for _ in range(steps):

@@ -1,4 +1,4 @@
-"""A busy computer is told as that, and not as a bad plug."""
+"""A busy computer is reported as such, and not as a bad plug."""
 
 import os
 from typing import Any
@@ -35,7 +35,7 @@ def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():
     lateness = HostLateness()
     assert lateness.cause(0.0) == ""
     lateness.record_own_silence(0.7, 5.0)
-    lateness.record_own_silence(0.12, 5.1)  # the longest of one episode is told
+    lateness.record_own_silence(0.12, 5.1)  # the longest of one episode is reported
     assert lateness.cause(5.2) == "this computer was late: it sent nothing for 0.70 s"
     assert lateness.cause(5.2 + AFTERMATH_S) == ""
     lateness.record_own_silence(0.2, 9.0)
@@ -99,7 +99,7 @@ def test_a_host_that_slept_is_told_as_that_and_servos_go_on():
 
 
 def standing_still(noisy: Noisy, seconds: float):
-    """Keep what is sent from now on from the servos for so long; then all of it arrives."""
+    """Delay all packets to the servos for a time; then all of them arrive."""
     held: list[Any] = []
     until_s, write = noisy.now + seconds, noisy.port.write
     available, read_until = noisy.port.getBytesAvailable, noisy.port.read_until

@@ -58,7 +58,7 @@ def test_the_script_tells_inside_from_outside(
     bench = importlib.import_module("bench_human")
 
     class Row:
-        """What a row is."""
+        """Definition of a row."""
 
         WANTED = {"low": (0.0, 1.0), "high": (0.0, 1.0), "lost": (0.0, 1.0)}
 

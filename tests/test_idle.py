@@ -1,4 +1,4 @@
-"""What the gaze does with no one in sight."""
+"""The gaze with no one in sight."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -82,7 +82,7 @@ def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:
 
 
 def test_a_face_is_placed_through_the_lens_as_measured() -> None:
-    where = np.array([0.34, -0.16, 0.9])  # far out in the picture, where the lens bends most
+    where = np.array([0.34, -0.16, 0.9])  # far out in the picture, with the largest distortion
     frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
     landmarks = project(LANDMARKS_FACE_M @ frontal.T + where, BENT)
     found = Detections(0.0, 1, 640, 400, (DetectedFace((0.0, 0.0, 9.0, 9.0), landmarks, 0.9),))

@@ -48,7 +48,7 @@ def test_rustypot_with_x330(path):
     client.sync_write_raw_goal_position(ids, [1500] * 3)
     assert eventually(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
     client.set_fast_sync_read(True)
-    # They may have been seen on their way past it.
+    # They may have been seen while passing it.
     assert eventually(lambda: near(client.sync_read_raw_present_position([3, 1, 2]), 1500))
     for values, error in client.sync_read_raw_data_with_error(ids, 126, 10):
         assert (len(values), error) == (10, 0)
@@ -129,7 +129,7 @@ def judge_with_sdk():
 
 
 class SimulatedPort(InProcessPort):
-    """A port whose clock goes on when somebody waits."""
+    """A port whose clock advances with each wait."""
 
     def __init__(self):
         self._t_s = 0.0

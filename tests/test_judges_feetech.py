@@ -69,7 +69,7 @@ def test_positions_speeds_and_torque_of_a_group(client):
         return all(abs(a - b) <= STEADY_STEPS for a, b in zip(places, wanted, strict=True))
 
     assert eventually(near)
-    # 1 and 3 turn downwards, 2 upwards, none much faster than asked
+    # 1 and 3 turn downwards, 2 upwards, none much faster than commanded
     assert min(speeds[0] for speeds in seen) < -500
     assert max(speeds[1] for speeds in seen) > 500
     assert min(speeds[2] for speeds in seen) < -500

@@ -25,7 +25,7 @@ HOSTS: dict[str, Missed] = {
 
 
 class LateClock:
-    """A simulated clock on which waiting takes some slots longer than asked for."""
+    """A simulated clock on which waits take some slots longer than requested."""
 
     def __init__(self, clock: Clock, missed: Missed, period_s: float) -> None:
         self._clock, self._missed, self._period_s = clock, missed, period_s
@@ -71,7 +71,7 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str) -> None:
         far = [k for k in range(1, len(sent)) if abs(angles[k - 1] - park_rad) > radians(1.0)]
         step = [0.0, *(now - before for before, now in pairwise(angles))]
         gap_s = [0.0, *(now - before for before, now in pairwise(times))]
-        for k in far[1:]:  # no farther than the slow speed leads in the time that has passed
+        for k in far[1:]:  # no farther than the slow speed reaches in the passed time
             last = abs(step[k - 1]) / gap_s[k - 1]
             assert abs(step[k]) / gap_s[k] <= max(slow, last) + 1e-6
         if host != "never four times":

@@ -1,4 +1,4 @@
-"""What a tick of joints costs: how many functions written in Python are called.
+"""Cost of a tick of joints: the number of calls of Python functions.
 
 Between ticks the loop sleeps and the processor's caches are used by others, so the number of
 functions is what a tick costs; counted here, as time on a shared machine means nothing.
@@ -69,7 +69,7 @@ def test_a_tick_calls_few_functions(kind):
             body.write(tuple([0.001 * (k % 50) + 0.01 * i for i in IDS]))
         return state
 
-    ticks(500)  # whatever was still on its way inside has arrived
+    ticks(500)  # everything in transit has arrived
     before = sys.getprofile()
     sys.setprofile(count)
     state = ticks(100)

@@ -81,7 +81,7 @@ def test_lower_lids_follow_by_less_than_the_upper_ones_and_evenly() -> None:
     assert level.lower_left == level.lower_right == AWAKE
     assert up.lower_left == pytest.approx(AWAKE - 0.08)
     assert down.lower_left == pytest.approx(AWAKE + 0.08)
-    # On lids that travel 45 and 30 deg: a quarter of the upper lid's way.
+    # On lids that travel 45 and 30 deg: a quarter of the upper lid's travel.
     way = 30.0 * (down.lower_left - level.lower_left) / (45.0 * (level.left - down.left))
     assert way == pytest.approx(2.2 / 9.1, abs=0.01)
     # Looking down narrows the fissure, looking up a little does not.

@@ -14,7 +14,7 @@ from gazerig.params import declarations
 DT = 0.005
 STEEPEST = 1.875  # slope of minimum jerk at its middle
 GLIDE_S, DROOP_S = 0.3, 1.0
-# To make sixty numbers simple takes minutes; the example as it was found says enough.
+# To simplify sixty numbers takes minutes; the found example is sufficient.
 WITHOUT_SHRINKING = (Phase.explicit, Phase.generate)
 
 

@@ -177,7 +177,7 @@ def test_e74_a_shift_of_3_degrees_brings_no_blink() -> None:
 
 
 def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_after() -> None:
-    """A person moves from side to side every two seconds; eyes and head wait for lids that lead."""
+    """A person moves from side to side every 2 s; eyes and head wait for the lids."""
     span = (-radians(60.0), radians(60.0))
     kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
     model = Oculomotor(

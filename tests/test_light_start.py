@@ -1,4 +1,4 @@
-"""What processes do not import: that of the control loop has NumPy, the serial port, rig files."""
+"""Imports of processes: the control loop has NumPy, the serial port and rig files only."""
 
 from collections.abc import Iterator
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""Each fault of the line, asked for by text, as the bytes that arrive at the host show it."""
+"""Each fault of the line, injected by text, as seen in the bytes at the host."""
 
 import json
 import struct
@@ -236,7 +236,7 @@ def test_colliding_servos_mix_where_they_differ(world):
     twin = status(2, 0, struct.pack("<i", 2002 + 257))
     assert mixed == bytes(a & b for a, b in zip(good(2), twin, strict=True))
     assert not sound(mixed)
-    # The later servos heard the mixture and go on from it: only the inner CRC tells.
+    # The later servos received the mixture and continue from it: only the inner CRC detects it.
     fast = world.fast()
     assert sound(fast)
     assert [sound(fast[: 8 + 8 * k]) for k in (1, 2, 3)] == [True, False, True]
@@ -418,7 +418,7 @@ _WORDS = st.sampled_from(
 
 @given(st.lists(st.lists(_WORDS, min_size=1, max_size=5), max_size=6))
 def test_no_mixture_of_commands_breaks_the_bus(lines):
-    """Whatever was asked for, the bus goes on, and is sound again once all is cleared."""
+    """Under every fault the bus continues, and it is normal again once all are cleared."""
     world = World()
     for line in lines:
         try:

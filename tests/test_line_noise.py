@@ -72,7 +72,7 @@ def test_noise_on_the_line_of_a_board_leads_no_joint_out_nor_faster_than_a_servo
 
 
 def test_noise_on_an_i2c_bus_whose_bytes_carry_no_check_is_over_in_a_tick():
-    """A pulse that noise has made stands until the next goals: 5 ms, and never in silence."""
+    """A pulse made by noise lasts until the next goals: 5 ms, and never in silence."""
     noisy = Noisy("pca9685", seed=2)
     noisy.start()
     outcome = noisy.run("static 0.5", 0.5, 2000)

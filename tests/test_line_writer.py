@@ -1,4 +1,4 @@
-"""Lines for people go to a pipe that nobody reads, or whose reader has gone: nobody waits."""
+"""Lines for people go to a pipe without a reader, or whose reader has gone, without waiting."""
 
 import fcntl
 import os
@@ -25,7 +25,7 @@ def test_a_pipe_that_nobody_reads_keeps_nobody_waiting() -> None:
         writer.status("a status\n")
     assert writer.dropped > 1000 and not writer.flush(0.05)
     got = b""
-    while b"49 x" not in got:  # what was kept comes in order once somebody reads
+    while b"49 x" not in got:  # stored lines arrive in order once the pipe is read
         got += os.read(reads, 65536)
     assert got.startswith(b"0 x") and writer.lost_reader() is None
 

@@ -68,7 +68,7 @@ class Rig:
         )
 
     def written(self, text: str) -> str:
-        """Write the file, look as often as it takes, and give what was said last."""
+        """Write the file, check until it is read, and return the last message."""
         self.path.write_text(text, encoding="utf-8")
         for _ in range(3):
             self.live._watch.look()

@@ -1,4 +1,4 @@
-"""What can be looked at: points of two frames, directions, people, pixels; and how a lead ends."""
+"""Gaze targets of clients: points of two frames, directions, people, pixels; the end of control."""
 
 import json
 from collections.abc import Iterator

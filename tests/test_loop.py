@@ -126,7 +126,7 @@ def test_what_is_asked_for_is_in_force_from_the_next_tick_on() -> None:
 
 
 class SlowRobot:
-    """Costs time as it is told, on a simulated clock."""
+    """Takes a given time, on a simulated clock."""
 
     def __init__(self, clock: SimulatedClock, cost_s: Callable[[int], float]) -> None:
         self.times: list[tuple[float, float]] = []
@@ -168,7 +168,7 @@ MOUNT = CameraMount(CameraParams())
 
 
 def seen_from(head_yaw: float, t_s: float, number: int) -> Detections:
-    """Show a face that stands still at (1, 0.2, 0.2) from a head that is turned."""
+    """Show a stationary face at (1, 0.2, 0.2) from a head that is turned."""
     R, p = MOUNT.pose(*KINEMATICS.head_pose((head_yaw, 0.0, 0.0)))
     nose = np.array([1.0, 0.2, 0.2])
     towards = (np.array(p) - nose) / np.linalg.norm(np.array(p) - nose)

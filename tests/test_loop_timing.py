@@ -77,7 +77,7 @@ def test_a_computer_that_misses_slots_is_called_busy_with_its_figures() -> None:
     figures = timed(times)
     assert figures.late_share == pytest.approx(32 / 399)
     assert busy_text(figures) == ("the computer is too busy: 8% of ticks came late (worst 80 ms)")
-    assert busy_text(timed(times[:90])) == ""  # half a second tells nothing
+    assert busy_text(timed(times[:90])) == ""  # half a second is too short
 
 
 def test_slots_of_a_tuned_rate_are_no_late_ticks() -> None:

@@ -1,4 +1,4 @@
-"""A second pair of neck joints below the neck: gaze allows for where it carries the head."""
+"""A second pair of neck joints below the neck: gaze allows for the head's displacement."""
 
 from dataclasses import replace
 from math import cos, degrees, radians, sin

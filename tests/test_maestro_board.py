@@ -176,7 +176,7 @@ def test_a_timeout_is_counted_once_until_the_host_speaks_again(world):
     assert world.after(0.2).errors() == TIMEOUT
 
 
-# How channels of an emulated Maestro move, and its servos with them
+# Motion of the channels of an emulated Maestro, and of its servos
 
 
 # --- motion
@@ -303,7 +303,7 @@ def test_a_channel_keeps_its_limits_and_always_arrives(orders):
         for _ in range(number if order == "step" else 0):
             before = channel.position
             channel.step()
-            # A speed limit that was lowered on the way is reached at the acceleration.
+            # A speed limit that was lowered in motion is reached at the acceleration.
             if channel.speed and not channel.acceleration:
                 assert abs(channel.position - before) <= channel.speed
         assert channel.position == 0 or 3968 <= channel.position <= 8000

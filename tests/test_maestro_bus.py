@@ -33,7 +33,7 @@ TICK_S = 0.01
 
 
 class Bench:
-    """A board, a port to it, and a bus; time passes where somebody waits."""
+    """A board, a port to it, and a bus; time passes during waits."""
 
     def __init__(self, setups=SETUPS, channels=12, chosen=(), **params):
         self.now_s = 0.0
@@ -404,7 +404,7 @@ def test_release_is_confirmed_and_reported_where_it_is_not(held):
     assert sum("not confirmed" in line for line in held.bus.events()) == 3
 
 
-# What goes wrong on a Maestro bus, and how our driver gets over it
+# Faults of a Maestro bus, and the recovery of our driver
 
 
 def test_a_restart_is_noticed_within_a_tick_and_held_anew_where_it_was(held):
@@ -435,7 +435,7 @@ def test_after_a_restart_limits_are_armed_before_any_goal(held):
 
 def test_an_error_that_sends_all_home_is_named_and_healed(held):
     held.run(0.5, [5500, 5600, 6600])
-    held.raw("55")  # a data byte where a command is due
+    held.raw("55")  # a data byte instead of a command
     assert held.pulses() == [0, 0, 0]
     seen = held.run(0.3, [5500, 5600, 6600])
     assert any(r is not None and r.rearmed for r in seen[2])

@@ -1,4 +1,4 @@
-"""What befalls an emulated Maestro, on its line and inside."""
+"""Faults of an emulated Maestro, on its line and inside."""
 
 import json
 

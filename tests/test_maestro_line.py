@@ -1,4 +1,4 @@
-"""The line's time-out and the memory of one channel, each by itself."""
+"""The line's time-out and the memory of one channel, separately."""
 
 import pytest
 from stand_in import StandIn
@@ -13,7 +13,7 @@ SETUP = ServoConfig(3, "hobby", 4400, 7600, 12_000.0)
 
 
 class SlowPort(StandIn):
-    """A port whose answers are a list of byte strings; one that is late arrives while draining."""
+    """A port whose answers are a list of byte strings; a late answer arrives while draining."""
 
     port_name = "scripted"
 

@@ -15,7 +15,7 @@ WANTED = tuple(ServoConfig(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
 
 
 def row_at(steps, now_s):
-    """Return what a servo tells, with something of its own in every column."""
+    """Return a servo's feedback, with a different value in every column."""
     return Row(
         steps, steps + 0.1, steps / 100.0, now_s, steps + 0.3, None if steps % 2 else steps + 0.4,
         steps % 2 == 0, f"fault {steps}", steps % 3 > 0, steps % 5 == 0,
@@ -23,7 +23,7 @@ def row_at(steps, now_s):
 
 
 class Scripted:
-    """A bus of a few servos that keeps what it was told, and fails where it is told to.
+    """A bus of a few servos that records its calls, and fails in the given ones.
 
     Servos are called by a letter and stand at steps of their own; wrong: methods that raise
     """

@@ -155,7 +155,7 @@ def test_an_archive_with_other_members_is_refused(server: str) -> None:
 
 def test_offline_it_takes_downloads_from_a_folder(tmp_path: Path) -> None:
     (tmp_path / "some.whl").write_bytes(WHEEL)
-    file = in_wheel("http://127.0.0.1:9")  # nobody answers there
+    file = in_wheel("http://127.0.0.1:9")  # no server answers there
     bring(file, source=tmp_path)
     assert file.state() == "there"
 

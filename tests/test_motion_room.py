@@ -1,4 +1,4 @@
-"""A head that turns in a still room sees no moving body; and it sees one that moves."""
+"""A turning head in a still room detects no moving body; and it detects a moving one."""
 
 from collections.abc import Callable
 
@@ -107,7 +107,7 @@ def watch(
     count: int = 10,
     params: MotionParams | None = None,
 ) -> tuple[list[tuple[MovingBlob, ...]], list[str]]:
-    """Turn the head, tell the detector what the joints say, and give what it found."""
+    """Turn the head, give the joints' angles to the detector, and return its detections."""
     rng = np.random.default_rng(9)
     detector = MotionDetector(params or MotionParams())
 
@@ -237,5 +237,5 @@ def test_what_fills_the_picture_is_no_room_while_the_joints_say_that_the_head_st
     found, silent = watch(lambda t_s: 0.0, lambda t_s: [(np.array([0.5 * t_s, 0.0, 0.9]), 0.5)])
     assert any(found)
     flows = [blob.flow_px_s[0] for blobs in found for blob in blobs]
-    assert min(flows) > 0.0  # the person moves, the wall beside does not
+    assert min(flows) > 0.0  # the person moves, the wall behind does not
     assert set(silent[1:]) <= {"", "no common motion of the background"}

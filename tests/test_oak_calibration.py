@@ -48,7 +48,7 @@ def test_e98_straightened_frames_have_no_distortion_others_that_of_the_lens():
     straight, bent = found(), found(OakParams(undistort=False))
     assert not straight.lens.has_distortion and bent.lens.has_distortion
     assert straight.raw_distortion == bent.lens.distortion
-    # The five numbers put points where the fourteen of the factory do.
+    # The five numbers place points as the fourteen of the factory do.
     rng = np.random.default_rng(0)
     points = np.column_stack(
         (rng.uniform(-0.5, 0.5, 200), rng.uniform(-0.3, 0.3, 200), np.ones(200))

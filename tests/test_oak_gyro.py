@@ -1,4 +1,4 @@
-"""The gyro of an OAK camera: turns, bias, axes, and what is said of one that is of no use."""
+"""The gyro of an OAK camera: turns, bias, axes, and messages about a useless one."""
 
 import threading
 import time

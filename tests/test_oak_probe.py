@@ -1,4 +1,4 @@
-"""Which camera is taken, and what is said where none can be; device calls are stood in for."""
+"""The chosen camera, and messages without one; device calls have stand-ins."""
 
 import gc
 import threading

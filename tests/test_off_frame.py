@@ -1,4 +1,4 @@
-"""Landmarks outside the picture: said once, and the gaze goes on without such a face."""
+"""Landmarks outside the picture: reported once, and the gaze continues without such a face."""
 
 from dataclasses import replace
 

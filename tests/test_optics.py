@@ -25,7 +25,7 @@ LENS = Intrinsics(120.0, 124.0, 82.0, 57.0)
 
 
 class Dots:
-    """White dots of 3 x 3 pixels in known directions, and what was asked for."""
+    """White dots of 3 x 3 pixels in known directions, and the commands."""
 
     def __init__(self, *directions: Vec3) -> None:
         self.directions = np.array(directions)

@@ -150,7 +150,7 @@ def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whateve
     def images() -> Iterator[ImageArray]:
         for width, height in sizes:
             image = spot_at(direction, width, height, field_rad)
-            # As the camera delivers it: the way back.
+            # As the camera delivers it: the inverse.
             image = np.rot90(image, orientation.rotation // 90)
             yield np.ascontiguousarray(image[:, ::-1] if orientation.mirrored else image)
 

@@ -14,7 +14,7 @@ from gazerig.robot.control.loop import Tick, run
 
 
 def ran(rig: Rig, seconds: float, seed: int = 0) -> tuple[Assembly, list[Tick], tuple[str, ...]]:
-    """Run a rig before a visitor; gives what ran, every tick, and what was said at the start."""
+    """Run a rig before a visitor; return the run, every tick, and the messages at the start."""
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=seed, scene="visitor"))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
@@ -90,7 +90,7 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     i = {name: k for k, name in enumerate(rig.names)}
     desired = np.degrees([t.guard_result.command_rad for t in ticks])
     shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
-    assert len(shut) > 3  # some blink shuts all the way
+    assert len(shut) > 3  # some blink shuts fully
     at = shut[len(shut) // 2]
     shut_deg, _ = rig.lid_joints.ends_deg("left_upper_lid")
     assert shut_deg is not None

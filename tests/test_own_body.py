@@ -1,4 +1,4 @@
-"""The robot's own head in the view of its camera: told from people's hands by the kinematics."""
+"""The robot's own head in the view of its camera: distinguished from hands by the kinematics."""
 
 from math import radians
 

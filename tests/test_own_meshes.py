@@ -1,4 +1,4 @@
-"""A user's own meshes take the place of the program's; a bad one is told by its line."""
+"""A user's own meshes replace the program's; a bad one is reported with its line."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Panels of one file, ours and those of packages; one that fails shows why, the page continues."""
+"""Panels of one file, ours and those of packages; a failed one shows why, the page continues."""
 
 from pathlib import Path
 

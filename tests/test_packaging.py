@@ -1,4 +1,4 @@
-"""What is installed is all there is, and what is checked is the same wherever it is checked."""
+"""The installed package is complete, and checks are the same everywhere."""
 
 import json
 import re

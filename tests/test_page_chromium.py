@@ -1,4 +1,4 @@
-"""A person at a browser and a simulated rig: stop, lead, move joints, tune; nobody else.
+"""A person at a browser and a simulated rig: stop, look, move joints, tune; no one else.
 
 The rig ticks in simulated time, slower than real, so that it leaves the processor to the
 browser.
