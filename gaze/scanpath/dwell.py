@@ -118,6 +118,9 @@ def _tail(cut: float) -> tuple[float, float, float]:
     return tail, excess, sqrt(max(0.0, 1.0 - hazard * excess)) / excess
 
 
+_LONGEST_S, _LONGEST = 3.0, 8.0
+"""Longest rest, and the same over a mean rest for slow laws: a log-normal law whose SD is above its
+mean would draw stares of many seconds."""
 _LEAST_ABOVE = 0.15
 """Smallest mean excess of a rest over the shortest one, as a share of it."""
 
@@ -164,10 +167,11 @@ def rests_s(share: Floats, visit_s: Floats, shift_s: float, shortest_s: float) -
 def shift_dwell(law: str, mean_s: float, sd_s: float, shortest_s: float) -> Draw:
     """Return a dwell law that begins at a shortest time instead of at 0 and keeps the mean.
 
-    A mean that is not above the shortest time is increased slightly.
+    A mean that is not above the shortest time is increased slightly. No law draws a stare.
     """
     if shortest_s <= 0.0:
         return dwell_distribution(law, mean_s, sd_s)
     above_s = max(mean_s - shortest_s, _LEAST_ABOVE * shortest_s)
     beyond = dwell_distribution(law, above_s, sd_s)
-    return lambda rng: shortest_s + beyond(rng)
+    longest_s = max(_LONGEST_S, _LONGEST * (shortest_s + above_s))
+    return lambda rng: min(longest_s, shortest_s + beyond(rng))

@@ -45,13 +45,18 @@ class Visit(NamedTuple):
 
 
 def visits(run: MeasuredRun) -> list[Visit]:
-    """Return the visits that begin and end with a shift between parts of one face."""
+    """Return the visits that begin with a shift between parts of one face.
+
+    They end with such a shift, or with a look away, which waits for the end of a rest: without
+    these the longest rests would be missing most often.
+    """
     flight = run.phase == "saccade"
     begins = np.flatnonzero(np.diff(run.shift) != 0) + 1
     found = []
     for begin, end in pairwise(begins.tolist()):
-        if not run.part[begin - 1] or not run.part[end]:
-            continue  # the face was entered, or is left
+        away = str(run.target_name[end]).startswith("away")
+        if not run.part[begin - 1] or not (run.part[end] or away):
+            continue  # the face was entered, or is lost
         flown = np.flatnonzero(flight[begin:end])
         if run.part[begin] and len(flown):
             # Where a target moves, later saccades catch up within the rest.
