@@ -154,6 +154,8 @@ class Percept:
 
 ORDERED = "puppet"
 """Kind of a target ordered by a person or a program: the gaze rests exactly on that point."""
+AWAY = "away"
+"""Kind of a target next to a face during a look away from it."""
 SEARCH = "search"
 """Kind of a target where a lost person may be."""
 

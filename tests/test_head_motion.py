@@ -68,6 +68,22 @@ def test_after_pursuit_the_head_comes_to_rest() -> None:
     assert np.ptp(yaws[t > 8.0]) < 0.1
 
 
+def test_the_head_goes_on_with_a_walker_during_a_look_away() -> None:
+    head, yaws, place = model(), list[float](), 0.0
+    for k in range(round(3.0 / DT)):
+        t, place = k * DT, 12.0 * k * DT
+        away = t >= 2.2
+        now = (radians(place), 0.0)
+        past = (radians(38.0), 0.0) if away else now
+        soon = None if away else (radians(place + 12.0 * head.foresees_s), 0.0)
+        aside = abs(past[0] - radians(yaws[-1] if yaws else 0.0))
+        seen = target(t, kind="away" if away else "face")
+        yaws.append(degrees(head.step(seen, now, past, aside, 1.0, t, soon)[0]))
+    late = round(2.4 / DT)
+    assert (yaws[-1] - yaws[late]) / (3.0 - 2.4) == pytest.approx(12.0, abs=1.5)
+    assert 0.0 < place - yaws[-1] < 4.0
+
+
 def test_recentring_is_late_random_and_slow() -> None:
     place = np.full(round(30.0 / DT), 32.0)
     starts, peaks, ends = [], [], []

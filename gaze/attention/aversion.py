@@ -18,7 +18,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
-from gazerig.gaze.types import Target, Vec3
+from gazerig.gaze.types import AWAY, Target, Vec3
 from gazerig.params import Bounds
 
 AversionMode = Literal["none", "talk", "listen", "think"]
@@ -222,7 +222,7 @@ class Aversion:
             p_world_m=away,
             v_world_m_s=(0.0, 0.0, 0.0),
             at_s=t_s,
-            kind="away",
+            kind=AWAY,
             top_down=True,
             part=None,
             shift=self._away_shift,

@@ -16,6 +16,7 @@ turns slowly to recentre it. A target in sustained motion is pursued by the head
 plans a minimum-jerk movement of .6 s to where the target will be soon. On a ramp this lags by .6 of
 that time, .36 s, less the .2 s of foresight; people's heads lag by .1 to .2 s. When the motion
 ends, the last plan brings the head to rest.
+During a look away the eyes rest on a place of the room, and the head goes on with the person.
 """
 
 from math import degrees, exp, hypot, radians
@@ -34,7 +35,7 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
-from gazerig.gaze.types import SEARCH, Angles2, Angles3, Target, Vec3
+from gazerig.gaze.types import AWAY, SEARCH, Angles2, Angles3, Target, Vec3
 
 OWN_LOOKS = ("glance", SEARCH, "rest")
 """Kinds of targets that are not caused by anything visible (gazerig.gaze.attention.idle)."""
@@ -270,6 +271,9 @@ class HeadModel:
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         soon_rad = facing_rad if soon_rad is None else soon_rad
+        if self._pursues and target.kind == AWAY:
+            ahead = add(direction(facing_rad), scale(self._drift, self.foresees_s))
+            soon_rad = yaw_pitch(ahead)
         if self._is_in_sustained_motion(facing_rad, soon_rad, since_eye_onset_s, t_s):
             self._pursue(target, facing_rad, soon_rad, t_s)
         since_s = t_s - self._planned_s
