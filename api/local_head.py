@@ -39,7 +39,7 @@ class LocalHead(Head):
     """A head whose control loop is in this program; ``gazerig.open`` creates it.
 
     Args:
-        options: what to run.
+        options: options of the run.
         substitutes: the program's own camera, detector or attention rule.
         say: receives one line per message; None: ``logging.getLogger("gazerig")``.
     """
@@ -323,7 +323,7 @@ class SimulatedHead(LocalHead):
         return self._active_run().assembly.clock.now_s()
 
     def step(self, seconds: float | None = None) -> None:
-        """Let simulated time pass.
+        """Advance simulated time.
 
         Args:
             seconds: rounded to whole ticks; None: one tick.

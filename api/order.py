@@ -16,7 +16,7 @@ class OrderHost(Protocol):
         """Return the owner of gaze and joints, and the newest gesture."""
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Let the head's time pass until a condition is true, or at most ``seconds``."""
+        """Wait by the head's clock until a condition is true, at most ``seconds``."""
 
     def _release_control(self) -> None:
         """Let the head choose its targets again."""

@@ -1,4 +1,4 @@
-"""Rigs, rule sets and face walks by name or path; the rules between the sections of a rig."""
+"""Rigs, rule sets and face walks by name or path, and rules between the sections of a rig."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -35,16 +35,16 @@ def load_rig(
     profile: str | None = None,
     further: Sequence[Check[Rig]] = (),
 ) -> Rig:
-    """Return a rig by shipped name or path, with every rule checked.
+    """Return a rig by shipped name or path, after checking every rule.
 
     Args:
-        name_or_path: of the rig.
-        character: name or path of a file with differences, laid over rig and profile.
+        name_or_path: name or path of the rig.
+        character: name or path of a file with differences, merged over rig and profile.
         profile: name or path of a style of gaze, instead of the rig's.
-        further: rules besides a rig's own, such as read other files.
+        further: additional rules, such as those that read other files.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: lists every fault.
     """
     layers = layers_of(name_or_path, character, profile)
     return load(layers[-1], Rig, defaults=layers[:-1], checks=(*RULES, *further))
@@ -54,7 +54,7 @@ def rig_path(name_or_path: str) -> Path:
     """Return the file of a rig by shipped name or path; a path need not exist.
 
     Raises:
-        gazerig.config.load.ConfigError: none of that name is shipped.
+        gazerig.config.load.ConfigError: no shipped rig has this name.
     """
     return _find("rigs", name_or_path)
 
@@ -62,10 +62,10 @@ def rig_path(name_or_path: str) -> Path:
 def layers_of(
     name_or_path: str, character: str | None = None, profile: str | None = None
 ) -> list[Path]:
-    """Return the files that ``load_rig`` lays one over the other, the rig's own first.
+    """Return the files that ``load_rig`` merges, the rig's own first.
 
     Raises:
-        gazerig.config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
+        gazerig.config.load.ConfigError: no shipped rig has this name, or the rig cannot be read.
     """
     layers = [rig_path(name_or_path)]
     named = profile or read_yaml(layers[0], tuple(shapes_of(Rig))).data.get("profile")
@@ -77,10 +77,10 @@ def layers_of(
 
 
 def load_rules(name_or_path: str) -> TopDownParams:
-    """Return a rule set, behaviour -> what to look at, by shipped name or path.
+    """Return a rule set (behaviour -> gaze target) by shipped name or path.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: lists every fault.
     """
     return load(_find("rules", name_or_path), TopDownParams)
 
@@ -89,7 +89,7 @@ def load_walk(name_or_path: str) -> Walk:
     """Return the statistics of a face walk by shipped name or path.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: lists every fault.
     """
     return load(_find("scanpaths", name_or_path), Walk)
 
@@ -108,21 +108,21 @@ def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
         if not JOINT_NAME.fullmatch(name):
             yield (
                 f"joints.{name}",
-                "no name of a joint: small letters, digits and _, a letter first, at most 40",
+                "not a valid joint name: lower-case letters, digits and _, beginning with a letter, at most 40 characters",
             )
         elif name not in GAZE_JOINTS and (near := get_close_matches(name, absent, 1, 0.8)):
-            # A jaw may have any name; a misspelt neck would not move, without a message.
+            # A jaw may have any name; a misspelt neck joint would not move, without a message.
             yield f"joints.{name}", f"did you mean {near[0]}? Other joints need less similar names"
     for way in ("pan", "tilt"):
         own = [name for name in (f"left_eye_{way}", f"right_eye_{way}") if name in rig.joints]
         both = f"eyes_{way}"
         if both in rig.joints and own:
-            yield f"joints.{both}", f"turns both eyes, which {' and '.join(own)} would do as well"
+            yield f"joints.{both}", f"turns both eyes, which {' and '.join(own)} do too"
         elif both not in rig.joints and len(own) < 2:
             yield (
                 f"joints.{both}",
-                f"nothing turns {'an eye' if own else 'the eyes'} in {way}: needed are "
-                f"left_eye_{way} and right_eye_{way}, or {both} where one servo turns both",
+                f"nothing turns {'an eye' if own else 'the eyes'} in {way}: use "
+                f"left_eye_{way} and right_eye_{way}, or {both} if one servo turns both",
             )
 
 
@@ -131,7 +131,7 @@ def _servo_ids(rig: Rig) -> Iterable[tuple[str, str]]:
     for name, joint in rig.joints.items():
         place = joint.bus, joint.id
         if place in owner:
-            yield f"joints.{name}.id", f"id {joint.id} is already that of {owner[place]}"
+            yield f"joints.{name}.id", f"id {joint.id} is already used by {owner[place]}"
         owner.setdefault(place, name)
 
 
@@ -139,27 +139,30 @@ def _models(rig: Rig) -> Iterable[tuple[str, str]]:
     for name, joint in rig.joints.items():
         if joint.model not in SERVOS:
             known = ", ".join(sorted(SERVOS))
-            yield f"joints.{name}.model", f"unknown servo model {joint.model!r}; known are {known}"
+            yield (
+                f"joints.{name}.model",
+                f"unknown servo model {joint.model!r}; known models: {known}",
+            )
 
 
 def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
     if "" in rig.buses:
-        yield "buses", "a bus needs a name; the one without is under bus"
+        yield "buses", "a bus needs a name; the unnamed one is under bus"
     ports = {"bus": rig.bus.port}
     for name, bus in rig.buses.items():
         same = next((key for key, port in ports.items() if port == bus.port), None)
         if same is not None:
-            yield f"buses.{name}.port", f"{bus.port} is already that of {same}: a port has one bus"
+            yield f"buses.{name}.port", f"{bus.port} is already used by {same}: a port has one bus"
         ports[f"buses.{name}"] = bus.port
     for name, joint in rig.joints.items():
         if joint.bus and joint.bus not in rig.buses:
             there = ", ".join(rig.buses) or "none"
-            yield f"joints.{name}.bus", f"no bus {joint.bus!r} under buses; there is {there}"
+            yield f"joints.{name}.bus", f"no bus {joint.bus!r} under buses; available: {there}"
         elif joint.model in SERVOS and not SERVOS[joint.model].fits_bus(rig.bus_of(name).kind):
             kind = rig.bus_of(name).kind
             yield (
                 f"joints.{name}.model",
-                f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
+                f"a {joint.model} needs a bus of kind {SERVOS[joint.model].bus}, its bus is of kind {kind}",
             )
         elif joint.model in SERVOS:
             yield from _channel_fault(name, rig)
@@ -167,11 +170,11 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
     used = {joint.bus for joint in rig.joints.values()}
     for name in rig.buses:
         if name not in used:
-            yield f"buses.{name}", "no joint is on it: take it out, or give joints this bus"
+            yield f"buses.{name}", "no joint uses it: remove it, or assign joints to it"
 
 
 def _channel_fault(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find what keeps a joint from its channel of a board of hobby servos."""
+    """Return why a joint cannot have its channel on a board of hobby servos, "" if it can."""
     joint, params = rig.joints[name], rig.bus_of(name).section
     if not isinstance(params, HobbyBoardParams):
         return
@@ -183,7 +186,7 @@ def _channel_fault(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def _servo_setup(name: str, rig: Rig) -> ServoConfig:
-    """Return what the bus must know of a joint's servo, as far as the rig is right."""
+    """Return the configuration of a joint's servo, as far as the rig is valid."""
     for one in rig.couplings.values():
         known = {one.first, one.second} <= rig.joints.keys() and all(
             rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
@@ -202,8 +205,8 @@ def _byte_order_faults(rig: Rig) -> Iterable[tuple[str, str]]:
         if known and facts and known.bus == facts.bus and known.family != facts.family:
             yield (
                 f"joints.{name}.model",
-                f"a {joint.model} cannot be on one bus with a {first[joint.bus]}: their numbers "
-                "have another byte first; give each series a port of its own under buses",
+                f"a {joint.model} cannot be on one bus with a {first[joint.bus]}: their byte orders "
+                "differ; give each series its own port under buses",
             )
 
 
@@ -222,7 +225,7 @@ def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Whether the forbidden ranges leave any pose."""
+    """Check whether the forbidden ranges allow any pose."""
     if any(True for rule in (_joint_names, _models) for _ in rule(rig)):
         return
     try:
@@ -262,7 +265,7 @@ def _masses(rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find couplings whose servos cannot do the whole range of their joints."""
+    """Find couplings whose servos cannot move their joints over the whole range."""
     owner: dict[str, str] = {}
     for name, coupling in rig.couplings.items():
         absent = [
@@ -272,10 +275,10 @@ def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
         ]
         for key, joint in absent:
             there = ", ".join(rig.names)
-            yield f"couplings.{name}.{key}", f"no joint {joint!r}; there is {there}"
+            yield f"couplings.{name}.{key}", f"no joint {joint!r}; available: {there}"
         for joint in (coupling.first, coupling.second):
             if joint in owner:
-                yield f"couplings.{name}", f"{joint} is in {owner[joint]} already"
+                yield f"couplings.{name}", f"{joint} is already in {owner[joint]}"
             owner.setdefault(joint, name)
         known = not absent and all(
             rig.joints[joint].model in SERVOS for joint in (coupling.first, coupling.second)
@@ -289,14 +292,14 @@ def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
 def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
     for code in rig.face_parts_mm:
         if code not in PARTS:
-            yield f"face_parts_mm.{code}", f"unknown face part; parts are {', '.join(PARTS)}"
+            yield f"face_parts_mm.{code}", f"unknown face part; known parts: {', '.join(PARTS)}"
 
 
 EYES = tuple(name for name in GAZE_JOINTS if name not in (*NECK, *LIDS))
 
 
 class _KeyedMove(NamedTuple):
-    """The widest move of a joint that a table can ask for, in degrees."""
+    """Largest move of a joint that a table can request, in degrees."""
 
     key: str
     joint: str
@@ -305,7 +308,7 @@ class _KeyedMove(NamedTuple):
 
 
 def expressions(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find expressions that the joints cannot do."""
+    """Find expressions that exceed the joints' limits."""
     ends: dict[str, tuple[float, float]] = {}
     widest: dict[str, str] = {}
     for name, angles in rig.expressions.items():
@@ -323,7 +326,7 @@ def expressions(rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def levels(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find levels that their joint cannot do."""
+    """Find levels that exceed their joint's limits."""
     for name, level in rig.levels.items():
         if fault := _joint_fault(rig, level.joint):
             yield f"levels.{name}.joint", fault
@@ -340,9 +343,9 @@ def _joint_fault(rig: Rig, joint: str) -> str:
     """Return why a joint cannot be moved independently of gaze, "" if it can."""
     free = [name for name in rig.names if name not in EYES]
     if joint in EYES:
-        return f"gaze alone turns the eyes; what can be moved here is {', '.join(free)}"
+        return f"only gaze turns the eyes; joints that can be moved here: {', '.join(free)}"
     if joint not in rig.joints:
-        return f"no joint {joint!r}; there is {', '.join(free)}"
+        return f"no joint {joint!r}; available: {', '.join(free)}"
     return ""
 
 
@@ -352,11 +355,11 @@ def _range_fault(rig: Rig, joint: str, angle: float) -> str:
     if joint in LIDS:
         shut, wide = rig.lid_joints.ends_deg(joint)
         if shut is None or wide is None:
-            return ""  # reported if the ends are missing
+            return ""  # reported elsewhere if the ends are missing
         if abs(angle) <= abs(wide - shut):
             return ""
         return (
-            f"{angle:g} deg is more than the lid's whole way of {abs(wide - shut):g} deg "
+            f"{angle:g} deg is more than the lid's whole range of {abs(wide - shut):g} deg "
             f"from open at {wide:g} to shut at {shut:g}"
         )
     if params.min_deg <= angle <= params.max_deg:
@@ -365,7 +368,7 @@ def _range_fault(rig: Rig, joint: str, angle: float) -> str:
 
 
 def _too_fast(rig: Rig, move: _KeyedMove, key: str) -> Iterable[tuple[str, str]]:
-    """Find a minimum-jerk move that is faster or more abrupt than the joint can be."""
+    """Return the limit that a minimum-jerk move of a joint exceeds, "" if none."""
     joint = rig.joints[move.joint]
     speed = PEAK_SPEED * move.span_deg / move.time_s
     accel = PEAK_ACCELERATION * move.span_deg / move.time_s**2
@@ -383,18 +386,18 @@ def _too_fast(rig: Rig, move: _KeyedMove, key: str) -> Iterable[tuple[str, str]]
     yield (
         move.key,
         f"{move.joint} would move {move.span_deg:g} deg within {move.time_s:g} s: {limit}; "
-        f"{key.rpartition('.')[2]} of {least} or more would do",
+        f"{key.rpartition('.')[2]} must be at least {least}",
     )
 
 
 def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find what keeps a rig from its own gestures, and the gestures that rules name in vain."""
+    """Find gestures that the rig cannot play, and rules that name unknown gestures."""
     known = set(shipped_gestures())
     for i, file in enumerate(rig.gesture_files):
         try:
             gesture = load_gesture(gesture_path(file))
             known.add(gesture_name(file))
-            # A gesture that the rig cannot do from the middle of its ranges is refused.
+            # A gesture that the rig cannot play from the middle of its ranges is rejected.
             limits = [rig.joints[name].limit() for name in rig.names]
             middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
             spans = {}
@@ -421,7 +424,7 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
             there = ", ".join(sorted(known))
             yield (
                 f"gaze.top_down.rules.{behaviour}.gesture",
-                f"no gesture {rule.gesture!r}{near} there is {there}",
+                f"no gesture {rule.gesture!r}{near} available: {there}",
             )
 
 
@@ -440,4 +443,4 @@ RULES = (
     levels,
     gesture_rules,
 )
-"""What no single section of a rig can know."""
+"""Rules between several sections of a rig."""

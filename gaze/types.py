@@ -113,7 +113,7 @@ class Face:
     looks_at_head: whether the person looks at the robot's head (gaze at robot: one side of mutual
         gaze); None if that is too uncertain
     gaze_world:    direction of the gaze of the eyes; None if the detector does not find it
-    eye_opening:   of the lids over the usual opening, 0 is shut; None if not found
+    eye_opening: opening of the lids divided by the usual one, 0 is shut; None if not found
     mouth_opening_m: gap between the lips, at an adult's size; None if not found
     speaks:        whether the mouth moves like that of a speaking person; None if not found
     """
@@ -139,7 +139,7 @@ class Face:
 class Percept:
     """Contents of one frame, in the world by the head pose at its time of capture.
 
-    scene: number of cuts before this frame; after a cut nothing seen earlier exists
+    scene: number of cuts before this frame; after a cut earlier bodies no longer exist
     """
 
     captured_s: float
@@ -153,11 +153,11 @@ class Percept:
 
 
 ORDERED = "puppet"
-"""Kind of a target ordered by a person or a program: the gaze rests exactly on that point."""
+"""Kind of a target commanded by a person or a program: the gaze rests exactly on that point."""
 AWAY = "away"
 """Kind of a target next to a face during a look away from it."""
 SEARCH = "search"
-"""Kind of a target where a lost person may be."""
+"""Kind of a target at a possible place of a lost person."""
 
 
 class Salience(NamedTuple):
@@ -191,12 +191,12 @@ class Target(NamedTuple):
     top_down: whether a rule chose it
     part:     face part code if the target is a face
     shift:    increases whenever another object or part is chosen: the saccade's event flag
-    why:      the reason in words
+    why:      reason as text
     centre_world_m: goal of the head, e.g. the face's centre; None: the point itself
     plan:     choice of the action planner (gazerig.gaze.attention.action_planner) with its reason;
         "" without one
-    saliences: of the winner and of the next three, highest first
-    is_lost:  whether it is out of sight and its last position is looked at
+    saliences: saliences of the winner and of the next three, highest first
+    is_lost:  whether it is not visible and the gaze is on its last position
     """
 
     p_world_m: Vec3
@@ -223,7 +223,7 @@ class GazeState(NamedTuple):
     R_world_head, p_world_head_m: pose of the head frame
     p_world_eye_left_m, p_world_eye_right_m: centres of rotation of the eyes
     lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
-    lower_left, lower_right: the same of the lower lids
+    lower_left, lower_right: opening of the lower lids
     base_rad, base_rate_rad_s: (yaw, pitch) of a lower neck, which carries the neck, and their rates
     """
 
@@ -284,7 +284,7 @@ class GazeCommand(NamedTuple):
 
 
 class HeadGeometry(Protocol):
-    """The kinematics that the oculomotor models need (gazerig.robot.model.kinematics)."""
+    """Kinematics that the oculomotor models need (gazerig.robot.model.kinematics)."""
 
     def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
         """Return R_world_head and p_world_head_m for angles of the neck and a lower neck."""

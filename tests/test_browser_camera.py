@@ -135,7 +135,7 @@ def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None
     assert "60 deg wide" in lent.camera.events()[0]
     lent.now_s += SILENT_S + 0.1
     assert lent.number() == 1 and lent.placed == [True, False]
-    assert lent.camera.events() == ("the browser's camera has ended: the scene is there again",)
+    assert lent.camera.events() == ("the browser's camera has ended: the scene continues",)
     for _ in range(400):
         if lent.browsers.closed:
             break

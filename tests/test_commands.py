@@ -57,15 +57,15 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (None, "there is ask, look_at"),
-        ({"do": "dance"}, "there is ask, look_at"),
+        (None, "available: ask, look_at"),
+        ({"do": "dance"}, "available: ask, look_at"),
         ({"do": "ask", "menu": "lids"}, "takes menu, choice"),
         ({"do": "ask", "menu": "lids", "choice": "sleepy", "x": 1}, "takes menu, choice"),
         ({"do": "look_at", "p_world_m": [1e200, 0.0, 0.0]}, "none beyond .-1000 m"),
         ({"do": "look_at", "p_world_m": [0.0, 10**400, 0.0]}, "none beyond .-1000 m"),
         ({"do": "look_at", "p_world_m": None, "stay": 1}, "true or false"),
         ({"do": "jog", "angles_rad": [["neck_yaw", 7.0]]}, "within .-360 deg"),
-        ({"do": "jog", "angles_rad": [["neck_yaw", 0.0]] * 99}, "one a joint"),
+        ({"do": "jog", "angles_rad": [["neck_yaw", 0.0]] * 99}, "one per joint"),
         ({"do": "stop", "why": "x" * 999}, "at most 200"),
         ({"do": "renew", "who": 3}, "text"),
         ({"do": "resume", "confirmed": "yes"}, "true or false"),
@@ -232,9 +232,9 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
 
 
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
-    with pytest.raises(ValueError, match="there is behaviour, conversation, lids"):
+    with pytest.raises(ValueError, match="available: behaviour, conversation, lids"):
         running.order(Ask("mood", "x"))
-    with pytest.raises(ValueError, match="there is awake"):
+    with pytest.raises(ValueError, match="available: awake"):
         running.order(Ask("lids", "x"))
 
 
@@ -262,7 +262,7 @@ def replied(running: Running, order: Command, seconds: float = 0.006) -> str:
 def test_a_stop_holds_two_seconds_whoever_asks(running: Running) -> None:
     running.order(Stop("a hand", "browser 1"))
     running.go(0.5)
-    assert "holds at least 2 s: ask again in 1.5 s" in replied(running, Resume("browser 1", True))
+    assert "lasts at least 2 s: try again in 1.5 s" in replied(running, Resume("browser 1", True))
     running.go(1.6)
     assert replied(running, Resume("browser 1")) == "" and not running.made.robot.stopped
 
@@ -270,8 +270,10 @@ def test_a_stop_holds_two_seconds_whoever_asks(running: Running) -> None:
 def test_another_resumes_only_who_confirms(running: Running) -> None:
     running.order(Stop("a hand", "browser 1"))
     running.go(2.1)
-    assert "stopped by browser 1: another may only" in replied(running, Resume("browser 2"))
-    assert "stopped by browser 1: another may only" in replied(running, Resume())
+    assert "stopped by browser 1: another client must confirm" in replied(
+        running, Resume("browser 2")
+    )
+    assert "stopped by browser 1: another client must confirm" in replied(running, Resume())
     assert running.made.robot.stopped
     ticket = running.made.robot.command(Resume("browser 2", confirmed=True))
     tick = running.go(0.006)[0]
@@ -308,7 +310,7 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
     running.order(Stop("a hand"))
     assert running.go(0.006)[0].commands == (Stop("a hand"),)
     replies = [ticket.wait(0.0) for ticket in tickets]
-    assert all(reply is not None and "stopped since" in reply.refused for reply in replies)
+    assert all(reply is not None and "stopped meanwhile" in reply.refused for reply in replies)
     assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
 
 
@@ -323,7 +325,10 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None
     assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
     words = [event for tick in ticks for event in tick.events]
     assert "led by a show (process 7): jog neck_yaw 17.2" in words
-    assert "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze leads again" in words
+    assert (
+        "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze models are in control again"
+        in words
+    )
     gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     yaw = [tick.guard_result.command_rad[YAW] for tick in ticks]
     assert max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= gentle * 0.005 * 1.01
@@ -336,7 +341,7 @@ def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running)
         assert replied(running, Renew("a show")) == ""
     assert running.ticks[-1].controlled_by == "a show: look at 1.2 0.6 0.3"
     for _ in range(4):
-        assert "lead nothing" in replied(running, Renew("another"))
+        assert "no longer control" in replied(running, Renew("another"))
         running.go(0.4)
     assert running.ticks[-1].controlled_by == "" and running.ticks[-1].target.kind == "face"
 

@@ -37,7 +37,7 @@ def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     )
     shot = shown(tick)
     assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
-    assert shot.control_sentence == "nobody leads: it chooses by itself what to look at"
+    assert shot.control_sentence == "no client is in control: the head chooses its own targets"
 
 
 def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running: Running) -> None:

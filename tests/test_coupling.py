@@ -147,7 +147,7 @@ def test_servos_get_the_limits_that_the_whole_range_needs(kind: str) -> None:
         (replace(KINDS["differential"], first_ratio=5.0),
          "the servo of neck_pitch would be at -284 steps, outside its 0..4095"),
         (replace(KINDS["measured"], points=tuple(p for p in grid(RODS, 5) if p[0] > -30.0)),
-         "its points do not go so far"),
+         "its points do not extend that far"),
         (replace(PARALLEL, first="nek_pitch"), "no joint 'nek_pitch'; there is"),
     ],
 )  # fmt: skip
@@ -170,7 +170,7 @@ def test_a_coupling_that_cannot_be_is_refused() -> None:
     back = [(f, s, abs(f), s) for f in (-10.0, 0.0, 10.0) for s in (-10.0, 10.0)]
     with pytest.raises(ValueError, match="reverse next to 0, -10 deg"):
         CouplingParams("measured", "neck_pitch", "neck_roll", points=tuple(back))
-    with pytest.raises(ValueError, match="name two joints"):
+    with pytest.raises(ValueError, match="give two different joints"):
         CouplingParams("differential", "jaw", "jaw")
     with pytest.raises(Unreachable, match="too short"):
         RODS.servo_rad((0.0, 1.4))
@@ -297,7 +297,7 @@ def coupled_file(tmp_path: Path) -> str:
 def test_bring_up_of_a_coupled_neck(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = coupled_file(tmp_path)
-    assert "good: rig 'feetech'" in invoked("check", rig).err
+    assert "valid: rig 'feetech'" in invoked("check", rig).err
     jog = invoked("jog", rig, "neck_roll", "6", "--mock")
     assert jog.code == 0 and "neck_roll: desired 6.0, measured" in jog.out + jog.err
     refused = invoked("calibrate", "joints", rig, "--joint", "neck_roll", "--mock", "--dry-run")

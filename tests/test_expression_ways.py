@@ -19,7 +19,7 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
 
 def test_an_expression_from_the_command_line(rig: TickedRig) -> None:
     assert "neutral, happy, sad, surprised" in gazerig("ctl", "express")
-    assert "happy is in force, strength 0.5" in gazerig(
+    assert "happy is active, strength 0.5" in gazerig(
         "ctl", "express", "happy", "--strength", "0.5"
     )
     assert rig.tick(200)["jaw"] == pytest.approx(3.0)
@@ -33,8 +33,8 @@ def test_a_level_from_the_command_line_is_kept_up_and_let_go(
     monkeypatch.setattr(animation, "RealClock", SimulatedClock)
     assert gazerig("ctl", "level", "mouth", "0.7", "--seconds", "0.25") == ""
     assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
-    assert "'loud' is no level: give a number 0..1" in gazerig("ctl", "level", "mouth", "loud")
-    assert "no level 'ear'; there is mouth" in gazerig("ctl", "level", "ear", "1")
+    assert "'loud' is not a level: give a number 0..1" in gazerig("ctl", "level", "mouth", "loud")
+    assert "no level 'ear'; available: mouth" in gazerig("ctl", "level", "ear", "1")
 
 
 def test_levels_come_from_standard_input(rig: TickedRig) -> None:

@@ -107,9 +107,9 @@ def test_a_lid_keeps_shutting_in_a_sad_face() -> None:
 
 
 def test_what_no_table_holds_is_refused_with_what_there_is(made: Assembly) -> None:
-    with pytest.raises(ValueError, match="no expression 'glad'; there is neutral, happy, sad"):
+    with pytest.raises(ValueError, match="no expression 'glad'; available: neutral, happy, sad"):
         made.robot.command(Express("glad"))
-    with pytest.raises(ValueError, match="no level 'ear'; there is mouth"):
+    with pytest.raises(ValueError, match="no level 'ear'; available: mouth"):
         made.robot.command(SetLevel("ear", 0.5))
 
 
@@ -135,7 +135,7 @@ def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Assembly) ->
     assert desired_deg(made, after[int(HOLD_S / DT) - 5])["jaw"] == pytest.approx(7.0)
     assert desired_deg(made, after[-1])["jaw"] == 0.0
     said = [event for tick in after for event in tick.events if "level" in event]
-    assert said == ["level mouth: not set any more, so it falls to 0"]
+    assert said == ["level mouth: not set any more, so it returns to 0"]
 
 
 def test_a_level_adds_to_an_expression(made: Assembly) -> None:
@@ -186,10 +186,10 @@ def test_a_rig_with_a_face_keeps_all_rules() -> None:
 @pytest.mark.parametrize(
     ("face", "blend_s", "said"),
     [
-        ({"left_eye_pan": 5.0}, 0.5, "gaze alone turns the eyes"),
+        ({"left_eye_pan": 5.0}, 0.5, "only gaze turns the eyes"),
         ({"javv": 5.0}, 0.5, "no joint 'javv'; there is"),
         ({"jaw": 26.0}, 0.5, "26 deg is outside the joint's range -2..25"),
-        ({"left_upper_lid": -60.0}, 0.5, "more than the lid's whole way of 45 deg"),
+        ({"left_upper_lid": -60.0}, 0.5, "more than the lid's whole range of 45 deg"),
         ({"neck_roll": 20.0}, 0.1, "375 deg/s, its limit is max_speed_deg_s 200; expression_blend_s"),
         ({"neck_roll": 5.0}, 0.1, "2887 deg/s2, its limit is max_accel_deg_s2 2000"),
     ],
@@ -205,7 +205,7 @@ def test_an_expression_that_no_joint_can_do_is_refused(
 @pytest.mark.parametrize(
     ("level", "said"),
     [
-        (LevelParams("left_eye_tilt", 0.0, 5.0), "mouth.joint: gaze alone turns the eyes"),
+        (LevelParams("left_eye_tilt", 0.0, 5.0), "mouth.joint: only gaze turns the eyes"),
         (LevelParams("jaw", 0.0, 40.0), "mouth.high_deg: 40 deg is outside"),
         (LevelParams("jaw", 0.0, 20.0, 20.0), "mouth.smoothing_ms: jaw would move 20 deg"),
     ],

@@ -77,7 +77,7 @@ def test_it_is_exported_and_reported(
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("check", "expressive"), 0, "good: rig 'expressive', 9 joints"),
+        (("check", "expressive"), 0, "valid: rig 'expressive', 9 joints"),
         (("scan", "expressive", "--mock", "--kind", "feetech"), 0, "9 servos on"),
         (("setup", "expressive", "--mock", "--joint", "jaw", "--yes"), 0, "jaw (servo 7): id 1 -> 7"),
         (("monitor", "expressive", "--mock", "--seconds", "0.3"), 0, "right_brow"),

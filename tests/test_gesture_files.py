@@ -48,13 +48,13 @@ BAD = {
     "": ":1: no column of times",
     "when,neck_yaw\n0,1\n": ":1: no column of times",
     "frame,neck_yaw\n0,1\n": "give --fps",
-    "time,neck_yaw\n0,1\n0.5\n": ":3: has 1 columns, and the first row names 2",
-    "time,neck_yaw\n0,1\n0.5,left\n": ":3: neck_yaw: 'left' is no number",
-    "time,neck_yaw\n0,1\n0.5,nan\n": ":3: neck_yaw: 'nan' is no number",
+    "time,neck_yaw\n0,1\n0.5\n": ":3: has 1 columns, but the first row has 2",
+    "time,neck_yaw\n0,1\n0.5,left\n": ":3: neck_yaw: 'left' is not a number",
+    "time,neck_yaw\n0,1\n0.5,nan\n": ":3: neck_yaw: 'nan' is not a number",
     "time,neck_yaw\n0,1\n0.5,2\n0.4,3\n": ":4: neck_yaw: 0.4 s is not after 0.5 s",
     "time,neck_yaw\n-1,1\n": ":2: time -1 is before 0",
     "time,neck_yaw\n": "no rows",
-    "time,tail\n0,1\n1,5\n": "no joint 'tail'; there is left_eye_pan",
+    "time,tail\n0,1\n1,5\n": "no joint 'tail'; available: left_eye_pan",
     "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
     "time,neck_yaw\n0,1\n99,5\n": "a gesture takes at most 60 s",
 }
@@ -71,7 +71,7 @@ def test_all_bad_rows_are_named_at_once(tmp_path: Path) -> None:
     rows = "\n".join(f"{t},x" for t in range(15))
     with pytest.raises(SetupError) as caught:
         read_table(table(tmp_path, f"time,neck_yaw\n{rows}\n"), None)
-    assert str(caught.value).count("is no number") == 10 and "and 5 more" in str(caught.value)
+    assert str(caught.value).count("is not a number") == 10 and "and 5 more" in str(caught.value)
 
 
 def test_the_command_imports_a_table_for_a_rig(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def test_gestures_from_the_command_line(rig: TickedRig) -> None:
     assert "gestures end within" in gazerig("ctl", "play", "none")
     listed = gazerig("ctl", "play", "--list")
     assert "brow_shrug    who knows: the brows go up (1.2 s)" in listed and "nod " in listed
-    assert "no gesture 'wink'; there is brow_shrug" in gazerig("ctl", "play", "wink")
+    assert "no gesture 'wink'; available: brow_shrug" in gazerig("ctl", "play", "wink")
 
 
 def test_the_reply_says_what_is_really_done(rig: TickedRig) -> None:

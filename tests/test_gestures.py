@@ -150,7 +150,7 @@ def nod(**more: object) -> Gesture:
 def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
     fast = (KeyFrame(0.05, head_pitch_deg=-10.0),)
     with pytest.raises(
-        GestureRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, and gestures may use 1600"
+        GestureRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, but gestures may use 1600"
     ):
         fitted(Gesture("a jerk", fast))  # fmt: skip
     slow = fitted(Gesture("a jerk", fast, fit="slow"))
@@ -204,7 +204,7 @@ def test_in_joint_space_the_eyes_go_along_with_the_head() -> None:
 
 
 BAD = {
-    "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names nothing that moves"),
+    "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names no motion"),
     "frames:\n  - {time_s: 0.2, head_pich_deg: 3}\n": ("frames.0.head_pich_deg", "head_pitch_deg"),
     "frames:\n  - {time_s: 0.2, head_pitch_deg: 300}\n": ("frames.0.head_pitch_deg", "90"),
     "frames:\n  - {time_s: 0.2, lids: {top: 0.5}}\n": ("frames.0", "no lids 'top'"),
@@ -212,7 +212,7 @@ BAD = {
     "frames: []\n": ("", "at least one frame"),
     "frames:\n  - {time_s: 0.5, head_yaw_deg: 1}\n  - {time_s: 0.5, head_yaw_deg: 2}\n": (
         "frames.1.time_s",
-        "later than the frame before",
+        "later than the previous frame",
     ),
     "loop_s: [0.1, 0.5]\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("loop_s", "no frame"),
     "frames:\n  - {time_s: 0.5, joints_deg: {neck_yaw: 1}}\n": (

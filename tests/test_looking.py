@@ -57,8 +57,8 @@ def test_looks_cross_processes_as_json(command: Command) -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"do": "look_at", "p_world_m": None, "for_s": 0}, "for_s is above 0"),
-        ({"do": "look_at", "p_world_m": None, "for_s": nan}, "for_s is above 0"),
+        ({"do": "look_at", "p_world_m": None, "for_s": 0}, "for_s must be above 0"),
+        ({"do": "look_at", "p_world_m": None, "for_s": nan}, "for_s must be above 0"),
         ({"do": "look_at_in_head", "p_head_m": None}, "three finite numbers"),
         ({"do": "look_at_in_head", "p_head_m": [nan, 0, 0]}, "three finite numbers"),
         ({"do": "look_at_direction", "direction_rad": [4.0, 0.0]}, "within .-180 deg"),
@@ -119,7 +119,7 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Running) -> Non
 
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Running) -> None:
-    assert rig.do(LookAtPerson(99))[0].refused.startswith("no person 99 is seen now; there is ")
+    assert rig.do(LookAtPerson(99))[0].refused.startswith("person 99 is not visible; visible: ")
     percept = rig.go(0.006)[-1].percept
     assert percept is not None
     rig.do(LookAtPerson(percept.faces[0].id, stay=True))
@@ -166,7 +166,10 @@ def test_a_lead_ends_after_its_time_and_says_so(rig: Running) -> None:
         and not ticks[-1].client_control.active
     )
     words = [event for tick in ticks for event in tick.events]
-    assert "a show: look at 1 0.5 0.3: its time is over, so the gaze leads again" in words
+    assert (
+        "a show: look at 1 0.5 0.3: its time is over, so the gaze models are in control again"
+        in words
+    )
 
 
 def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:

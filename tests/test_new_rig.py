@@ -100,7 +100,7 @@ def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
     assert rig.bus.kind == "maestro" and "left_eye_pan" not in rig.joints
     assert rig.geometry.interocular_mm == 70 and rig.camera.horizontal_field_deg == 69
     said = capfd.readouterr()
-    assert "'9' is none of them" in said.err and "'far' is no length" in said.err
+    assert "'9' is not a choice" in said.err and "'far' is not a length" in said.err
     steps = [line.split("  ")[1] for line in said.out.splitlines()[1:6]]
     assert steps == [
         "gazerig run a.yaml --mock",
@@ -124,10 +124,10 @@ def test_an_end_of_answers_names_the_option(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("a.yaml", "--board", "arduino"), "--board arduino: there is dynamixel, feetech"),
+        (("a.yaml", "--board", "arduino"), "--board arduino: expected dynamixel, feetech"),
         (("a.txt",), "a.txt: a rig's file ends in .yaml: gazerig new a.yaml"),
         (("a.yaml", "--joints", "eyes_pan"), "nothing turns the eyes in tilt"),
-        (("a.yaml", "--joints", "eyes_pan,eyes_tilt,Jaw"), "no name of a joint"),
+        (("a.yaml", "--joints", "eyes_pan,eyes_tilt,Jaw"), "not a valid joint name"),
         (("there.yaml",), "there.yaml already exists"),
     ],
 )

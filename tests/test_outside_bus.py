@@ -76,7 +76,7 @@ def test_its_section_is_checked(example, tmp_path):
         (
             "model: lx-16a",
             "model: sts3215",
-            "a sts3215 speaks feetech, and its bus is of kind lx16a",
+            "a sts3215 needs a bus of kind feetech, its bus is of kind lx16a",
         ),
     ):
         file = tmp_path / "head.yaml"

@@ -90,7 +90,7 @@ def test_the_order_is_that_of_the_file() -> None:
         ({"loop.rate_hz": "fast"}, "loop.rate_hz: 'fast' is text, wanted a number, 20 to 1000 Hz"),
         ({"loop.rate_hz": float("nan")}, "is not a finite number"),
         ({"joints.neck_yaw.max_deg": -80.0}, "min_deg -70.0 must be below max_deg -80.0"),
-        ({"joints.neck_yaw.id": 1}, "id 1 is already that of left_eye_pan"),
+        ({"joints.neck_yaw.id": 1}, "id 1 is already used by left_eye_pan"),
         ({"park_deg.neck_pitch": -50.0}, "-50.0 is outside the joint's range -35.0..35.0"),
         ({"joints.left_upper_lid.min_deg": -5.0}, "lid_joints.left_shut_deg"),
         ({"gaze.top_down.rules.wait": None}, "behaviour 'wait' has no rule"),

@@ -117,7 +117,7 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "place", "rule"),
     [
-        (r"^    id: 9 ", "    id: 1 ", "joints.neck_roll.id", "id 1 is already that of"),
+        (r"^    id: 9 ", "    id: 1 ", "joints.neck_roll.id", "id 1 is already used by"),
         (r"model: xc330-m288", "model: xc330", "joints.neck_yaw.model", "unknown servo model"),
         (r"^  neck_roll:", "  neck_rol:", "joints", "neck_roll"),
         (r"left_shut_deg: -25.0", "left_shut_deg: -80.0", "lid_joints.left_shut_deg", "outside"),
@@ -130,7 +130,12 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
         (r"^    zero_step: 2048", "    zero_step: 20", "joints.left_eye_pan", "0..4095"),
         (r"max_salience: 1.0", "max_salience: 0.1", "gaze.head", "above min_salience"),
         (r"^lid_joints:(.*\n  .*)*", "", "lid_joints.left_shut_deg", "left_upper_lid needs it"),
-        (r"^  left_open_deg.*\n", "", "lid_joints", "left upper lid one end is missing; give both"),
+        (
+            r"^  left_open_deg.*\n",
+            "",
+            "lid_joints",
+            "one end of the left upper lid is missing; give both",
+        ),
     ],
 )
 def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path) -> None:
@@ -186,16 +191,24 @@ def test_joints_stand_in_their_order_whatever_bus_they_are_on(mixed: Rig) -> Non
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("bus: neck", "bus: nack", "joints.neck_yaw.bus: no bus 'nack' under buses; there is neck"),
-        ("model: sts3215", "model: xl330-m077", "speaks dynamixel, and its bus is of kind feetech"),
-        ("/dev/ttyUSB0", "/dev/ttyACM0", "buses.neck.port: /dev/ttyACM0 is already that of bus"),
+        (
+            "bus: neck",
+            "bus: nack",
+            "joints.neck_yaw.bus: no bus 'nack' under buses; available: neck",
+        ),
+        (
+            "model: sts3215",
+            "model: xl330-m077",
+            "needs a bus of kind dynamixel, its bus is of kind feetech",
+        ),
+        ("/dev/ttyUSB0", "/dev/ttyACM0", "buses.neck.port: /dev/ttyACM0 is already used by bus"),
         ("id: 5", "id: 12", "joints.right_lower_lid.id: the board has channels 0 to 11"),
-        (", bus: tilt", "", "joints.neck_pitch.model: a sts3215 speaks feetech"),
-        ("id: 4\n", "id: 3\n", "joints.left_lower_lid.id: id 3 is already that of right_upper_lid"),
+        (", bus: tilt", "", "joints.neck_pitch.model: a sts3215 needs a bus of kind feetech"),
+        ("id: 4\n", "id: 3\n", "joints.left_lower_lid.id: id 3 is already used by right_upper_lid"),
         (
             "left_lower_shut_deg: -8.0",
             "left_lower_shut_deg: null",
-            "of the left lower lid one end is missing",
+            "one end of the left lower lid is missing",
         ),
         ("eyes_tilt:", "left_eye_tilt:", "nothing turns an eye in tilt"),
         ("kind: maestro", "kind: maestra", "bus.kind"),
@@ -215,7 +228,7 @@ def test_an_eye_has_one_master(tmp_path: Path) -> None:
         "\nlid_joints:", own[0].replace("eyes_pan", "left_eye_pan").join(("\n", "\nlid_joints:"))
     )
     said = faults(tmp_path, text.replace("id: 0", "id: 9", 1))
-    assert "joints.eyes_pan: turns both eyes, which left_eye_pan would do as well" in said
+    assert "joints.eyes_pan: turns both eyes, which left_eye_pan does too" in said
 
 
 def test_a_lid_needs_its_ends(tmp_path: Path) -> None:

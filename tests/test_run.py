@@ -116,7 +116,7 @@ def test_a_recorded_run_is_run_again_to_the_same_bytes(
     again = ran("replay", str(file), "--rerun")
     assert again.returncode == 0, again.stderr
     words = re.sub(r"\s+", " ", again.stdout + again.stderr)
-    assert "ticks are the same to the bit; the bytes on the bus are the same" in words
+    assert "ticks are bit-identical; the bytes on the bus are the same" in words
     capfd.readouterr()
     assert typed("run", "--mock", "--fast", "--seconds", "1", "--record", str(file)) == 2
     assert "already exists" in capfd.readouterr().err

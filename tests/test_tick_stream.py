@@ -88,7 +88,7 @@ def test_who_fails_is_left_out_and_the_others_go_on(recorded: Recorded) -> None:
     stream.add_sink("test", sink.take)
     for tick in recorded.ticks[:5]:
         stream.update(tick)
-    assert said == ["the page failed (RuntimeError: no room); the rig runs on without"]
+    assert said == ["the page failed (RuntimeError: no room); the rig continues without it"]
     assert len(sink.batches) == 5
 
 
@@ -104,7 +104,7 @@ def test_numbers_keep_their_bits_and_their_type() -> None:
     values = [0, 0.0, -0.0, 1, 1.0, True, None, "1", 5e-324, 2**63, -(2**63)]
     assert repr(decode_plain(encode(values))) == repr(values)
     assert repr(decode_plain(encode([np.float64(0.1), np.arange(2.0)]))) == "[0.1, [0.0, 1.0]]"
-    with pytest.raises(TypeError, match="object is no part of a tick"):
+    with pytest.raises(TypeError, match="object is not part of a tick"):
         encode([object()])
 
 

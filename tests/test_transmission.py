@@ -70,10 +70,10 @@ def test_a_straight_gear_is_what_it_was() -> None:
 @pytest.mark.parametrize(
     ("angles", "steps", "words"),
     [
-        ([0.0], [1.0], "two places or more"),
-        ([0.0, 0.0], [1.0, 2.0], "angles of a linkage must rise; place 2"),
-        ([0.0, 0.1, 0.2], [1.0, 2.0, 1.5], "all rise or all fall; place 3"),
-        ([0.0, 0.1], [1.0, 1.0], "all rise or all fall"),
+        ([0.0], [1.0], "at least two points"),
+        ([0.0, 0.0], [1.0, 2.0], "angles of a linkage must increase; point 2"),
+        ([0.0, 0.1, 0.2], [1.0, 2.0, 1.5], "all increase or all decrease; point 3"),
+        ([0.0, 0.1], [1.0, 1.0], "all increase or all decrease"),
     ],
 )
 def test_places_that_cannot_be_are_refused(

@@ -114,7 +114,7 @@ def test_what_is_no_new_file_is_no_copy_and_starts_no_process(tmp_path: Path) ->
         folder: "is a directory; name a new .yaml file in it",
         full: "is a device; name a new .yaml file",
         Path("/dev/full"): "is a device; name a new .yaml file",
-        tmp_path / "mine.txt": "ends in .yaml; name it so",
+        tmp_path / "mine.txt": "ends in .yaml; rename it",
     }.items():
         with pytest.raises(ConfigError, match=f"{path}: .*{what}"):
             bench.tuning.save(path)
@@ -198,7 +198,7 @@ def _differing(bench: Bench) -> list[str]:
 def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path) -> None:
     bench = Bench("desk")
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
-    with pytest.raises(ConfigError, match="comes with the program"):
+    with pytest.raises(ConfigError, match="is part of the program"):
         bench.tuning.save()
     with pytest.raises(ConfigError, match=r"ends in \.yaml"):
         bench.tuning.save(tmp_path / "my")

@@ -270,7 +270,7 @@ def test_a_say_that_blocks_is_an_event_that_comes_again(
             return [one for one in events if "say of the program has not returned" in one]
 
         wait_for(lambda: len(told()) > 1)
-        assert "lines wait" in told()[0] and "say of the program" in overdue_text()
+        assert "lines are waiting" in told()[0] and "say of the program" in overdue_text()
 
 
 def test_a_camera_that_does_not_open_is_no_start(
@@ -373,7 +373,7 @@ def test_a_call_that_catches_everything_is_met_again_and_told(
         lines += report.due_lines()
     gate.set()
     wait_for(lambda: not OVERDUE_SOURCES)
-    assert lines and lines[0].startswith("a rule was given up 0 s ago and does not end")
+    assert lines and lines[0].startswith("a rule was abandoned 0 s ago and has not ended")
     assert len(lines) < 20 and report.due_lines() == () and overdue_text() == ""
 
 

@@ -1,4 +1,4 @@
-"""Whole machines under faults while they move: rig, buses, guard and true servos.
+"""Complete machines under faults during motion: rig, buses, guard and true servos.
 
 Everything runs in this process in simulated time, including the time of bytes on the wire.
 Every tick checks the true positions of the servos.
@@ -110,11 +110,11 @@ class RuleViolation(AssertionError):
 class Machine:
     """A rig's joints on emulated buses, which the guard moves to and fro.
 
-    said: the messages; longest_s: the longest read; heard: joints that answered under torque in the
-        last tick
+    said: the messages; longest_s: the longest read; heard: joints that have answered under torque
+        in the last tick
     own_speed: servos may catch up at their own speed
     volts: their supply voltage, to which faults of the supply return
-    room_rad: how far servos may be out of their range, rad
+    room_rad: largest distance of servos outside their range, rad
     """
 
     volts = 5.0

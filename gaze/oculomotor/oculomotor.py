@@ -1,8 +1,8 @@
 """Oculomotor control: converts a target to head, eye and lid angles, tick by tick.
 
 Gaze is planned in space and the eyes take the remainder: E = gaze - head. So every motion of the
-head during or after a gaze shift, planned or pushed, is compensated exactly (the vestibulo-ocular
-reflex), and vergence follows from each eye's own geometry.
+head during or after a gaze shift, planned or caused by a push, is compensated exactly (the
+vestibulo-ocular reflex), and vergence follows from each eye's own geometry.
 """
 
 from math import radians
@@ -51,7 +51,7 @@ _Seen = tuple[Vec3, Vec3, Vec3, Vec3, bool]
 """The target at this tick: its point and velocity, the goal point of the head, the vector from
 midway between the eyes to the first, and whether that goal point moves with it."""
 _SWING_RAD = radians(12.0)
-"""The head stays in the middle of smaller swings, and pursues larger ones."""
+"""The head stays at the centre of smaller swings, and pursues larger ones."""
 
 
 class ReachableGaze(NamedTuple):
@@ -76,8 +76,8 @@ class Oculomotor:
 
     Args:
         params: thresholds and times.
-        geometry: of head and eyes.
-        eye_limits: for left and right eye, ((yaw low, high), (pitch low, high)), rad.
+        geometry: geometry of head and eyes.
+        eye_limits: limits of left and right eye, ((yaw low, high), (pitch low, high)), rad.
         saccade: the model of saccades.
         pursuit: the model of pursuit.
         head: the model of head movements.
@@ -158,7 +158,7 @@ class Oculomotor:
 
         state: head and eyes as measured now
         dt_s: time since the last step
-        offset: of gestures and expressions
+        offset: offset by gestures and expressions
         """
         if not self._started:
             self.reset(t_s, state)
@@ -243,7 +243,7 @@ class Oculomotor:
     def _record_shift(self, target: Target, aside_rad: float, off_rad: float, t_s: float) -> None:
         """Record a new target; the lids draw the blink that comes with its saccade, or its bend.
 
-        aside_rad, off_rad: angles of the target off the head's facing direction, and off the gaze
+        aside_rad, off_rad: angles of the target from the head's facing direction, and from the gaze
         """
         gaze = self._gaze
         waits = gaze.is_saccade_due

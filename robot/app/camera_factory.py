@@ -64,10 +64,10 @@ def camera_poses(
     """Return the placement of a run's camera.
 
     Args:
-        kinematics: of the head.
-        camera: the present parameters of the camera.
-        options: define the pose by which detections are placed.
-        real: another process reads the camera, and needs its rotation.
+        kinematics: Kinematics of the head.
+        camera: Present parameters of the camera.
+        options: Define the head pose used to locate detections.
+        real: Whether another process reads the camera and needs its rotation.
     """
     mount = CameraMount(camera)
     turns = PoseBuffer() if real and mount.on_head else None
@@ -102,9 +102,9 @@ def run_camera(
 
 
 def true_head_pose(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
-    """Return the pose of the emulated head: from the servos themselves if they are in this process.
+    """Return the pose of the emulated head, from the true servos if they are in this process.
 
-    Its mechanics are those of the rig at the start, whatever parameters change later.
+    Its mechanics are those of the rig at the start, even if parameters change later.
     """
     if true_steps is None:
         return poses.head_pose
@@ -146,7 +146,7 @@ def scene_camera(
     """Return a camera on a simulated scene, which renders frames or returns ideal detections.
 
     clock, turns: the host's clock, and the history of the camera's rotation, for a scene that is
-        drawn in real time, in a process of its own
+        drawn in real time, in a separate process
     """
     field_deg = rig.camera.horizontal_field_deg
     if not options.pixels:
@@ -155,7 +155,7 @@ def scene_camera(
     if clock is not None and not options.fast:
         motion = partial(motion_finder, rig.motion, rig.camera.lens, radians(field_deg), turns)
         return drawn_camera(rig, scene, mount, where, rng, clock, own, motion, locate)
-    # Imported here: drawing and detection, with OpenCV.
+    # Imported here because drawing and detection need OpenCV.
     from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
@@ -178,13 +178,13 @@ def drawn_camera(
     """Return a camera on a drawn scene in real time.
 
     Args:
-        rig: its field of view, and the recovery of a lost camera.
-        scene: in front of it.
-        mount: its placement on the head.
-        where: rotation and position of the head in the world at a time.
-        rng: for the noise.
-        clock: the host's.
-        own: a program's own detector, if it has one.
+        rig: Defines its field of view, and the recovery of a lost camera.
+        scene: Scene in front of it.
+        mount: Placement on the head.
+        where: Rotation and position of the head in the world at a time.
+        rng: Random numbers of the noise.
+        clock: The host's clock.
+        own: Detector of a program, if any.
         motion: creates the motion detector.
         locate: locates detections in the camera's axes.
     """
@@ -296,7 +296,7 @@ def program_camera(
     """Return the program's own camera, checked and supervised like another package's.
 
     Raises:
-        SetupError: it is no camera, or gives frames in simulated time.
+        SetupError: it is not a camera, or it returns frames in simulated time.
     """
     camera = parts.camera
     label = part_label("camera", camera)
@@ -304,7 +304,9 @@ def program_camera(
         require_method(camera, "camera", "latest")
         return GuardedCamera(cast(Camera, camera), label, None if fast else LONGEST_CAMERA_S)
     if fast:
-        raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
+        raise SetupError(
+            f"{label} returns frames in real time: in simulated time return detections"
+        )
     source = CheckedSource(cast(FrameSource, camera), label)
     turned = UprightSource(source, frame_orientation(rig.camera))
     return GuardedCamera(supervise_source(rig, parts, turned, clock, motion, locate), label)
@@ -385,9 +387,7 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
                 done = _retune_simulated_camera(camera, after, detector, motion, locate)
     except SetupError as error:
         return f"the detector is unchanged: {error}"
-    return (
-        "" if done else "the camera's process is busy and keeps its parameters: set them once more"
-    )
+    return "" if done else "the camera's process is busy and keeps its parameters: set them again"
 
 
 def _retune_simulated_camera(

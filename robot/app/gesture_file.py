@@ -51,18 +51,18 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
 
     Args:
         rig: the rig whose joints it moves.
-        series: times in seconds and angles in degrees, by joint of the rig; a gesture is their
-            motion relative to their first angle.
+        series: times in seconds and angles in degrees, by joint of the rig; the gesture is the
+            motion relative to the first angle.
         description: meaning of the gesture.
 
     Raises:
-        SetupError: a joint is not the rig's, the gesture is too long, or nothing moves.
+        SetupError: a joint does not exist in the rig, the gesture is too long, or nothing moves.
     """
     tracks = {_track_of_joint(name) for name in rig.names}
     unknown = [name for name in series if _track_of_joint(name) not in tracks]
     if unknown:
         raise SetupError(
-            f"no joint {unknown[0]!r}; there is {', '.join(rig.names)}; rename the column"
+            f"no joint {unknown[0]!r}; available: {', '.join(rig.names)}; rename the column"
         )
     start_s = min(float(times[0]) for times, _ in series.values())
     end_s = max(float(times[-1]) for times, _ in series.values())
@@ -95,7 +95,7 @@ def write_gesture(
         The file, and the gesture fitted to the rig.
 
     Raises:
-        SetupError: the file cannot be written, or the rig cannot perform it.
+        SetupError: the file cannot be written, or the rig cannot play it.
         gazerig.config.load.ConfigError: the name or the gesture breaks a rule.
     """
     path = folder / f"{name}.yaml"
@@ -104,14 +104,14 @@ def write_gesture(
     try:
         return path, fit_to_rig(rig, load_gesture(path))
     except GestureRefused as refused:
-        raise SetupError(f"{path} is written, but {rig.name} cannot do it: {refused}") from None
+        raise SetupError(f"{path} is written, but {rig.name} cannot play it: {refused}") from None
 
 
 def fit_to_rig(rig: Rig, gesture: Gesture) -> FittedGesture:
     """Return a gesture fitted to a rig, from the middle of its ranges.
 
     Raises:
-        gazerig.robot.model.gesture_fit.GestureRefused: the rig cannot perform it.
+        gazerig.robot.model.gesture_fit.GestureRefused: the rig cannot play it.
     """
     bounds = limits(rig.joints)
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
@@ -193,7 +193,7 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
     """Return the keys of every joint of a CSV file.
 
     Args:
-        path: of the file.
+        path: Path of the file.
         fps: frames per second, for a column of frame numbers.
 
     Raises:
@@ -211,8 +211,8 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
     time = next((i for i, name in enumerate(head) if name in _TIMES), None)
     if time is None:
         raise SetupError(
-            f"{path}:1: no column of times: the first row names the columns; one of "
-            f"{', '.join(_TIMES)} must be there"
+            f"{path}:1: no column of times: the first row must name the columns, one of them "
+            f"{', '.join(_TIMES)}"
         )
     if head[time] == "frame" and fps is None:
         raise SetupError(f"{path}:1: times are frame numbers: give --fps, e.g. 24 or 30")
@@ -223,7 +223,7 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
         shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
         raise SetupError("\n".join(shown))
     if not found:
-        raise SetupError(f"{path}: no rows under the names of the columns")
+        raise SetupError(f"{path}: no rows below the column names")
     return found
 
 
@@ -254,10 +254,10 @@ class _Table:
         }
 
     def _row_keys(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
-        """Yield the keys of one row; an empty cell of a wide table is no key."""
+        """Yield the keys of one row; an empty cell of a wide table is not a key."""
         if len(row) != len(self._head):
             self._add_error(
-                line, f"has {len(row)} columns, and the first row names {len(self._head)}"
+                line, f"has {len(row)} columns, but the first row has {len(self._head)}"
             )
             return
         time = self._read_number(line, self._head[self._time], row[self._time])
@@ -284,7 +284,7 @@ class _Table:
             value = float("nan")
         if isfinite(value):
             return value
-        self._add_error(line, f"{what}: {cell.strip()!r:.40} is no number")
+        self._add_error(line, f"{what}: {cell.strip()!r:.40} is not a number")
         return None
 
     def _add_error(self, line: int, text: str) -> None:

@@ -1,11 +1,11 @@
 """Store of a running rig's parameters: present values, changes and files.
 
-There are three rigs: the one of its files (with the options of the command line), the
-present one, and the one of defaults. A person's changes override the files until they are
-saved, for every character and every later edit of the files.
+There are three rigs: that of the files (with the options of the command line), the present one, and
+that of the defaults. A user's changes override the files until they are saved, also after a change
+of the character or of the files.
 
-All methods may be called from any thread. Changes reach the running parts as one command, checked
-as a whole before.
+All methods may be called from any thread. Changes are checked together, and then reach the running
+parts as one command.
 """
 
 import contextlib
@@ -54,9 +54,9 @@ class _RigState(NamedTuple):
     """State at one moment, replaced as a whole.
 
     saved: rig of the files, with the options; rig: the present one
-    name: of the rig as given, a shipped name or a path
-    files: in use, with their contents at the last valid read
-    file_values, values: of ``saved`` and of ``rig``, by key
+    name: the given name or path of the rig
+    files: present files, with their contents at the last valid read
+    file_values, values: values of ``saved`` and of ``rig``, by key
     """
 
     saved: Rig
@@ -81,12 +81,12 @@ class ParamStore:
         rig: name or path of the rig.
         character: name or path of the character.
         profile: name or path of the profile.
-        now: the time in the name of a backup.
+        now: Returns the time for the name of a backup.
         elsewhere: calls a function that reads or writes rig files in another process, so that
             the control loop is not delayed.
 
     Raises:
-        gazerig.config.load.ConfigError: the files have changed since, and are invalid now.
+        gazerig.config.load.ConfigError: the files have changed meanwhile and are now invalid.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class ParamStore:
         self._options = differences(read, whole)
         self._state = _RigState(whole, whole, rig, character, files, found, found, 0)
         self._described = described(whole, self._defaults)
-        # A shipped rig's own folder is the package's, which contains no file of a user.
+        # The folder of a shipped rig belongs to the package and contains no user files.
         at_home = rig in shipped_names("rigs")
         self.confined = AllowedFolder(Path.cwd() if at_home else self.path.parent)
 
@@ -140,7 +140,7 @@ class ParamStore:
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters in the order of the file."""
         state, made = self._state, self._described
-        # Everything except the set of entries stays.
+        # Everything stays except the set of entries.
         if [param.key for param in made] != list(state.values):
             made = self._described = described(state.rig, self._defaults)
         return made
@@ -153,7 +153,7 @@ class ParamStore:
         """Return the present values whose keys have a prefix.
 
         Raises:
-            gazerig.config.load.ConfigError: there is none; the message lists similar keys.
+            gazerig.config.load.ConfigError: no key matches; the message lists similar keys.
         """
         state = self._state
         found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
@@ -165,7 +165,7 @@ class ParamStore:
         Returns a line for each changed value.
 
         Raises:
-            gazerig.config.load.ConfigError: with every fault; nothing changes.
+            gazerig.config.load.ConfigError: lists every fault; nothing changes.
         """
         with self._changing:
             return self._apply(self._state, apply_changes(self._state.rig, changes))
@@ -187,7 +187,7 @@ class ParamStore:
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write the present values into the rig's file, or into a copy of it at a new path.
 
-        From then on the copy is this rig's file. A file that was broken by hand meanwhile is
+        From then on the copy is this rig's file. A file that a user has made invalid meanwhile is
         kept as a backup.
 
         Raises:
@@ -199,7 +199,7 @@ class ParamStore:
             if copied:
                 refuse_copy(str(path))  # checked before another process is started
             if self._state.files.has_changed():
-                # A valid edit that is not applied yet counts; one with faults does not.
+                # A valid edit that is not applied yet is included; an invalid one is not.
                 with contextlib.suppress(ConfigError):
                     self._reload()
             state = self._state
@@ -241,7 +241,7 @@ class ParamStore:
     def apply_character(self, name: str) -> tuple[str, ...]:
         """Apply another character to the rig; unsaved values override both.
 
-        name: of a shipped one, a path, or "none"
+        name: name of a shipped character, a path, or "none"
 
         Raises:
             gazerig.config.load.ConfigError: the character is unknown, or does not fit the rig.
@@ -259,7 +259,7 @@ class ParamStore:
         path: the edited file
 
         Raises:
-            gazerig.config.load.ConfigError: with every fault; nothing changes.
+            gazerig.config.load.ConfigError: lists every fault; nothing changes.
         """
         with self._changing:
             return self._reload()
@@ -281,7 +281,7 @@ class ParamStore:
         return RigLayers(state.name, state.character, self._profile)
 
     def _read(self, state: _RigState) -> _RigState:
-        """Read the files, with the options over them; the present rig stays."""
+        """Read the files and apply the options; the present rig does not change."""
         rig, files = self._elsewhere(read_all, self._layers(state))
         saved = apply_changes(rig, self._options)
         return state._replace(saved=saved, file_values=values(saved), files=files)
@@ -303,12 +303,12 @@ class ParamStore:
 
 
 def _defaults(rig: Rig) -> Rig:
-    """Return the shipped rig of the same name, else the base of all rigs."""
+    """Return the shipped rig of the same name, otherwise the base of all rigs."""
     return load_rig(rig.name if rig.name in shipped_names("rigs") else _DEFAULTS)
 
 
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
-    """Return each value that differs, as YAML; was: the former values."""
+    """Return each value that differs, as YAML; was: former values."""
     found = flatten_changes(after, differences(before, after))
     return tuple(
         ParamChange(key, _text(was[key]) if key in was else None, _text(value))

@@ -1,4 +1,4 @@
-"""A program's own camera, detector and rule of attention, in place of the rig's."""
+"""A program's own camera, detector and attention rule, which replace those of the rig."""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 """Observers and remote controls of a run, outside the control loop.
 
-The page, the status line, other programs, the rig's files and the recording: each is optional,
-has its own thread or process, and receives a tick with hardly any delay.
+The page, the status line, other programs, the rig's files and the recording: each is optional, has
+its own thread or process, and receives each tick with hardly any delay.
 """
 
 import contextlib
@@ -47,10 +47,10 @@ STEER = "steer"
 
 
 class SteeringButtons(NamedTuple):
-    """Buttons of the page that steer a calibration, in place of all other controls of the robot.
+    """Buttons of the page that steer a calibration, instead of all other controls of the robot.
 
-    keys: their labels; press: handles one, in a thread of the page's, and returns a message
-        about it; shown: returns the progress, in words
+    keys: their labels; press: handles a button in a thread of the page and returns a message about
+        it; shown: returns the progress as text
     """
 
     keys: tuple[str, ...]
@@ -65,13 +65,13 @@ class RunObservers:
 
     Args:
         assembly: the robot and its surroundings.
-        options: address of the page, and whether time is simulated, without any user.
+        options: Define the page's address, and whether time is simulated (without a user).
         say: prints a line.
-        status: rewrites the status line; None: there is none.
+        status: Rewrites the status line; None for none.
         tuning: the parameters; None if they cannot be changed from outside.
         recorder: records the run.
         browse: opens the page in the user's browser.
-        steer: buttons that steer the head; the page can then otherwise only stop and resume.
+        steer: Buttons that steer the head; the page can then only stop and resume besides.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class RunObservers:
         )
         address = options.page_address
         self._page = self._make_page(address, options.page_token) if address is not None else None
-        # Simulated time runs faster than a page or a line can show.
+        # Simulated time is faster than a page or a line can show.
         live = not options.fast
         self._publisher = None
         if live and self._page:
@@ -188,7 +188,7 @@ class RunObservers:
             character = self._tuning.character_name if self._tuning is not None else ""
             in_force = menus["behaviour"][0], menus["conversation"][0], character
         self._states += 1
-        if self._states % _STATES_PER_FIGURES == 1:  # they take half a millisecond
+        if self._states % _STATES_PER_FIGURES == 1:  # computing them takes half a millisecond
             self._figures = self._timing.figures()
         return RunState(
             errors, *in_force, robot.perception.residual(), start_s,
@@ -205,7 +205,7 @@ class RunObservers:
             self._world_recorded = True
 
     def attach(self, observers: Observers) -> None:
-        """Let all of them observe the ticks; each that fails is left out."""
+        """Add all of them as observers of the ticks; any that fails is dropped."""
         if self._recorder is not None:
             if self._made.room is not None:
                 observers.add("recording the surroundings", self._record_world)
@@ -231,7 +231,7 @@ class RunObservers:
 
     def show_parking(self, tick: Tick) -> None:
         """Show a tick of the motion to the parking pose, which is not recorded."""
-        with contextlib.suppress(Exception):  # nothing may keep the head from parking
+        with contextlib.suppress(Exception):  # nothing may prevent the head from parking
             if self._status is not None:
                 self._status.update(tick)
             if self._live is not None:
@@ -239,7 +239,7 @@ class RunObservers:
             self._parking.update(tick)
 
     def wrap_stop(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
-        """Return the loop's ``stop`` as the recording needs it."""
+        """Return the loop's ``stop`` adapted for the recording."""
         return self._recorder.wrap_stop(stop) if self._recorder is not None else stop
 
     def open_files(self) -> None:
@@ -252,12 +252,12 @@ class RunObservers:
             self._recorder.open()
 
     def open(self) -> None:
-        """Open the remote controls, once the robot has started; those that fail are left out."""
+        """Open the remote controls, once the robot has started; any that fails is dropped."""
         with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._recorder.begin()
         with self._report_errors("the remote control"):
-            # Before the page, which relays to it.
+            # Opened before the page, which relays to it.
             if self._live is not None:
                 self._live.open()
         with self._report_errors("the page"):
@@ -268,7 +268,7 @@ class RunObservers:
 
     @contextlib.contextmanager
     def _report_errors(self, name: str) -> Iterator[None]:
-        """Report what the block raises, and continue."""
+        """Report errors of the block, and continue."""
         try:
             yield
         except Exception as error:
@@ -311,13 +311,13 @@ class RunObservers:
             self._publisher.depth = on
 
     def _record_time(self, tick: Tick) -> None:
-        """Record the time of a tick; a tuned loop has slots of its own."""
+        """Record the time of a tick; a tuned loop has its own slots."""
         if tick.commands and any(isinstance(command, Tune) for command in tick.commands):
             self._timing.retune(self._made.loop.rate_hz)
         self._timing.update(tick.t_s)
 
     def _follow(self, tick: Tick) -> None:
-        """Store the percept that places a click, and show the rig after tuning."""
+        """Store the percept for the placement of a click, and show the rig again after tuning."""
         self._picking.newest = tick
         if self._publisher is None:
             return
@@ -329,7 +329,7 @@ class RunObservers:
 
 
 def stop_only_handler(command: CommandTaker) -> CommandTaker:
-    """Return a taker of stop and resume only; other commands raise ValueError."""
+    """Return a handler that accepts only stop and resume; other commands raise ValueError."""
 
     def take(asked: Command) -> Ticket | None:
         if not isinstance(asked, Stop | Resume):

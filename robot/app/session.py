@@ -43,7 +43,7 @@ class SceneScore(NamedTuple):
     def from_scene(
         cls, scene: Scene, start_s: Callable[[], float | None] = lambda: None
     ) -> "SceneScore":
-        """Return the score of a scene before its first tick; start_s: its start, None before."""
+        """Return the score of a scene before its first tick; start_s: its start, or None."""
         events = scene.events()
         moved = scene.opponent if isinstance(scene, BoxingScene) else None
         return cls(
@@ -93,7 +93,7 @@ def run_figures(
 
 
 SECONDS = "seconds"
-"""Reason of a run that ended after its time."""
+"""Reason of a run that ended after its duration."""
 
 
 class ComposedRun(NamedTuple):
@@ -114,9 +114,9 @@ def compose(
     """Assemble one run; nothing moves.
 
     Args:
-        options: what to run.
-        substitutes: parts of a program's own; a recorder wraps the body.
-        room: open surroundings with other robots in them; None: it is alone.
+        options: Options of the run.
+        substitutes: Parts of a program; a recorder wraps the body.
+        room: Open surroundings that contain other robots; None for a single robot.
 
     Raises:
         gazerig.config.load.ConfigError: the rig, character, profile or walk is invalid.
@@ -154,17 +154,17 @@ def run(
     """Run until the time is over, a signal arrives or a part fails; return the figures.
 
     Args:
-        composed: what to run.
+        composed: The composed run.
         stopped: returns the name of an arrived signal, None before.
         say: writes a line.
-        status: rewrites the status line; None: there is none.
-        watch: gets every tick.
-        browse: opens the page in the user's browser; None: leaves that to the user.
-        ends: gets the reason as soon as it ends, before the head parks.
+        status: Rewrites the status line; None for none.
+        watch: Receives every tick.
+        browse: Opens the page in the user's browser; None: the user does.
+        ends: Receives the reason of the end, before the head parks.
         summarised: also summarise every tick, for figures of the gaze and of a scene's events.
 
     Raises:
-        SetupError: before anything moved.
+        SetupError: the run cannot start; nothing has moved.
     """
     try:
         session = Session(composed, stopped, say, status, watch, browse, summarised)
@@ -174,9 +174,9 @@ def run(
 
 
 class Session:
-    """One run, with its observers; arguments as of ``run``.
+    """One run, with its observers; arguments as in ``run``.
 
-    stopped_by: reason of its end; a fault unless ``power_on``'s block sets another
+    stopped_by: reason of its end; a fault unless the block of ``power_on`` sets another one
     """
 
     def __init__(
@@ -192,7 +192,7 @@ class Session:
         options, assembly = composed.options, composed.assembly
         self._options, self._made, self._stopped = options, assembly, stopped
 
-        def tried(line: str) -> None:  # a failed message ends nothing
+        def tried(line: str) -> None:  # a failed message must not end the run
             with contextlib.suppress(Exception):
                 say(line)
 
@@ -248,14 +248,14 @@ class Session:
                 self._made.robot.report(line)
 
     def _stop_reason(self, seconds: float) -> str | None:
-        """Return the reason why the run ends now, None while it continues."""
+        """Return the reason for ending the run now, None while it continues."""
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
         return self._stopped() or self._interrupts() or (SECONDS if over else None)
 
     def run(self, ends: Callable[[str], object] | None = None) -> dict[str, object]:
         """Run from torque on to torque off; return the figures.
 
-        ends: gets the reason of its end, before the head parks
+        ends: receives the reason of its end, before the head parks
         """
         wall = RealClock()
         began_s = wall.now_s()
@@ -279,10 +279,10 @@ class Session:
 
     @contextlib.contextmanager
     def power_on(self) -> Iterator[TickLoop]:
-        """Switch on, let the block step the loop, shut down like every exit.
+        """Switch the torque on, run the block, which steps the loop, and shut down.
 
         Raises:
-            SetupError: before anything moved.
+            SetupError: the run cannot start; nothing has moved.
         """
         assembly, run_observers, say = self._made, self._run_observers, self._say
         run_observers.open_files()
@@ -303,7 +303,7 @@ class Session:
                 begun = True
                 self._start_s = assembly.clock.now_s()
                 events, options = self._made.robot.body.bus.events(), self._options
-                if options.mock and not options.verbose:  # without registers of emulated servos
+                if options.mock and not options.verbose:  # omit registers of emulated servos
                     events = tuple([event for event in events if not is_register_change(event)])
                 for note in (*assembly.notes, *group_events(events)):
                     say(note)
@@ -328,14 +328,14 @@ class Session:
         if face_gaze is None or (out := options.heatmap) is None:
             return None
         if not face_gaze.points_face_m:
-            self._say(f"no heat map in {out}: no face was looked at")
+            self._say(f"no heat map in {out}: the gaze was never on a face")
             return None
-        from gazerig.robot.analysis.heatmap import write_heatmap  # with a face detector
+        from gazerig.robot.analysis.heatmap import write_heatmap  # imports a face detector
 
         points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
         try:
             write_heatmap(points, seconds, out, options.heatmap_face, options.force)
-        except SetupError as error:  # the figures of the run are still available
+        except SetupError as error:  # the figures of the run are printed nevertheless
             self._say(str(error))
             return out
         self._say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
@@ -343,9 +343,9 @@ class Session:
 
 
 def _longest_s(assembly: Assembly, options: RunOptions) -> float | None:
-    """Return the duration of the run, s: as given, or a scene's round in simulated time."""
+    """Return the duration of the run, s: the given one, or in simulated time that of a round."""
     if options.seconds is None and options.fast and assembly.scene is not None:
-        return assembly.scene.round_s + 1.0  # and the end of the round
+        return assembly.scene.round_s + 1.0  # includes the end of the round
     return options.seconds
 
 
@@ -355,7 +355,7 @@ def shut_down(
     say: Callable[[str], None],
     interrupts: Interrupts | None = None,
 ) -> None:
-    """Park, switch torque off, close, and report the results: the only end, by power_down.py."""
+    """Park, switch the torque off, close, and report the results; every end uses it."""
     leaving = prepare_shutdown(
         assembly, say, interrupts if interrupts is not None else Interrupts()
     )
@@ -369,7 +369,7 @@ def prepare_shutdown(
     interrupts: Interrupts,
     watch: Callable[[Tick], object] | None = None,
 ) -> PowerDown:
-    """Return the shutdown of a run of this robot; watch: gets a tick at every step of parking."""
+    """Return the shutdown of a run of this robot; watch: receives every tick of parking."""
     return PowerDown(
         lambda again: park_unless_stopped(assembly, again, watch),
         assembly.robot.stop,

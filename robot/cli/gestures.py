@@ -1,4 +1,4 @@
-"""The command import-gesture, and how a command writes a gesture."""
+"""Command import-gesture, and the output of commands that write a gesture."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-FolderOption = Annotated[Path, typer.Option("--folder", help="Where the gesture's file goes.")]
+FolderOption = Annotated[Path, typer.Option("--folder", help="Folder for the gesture's file.")]
 
 
 @app.command("import-gesture", cls=RigCommand)
@@ -24,7 +24,8 @@ def import_gesture(
     table: Annotated[Path, typer.Argument(metavar="CSV", help="Key frames: time, joint, angle.")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the gesture.")],
     fps: Annotated[
-        float | None, typer.Option(min=1.0, max=1000.0, help="Frames a second, for frame numbers.")
+        float | None,
+        typer.Option(min=1.0, max=1000.0, help="Frames per second, for frame numbers."),
     ] = None,
     folder: FolderOption = Path("."),
     force: ForceOption = False,
@@ -39,7 +40,7 @@ def import_gesture(
 
 
 def print_gesture_fit(rig_name: str, path: Path, fitted: "FittedGesture") -> None:
-    """Print how a rig performs a gesture that was written, and how to use it."""
+    """Print how a rig plays a written gesture, and how to use it."""
     slower = (
         f", slower by {fitted.slowed_by:.2f} for {fitted.slow_joint}" if fitted.slow_joint else ""
     )

@@ -1,4 +1,4 @@
-"""Commands that move, stop and resume a rig that runs in another terminal."""
+"""Commands that move, stop and resume a rig in another terminal."""
 
 import contextlib
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from gazerig.robot.remote.client import RobotClient, connect_to_all
 app = typer.Typer()
 _LEADS_EVERY_S = 0.2
 _NEGATIVE = {"ignore_unknown_options": True}
-"""Click settings: -3 is a number, no option."""
+"""Click settings: -3 is a number, not an option."""
 
 PidOption = Annotated[
     str | None,
@@ -32,7 +32,7 @@ PidOption = Annotated[
         "--rig",
         "--pid",
         metavar="NAME|N",
-        help="The rig of this name or process, if several run.",
+        help="Name or process id of the rig, if several run.",
     ),
 ]
 
@@ -48,16 +48,19 @@ def look(
         ),
     ],
     head: Annotated[
-        bool, typer.Option("--head", help="X Y Z or YAW PITCH are from the head as it is now.")
+        bool,
+        typer.Option("--head", help="X Y Z or YAW PITCH are relative to the present head pose."),
     ] = False,
     distance: Annotated[
-        float | None, typer.Option(metavar="M", help="Of a pixel or direction, metres away.")
+        float | None, typer.Option(metavar="M", help="Distance of a pixel or direction, metres.")
     ] = None,
     stay: Annotated[
-        bool, typer.Option("--stay", help="Return at once; it looks there until: look free.")
+        bool,
+        typer.Option("--stay", help="Return immediately; the head looks there until: look free."),
     ] = False,
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Look there for S seconds; else until Ctrl-C.")
+        float | None,
+        typer.Option(min=0.0, help="Look there for S seconds; otherwise until Ctrl-C."),
     ] = None,
     pid: PidOption = None,
 ) -> None:
@@ -86,12 +89,12 @@ def look(
                 return
             now = rig.status()
             stopped = f"it was stopped: {now['stopped']}" if now["stopped"] else "it looks freely"
-            say(f"controlled_by by {now['controlled_by']}" if now["controlled_by"] else stopped)
+            say(f"controlled by {now['controlled_by']}" if now["controlled_by"] else stopped)
 
 
 @app.command()
 def stop(
-    why: Annotated[str, typer.Argument(help="Reason, for the log.")] = "gazerig stop",
+    why: Annotated[str, typer.Argument(help="Reason for the log.")] = "gazerig stop",
     pid: PidOption = None,
 ) -> None:
     """Switch the torque of every running rig off at once; nothing parks, the programs continue."""
@@ -108,7 +111,7 @@ def stop(
                 failed = True
                 say(f"{rig.pid}: NOT KNOWN TO HAVE STOPPED, press the emergency stop: {error}")
             else:
-                say(f"{rig.pid}: torque is off; gazerig ctl resume goes on")
+                say(f"{rig.pid}: torque is off; gazerig ctl resume continues")
     if failed:
         raise typer.Exit(FAULT)
 
@@ -116,7 +119,7 @@ def stop(
 @app.command()
 def resume(
     yes: Annotated[
-        bool, typer.Option("--confirm", "--yes", help="No hand is in the mechanism, do not ask.")
+        bool, typer.Option("--confirm", "--yes", help="Do not ask: no hand is in the mechanism.")
     ] = False,
     pid: PidOption = None,
 ) -> None:
@@ -128,21 +131,24 @@ def resume(
             return
         if not yes:
             say(f"stopped: {now['stopped']}")
-            typer.confirm("The torque goes on and the head moves. Is no hand in it?", abort=True)
+            typer.confirm(
+                "Torque will be switched on and the head will move. Is no hand in the mechanism?",
+                abort=True,
+            )
         rig.resume(confirmed=True)
-        say("torque is on; it goes on slowly")
+        say("torque is on; it continues slowly")
 
 
 def read_look(words: Sequence[str], head: bool = False, distance_m: float | None = None) -> Look:
-    """Read the target to look at.
+    """Return the gaze target of the arguments.
 
     Args:
         words: X Y Z in metres, "person" N, "pixel" X Y, "direction" YAW PITCH in degrees, "free".
-        head: a point or direction is from the head as it is now.
-        distance_m: of a pixel or direction.
+        head: Whether a point or direction is relative to the present head pose.
+        distance_m: Distance of a pixel or direction.
 
     Raises:
-        SetupError: it is none of these.
+        SetupError: the words are not a target.
     """
     kind, numbers = (words[0], words[1:]) if words[0] in _NUMBERS else ("point", words)
     try:
@@ -169,4 +175,4 @@ def read_look(words: Sequence[str], head: bool = False, distance_m: float | None
 
 
 _NUMBERS = {"point": 3, "person": 1, "pixel": 2, "direction": 2, "free": 0}
-"""What can be looked at, and how many numbers say it."""
+"""Kinds of targets, and the number of their numbers."""

@@ -1,4 +1,4 @@
-"""The commands ``gazerig replay`` and ``gazerig export``: what is done with a recorded run."""
+"""Commands replay and export, for recorded runs."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -47,21 +47,22 @@ def replay(
         str | None,
         typer.Argument(
             metavar="RIG",
-            help="With --rerun: another rig than the recorded one.",
+            help="With --rerun: a rig instead of the recorded one.",
             autocompletion=complete_rig,
         ),
     ] = None,
-    page: Annotated[str, typer.Option(help="Where the page is served.")] = "127.0.0.1:8080",
-    play: Annotated[bool, typer.Option(help="Start to play at once.")] = False,
+    page: Annotated[str, typer.Option(help="HOST:PORT of the page.")] = "127.0.0.1:8080",
+    play: Annotated[bool, typer.Option(help="Start playing immediately.")] = False,
     rerun: Annotated[
-        bool, typer.Option(help="Run the recorded input through the present models; no page.")
+        bool,
+        typer.Option(help="Run the recorded input through the present models, without a page."),
     ] = False,
     character: Annotated[str | None, typer.Option(help="With --rerun: another character.")] = None,
     joints: Annotated[
         str | None, typer.Option(help="With --rerun: recorded or emulated joints.")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="End after S seconds; else at Ctrl-C.")
+        float | None, typer.Option(min=0.0, help="Stop after S seconds; otherwise at Ctrl-C.")
     ] = None,
 ) -> None:
     """Show a recorded run on the page, with a time slider; or run it again with --rerun."""
@@ -70,7 +71,7 @@ def replay(
             well = _rerun(file, rig, character, joints)
         elif rig is not None or character is not None or joints is not None:
             raise SetupError(
-                "another RIG, --character and --joints need --rerun: a replay shows what was"
+                "another RIG, --character and --joints need --rerun; replays show the recorded run"
             )
         else:
             with record_signals() as stopped:
@@ -88,7 +89,7 @@ def export(
     bids: Annotated[bool, typer.Option("--bids", help="A BIDS data set (version 1.11.1).")] = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="For --csv the beginning of the names, for --bids the folder."),
+        typer.Option(help="For --csv the start of the file names, for --bids the folder."),
     ] = None,
     subject: Annotated[
         str | None, typer.Option(help="BIDS: name of the participant (default: the rig's).")
@@ -192,7 +193,7 @@ def _show(
             replaying.send_introduction_again()
         if url is not None and url != urls[-1]:
             urls.append(url)
-            say(f"{frames.duration_s:.1f} s of {file} on {url}: Ctrl-C ends")
+            say(f"{frames.duration_s:.1f} s of {file} on {url}: Ctrl-C stops")
         past = seconds is not None and clock.now_s() - began_s >= seconds
         return page.gone or past or stopped() is not None
 
@@ -208,7 +209,7 @@ def _show(
 
 
 def _recorded_world(recording: "RunRecording") -> "WorldShapes | None":
-    """Return the recorded run's world; None without one, or if it is lost, with a message."""
+    """Return the world of the recorded run; None without one, or with a message if it is lost."""
     if recording.world is None:
         return None
     from gazerig.robot.app.surroundings import surroundings
@@ -222,7 +223,7 @@ def _recorded_world(recording: "RunRecording") -> "WorldShapes | None":
 
 
 def _recorded_rig(config_yaml: str) -> "ShownRig | None":
-    """Return the recorded rig's build; None, with the reason, if it is unknown."""
+    """Return the shapes of the recorded rig; None, with the reason, if they are unknown."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.rig import Rig
     from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
@@ -253,9 +254,9 @@ def _recorded_rig(config_yaml: str) -> "ShownRig | None":
 
 
 def _rerun(file: Path, rig: str | None, character: str | None, joints: str | None) -> bool:
-    """Run a recording again and print the result; return False if it should be the same and is not.
+    """Run a recording again and print the result; return False if it differs unexpectedly.
 
-    Only joints as recorded can come out the same; nothing else was then to change.
+    Results must be identical only if joints are replayed and nothing else has changed.
     """
     from gazerig.robot.app.resimulate import rerun
     from gazerig.robot.recording.read import RunRecording, report_bad_contents
@@ -284,19 +285,23 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
 
 def agreement_text(result: "Resimulation") -> str:
-    """Return a text: result far a rerun agrees with the recorded run."""
-    text = f"{result.agreeing_ticks} of {result.ticks} ticks are the same to the bit"
+    """Return how far a rerun agrees with the recorded run, as text."""
+    text = f"{result.agreeing_ticks} of {result.ticks} ticks are bit-identical"
     if result.first_difference_s is not None:
-        text += f"; the first other one at {result.first_difference_s:.3f} s: {result.difference}"
+        text += (
+            f"; the first difference is at {result.first_difference_s:.3f} s: {result.difference}"
+        )
     if result.sent_bytes_same is not None:
-        text += f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'others'}"
+        text += (
+            f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'different'}"
+        )
     return f"joints {result.joints}: {text}"
 
 
 def compare_figures(
     was: Mapping[str, object], now: Mapping[str, object], within: str = ""
 ) -> Iterator[tuple[str, str, str]]:
-    """Return the figures of two runs side by side: name and both in words."""
+    """Return the figures of two runs side by side: name and both values as text."""
     for name in dict.fromkeys((*was, *now)):
         one, other = was.get(name), now.get(name)
         if isinstance(one, Mapping) or isinstance(other, Mapping):
@@ -320,7 +325,7 @@ def _value_text(value: object) -> str:
 
 
 def _with_progress(ticks: Iterable["Tick"], read: Callable[[float], None]) -> Iterator["Tick"]:
-    """Pass ticks on and show the progress."""
+    """Yield ticks and show the progress."""
     start_s = None
     for number, tick in enumerate(ticks):
         start_s = tick.t_s if start_s is None else start_s
@@ -331,7 +336,7 @@ def _with_progress(ticks: Iterable["Tick"], read: Callable[[float], None]) -> It
 
 @contextmanager
 def _progress(text: str, total_s: float) -> Iterator[Callable[[float], None]]:
-    """Draw a bar on a terminal; nothing elsewhere."""
+    """Draw a progress bar on a terminal; elsewhere nothing."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task(text, total=total_s)

@@ -72,8 +72,8 @@ def run(
     force: options.Force = False,
     summary: options.Summary = None,
 ) -> None:
-    """Run the head: gazerig run --mock, then open the page it names."""
-    asked = RunOptions(**locals())  # what a person can ask for is a field of the same name
+    """Run the head: gazerig run --mock, then open the page at the printed address."""
+    asked = RunOptions(**locals())  # every option is a field of the same name
     asked = replace(asked, camera=parse_camera(camera))
     with clear_errors(rig, port, mock):
         if port is not None and not mock:
@@ -86,7 +86,7 @@ def run(
         shows = status if not fast and sys.stderr.isatty() else None
         if shows is not None:
             shows("loading: a few seconds ...")
-        # Vision and emulator are heavy; `check` and `--help` do without them.
+        # Vision and emulator are large; `check` and `--help` do not import them.
         from gazerig.robot.app import session
 
         browse = open_page if not no_browser and is_desktop_here() else None
@@ -96,7 +96,7 @@ def run(
             if asked.world is not None:
                 from gazerig.robot.app.surroundings import surroundings
 
-                group = surroundings(asked.world).group(asked)  # None: it has one head
+                group = surroundings(asked.world).group(asked)  # None: a single head
             if group is not None:
                 carry_out = group.run
             else:
@@ -115,17 +115,17 @@ def run(
 
 
 class StartLine:
-    """Says in its first line what runs: before any other, and not for a run that is refused.
+    """Message output with a first line that describes the run, unless the run is refused.
 
     Args:
-        line: describes the run; "" prints nothing.
+        line: Description of the run; "" prints nothing.
     """
 
     def __init__(self, line: str) -> None:
         self._line = line
 
     def say(self, line: str) -> None:
-        """Print a line, after the first."""
+        """Print a line, after the first one."""
         self.update(None)
         say(line)
 
@@ -137,17 +137,17 @@ class StartLine:
 
 
 def start_text(asked: RunOptions) -> str:
-    """Return what is started, and how it is ended, in one line."""
+    """Return one line that describes the run and how to end it."""
     servos = "emulated servos" if asked.mock else "its servos"
     sight = f"it looks at {asked.camera_source or f'a simulated scene, {asked.scene}'}"
     if asked.world is not None:
         sight = f"it is in a world, {asked.world}"
-    text = f"{asked.rig}: {servos}; {sight}. Ctrl-C parks the head and ends."
+    text = f"{asked.rig}: {servos}; {sight}. Ctrl-C parks the head and ends the run."
     return text if asked.computer is None else f"{text}\n{level_text(asked.computer)}"
 
 
 def report_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
-    """Return whether a run had faults, and print the joints that they held."""
+    """Return whether a run had faults, and print the joints that were stopped by them."""
     alike: dict[tuple[str, int, float], list[str]] = {}
     for joint, reasons in figures["joint_faults"].items():
         for reason, count in reasons.items():

@@ -1,4 +1,4 @@
-"""The command ``gazerig ctl steer``: keys or a gamepad move a rig that runs in another terminal."""
+"""Command steer: keys or a gamepad move a rig in another terminal."""
 
 import contextlib
 import sys
@@ -22,10 +22,10 @@ _EVERY_S = 0.05
 _FAR_M = 1.5
 END = "end"
 HELP = {
-    "keyboard": "arrow keys: where it looks; 1 nod, 2 shake, 3 wink, 4 surprised, 5 sleepy; "
-    "space: STOP; q: end",
-    "gamepad": "stick: where it looks; A nod, B shake, X wink, Y surprised, left shoulder sleepy; "
-    "Start: STOP; Ctrl-C: end",
+    "keyboard": "arrow keys: gaze; 1 nod, 2 shake, 3 wink, 4 surprised, 5 sleepy; "
+    "space: STOP; q: quit",
+    "gamepad": "stick: gaze; A nod, B shake, X wink, Y surprised, left shoulder sleepy; "
+    "Start: STOP; Ctrl-C: quit",
 }
 
 
@@ -33,29 +33,29 @@ class SteeringInput(Protocol):
     """An input device for steering."""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Steer by what was moved, and return what was pressed: gestures, STOP, END."""
+        """Apply moved controls, and return the pressed ones: gestures, STOP, END."""
         ...
 
 
 @app.command()
 def steer(
     keyboard: Annotated[bool, typer.Option("--keyboard", help="Arrow keys (the default).")] = False,
-    gamepad: Annotated[bool, typer.Option("--gamepad", help="The first gamepad there is.")] = False,
+    gamepad: Annotated[bool, typer.Option("--gamepad", help="The first gamepad.")] = False,
     device: Annotated[
-        str | None, typer.Option(metavar="PATH", help="That gamepad: /dev/input/event7.")
+        str | None, typer.Option(metavar="PATH", help="A certain gamepad: /dev/input/event7.")
     ] = None,
     behind: Annotated[
-        bool, typer.Option("--behind", help="You stand behind the head: its right is yours.")
+        bool, typer.Option("--behind", help="You are behind the head: its right is your right.")
     ] = False,
     pid: PidOption = None,
 ) -> None:
-    """Steer the running head by arrow keys or a gamepad; released, it looks freely again."""
+    """Steer the running head by arrow keys or a gamepad; when released, it looks freely again."""
     with clear_errors():
         with_pad = gamepad or device is not None
         if keyboard and with_pad:
-            raise SetupError("--keyboard or --gamepad: one of them")
+            raise SetupError("use only one of --keyboard and --gamepad")
         if not with_pad and not sys.stdin.isatty():
-            raise SetupError("keys are read from a terminal: type this in one, or use --gamepad")
+            raise SetupError("keys are read from a terminal: run this in one, or use --gamepad")
         with contextlib.ExitStack() as stack:
             controls = stack.enter_context(_gamepad(device) if with_pad else _keyboard())
             rig = stack.enter_context(RobotClient.connect(pid, "gazerig ctl steer"))
@@ -74,22 +74,22 @@ def run_steering(
     clock: Clock,
     show: Callable[[str], None],
 ) -> None:
-    """Do what a person steers until they end it.
+    """Apply steering commands until the user ends it.
 
     Args:
-        rig: that runs.
-        controls: what they steer with.
-        steering: what that means.
-        clock: of this program.
-        show: writes the status line.
+        rig: The running rig.
+        controls: The input device.
+        steering: Converts its input to commands.
+        clock: Clock of this program.
+        show: Writes the status line.
     """
     looks: Angles2 | None = None
     while True:
         now_s = clock.now_s()
         pressed = controls.update(steering, now_s)
-        if STOP in pressed:  # before all else
+        if STOP in pressed:  # has priority
             rig.stop("gazerig ctl steer")
-            say("torque is off; gazerig ctl resume goes on")
+            say("torque is off; gazerig ctl resume continues")
         if END in pressed:
             return
         wanted = steering.direction_rad(now_s)
@@ -114,7 +114,7 @@ def run_steering(
 class KeyControls:
     """Keys of a terminal.
 
-    text: returns what was typed since the last call, "" for nothing; None: the terminal is gone
+    text: returns the text typed since the last call, "" for none, None if the terminal has closed
     """
 
     _ARROWS: ClassVar = {"up": (0, 1), "down": (0, -1), "right": (1, 0), "left": (-1, 0)}

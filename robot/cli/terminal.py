@@ -1,10 +1,10 @@
-"""The terminal: lines for people, one status line, clear errors, Ctrl-C as a request to stop.
+"""Terminal output: message lines, one status line, errors, and Ctrl-C as a request to stop.
 
-Lines for people are written by a thread: a pipe without a reader, a terminal stopped with Ctrl-S or
-a full disk delays no caller. Lines that cannot be written are dropped and counted.
+A thread writes the message lines, so that a pipe without a reader, a terminal stopped with Ctrl-S
+or a full disk delays no caller. Lines that cannot be written are dropped and counted.
 
-Commands that a message suggests get the rig and port of this one. A driver or the doctor that finds
-a fault does not know them; a cure that leaves them out would set up the default rig instead.
+Commands suggested in messages get the rig and port of the current command. A driver or the doctor
+that reports a fault does not have them; without them a suggested command would use the default rig.
 """
 
 import atexit
@@ -37,18 +37,18 @@ from gazerig.robot.control.interrupts import ENDING, Interrupts
 _OF_REPORTS = ("jinja2", "scipy")
 """Packages of the extra ``report`` that commands import as soon as they start."""
 _MOST = 500
-"""So many lines wait; more are dropped."""
+"""Lines that may wait; further lines are dropped."""
 _RETRY_S = 0.2
 _LOOK_S = 0.5
 UNREAD = "standard error, whose reader has closed it"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""A disk may have room again."""
+"""Errors that may end: a disk may have space again later."""
 
 
 class LineWriter:
     """Writes to a file descriptor, in the order of the calls.
 
-    dropped: lines that were not written
+    dropped: number of lines that were not written
     """
 
     def __init__(self, fd: int, most: int = _MOST) -> None:
@@ -63,16 +63,16 @@ class LineWriter:
         self.dropped = 0
 
     def line(self, text: str) -> None:
-        """Write this, line end included; returns at once."""
+        """Write a line, including its line end, without waiting."""
         if self._gone or self._call.waiting_calls() >= self._most:
             self.dropped += 1
             return
-        # The text on the status line is older than this.
+        # The text of the status line is older than this line.
         self._status = None
         self._call.begin(lambda: self._write(text))
 
     def status(self, text: str) -> None:
-        """Write this unless something newer comes first; returns at once."""
+        """Write a status line, unless a newer text replaces it first; does not wait."""
         if self._gone:
             return
         self._status = text
@@ -81,7 +81,7 @@ class LineWriter:
             self._call.begin(self._write_status)
 
     def lost_reader(self) -> str | None:
-        """Return that its reader is gone, None while it may be there."""
+        """Return a message if the reader has closed the pipe, otherwise None."""
         now_s = perf_counter()
         if self._unread is None and now_s - self._look_s > _LOOK_S:
             self._look_s = now_s
@@ -90,13 +90,13 @@ class LineWriter:
         return self._unread
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until everything is written, no longer than this; return whether it is."""
+        """Wait until everything is written, at most this long; return whether it is."""
         return self._gone or self._call.wait_idle(timeout_s)
 
     def _reader_gone(self) -> bool:
-        """Return whether a pipe has lost its reader, which else only the next line would find."""
+        """Return whether a pipe has lost its reader, which only the next write would detect."""
         try:
-            if not hasattr(select, "poll"):  # Windows: the next line finds it
+            if not hasattr(select, "poll"):  # Windows: the next write detects it
                 return False
             if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
                 return False
@@ -117,12 +117,11 @@ class LineWriter:
         while data and not self._gone:
             try:
                 data = data[os.write(self._fd, data) :]
-            except BlockingIOError:  # another process made it so
+            except BlockingIOError:  # another process has made it non-blocking
                 with contextlib.suppress(OSError, ValueError):
                     select.select([], [self._fd], [], _RETRY_S)
             except OSError as error:
-                # Without a reader, all that follow are lost. A terminal that is gone comes with
-                # SIGHUP, for those who want to know.
+                # Without a reader, all further lines are lost. SIGHUP reports a closed terminal.
                 self._gone = error.errno not in _FULL
                 if error.errno == errno.EPIPE:
                     self._unread = UNREAD
@@ -135,14 +134,16 @@ _SUGGESTED = re.compile(
     r"(?P<words>(?: --fix\b| --joint \w+| --kind \w+|(?<=reboot) \d+)*)"
 )
 _given: list[Mapping[str, object]] = [{}]
-"""Of the command in force, last; for all threads, as those that watch a run speak, too."""
+"""Parameters of the current command (last item). Shared by all threads, as monitor threads also
+write messages.
+"""
 
 
 @contextlib.contextmanager
 def suggest_for_rig(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
     """Make messages within the block suggest commands for this rig and port.
 
-    A block that names no rig speaks of the one around it.
+    A block without a rig uses the parameters of the enclosing block.
     """
     _given.append({"rig": rig, "port": port, "mock": mock} if rig is not None else _given[-1])
     try:
@@ -152,19 +153,18 @@ def suggest_for_rig(rig: str | None, port: str | None, mock: bool) -> Iterator[N
 
 
 def suggest_doctor(text: str) -> str:
-    """Return a fault of servos with the command that finds its cause, where none is named yet."""
+    """Return a servo fault with the command that finds its cause, unless one is suggested."""
     given = _given[-1]
     reaches = isinstance(given.get("rig"), str) and given.get("mock") is not True
     return f"{text}; gazerig doctor finds the cause" if reaches and "gazerig " not in text else text
 
 
 def complete_suggestions(text: str, given: Mapping[str, object] | None = None) -> str:
-    """Return a message in which every suggested command reaches what this command reached.
+    """Return a message whose suggested commands use the rig and port of the current command.
 
     Args:
         text: The message.
-        given: Parameters of the command that speaks: rig, port, mock; those of the present one
-            where None.
+        given: Parameters of the command: rig, port, mock; None: those of the current one.
     """
     if given is None:
         given = _given[-1]
@@ -174,7 +174,7 @@ def complete_suggestions(text: str, given: Mapping[str, object] | None = None) -
 
     def whole(found: re.Match[str]) -> str:
         if text[found.end() :].startswith((f" {shlex.quote(str(known['rig']))}", " --port ")):
-            return found[0]  # its message is complete
+            return found[0]  # it already has these arguments
         if found["command"] == "reboot" and not found["words"]:
             return found[0]  # a description, not a command
         port, mock = known.get("port"), known.get("mock") is True
@@ -188,18 +188,18 @@ def complete_suggestions(text: str, given: Mapping[str, object] | None = None) -
 
 
 BAD_INPUT = 2
-"""Exit code: something asked for or configured is wrong."""
+"""Exit code: an argument or the configuration is invalid."""
 FAULT = 1
 """Exit code: something failed while running."""
 INTERRUPTED = 130
-"""Exit code: Ctrl-C before there was anything to park."""
+"""Exit code: Ctrl-C before anything had to be parked."""
 
 DEBUG_LOGGER = "gazerig"
-"""At level DEBUG errors also show where they come from."""
+"""Logger; at level DEBUG errors are shown with their traceback."""
 
 _STDERR = 2
 _FLUSH_S = 1.0
-"""The last lines have so long to be written."""
+"""Longest time to write the last lines at exit."""
 _UNREAD = "standard output: its reader has closed it"
 _writer = LineWriter(_STDERR)
 atexit.register(_writer.flush, _FLUSH_S)
@@ -228,9 +228,9 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing f
 def clear_errors(
     rig: str | None = None, port: str | None = None, mock: bool = False
 ) -> Iterator[None]:
-    """Turn what a person can mend into its message and exit code 2.
+    """Convert errors that a user can correct to their message and exit code 2.
 
-    rig, port, mock: as the command was given them, for the commands that messages suggest
+    rig, port, mock: arguments of the command, for suggested commands
     """
     with suggest_for_rig(rig, port, mock), _report_errors():
         yield
@@ -269,12 +269,12 @@ def _show_origin() -> None:
 
 
 def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str) -> NoReturn:
-    """Run the command line and exit; whatever goes wrong is one line.
+    """Run the command line and exit; report every error in one line.
 
-    Ctrl-C is "interrupted" and exit code 130, a reader of standard output that has gone one
-    line and exit code 1.
+    Ctrl-C prints "interrupted" and has exit code 130. If the reader of standard output has closed
+    it, one line is printed and the exit code is 1.
 
-    again: what to do about an unexpected error
+    again: remedy for an unexpected error
     """
     threading.excepthook, before = _report_thread_error, threading.excepthook
     code: str | int | None = None
@@ -290,7 +290,7 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
         code = end.code
         if code == INTERRUPTED:
             say("interrupted")
-        elif isinstance(end.__context__, BrokenPipeError):  # typer exits without a word
+        elif isinstance(end.__context__, BrokenPipeError):  # typer exits without a message
             say(_UNREAD)
             _drop_stdout()
     except KeyboardInterrupt:
@@ -315,26 +315,26 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
 
 
 def _drop_stdout() -> None:
-    """Discard what is still to be printed: at exit it would fail once more."""
+    """Discard unprinted output, which would fail again at exit."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _report_thread_error(args: threading.ExceptHookArgs) -> None:
-    """Report in one line that a thread has ended by an error; the others go on."""
+    """Report in one line that an error has ended a thread; the other threads continue."""
     name = args.thread.name if args.thread is not None else "a thread"
     what = " ".join(str(args.exc_value).split())
-    say(f"{name} failed ({args.exc_type.__name__}: {what}); the rest runs on without")
+    say(f"{name} failed ({args.exc_type.__name__}: {what}); the program continues without it")
 
 
 def record_signals() -> Interrupts:
-    """Return a block in which Ctrl-C and other requests to end are only noted, by name."""
+    """Return a block that records Ctrl-C and other requests to end by name."""
     return Interrupts(also=_writer.lost_reader)
 
 
 @contextlib.contextmanager
 def exit_on_signals() -> Iterator[None]:
-    """Let a request to end that comes while a run is made end it as Ctrl-C does, files and all."""
+    """Exit on a request to end while a run is being prepared, with the same cleanup as Ctrl-C."""
 
     def end(number: int, frame: object) -> None:
         raise SystemExit(128 + number)
@@ -351,7 +351,7 @@ def exit_on_signals() -> Iterator[None]:
 
 
 def say(line: str) -> None:
-    """Write a line for people; the status line before it is wiped. Never waits, never raises."""
+    """Write a message line and clear the status line before it. Never waits, never raises."""
     _write(f"{complete_suggestions(line)}\n", wiped=True)
 
 
@@ -364,7 +364,7 @@ def status(line: str) -> None:
 def _write(text: str, wiped: bool = False, status: bool = False) -> None:
     """Write to standard error, in the writer's thread if that is a file, a pipe or a tty."""
     stderr = sys.stderr
-    if stderr is None:  # it was closed before this program began
+    if stderr is None:  # closed before this program started
         return
     try:
         if wiped and stderr.isatty():
@@ -372,7 +372,7 @@ def _write(text: str, wiped: bool = False, status: bool = False) -> None:
         if stderr.fileno() == _STDERR:
             (_writer.status if status else _writer.line)(text)
             return
-    except (OSError, ValueError):  # it is no file at all
+    except (OSError, ValueError):  # it is not a file
         pass
     with contextlib.suppress(OSError, ValueError):
         stderr.write(text)

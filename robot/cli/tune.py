@@ -1,4 +1,4 @@
-"""Commands that tune and steer a rig which runs in another terminal: get, set, save, stop ..."""
+"""Commands that tune and steer a rig in another terminal: get, set, save, stop ..."""
 
 import json
 import tempfile
@@ -43,19 +43,19 @@ app = typer.Typer()
 app.add_typer(ctl)
 app.command()(look_and_stop.stop)
 _OLD_S = 1.0
-"""A loop that has not ticked for so long does not do as it should."""
+"""A loop without a tick for this long is reported as delayed."""
 _LAST_SAID = 5
 _NEGATIVE = {"ignore_unknown_options": True}
-"""Click settings: -3 is a number, no option."""
+"""Click settings: -3 is a number, not an option."""
 
 
 def complete_key(incomplete: str) -> list[str]:
-    """Complete a key of the running rig, or of the shipped one where none runs."""
+    """Complete a key of the running rig, or of the shipped rig if none runs."""
     try:
         with RobotClient.connect() as rig:
             return list(rig.get(incomplete))
     except DriverError:
-        # Only here: the other commands leave all keys and rules to the rig that runs.
+        # Imported only here: the other commands leave keys and rules to the running rig.
         from gazerig.config.parameters import parameters
         from gazerig.config.schema import load_rig
 
@@ -64,7 +64,7 @@ def complete_key(incomplete: str) -> list[str]:
 
 
 def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete keys and, in between, the values that a key may have."""
+    """Complete keys, and values of the previous key."""
     given = context.params.get("pairs") or []
     if len(given) % 2 == 0:
         return complete_key(incomplete)
@@ -88,13 +88,13 @@ def complete_menu(incomplete: str) -> list[str]:
 
 
 def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete choices of the menu named before it."""
+    """Complete choices of the menu before it."""
     choices = _menus().get(context.params.get("menu") or "", ())
     return [choice for choice in choices if choice.startswith(incomplete)]
 
 
 def _menus() -> dict[str, tuple[str, ...]]:
-    """Return the running rig's menus, none where none runs: a shell shows no errors."""
+    """Return the menus of the running rig, none without one, as a shell shows no errors."""
     try:
         with RobotClient.connect() as rig:
             return rig.menus()
@@ -108,7 +108,7 @@ def rigs(
         bool, typer.Option("--json", help="Print a list of objects as JSON.")
     ] = False,
 ) -> None:
-    """List the rigs that run here: name, rig, process, address of the page with its token."""
+    """List the running rigs: name, rig, process, address of the page with its token."""
     with clear_errors():
         found = []
         for rig in connect_to_all():
@@ -130,16 +130,16 @@ def get(
     prefix: Annotated[
         str,
         typer.Argument(
-            metavar="KEY", help="A key, or how keys begin.", autocompletion=complete_key
+            metavar="KEY", help="A key, or the start of keys.", autocompletion=complete_key
         ),
     ] = "",
     differs: Annotated[
-        bool, typer.Option("--differs", help="Only what differs from the defaults.")
+        bool, typer.Option("--differs", help="Only values that differ from the defaults.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print key -> value as JSON.")] = False,
     pid: PidOption = None,
 ) -> None:
-    """Show the running rig's parameters: value, unit, default; * marks what is not saved."""
+    """Show the running rig's parameters: value, unit, default; * marks unsaved values."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         values = rig.get(prefix)
         found = [param for param in rig.parameters() if param.key in values]
@@ -147,7 +147,7 @@ def get(
             other = {change.key for change in rig.changed_from_defaults()}
             found = [param for param in found if param.key in other]
         if not found and not differs:
-            raise SetupError(f"{prefix}: no key begins so; gazerig ctl get lists all")
+            raise SetupError(f"{prefix}: no key begins with it; gazerig ctl get lists all")
         if as_json:
             print(json.dumps({param.key: values[param.key] for param in found}, indent=2))
             return
@@ -178,31 +178,31 @@ def put(
             unsaved = len(rig.unsaved())
         _print_notes(notes)
         if not notes:
-            say("all of that is in force already")
+            say("all of these values are already active")
         if unsaved:
             say(
-                f"not saved yet: {_count_text(unsaved)}; gazerig ctl save keeps, gazerig ctl revert takes back"
+                f"not saved yet: {_count_text(unsaved)}; gazerig ctl save saves, gazerig ctl revert undoes"
             )
 
 
 @ctl.command()
 def save(
     path: Annotated[
-        Path | None, typer.Argument(help="YAML file; default: the one the rig was started with.")
+        Path | None, typer.Argument(help="YAML file; default: the rig's own file.")
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Write what was set into the rig's YAML; comments stay, the old file is kept as a backup."""
+    """Write changed values into the rig's YAML; comments stay, the old file is kept as a backup."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         saved = rig.save(path)
     _print_notes(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
     if not saved.changes and saved.backup is not None:
-        say(f"{saved.path} had faults: what is in force is in it; as it was: {saved.backup}")
+        say(f"{saved.path} had faults: it now contains the present values; backup: {saved.backup}")
         return
     if not saved.changes:
-        say(f"{saved.path} says all of it already: nothing to save")
+        say(f"{saved.path} already contains all values: nothing to save")
         return
-    kept = f"; as it was: {saved.backup}" if saved.backup is not None else ""
+    kept = f"; backup: {saved.backup}" if saved.backup is not None else ""
     say(f"{saved.path}: {_count_text(len(saved.changes))} written{kept}")
 
 
@@ -212,20 +212,20 @@ def revert(pid: PidOption = None) -> None:
     with clear_errors(), RobotClient.connect(pid) as rig:
         notes = rig.revert()
     _print_notes(notes)
-    say(f"{_count_text(len(notes))} taken back")
+    say(f"{_count_text(len(notes))} undone")
 
 
 @ctl.command()
 def character(
     name: Annotated[
-        str, typer.Argument(help="One of the shipped ones.", autocompletion=complete_character)
+        str, typer.Argument(help="Name of a shipped character.", autocompletion=complete_character)
     ],
     pid: PidOption = None,
 ) -> None:
     """Apply another character to the running rig."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         _print_notes(rig.apply_character(name))
-        say(f"apply_character {name} is in force")
+        say(f"character {name} is active")
 
 
 @ctl.command()
@@ -244,11 +244,11 @@ def ask(
     with clear_errors(), RobotClient.connect(pid) as rig:
         if menu is not None and choice is not None:
             rig.ask(menu, choice)
-            say(f"{menu} {choice} is in force")
+            say(f"{menu} {choice} is active")
             return
         menus = rig.menus()
         if menu is not None and menu not in menus:
-            raise SetupError(f"{menu}: no menu of this rig; there is {', '.join(menus)}")
+            raise SetupError(f"{menu}: not a menu of this rig; available: {', '.join(menus)}")
         shown = menus if menu is None else {menu: menus[menu]}
         _print_notes(
             f"{name}: {', '.join((f'{first} (in force)', *others))}"
@@ -258,10 +258,10 @@ def ask(
 
 @ctl.command()
 def status(
-    as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
     pid: PidOption = None,
 ) -> None:
-    """Print what the running rig does: target and reason, guard, joints, its last messages."""
+    """Print the state of the running rig: target and reason, guard, joints, its last messages."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         now = rig.status()
     if as_json:
@@ -274,7 +274,7 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
     """Read KEY VALUE KEY VALUE ... with values as YAML.
 
     Raises:
-        SetupError: a value is missing or no YAML, or a key is given twice.
+        SetupError: a value is missing or not YAML, or a key is given twice.
     """
     if len(pairs) % 2:
         raise SetupError(
@@ -283,15 +283,15 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
     keys = pairs[::2]
     for key in keys:
         if keys.count(key) > 1:
-            raise SetupError(f"{key}: stands twice; give it one value")
+            raise SetupError(f"{key}: duplicate key; give it one value")
     return {key: read_value(key, text) for key, text in zip(keys, pairs[1::2], strict=True)}
 
 
 def read_value(key: str, text: str) -> Any:
-    """Read a value as YAML, as it follows its key in a file.
+    """Return a value parsed as YAML, like the text after a key in a file.
 
     Raises:
-        SetupError: it is no YAML value.
+        SetupError: it is not a YAML value.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "value.yaml"
@@ -308,24 +308,24 @@ def read_value(key: str, text: str) -> Any:
 
 
 def state_lines(now: Mapping[str, Any]) -> list[str]:
-    """Return the result of ``RobotClient.status`` as a few lines."""
+    """Return the result of ``RobotClient.status`` as lines of text."""
     lines = [f"rig: {now.get('rig', '')}, process {now.get('pid', '')}"]
     if not now["ticks"]:
-        return [*lines, "it has just been started: nothing is known yet"]
+        return [*lines, "it has just started: nothing is known yet"]
     if now["stopped"]:
-        lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig ctl resume goes on")
+        lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig ctl resume continues")
     if now["age_s"] > _OLD_S:
-        lines.append(f"the loop is held up: what follows is {now['age_s']:.1f} s old")
+        lines.append(f"the loop is delayed: the following data are {now['age_s']:.1f} s old")
     joints = ", ".join(f"{name} {deg:.1f}" for name, deg in now["joints_deg"].items())
     unsaved = now["unsaved"]
     return [
         *lines,
-        *([f"control_text by {now['control_text']}"] if now["control_text"] else []),
+        *([f"controlled by {now['control_text']}"] if now["control_text"] else []),
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         *(f"camera: {text}" for text in now.get("camera", ())),
         f"joints in deg: {joints}",
-        f"not saved: {_count_text(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
+        f"not saved: {_count_text(unsaved)}; gazerig ctl save saves" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_SAID:]),
     ]
 
@@ -333,7 +333,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
 def _table(
     found: Iterable[Parameter], values: dict[str, JsonValue], unsaved: set[str]
 ) -> list[str]:
-    """Lay parameters out in columns, never cut: the lines are also read by programs."""
+    """Format parameters in columns without cutting text, as programs read the lines too."""
     rows = [("", "key", "value", "unit", "default", "")]
     for param in found:
         value = _value_text(values[param.key])
@@ -356,7 +356,7 @@ def _table(
 
 
 def _rule_text(param: Parameter) -> str:
-    """Return description one parameter is, its range, and when a change takes effect."""
+    """Return description and range of one parameter, and when a change takes effect."""
     bounds = "" if param.low is None or param.high is None else f"{param.low:g} .. {param.high:g}"
     choices = ", ".join(map(_value_text, param.choices))
     allowed = " ".join(part for part in (bounds, param.unit if bounds else "") if part) or choices
@@ -366,7 +366,7 @@ def _rule_text(param: Parameter) -> str:
 
 
 def _value_text(value: object) -> str:
-    """Write a value as it can be given to ``set``."""
+    """Return a value as text that ``set`` accepts."""
     return value if isinstance(value, str) else json.dumps(value)
 
 

@@ -101,10 +101,10 @@ def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:
         ValueError: The message lists the available choices.
     """
     if command.menu not in menus:
-        raise ValueError(f"nothing called {command.menu!r} to choose; there is {', '.join(menus)}")
+        raise ValueError(f"no menu {command.menu!r}; available: {', '.join(menus)}")
     if command.choice not in menus[command.menu]:
         there = ", ".join(menus[command.menu])
-        raise ValueError(f"no {command.menu} {command.choice!r}; there is {there}")
+        raise ValueError(f"no {command.menu} {command.choice!r}; available: {there}")
 
 
 def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
@@ -115,7 +115,7 @@ def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
     """
     for name, _ in command.angles_rad:
         if name not in joints:
-            raise ValueError(f"this rig has no joint {name!r}; there is {', '.join(joints)}")
+            raise ValueError(f"this rig has no joint {name!r}; available: {', '.join(joints)}")
 
 
 def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:

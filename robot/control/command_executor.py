@@ -100,11 +100,13 @@ class CommandExecutor:
             self.opponent.update(t_s)
         lead, levels = self._lead, self._animation.levels
         if lead.controlled_by and (why := lead.expiry_reason(t_s)):
-            self._messages.append(f"{lead.controlled_by}: {why}, so the gaze leads again")
+            self._messages.append(
+                f"{lead.controlled_by}: {why}, so the gaze models are in control again"
+            )
             self._change_control(lambda: lead.end(why))
         if t_s >= levels.lapses_s:
             for name in levels.drop_lapsed(t_s):
-                self._messages.append(f"level {name}: not set any more, so it falls to 0")
+                self._messages.append(f"level {name}: not set any more, so it returns to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Execute a command; return its reply."""
@@ -133,7 +135,7 @@ class CommandExecutor:
                     self.opponent.move(p, t_s)
             case Renew():
                 if not self._lead.renew(command, t_s):
-                    return CommandReply(f"{command.who or 'you'} lead nothing now")
+                    return CommandReply(f"{command.who or 'you'} no longer control the head")
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
                 self._gestures.drop_present()
@@ -166,7 +168,7 @@ class CommandExecutor:
         """Move the given joints and hold the others; without any, free the joints."""
         names = self._body.names
         if command.angles_rad and (name := self._gestures.drop_present()):
-            self._messages.append(f"gesture {name} ends: the joints are led")
+            self._messages.append(f"gesture {name} ends: a client controls the joints")
         self._change_control(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
             # A slider may jump from end to end.
@@ -176,7 +178,7 @@ class CommandExecutor:
     def _play(self, command: Play, t_s: float) -> CommandReply:
         """Play a gesture on top of the gaze, unless a client holds the joints."""
         if command.gesture and self._lead.pose_rad:
-            return CommandReply(f"{self._lead.controlled_by}: the joints are held where they are")
+            return CommandReply(f"{self._lead.controlled_by}: the joints are held at their angles")
         reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
         if command.gesture:
             by = f" for {command.who}" if command.who else ""
@@ -200,14 +202,14 @@ class CommandExecutor:
                 self._messages.append(f"gesture for rule {top_down.behaviour} {reply.text()}")
 
     def _change_control(self, change: Callable[[], None]) -> None:
-        """Change who is in control; the models start slowly if they take joints over."""
+        """Change the client in control; the models start slowly if they take over joints."""
         held, text = bool(self._lead.pose_rad), self._lead.controlled_by
         change()
         if held and not self._lead.pose_rad:
             self._taken_over = True
             self._guard.start_gently()
         if self._lead.controlled_by and not text:
-            self._messages.append(f"controlled_by by {self._lead.controlled_by}")
+            self._messages.append(f"controlled by {self._lead.controlled_by}")
 
     def _resume(self, command: Resume, t_s: float) -> CommandReply:
         """Switch the torque on at the present angles; it stays off if a servo refuses."""

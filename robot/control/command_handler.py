@@ -1,4 +1,4 @@
-"""Requests to a running rig: one vocabulary for all clients, handled in one place.
+"""Requests to a running rig: the same for all clients, handled in one place.
 
 The live page, other programs, the command line and Python all send a request {"do": verb, ...}.
 A verb is a command to the robot (``gazerig.robot.model.commands``: look_at, jog, ask, stop, resume,
@@ -19,13 +19,13 @@ from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import Ticket
 
 QUESTIONS: dict[str, tuple[str, dict[str, Any]]] = {
-    "hello": ("Check the version of the messages; who the rig is", {"version": int}),
+    "hello": ("Check the version of the messages; return the rig's identity", {"version": int}),
     "status": ("Name, target, reason, guard, joints and last messages of the rig", {}),
     "state": ("Newest tick, and the events numbered above after", {"after": int}),
     "menus": ("Behaviours, modes of conversation, lid movements; the present one first", {}),
     "gestures": ("Gestures, and why the rig refuses them", {}),
-    "parameters": ("Rules and defaults of keys that begin so", {"prefix": str}),
-    "get": ("Present values of keys that begin so", {"prefix": str}),
+    "parameters": ("Rules and defaults of keys with a prefix", {"prefix": str}),
+    "get": ("Present values of keys with a prefix", {"prefix": str}),
     "unsaved": ("Values that differ from the rig's file", {}),
     "differs": ("Values that differ from the defaults", {}),
     "characters": ("Names of characters", {}),
@@ -37,7 +37,7 @@ CHANGES: dict[str, tuple[str, dict[str, Any]]] = {
     "character": ("Apply another character to the rig", {"name": str}),
     "fault": ("Execute a fault command of emulated servos (gazerig emulate)", {"text": str}),
 }
-"""Requests besides commands: what each does, and the types of its fields."""
+"""Requests besides commands: their descriptions, and the types of their fields."""
 ORDERS: dict[str, type[Command]] = {name: COMMANDS[name] for name in COMMANDS if name != "tune"}
 """Commands that programs may send."""
 REQUESTS = (
@@ -46,7 +46,7 @@ REQUESTS = (
 )
 """Names of all requests, with their fields."""
 
-REAL = "these servos are real: only emulated servos take fault commands (gazerig run --mock)"
+REAL = "these servos are real: only emulated servos accept fault commands (gazerig run --mock)"
 
 FIXED = "these parameters cannot be changed while the rig runs"
 
@@ -207,7 +207,7 @@ class CommandHandler:
     def handle(
         self, request: object, sign: Callable[[Command], Command] = lambda command: command
     ) -> RequestResult:
-        """Handle a request; the patterns are the vocabulary.
+        """Handle a request; its patterns define the possible requests.
 
         Args:
             request: {"do": verb, ...}.
@@ -273,7 +273,7 @@ class CommandHandler:
                 if self._paths is not None and name not in params.characters():
                     name = self._paths.check_file(name, "characters")
                 return ParamsChanged(_notes(params.apply_character(name)))
-        raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
+        raise ValueError(f"unknown request; available: {'; '.join(REQUESTS)}")
 
     def _require_params(self) -> ParamAccess:
         if self._params is None:

@@ -28,11 +28,11 @@ class CommandQueue:
         self._stops: deque[QueuedCommand] = deque()
 
     def __bool__(self) -> bool:
-        """Return whether any command waits."""
+        """Return whether any command is queued."""
         return bool(self._commands or self._stops)
 
     def __len__(self) -> int:
-        """Return the number of waiting commands."""
+        """Return the number of queued commands."""
         return len(self._commands) + len(self._stops)
 
     def add(self, command: Command) -> Ticket:
@@ -45,16 +45,16 @@ class CommandQueue:
         if isinstance(command, Stop):
             if len(self._stops) >= MAX_WAITING:
                 with suppress(IndexError):  # the loop has just taken it
-                    return self._stops[-1].ticket  # as good as one more
+                    return self._stops[-1].ticket  # same effect as another stop
             self._stops.append(waiting)
             return waiting.ticket
         if len(self._commands) >= MAX_WAITING:
-            raise ValueError(f"too many requests: {MAX_WAITING} commands wait already, ask again")
+            raise ValueError(f"too many requests: {MAX_WAITING} commands are waiting, try again")
         self._commands.append(waiting)
         return waiting.ticket
 
     def take_stops(self) -> list[QueuedCommand]:
-        """Remove and return all take_stops; refuse waiting commands that would move the head."""
+        """Remove and return all stops; refuse queued commands that would move the head."""
         taken: list[QueuedCommand] = []
         while self._stops:
             taken.append(self._stops.popleft())
@@ -78,7 +78,7 @@ class CommandQueue:
         for _ in range(len(self._commands)):
             waiting = self._commands.popleft()
             if isinstance(waiting.command, ControlCommand | Resume):
-                waiting.ticket.answer(CommandReply("it has been stopped since"))
+                waiting.ticket.answer(CommandReply("it has been stopped meanwhile"))
             else:
                 self._commands.append(waiting)
 

@@ -30,7 +30,7 @@ class GazeChange(NamedTuple):
 
 
 class GazeEvents:
-    """Compares each tick with the one before."""
+    """Compares each tick with the previous one."""
 
     def __init__(self) -> None:
         self._last: Tick | None = None

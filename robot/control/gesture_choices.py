@@ -102,7 +102,7 @@ class GestureChoices:
             return
         if command.gesture not in self._gestures:
             there = ", ".join(self.names)
-            raise ValueError(f"no gesture {command.gesture!r}; there is {there}")
+            raise ValueError(f"no gesture {command.gesture!r}; available: {there}")
         made = self._motions(command.gesture, command.times)
         if isinstance(made, GestureRefused):
             raise ValueError(f"{command.gesture}: {made}")
@@ -174,7 +174,7 @@ class GestureChoices:
         self._player.reset()
         if name:
             self._state = self._state._replace(
-                name="", end_reason="its joints are led or switched off"
+                name="", end_reason="its joints are controlled by a client or switched off"
             )
         return name
 

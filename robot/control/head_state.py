@@ -166,14 +166,14 @@ class HeadState:
     """The state of a head in one tick of the control loop.
 
     Attributes:
-        t_s: Time of the head's own clock: from 0 in simulated time, else as time.monotonic().
+        t_s: Time of the head's own clock: from 0 in simulated time, otherwise as time.monotonic().
         joints: Joints by name.
         gaze: Poses of head and eyes.
         people: Visible people.
         level: Level of the guard: "ok", "limited", "hold" or "torque_off".
         reasons: Limits applied by the guard, "joint: reason".
         stopped: Reason for a stop, "" while the head moves.
-        controlled_by: Client that controls gaze or joints, and its command; "" while the head chooses.
+        controlled_by: Client in control and its command, "" while the head chooses.
         client_control: State of the newest client's control.
         gesture: The newest gesture.
         control_source: Present source of control: gaze models, a client, a gesture, a stop.
@@ -229,7 +229,7 @@ def as_json(state: HeadState) -> dict[str, Any]:
 
 
 def from_json(data: Mapping[str, Any]) -> HeadState:
-    """Return the state that ``as_json`` wrote; fields unknown to this version are left out.
+    """Return the state that ``as_json`` wrote; fields unknown to this version are ignored.
 
     Raises:
         KeyError, TypeError, ValueError: The data is not a state.

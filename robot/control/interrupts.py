@@ -18,10 +18,11 @@ ENDING = available_signals("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
 """Ctrl-C, a request to end, a terminal that was closed, Ctrl-backslash, and Windows' Ctrl-Break."""
 _HANG_UP = available_signals("SIGHUP")
 _BACKGROUND = available_signals("SIGTTIN", "SIGTTOU")
-"""They would stop a background program that accesses its terminal, with the torque on."""
+"""Signals that would stop a background program when it accesses its terminal, with the torque on.
+"""
 
 _NEVER = 1 << 30
-"""More requests than can occur."""
+"""A number above that of possible requests."""
 
 SAME_REQUEST_S = 0.3
 """Signals closer together count as one request: shell and kernel each send their own."""
@@ -31,7 +32,7 @@ class Interrupts:
     """A recorder of requests to end this program, active inside its block.
 
     The first request is only recorded: the work reads it by calling this object. A second one
-    raises KeyboardInterrupt, because the work may hang, except if ``is_spared`` forbids it. SIGHUP is
+    raises KeyboardInterrupt, because the work may hang, unless ``is_spared`` forbids it. SIGHUP is
     never a second one: one closed terminal sends it several times.
 
     Args:
@@ -60,7 +61,7 @@ class Interrupts:
 
     @classmethod
     def from_stop(cls, stopped: Callable[[], str | None]) -> "Interrupts":
-        """Return ``stopped`` if it is an Interrupts, else a new one."""
+        """Return ``stopped`` if it is an Interrupts, otherwise a new one."""
         return stopped if isinstance(stopped, Interrupts) else cls()
 
     def __enter__(self) -> Self:
@@ -111,11 +112,11 @@ class Interrupts:
         return self._more + (self._first is not None)
 
     def only_record(self) -> None:
-        """Only record from now on: the work checks for requests often enough."""
+        """Only record further requests: the work checks for them often enough."""
         self.tolerated_requests = _NEVER
 
     def raise_if_requested(self) -> None:
-        """Raise if the end was requested before there is anything to park.
+        """Raise if the end was requested before anything has to be parked.
 
         Raises:
             KeyboardInterrupt: The end was requested.

@@ -12,9 +12,9 @@ FAULTS = frozenset(
 """The guard's reasons to hold a faulty joint, in addition to latched errors."""
 
 _PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
-"""A shorter loss of answers or restart is no fault."""
+"""Duration up to which a loss of answers or a restart is not a fault."""
 _BY_TIME = frozenset({"stale joints", "torque off", "not moving"})
-"""Reasons that a late computer can cause."""
+"""Reasons that a busy computer can cause."""
 _OVER_S = 1.0
 """A fault ends when the joint has not been held for this time; a retry alone does not end it."""
 
@@ -68,7 +68,7 @@ class JointFaults:
 
     Args:
         report: Receives a line, with the time since the first tick, when a fault begins and ends.
-        busy: Returns a text if the computer is too busy, which makes joints stale, else "".
+        busy: Returns a text if the computer is too busy, which makes joints stale, otherwise "".
     """
 
     def __init__(self, report: Callable[[str], None], busy: Callable[[], str] = lambda: "") -> None:

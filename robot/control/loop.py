@@ -44,7 +44,7 @@ from gazerig.robot.safety.guard import Guard
 
 
 class LoopCount(NamedTuple):
-    """The counts of a loop: ticks, overrun slots, reason for the end."""
+    """Counts of a loop: ticks, overrun slots, and the reason for the end."""
 
     ticks: int
     overruns: int
@@ -185,7 +185,7 @@ class Robot:
 
         Args:
             clock: Clock of the loop.
-            ready: Called just before the torque comes on; its exception ends the start.
+            ready: Called just before torque is switched on; its exception cancels the start.
 
         Raises:
             SetupError: A device is missing or does not match the configuration.
@@ -227,7 +227,7 @@ class Robot:
         """Read, perceive, choose, plan, guard, write.
 
         Raises:
-            DriverError: Bus or camera are gone.
+            DriverError: The bus or the camera is lost.
         """
         commands = self._execute_commands(t_s)
         joints = self.body.read(t_s)
@@ -277,7 +277,7 @@ class Robot:
     ) -> bool:
         """Move slowly to the parking pose; return whether it was reached in time.
 
-        A user's stop ends parking with the torque off. Other commands get no reply any more.
+        A user's stop ends parking with the torque off. Other commands no longer get a reply.
 
         Args:
             pose_rad: Joint angles of the parking pose.
@@ -320,7 +320,7 @@ class Robot:
             self.camera.close()
 
     def _execute_commands(self, t_s: float) -> tuple[Command, ...]:
-        """Execute and return the waiting commands, and end a control that was not renewed."""
+        """Execute and return the queued commands, and end a control that was not renewed."""
         taken = []
         for waiting in self._commands.take() if self._commands else ():
             command = self._looks.resolve_pixel(waiting.command)
@@ -368,7 +368,7 @@ class TickLoop:
         self._slot = self._ticks = self._overruns = 0
 
     def step(self) -> str | None:
-        """Wait for the next slot and tick; return the reason for the end, else None."""
+        """Wait for the next slot and tick; return the reason for the end, otherwise None."""
         clock, rate_hz = self._clock, self._params().rate_hz
         if rate_hz != self._rate_hz:
             self._slots_s += self._slot * (1.0 / self._rate_hz)

@@ -4,9 +4,9 @@
         power.switch_on(control.start)
         ...
 
-Whatever ends the block (a signal, an exception, lack of memory or the end of the work), the head
-parks in bounded time and the torque goes off. Nothing is written to a terminal before that, and
-writing cannot prevent it.
+At any end of the block (a signal, an exception, lack of memory or the end of the work), the head
+parks in bounded time and the torque is switched off. Nothing is written to a terminal before that,
+and writing cannot prevent it.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ class PowerDown:
         interrupts: Requests to end this program.
         off: Text for torque that is off.
         left: Text for unreachable servos, after the reason.
-        quiet: Say nothing if the torque went off properly.
+        quiet: Whether to report nothing if the torque was switched off properly.
 
     Attributes:
         cause: Reason for the end in the line, "" for none.
@@ -78,7 +78,7 @@ class PowerDown:
 
     def __enter__(self) -> Self:
         """Start the block."""
-        # This file may be interrupted only in its callees.
+        # An interrupt may occur only in the functions that this file calls.
         self._interrupts.is_spared = lambda frame: (
             frame is not None and frame.f_code.co_filename == __file__
         )

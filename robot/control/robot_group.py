@@ -13,7 +13,7 @@ from gazerig.robot.model.types import OtherHead
 
 
 class NamedRobot(NamedTuple):
-    """Another head of the same world: its name there and its robot."""
+    """Another head of the same world: its name and its robot."""
 
     name: str
     robot: Robot
@@ -22,7 +22,7 @@ class NamedRobot(NamedTuple):
         """Return a description of its present activity."""
         newest = self.robot.newest_tick
         if newest is None:
-            return OtherHead(self.name, "has not begun")
+            return OtherHead(self.name, "has not started")
         return OtherHead(self.name, head_activity(newest).headline, newest.guard_result.level)
 
 
@@ -70,7 +70,7 @@ class _GroupTicket(Ticket):
         self._first, self._others = first, tuple(others)
 
     def wait(self, within_s: float) -> CommandReply | None:
-        """Wait for each reply up to ``within_s``; return None if the first head has not replied."""
+        """Wait up to ``within_s`` for each reply; return None if the first head has not replied."""
         reply = self._first.wait(within_s)
         if reply is None or reply.refused:
             return reply

@@ -42,7 +42,9 @@ class StopControl:
         names = zip(body.names, joints.torque, strict=True)
         holding = [name for name, on in names if on and name not in joints.missing]
         if holding:
-            self._messages.append(f"stopped, but {', '.join(holding)} still held: torque off again")
+            self._messages.append(
+                f"stopped, but {', '.join(holding)} still had torque: switched off again"
+            )
             self._release(body, t_s)
 
     def resume(self, command: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
@@ -60,13 +62,13 @@ class StopControl:
             return CommandReply(self._messages[-1])
         self._latch.lift()
         self._refused = ""
-        self._messages.append(f"torque on again{by}: going on slowly")
+        self._messages.append(f"torque on again{by}: continuing slowly")
         return goals
 
     def _release(self, body: Body, t_s: float) -> None:
-        """Switch the torque off; a lost bus does so when it is back."""
+        """Switch the torque off; on a lost bus this happens when it reconnects."""
         self._released_s = t_s
         try:
             body.disable_torque()
         except DriverError as error:
-            self._messages.append(f"the stop is remembered, torque is NOT YET off: {error}")
+            self._messages.append(f"the stop is pending, torque is NOT YET off: {error}")

@@ -1,4 +1,4 @@
-"""The newest tick and the last events for other threads."""
+"""Newest tick and last events, for other threads."""
 
 from collections import deque
 from collections.abc import Callable
@@ -25,7 +25,8 @@ class TickFeed:
         self.newest: Tick | None = None
         self.ticks = 0
         self._messages: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
-        self._others: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)  # many: they push out none
+        # Separate, because they are many and would displace messages.
+        self._others: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
         self._changes = GazeEvents()
         self.number = 0
         self._joining: deque[Callable[[Progress], bool]] = deque()
@@ -62,7 +63,7 @@ class TickFeed:
 
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
         """Return the stored events with numbers above ``after``, the oldest first."""
-        newest = self.number  # an event that comes meanwhile must not hide an earlier one
+        newest = self.number  # an event added meanwhile must not hide an earlier one
         found = [*_events_after(self._messages, after), *_events_after(self._others, after)]
         found = [event for event in found if event.number <= newest]
         return tuple(sorted(found, key=lambda event: event.number))
@@ -73,5 +74,5 @@ class TickFeed:
 
 
 def _events_after(events: deque[HeadEvent], after: int) -> list[HeadEvent]:
-    newest_first = reversed(list(events))  # a copy: the loop appends meanwhile
+    newest_first = reversed(list(events))  # a copy, because the loop may append meanwhile
     return list(takewhile(lambda event: event.number > after, newest_first))

@@ -21,7 +21,7 @@ from gazerig.robot.model.command_json import as_recorded_json
 from gazerig.robot.model.control_source import ControlState, GestureState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
-LIVE_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
+LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 """Time between two batches of a run in real time."""
 SIMULATED_S = 0.2
 """Time between two batches in simulated time, without viewers."""
@@ -211,7 +211,7 @@ def all_finite(data: bytes) -> bool:
 
 
 def _read_percept(row: _PerceptRow) -> Percept:
-    """Return a percept from what ``_percept_row`` wrote."""
+    """Return a percept from the row of ``_percept_row``."""
     ids, kinds, p_m, v_m_s, w_rad_s, radius_m, cov = row.bodies
     p, v, w = (np.array(rows, float).reshape(-1, 3) for rows in (p_m, v_m_s, w_rad_s))
     pv_cov = None if cov is None else np.array(cov, float).reshape(-1, 6, 6)
@@ -228,7 +228,7 @@ def _to_plain(value: Any) -> Any:
     """Return a NumPy array or number as a list or a Python number."""
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no part of a tick")
+    raise TypeError(f"{type(value).__name__} is not part of a tick")
 
 
 def _to_utf8(value: Any) -> Any:

@@ -22,8 +22,8 @@ from gazerig.robot.perception.egomotion_residual import ResidualFigures
 def perception_text(tick: Tick, residual: ResidualFigures) -> str:
     """Return age of the frame, camera conditions, distances of faces and the ego-motion residual.
 
-    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
-    0.3 deg/s while the head turns"
+    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | static objects appear to move 0.3
+    deg/s while the head turns"
     """
     if tick.percept is None:
         return "no frame yet"
@@ -39,7 +39,7 @@ def perception_text(tick: Tick, residual: ResidualFigures) -> str:
         )
     if residual.speed_deg_s is not None:
         parts.append(
-            f"still things seem to move {residual.speed_deg_s:.1f} deg/s while the head turns"
+            f"static objects appear to move {residual.speed_deg_s:.1f} deg/s while the head turns"
         )
     return " | ".join(parts)
 
@@ -57,7 +57,7 @@ def target_name(target: Target) -> str:
 
 
 class Activity(NamedTuple):
-    """The head's present activity in words.
+    """The head's present activity as text.
 
     Attributes:
         headline: One sentence.
@@ -99,18 +99,18 @@ def _gaze_text(target: Target) -> str:
     """Return the gaze's activity as the predicate of a sentence about the head."""
     match target.kind:
         case "rest":
-            return "looks ahead: nobody is there"
+            return "looks ahead: nobody is visible"
         case "glance":
-            return "looks around: nobody is there"
+            return "looks around: nobody is visible"
         case "search":
-            return "looks for somebody who has gone"
+            return "looks for a person who has left"
         case "away":
             return "looks away for a moment"
         case "face":
             part = f" ({PART_NAMES[target.part]})" if target.part is not None else ""
             return f"looks at person {target.id}{part}"
         case "thing":
-            return "looks at something that moves"
+            return "looks at a moving object"
         case kind:
             return f"looks at a {kind}"
 
@@ -118,7 +118,7 @@ def _gaze_text(target: Target) -> str:
 def control_text(tick: Tick) -> str:
     """Return the client's command and the gaze's distance from its point, "" without one.
 
-    e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
+    e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg off: head yaw 70 of 180 deg"
     """
     if not tick.controlled_by:
         return ""
@@ -139,18 +139,18 @@ def _distance_text(tick: Tick) -> str:
         f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
         for one in limited
     )
-    return f"; {error:.0f} deg beside it: {', '.join(ends)}"
+    return f"; {error:.0f} deg off: {', '.join(ends)}"
 
 
 _FAULT_TEXTS = {
     "timeout": "no answer",
     "damaged": "answer damaged",
-    "corrupt": "answer damaged on the way",
+    "corrupt": "damaged answer",
     "incomplete": "answer incomplete",
-    "implausible": "answer not believed",
+    "implausible": "implausible answer",
     "refused": "order refused",
-    "unconfirmed": "order not confirmed",
-    "rearmed": "torque on again",
+    "unconfirmed": "unconfirmed command",
+    "rearmed": "torque switched on again",
     "restarted": "servo restarted",
     "alert": "servo reported a fault",
 }

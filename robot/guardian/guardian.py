@@ -72,7 +72,7 @@ class Guardian:
         return None if self._process is None else self._process.pid
 
     def join(self, plan: int) -> None:
-        """Register one port and start the guardian if it does not run; do not wait for it.
+        """Register one port and start the guardian if it is not running, without waiting for it.
 
         Raises:
             SetupError: no process can be started.
@@ -96,7 +96,7 @@ class Guardian:
                 self._ready = bool(os.read(stdout.fileno(), 1))
         if not self._ready:
             raise SetupError(
-                "the guardian, which releases the servos should this program die, did not start: "
+                "the guardian, which releases the servos if this program dies, did not start: "
                 "see the lines above"
             )
 
@@ -124,7 +124,7 @@ class Guardian:
         return self._heartbeat.state(plan) != IDLE
 
     def acknowledge(self, plan: int) -> None:
-        """Record that the loop knows of the release; the guardian may release again."""
+        """Record that the loop has noticed the release; the guardian may release again."""
         self._heartbeat.set_state(plan, IDLE)
 
     def check(self, now_s: float) -> None:
@@ -146,13 +146,13 @@ class Guardian:
             self._process.wait()
         self._close_pipes(self._process)
         for i in range(len(self.plans)):
-            if self.is_releasing(i):  # the dead guardian cannot finish
+            if self.is_releasing(i):  # the dead guardian cannot complete the release
                 self._heartbeat.set_state(i, RELEASED)
         if code is None:
             why = "did not respond"
         else:
             ended = f"signal {-code}" if code < 0 else f"exit code {code}"
-            why = f"ended by itself ({ended})"
+            why = f"ended unexpectedly ({ended})"
         self._events.append(f"the guardian {why}: started again")
         try:
             self._start()
@@ -182,7 +182,7 @@ class Guardian:
             return
         try:
             ending.wait(GOODBYE_S)
-        except subprocess.TimeoutExpired:  # nothing is armed: it has nothing left to do
+        except subprocess.TimeoutExpired:  # nothing is armed: it has no more tasks
             ending.kill()
             ending.wait()
 
@@ -278,7 +278,7 @@ class GuardedBus:
             SetupError: the guardian did not start, or the bus raises it.
             DriverError: the bus raises it.
         """
-        # Before the torque, because it comes on servo by servo.
+        # Armed first, because torque is switched on servo by servo.
         self._guardian.arm(self._plan)
         goals = self._bus.enable_torque()
         self._holding, self._lost_hold = True, False
@@ -338,7 +338,7 @@ class GuardedBus:
             if not self._holding:
                 return
             self._lost_hold, self._retry_s = True, now_s
-            self._events.append("the control loop stood still: the guardian switched torque off")
+            self._events.append("the control loop did not run: the guardian switched torque off")
         if now_s < self._retry_s:
             return
         self._retry_s = now_s + RETRY_S
@@ -351,4 +351,4 @@ class GuardedBus:
             return
         self._lost_hold = False
         self._rearmed = set(self._silent.missing)
-        self._events.append("torque on again where the joints are: going on slowly")
+        self._events.append("torque on again at the present angles: continuing slowly")

@@ -113,7 +113,7 @@ class ProgramWatch:
 
     def __init__(self, heartbeat: Heartbeat, plans: tuple[ReleasePlan, ...], parent: int) -> None:
         self._heartbeat, self._plans, self._parent = heartbeat, plans, parent
-        # Imported now: when it is needed, the disk may be unavailable.
+        # Imported now, because the disk may be unavailable when it is needed.
         self._releasers = [releaser(plan) for plan in plans]
         self._complained: set[int] = set()
         self._clock = RealClock()
@@ -151,7 +151,7 @@ class ProgramWatch:
         """Release one plan's servos while the program has the port open."""
         # Before the first byte: a loop that resumes now does not write until the release ends.
         self._heartbeat.set_state(i, RELEASING)
-        why = f"no sign of life of the control loop for {self._hang.silent_s:.1f} s"
+        why = f"no heartbeat of the control loop for {self._hang.silent_s:.1f} s"
         done = self._release(i, why, exclusive=False)
         self._heartbeat.set_state(i, RELEASED if done else IDLE)
         if not done:
@@ -191,7 +191,7 @@ class ProgramWatch:
 
 
 def say(line: str) -> None:
-    """Write a line to standard error; it may be closed, as with the terminal."""
+    """Write a line to standard error, which may be closed, for example with the terminal."""
     with contextlib.suppress(OSError):
         wipe = "\r\x1b[K" if os.isatty(2) else ""
         os.write(2, f"{wipe}{line}\n".encode())

@@ -27,7 +27,7 @@ from gazerig.robot.model.types import JointAngles
 ARRIVED_RAD = radians(1.0)
 """A gaze or joint has arrived if its measured error is below this."""
 GONE_S = 2.0
-"""A control that follows a person ends when the person has not been seen for this time."""
+"""A control that follows a person ends when the person has not been visible for this time."""
 
 
 class ClientControl:
@@ -102,9 +102,9 @@ class ClientControl:
             self.pose_rad = ()
             self._jogged.clear()
             if self.point is None and self.person is None:
-                self.end(f"{command.who or 'a client'} has returned the joints")
+                self.end(f"{command.who or 'a client'} has released the joints")
             self._describe()
-            if self.state.active:  # the previous target is looked at again
+            if self.state.active:  # the gaze returns to the previous target
                 arrived = self.state.arrived
                 self.state = self._new_state(self.state.number, t_s)._replace(arrived=arrived)
             return

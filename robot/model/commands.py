@@ -3,8 +3,8 @@
 A command is plain data. It is sent between processes as JSON and executed at the next tick. A
 recording of a run contains it, so that the run can be repeated.
 
-The latch of a stop keeps who stopped, its shortest duration, and who may lift it. Its times are
-those of the ticks, so a repeated run is stopped and resumed as recorded.
+The latch of a stop stores the client that stopped, the shortest duration, and the clients that may
+resume. Its times are those of the ticks, so a repeated run is stopped and resumed as recorded.
 """
 
 from collections.abc import Mapping
@@ -82,7 +82,7 @@ class LookAtDirection(NamedTuple):
 
 
 class LookAtPerson(NamedTuple):
-    """Look at a person and follow until the person has been out of sight for some time.
+    """Look at a person and follow until the person has not been visible for some time.
 
     Attributes:
         id: Perception's number of the person.
@@ -184,7 +184,7 @@ class MoveOpponent(NamedTuple):
 
 
 class Renew(NamedTuple):
-    """The heartbeat of the client in control of gaze or joints; others' have no effect."""
+    """Heartbeat of the client in control of gaze or joints; those of others have no effect."""
 
     who: str = ""
 
@@ -229,7 +229,7 @@ Command = (
 )
 
 REPEATED = (Renew, SetLevel, MoveOpponent)
-"""Commands that programs send many times per second; they send no message and no mark."""
+"""Commands that programs send many times per second; they create no message and no mark."""
 
 COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
@@ -284,17 +284,13 @@ class StopLatch:
         while len(self._asked_s) > _MAX_ASKERS:
             del self._asked_s[next(iter(self._asked_s))]
         if last_s is not None and t_s - last_s < MIN_RESUME_GAP_S:
-            return f"too many requests to resume: ask once, then not for {MIN_RESUME_GAP_S:g} s"
+            return f"too many requests to resume: wait {MIN_RESUME_GAP_S:g} s between two"
         left_s = self._stopped_s + MIN_HOLD_S - t_s
         if left_s > 0.0:
-            return f"a stop holds at least {MIN_HOLD_S:g} s: ask again in {left_s:.1f} s"
+            return f"a stop lasts at least {MIN_HOLD_S:g} s: try again in {left_s:.1f} s"
         if not command.confirmed and self._stoppers != {command.who}:
-            stopped_by = (
-                f"stopped stopped_by {self.stopped_by}"
-                if self.stopped_by
-                else "another client stopped it"
-            )
-            return f"{stopped_by}: another may only resume who confirms that no hand is in the mechanism"
+            by = f"stopped by {self.stopped_by}" if self.stopped_by else "another client stopped it"
+            return f"{by}: another client must confirm that no hand is in the mechanism"
         return ""
 
     def lift(self) -> None:

@@ -73,7 +73,7 @@ class ControlSource(NamedTuple):
     Attributes:
         kind: Kind of control.
         who: Name of the client for display, "" for none or unknown.
-        description: E.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, a stop's reason.
+        description: "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, a stop's reason.
         joints: Held joints.
         since_s: Start of the control on the rig's clock, None if unknown.
     """
@@ -117,9 +117,9 @@ def control_title(leader: ControlSource) -> str:
     """Return the source of control in two or three words, e.g. "neck_yaw held", "stopped"."""
     match leader.kind:
         case "gaze":
-            return "looks by itself"
+            return "looks freely"
         case "person":
-            return f"led by {leader.who}"
+            return f"controlled by {leader.who}"
         case "pointer":
             return "looks at the pointer"
         case "joint":
@@ -139,7 +139,7 @@ def control_sentence(leader: ControlSource, t_s: float) -> str:
     """
     match leader.kind:
         case "gaze":
-            return "nobody leads: it chooses by itself what to look at"
+            return "no client is in control: the head chooses its own targets"
         case "person":
             said = f"{leader.who} makes it {leader.description}"
         case "pointer":

@@ -18,7 +18,7 @@ Rates = tuple[Pair, Pair]
 
 
 class Unreachable(ValueError):
-    """Joint angles that no servo angles produce; the message gives the reason."""
+    """Joint angles that no servo angles can produce; the message gives the reason."""
 
 
 class Coupling(Protocol):
@@ -72,7 +72,9 @@ class Differential:
 
 
 _NEAR_LINE = 0.98
-"""Sine of the angle between rod and horn above which the rod has no force and two solutions."""
+"""Sine of the angle between rod and horn above which the rod transmits no force and has two
+solutions.
+"""
 
 
 class PushRods:
@@ -124,7 +126,7 @@ class PushRods:
         return joints
 
     def rates(self, joints: Pair) -> Rates:
-        """Return how fast the servos turn for each joint's speed, at joint angles."""
+        """Return the servo speeds per joint speed at joint angles."""
         a, b = self.servo_rad(joints)
         return self._slopes(joints, 1.0, a), self._slopes(joints, -1.0, b)
 
@@ -196,7 +198,7 @@ class MeasuredGrid:
         if missing or len(known) != len(points):
             raise ValueError(
                 "a measured coupling needs each angle of the first joint with each of the second, "
-                "once" + (f"; missing is {_degrees(missing[0])}" if missing else "")
+                "once" + (f"; missing: {_degrees(missing[0])}" if missing else "")
             )
         self._triangles = [
             _Triangle(corners, known)
@@ -224,12 +226,12 @@ class MeasuredGrid:
         """Return the joint angles of servo angles."""
         near = self._cells.near(servos)
         weights = [triangle.least_weight(servos) for triangle in near]
-        if not weights or max(weights) < 0.0:  # beyond the grid
+        if not weights or max(weights) < 0.0:  # outside the grid
             near, weights = self._triangles, [one.least_weight(servos) for one in self._triangles]
         return near[weights.index(max(weights))].joints(servos)
 
     def rates(self, joints: Pair) -> Rates:
-        """Return how fast the servos turn for each joint's speed, at joint angles."""
+        """Return the servo speeds per joint speed at joint angles."""
         return self._at(joints).slopes
 
     def contains(self, joints: Pair) -> bool:

@@ -30,15 +30,15 @@ class CouplingParams:
 
     # fmt: off
     kind: Annotated[CouplingKind, "differential: bevel gears; parallel: two push rods; measured: a table of positions"]
-    first: Annotated[str, "the joint that both servos turn the same direction, such as neck_pitch; its entry under joints holds servo a, "
-        "of a parallel neck the left one"]
-    second: Annotated[str, "the joint that they turn against each other, such as neck_roll; its entry holds servo b"]
+    first: Annotated[str, "joint that both servos turn in the same direction, such as neck_pitch; its entry in joints is servo a, "
+                          "in a parallel neck the left one"]
+    second: Annotated[str, "joint that they turn in opposite directions, such as neck_roll; its entry is servo b"]
     first_ratio: Annotated[float, Bounds(0.05, 50), "differential: turns of the servos for one turn of the first joint"] = 1.0
     second_ratio: Annotated[float, Bounds(0.05, 50), "differential: turns of the servos for one turn of the second joint"] = 1.0
     anchor_mm: Annotated[tuple[float, float, float] | None, Bounds(-500, 500),
-        "parallel: where the left rod holds the head, ahead, left and above of the pitch axis with the head level"] = None
+        "parallel: anchor of the left rod on the head, ahead, left and above of the pitch axis with the head level"] = None
     servo_mm: Annotated[tuple[float, float, float] | None, Bounds(-500, 500),
-        "parallel: the axis of the left servo's horn; the right side is its mirror image"] = None
+        "parallel: axis of the left servo's horn; the right side is its mirror image"] = None
     horn_mm: Annotated[float | None, Bounds(-500, 500), "parallel: length of the horns, negative where they point back; "
         "a horn is level at the servo's 0 deg"] = None
     rod_mm: Annotated[float | None, Bounds(1, 1000), "parallel: length of the rods between their joints"] = None
@@ -53,7 +53,7 @@ class CouplingParams:
             ValueError: Dimensions are missing or wrong; the message names them.
         """
         if self.first == self.second:
-            raise ValueError(f"first and second are both {self.first}; name two joints")
+            raise ValueError(f"first and second are both {self.first}; give two different joints")
         needed = ("anchor_mm", "servo_mm", "horn_mm", "rod_mm")
         missing = [key for key in needed if getattr(self, key) is None]
         if self.kind == "parallel" and (missing or self.horn_mm == 0.0):
@@ -118,7 +118,7 @@ def unreachable_text(pair: CoupledPair, joints: Mapping[str, JointParams]) -> st
     for at in _joint_grid(pair, joints):
         where = f"{pair.first} {degrees(at[0]):g}, {pair.second} {degrees(at[1]):g} deg"
         if isinstance(pair.coupling, MeasuredGrid) and not pair.coupling.contains(at):
-            return f"cannot reach {where}: its points do not go so far"
+            return f"cannot reach {where}: its points do not extend that far"
         try:
             servos = pair.coupling.servo_rad(at)
         except Unreachable as error:

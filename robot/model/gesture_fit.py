@@ -28,14 +28,14 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import further_joints
 
 _SMALLEST = 0.2
-"""A gesture of which a range leaves less than this share is not gesture, as it is hardly visible."""
+"""Smallest share of a gesture that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class GestureRefused(ValueError):
-    """A gesture that a rig cannot do; the message gives the joint, the time and the limit."""
+    """A gesture that a rig cannot play; the message gives the joint, the time and the limit."""
 
 
 class FittedGesture(NamedTuple):
@@ -45,7 +45,7 @@ class FittedGesture(NamedTuple):
         gesture: The gesture to play.
         slowed_by: Factor by which it takes longer than requested.
         slow_joint: Joint that needs this factor.
-        reduced_joints: (joint, remaining share of its motion) for joints whose ranges are too small.
+        reduced_joints: (joint, remaining share of its motion) for joints with too small ranges.
     """
 
     gesture: PlayedGesture
@@ -96,8 +96,8 @@ def _frames_for(
         needed = [n for n in lacking if n not in gesture.optional and n not in neck]
     if needed:
         raise GestureRefused(
-            f"it moves {', '.join(needed)}, which this rig lacks; list under optional what it "
-            "can do without"
+            f"it moves {', '.join(needed)}, which this rig lacks; list joints that it does not need "
+            "under optional"
         )
     return frames, tuple(lacking)
 
@@ -233,7 +233,7 @@ class GestureFit:
             if factor > found[0]:
                 asked = degrees(ratio[row, j] * most[j])
                 found = factor, self.joints[j], (
-                    f"{self.joints[j]} at {samples.times_s[row]:.2f} s: needs {asked:.0f} {unit}, and "
+                    f"{self.joints[j]} at {samples.times_s[row]:.2f} s: needs {asked:.0f} {unit}, but "
                     f"gestures may use {degrees(most[j]):.0f} ({share:g} of the joint's limit)"
                 )  # fmt: skip
         return found

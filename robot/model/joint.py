@@ -55,7 +55,7 @@ class Linkage(Protocol):
     Attributes:
         steepest: Largest number of steps per rad, above 0.
         rising: Whether more steps give a larger angle.
-        line: The line of a linear linkage, else None.
+        line: The line of a linear linkage, otherwise None.
     """
 
     steepest: float
@@ -117,15 +117,15 @@ class MeasuredLinkage:
 
     def __init__(self, angles_rad: Sequence[float], steps: Sequence[float]) -> None:
         if len(angles_rad) < 2 or len(angles_rad) != len(steps):
-            raise ValueError("a linkage needs two places or more, each an angle and a position")
+            raise ValueError("a linkage needs at least two points, each an angle and a position")
         up = steps[-1] > steps[0]
         for i in range(1, len(steps)):
             if angles_rad[i] <= angles_rad[i - 1]:
-                raise ValueError(f"the angles of a linkage must rise; place {i + 1} does not")
+                raise ValueError(f"the angles of a linkage must increase; point {i + 1} does not")
             if (steps[i] > steps[i - 1]) != up or steps[i] == steps[i - 1]:
                 raise ValueError(
-                    "the positions of a linkage must all rise or all fall; "
-                    f"place {i + 1} goes back: measure it again"
+                    "the positions of a linkage must all increase or all decrease; "
+                    f"point {i + 1} does not: measure it again"
                 )
         self.rising = up
         self.line: LinearLinkage | None = None
@@ -178,15 +178,15 @@ class JointParams:
         "measured points of a push-rod linkage, each [joint angle, servo position]; they replace sign, ratio and zero_step"] = ()
     bus: Annotated[str, "name of the joint's bus under buses; empty: the one under bus"] = ""
     servo_speed_deg_s: Annotated[float | None, Bounds(10, 5000),
-        "speed of a hobby servo's own shaft (0.12 s for 60 deg is 500), from which its position is estimated, as it has no "
-        "feedback; null: as fast as max_speed_deg_s"] = None
+        "speed of a hobby servo's own shaft (0.12 s for 60 deg is 500), used to estimate its position because it has no "
+        "feedback; null: max_speed_deg_s"] = None
     gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
-    friction_nm: Annotated[float, Bounds(0, 20), "dry friction of the joint's own bearings and linkage, besides the servo's"] = 0.0
+    friction_nm: Annotated[float, Bounds(0, 20), "dry friction of the joint's own bearings and linkage, in addition to the servo's"] = 0.0
     play_deg: Annotated[float, Bounds(0, 10), "play (backlash) between servo and joint, from stop to stop"] = 0.25
     spring_nm_deg: Annotated[float, Bounds(0, 5), "stiffness of a spring on the joint; 0: none"] = 0.0
-    spring_rest_deg: Annotated[float, Bounds(-720, 720), "angle at which that spring has no torque; beyond the range if it is preloaded"] = 0.0
+    spring_rest_deg: Annotated[float, Bounds(-720, 720), "angle at which the spring has no torque; outside the range if preloaded"] = 0.0
     firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware version that is accepted"] = 0
     # fmt: on
 
@@ -199,7 +199,7 @@ class JointParams:
         if self.min_deg >= self.max_deg:
             raise ValueError(f"min_deg {self.min_deg} must be below max_deg {self.max_deg}")
         if not self.min_deg <= 0.0 <= self.max_deg:
-            raise ValueError("0 deg, the centre, must lie between min_deg and max_deg")
+            raise ValueError("0 deg, the centre, must be between min_deg and max_deg")
         facts = SERVOS.get(self.model)
         if facts is None:
             return
@@ -209,16 +209,16 @@ class JointParams:
             if not least <= self.min_deg < self.max_deg <= most:
                 raise ValueError(
                     f"its linkage was measured from {least:g} to {most:g} deg: min_deg "
-                    f"{self.min_deg} and max_deg {self.max_deg} must lie within"
+                    f"{self.min_deg} and max_deg {self.max_deg} must be within"
                 )
         for key, angle in (("min_deg", self.min_deg), ("max_deg", self.max_deg)):
             steps = linkage.steps(radians(angle))
             if not facts.lowest <= steps <= facts.highest:
                 low, high = facts.lowest / facts.unit_steps, facts.highest / facts.unit_steps
                 if facts.unit == "steps":
-                    at = f"lies at step {steps:.0f}, outside the servo's {low:.0f}..{high:.0f}"
+                    at = f"is at step {steps:.0f}, outside the servo's {low:.0f}..{high:.0f}"
                 else:
-                    at = f"lies at {steps / facts.unit_steps:.0f} {facts.unit}, outside the "
+                    at = f"is at {steps / facts.unit_steps:.0f} {facts.unit}, outside the "
                     at += f"servo's {low:.0f}..{high:.0f} {facts.unit}"
                 raise ValueError(f"{key} {angle} {at}")
 

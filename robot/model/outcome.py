@@ -20,7 +20,8 @@ refused: nothing was done; ``Order.why`` gives the reason
 out of reach: the gaze will rest more than 1 degree off the point, at the limits of the joints.
     This is known as soon as the reply arrives. ``Order.why`` gives the error, and the joints that
     limit it. The order keeps control, and the head goes as far as it can
-taken over: something else moves the head now, or control has ended; ``Order.why`` gives the reason
+taken over: another source controls the head now, or control has ended; ``Order.why`` gives
+    the reason
 timed out: none of these within the given time
 """
 

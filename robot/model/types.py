@@ -66,10 +66,10 @@ class JointState(NamedTuple):
         measured_s: Host time of each joint's last fresh answer.
         missing: Joints without a fresh answer in this tick.
         torque: Whether the torque is on.
-        fault: Latched hardware errors in words, "" for none.
+        fault: Latched hardware errors as text, "" for none.
         load: Share of the servo's stall torque, signed, -1..1.
         temperature_c, voltage_v: Readings, None before the first.
-        rearmed: Whether the torque came on again with the measured position as goal.
+        rearmed: Whether torque was switched on again with the measured position as goal.
         measured: False without feedback: position and velocity are then those of the goal,
             moved at the servo's known speed.
     """
@@ -130,7 +130,7 @@ class GuardResult(NamedTuple):
             ValueError: There is no such joint; the message lists the joints.
         """
         if joint not in self.joints:
-            raise ValueError(f"no joint {joint!r}; there is {', '.join(self.joints)}")
+            raise ValueError(f"no joint {joint!r}; available: {', '.join(self.joints)}")
         i = self.joints.index(joint)
         return JointOutcome(
             self.desired_rad[i], self.command_rad[i], self.why[i] if self.why else ""
@@ -238,7 +238,7 @@ class Servos(NamedTuple):
         temperature_c, voltage_v: Readings, None before the first.
         load: Signed share of the stall torque, -1..1.
         torque: Whether the torque is on.
-        fault: Latched errors in words.
+        fault: Latched errors as text.
         age_s: Time since the last answer.
         unanswered: Ticks without an answer since the start, empty if they are not counted.
         limits: Limits of the readings.
@@ -316,7 +316,7 @@ class Snapshot:
         target_name, why: Target, e.g. "face 3: left eye", and the reason for it; while a client
             is in control, the client and its command.
         rate_hz: Control rate of the last second.
-        health: State of the bus in words.
+        health: State of the bus as text.
         behaviour: Present behaviour.
         saliences: Saliences of the winner and the next bodies, highest first.
         perception: Age of the frame, distances and their sources, apparent motion of still things.
@@ -324,7 +324,7 @@ class Snapshot:
             control, the kind of control, -1 and None.
         character, conversation: Present ones, "" if unknown.
         stopped: Reason for a stop, "" while the robot moves.
-        control_text: Client in control, its command and how well the head can follow; "" without one.
+        control_text: Client in control, its command and how well the head follows; "" without one.
         control_source: Source of control.
         control_sentence: Source of control in one sentence.
         headline: Present activity of the head in one sentence.
@@ -333,7 +333,7 @@ class Snapshot:
         camera: Pose and field of view of the camera.
         field_deg: Field of view of an eye towards temple, nose, above and below.
         servos, timing: Health of the servos and timing of the loop.
-        busy: Text if the computer is too busy, else "".
+        busy: Text if the computer is too busy, otherwise "".
         worst: The guard's worst level since the last snapshot.
         trail, events: Joints and finished eye movements since the last snapshot, oldest first.
         joints: Names of the joints.

@@ -226,14 +226,14 @@ def target_text(target: Target) -> str:
 
 
 def command_text(command: Command) -> str:
-    """Return a command as text, e.g. "asked: stop why=space bar"."""
+    """Return a command as text, e.g. "requested: stop why=space bar"."""
     usual = command._field_defaults
     given = " ".join(
         f"{name}={value}"
         for name, value in command._asdict().items()
         if name not in usual or value != usual[name]
     )
-    return f"asked: {type(command).__name__.lower()} {given}".rstrip()
+    return f"requested: {type(command).__name__.lower()} {given}".rstrip()
 
 
 def _degrees(way: Vec3) -> Angles2:
@@ -268,7 +268,7 @@ class Labels(NamedTuple):
     looked_at: Ints
 
     def event(self) -> list[str]:
-        """Return one word per sample: "blink" during a blink, else the movement."""
+        """Return one word per sample: "blink" during a blink, otherwise the movement."""
         labels = np.array(MOVEMENTS, dtype=object)[self.movement]
         return list(np.where(self.blink, "blink", labels))
 
@@ -281,7 +281,7 @@ class LabelledInterval(NamedTuple):
         amplitude_deg: Great circle from the first to the last sample of the measured cyclopean
             gaze, None if it was lost and for a blink.
         peak_deg_s: Highest speed of the measured cyclopean gaze, None as for the amplitude.
-        looked_at: Destination of a saccade, else the target that the eyes are on.
+        looked_at: Destination of a saccade, otherwise the present target of the eyes.
     """
 
     onset_s: float
@@ -315,7 +315,7 @@ def label_samples(trace: GazeAngles) -> Labels:
 
 
 def _is_carried(trace: GazeAngles, source: Ints) -> NDArray[np.bool_]:
-    """Return where the head carries the gaze to the planned one, with the eyes at their limit.
+    """Return where the head carries the gaze to the plan, with the eyes at their limit.
 
     The limit is the largest angle of the eyes in the head in the run.
 

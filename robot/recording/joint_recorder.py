@@ -33,7 +33,7 @@ class ForwardingBody(Body):
         return self._body.retune(joints, gentle_deg_s)
 
     def configured_limits(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds that the servos are configured to keep."""
+        """Return the ranges and speeds in the servos' configuration."""
         return self._body.configured_limits()
 
     def write(self, command_rad: JointAngles) -> None:

@@ -87,7 +87,7 @@ class Recorder:
             path: The file.
             info: Settings of the run.
             over: Overwrite an existing file.
-            patient: Wait for a slow writer, as a run in simulated time may.
+            patient: Whether to wait for a slow writer, as in simulated time.
         """
         self._path, self._target = path, Path(os.path.realpath(path))
         self._info = info
@@ -122,7 +122,7 @@ class Recorder:
             file_fd = os.open(path, flags, 0o644)
         except OSError as error:
             raise SetupError(
-                f"cannot write {path} ({error.strerror}): choose a folder you may write to"
+                f"cannot write {path} ({error.strerror}): choose a folder with write permission"
             ) from None
         self._opened = True
         try:
@@ -144,7 +144,7 @@ class Recorder:
         self._temporary = None
 
     def wrap_body(self, body: Body) -> Body:
-        """Return a body that wraps a robot's and records its readings."""
+        """Return a body that wraps a robot's body and records its readings."""
         self._health = body.bus.health
         return JointRecorder(body, self._body_records.append)
 
@@ -197,7 +197,7 @@ class Recorder:
     def _take(self, batch: TickBatch) -> bool:
         """Send ticks to the writer; return False if they are lost."""
         if not self._link.alive or self._link.failed:
-            return True  # the failure is reported; no receiver is left that could miss a percept
+            return True  # the failure is reported; no remaining receiver could miss a percept
         if self._link.post(writer.TICKS, batch.data):
             return True
         self.lost += batch.ticks
@@ -243,7 +243,8 @@ class Recorder:
             if self._temporary is not None:
                 self._temporary.unlink(missing_ok=True)
                 return f"nothing was recorded: {self._path} is unchanged"
-            if self._opened and self._target.is_file():  # else another program's, or a device
+            # Otherwise it belongs to another program, or is a device.
+            if self._opened and self._target.is_file():
                 self._target.unlink()
             return f"nothing was recorded: {self._path} was not created"
         done = self._link.done

@@ -1,7 +1,7 @@
 """Topics and schemas of a recorded run: JSON with schemas in MCAP (mcap.dev/spec).
 
-/rig/tick and /rig/percept contain everything, exactly. The other topics repeat parts of it
-in formats that viewers draw (Foxglove documentation, message schemas).
+/rig/tick and /rig/percept contain everything, exactly. The other topics repeat parts of it in
+formats that viewers can draw (Foxglove documentation, message schemas).
 """
 
 import dataclasses
@@ -63,21 +63,21 @@ _ORDER: Schema = {"type": "object", "properties": {"order": _TEXT}}
 _DESCRIPTIONS = {
     "t_s": "the rig's own time, s",
     "dt_s": "since the previous tick, s",
-    "joints": "as measured, in the order of guard_result.joints",
-    "pose": "of head and eyes, by joints; yaw + left, pitch + up; lids 0 shut .. 1 open",
+    "joints": "measured angles, in the order of guard_result.joints",
+    "pose": "measured poses of head and eyes; yaw + left, pitch + up; lids 0 shut .. 1 open",
     "percept": "number of the /rig/percept that this tick used",
-    "target": "where to look and why, the highest saliences term by term",
+    "target": "gaze target and its reason, with the highest saliences term by term",
     "gaze": "output of the gaze models",
     "desired_rad": "desired joint angles; in guard_result null if equal to the tick's",
     "guard_result": "output of the guard",
-    "measured": "false: the servo reports nothing, this is its goal moved at known speeds; "
+    "measured": "false: the servo has no feedback and this is its goal, moved at known speeds; "
     "empty: all are measured",
-    "stopped": "why the robot was stopped",
+    "stopped": "reason for a stop",
     "controlled_by": "client that controls gaze or joints, and its command",
-    "client_control": "the newest command of a client; left out before the first",
-    "gesture": "the newest gesture; left out before the first",
-    "plan": "choice of the action planner and its reason; left out without a planner",
-    "is_lost": "it is out of sight and its last position is looked at; left out if in sight",
+    "client_control": "the newest command of a client; omitted before the first",
+    "gesture": "the newest gesture; omitted before the first",
+    "plan": "choice of the action planner and its reason; omitted without a planner",
+    "is_lost": "it is not visible and the gaze is on its last position; omitted if visible",
     "before": "further reports of the machine since the previous tick",
     "looks_at_head": "null: too uncertain",
     "gaze_world": "null: the detector does not find the gaze of the eyes",

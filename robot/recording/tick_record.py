@@ -91,9 +91,9 @@ _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3
 def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     """Return a tick from ``tick_stream.decode_plain`` as JSON.
 
-    Fields without information are left out: ``guard_result.desired_rad`` if it equals the
-    tick's (null), ``client_control`` and ``gesture`` before the first, ``target.plan`` without a planner,
-    ``target.is_lost`` of a target in sight.
+    Fields without information are omitted: ``guard_result.desired_rad`` if it equals the tick's
+    (null), ``client_control`` and ``gesture`` before the first, ``target.plan`` without a planner,
+    ``target.is_lost`` of a visible target.
 
     Args:
         row: The fields of a ``TickRow``.
@@ -108,7 +108,7 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     target, gaze = data["target"], data["gaze"]
     target["saliences"] = [_name_fields(Salience, one) for one in target["saliences"]]
     gaze["limited"] = [_name_fields(LimitedAngle, one) for one in gaze["limited"]]
-    if data.pop("command_is_desired"):  # nearly always: written once
+    if data.pop("command_is_desired"):  # in nearly every tick: stored once
         data["guard_result"]["desired_rad"] = None
     for name in ("plan", "is_lost"):
         if not target[name]:
@@ -234,7 +234,7 @@ def _name_fields(kind: Any, values: Sequence[Any]) -> Json:
 
 
 def _build(kind: Any, data: Json) -> Any:
-    """Build a named tuple from JSON; fields unknown to this version are left out."""
+    """Build a named tuple from JSON; fields unknown to this version are ignored."""
     known = kind._fields
     return kind(
         **{k: _to_tuples(v) if type(v) is list else v for k, v in data.items() if k in known}
@@ -260,7 +260,7 @@ def _finite(value: Any) -> bool:
 
 
 def _encode_special_floats(value: Any) -> Any:
-    """Replace NaN and infinities by {"float": "nan"}, "inf" or "-inf", recursively."""
+    """Replace NaN and infinities with {"float": "nan"}, "inf" or "-inf", recursively."""
     if isinstance(value, float) and not isfinite(value):
         return {"float": repr(float(value))}
     if isinstance(value, tuple | list):

@@ -67,7 +67,7 @@ class RequestRejected(SetupError, Refused):
     """The rig refused a request and is unchanged; the message lists every broken rule.
 
     Attributes:
-        reply: Reply of the head to a command; None if the request was no command.
+        reply: Reply of the head to a command; None if the request was not a command.
     """
 
     def __init__(self, message: str, reply: CommandReply | None = None) -> None:
@@ -116,7 +116,7 @@ class ClientConnection:
         return self._result(answer)
 
     def _result(self, answer: object) -> object:
-        """Return the result in an answer, or raise what it states."""
+        """Return the result in an answer, or raise the error in it."""
         match answer:
             case {"ok": said}:
                 return said
@@ -125,30 +125,32 @@ class ClientConnection:
             case {"refused": str(rules)}:
                 raise RequestRejected(rules)
             case {"failed": str(what)}:
-                raise ConnectionLost(
-                    f"the rig (process {self.pid}) met an error of its own: {what}"
-                )
-        raise ConnectionLost(f"process {self.pid} gave no answer of a rig: {answer!r:.80}")
+                raise ConnectionLost(f"the rig (process {self.pid}) had an internal error: {what}")
+        raise ConnectionLost(f"process {self.pid} did not answer like a rig: {answer!r:.80}")
 
     def _answer(self, request: dict[str, object], within_s: float) -> object:
         try:
             self._wire.write(request, CONNECT_S)
         except (TypeError, ValueError) as error:
             raise RequestRejected(
-                f"only finite numbers, text, lists and mappings go: {error}"
+                f"only finite numbers, text, lists and mappings can be sent: {error}"
             ) from None
         except OSError:
-            raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
+            raise ConnectionLost(
+                f"the rig (process {self.pid}) has ended or disconnected"
+            ) from None
         try:
             return self._wire.read(within_s, within_s)
         except TimeoutError:
-            self.close()  # a late answer would be taken for that of the next request
+            self.close()  # a late answer would be mistaken for that of the next request
             raise ConnectionLost(f"the rig (process {self.pid}) does not answer") from None
         except (EOFError, OSError):
-            raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
+            raise ConnectionLost(
+                f"the rig (process {self.pid}) has ended or disconnected"
+            ) from None
         except MalformedMessage as error:
             self.close()
-            raise ConnectionLost(f"process {self.pid} gave no answer of a rig: {error}") from None
+            raise ConnectionLost(f"process {self.pid} did not answer like a rig: {error}") from None
 
 
 _EVERY_S = 0.25 * HEARTBEAT_S
@@ -248,7 +250,7 @@ class RobotClient:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """Hang up."""
+        """Disconnect."""
         self.close()
 
     def close(self) -> None:
@@ -275,11 +277,11 @@ class RobotClient:
         return str(now.get("name") or rig_name(now["rig"]))
 
     def get(self, prefix: str = "") -> dict[str, JsonValue]:
-        """Return the present values of all keys that begin with ``prefix``."""
+        """Return the present values of all keys that start with ``prefix``."""
         return cast(dict[str, JsonValue], self._connection.ask("get", prefix=prefix))
 
     def parameters(self, prefix: str = "") -> tuple[Parameter, ...]:
-        """Return the rules and defaults of all keys that begin with ``prefix``."""
+        """Return the rules and defaults of all keys that start with ``prefix``."""
         found = cast(list[dict[str, Any]], self._connection.ask("parameters", prefix=prefix))
         return tuple(Parameter.from_json(one) for one in found)
 
@@ -295,7 +297,7 @@ class RobotClient:
         raise RequestRejected(f"{key}: unknown key; gazerig ctl get lists all")
 
     def set(self, key: str, value: Value) -> tuple[str, ...]:
-        """Apply a value; when this returns, the loop uses it. Return notes for the user.
+        """Apply a value, which the loop uses when this returns; return notes for the user.
 
         Raises:
             RequestRejected: the value breaks a rule; nothing was changed.
@@ -319,7 +321,7 @@ class RobotClient:
         return _changes(self._connection.ask("differs"))
 
     def save(self, path: Path | str | None = None) -> SavedFile:
-        """Write the present values to the rig's own file, or to another of this computer.
+        """Write the present values to the rig's own file, or to another file on this computer.
 
         Raises:
             RequestRejected: the file cannot be written, or is shipped with the program.
@@ -392,7 +394,7 @@ class RobotClient:
         return self._command(Play(gesture, speed, times, self.who))
 
     def gestures(self) -> tuple[dict[str, Any], ...]:
-        """Return all gestures: name, description, duration_s, slowed_by, and refused if it is."""
+        """Return all gestures: name, description, duration_s, slowed_by, refused (if it is)."""
         return tuple(cast(list[dict[str, Any]], self._connection.ask("gestures")))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
@@ -470,7 +472,9 @@ class RobotClient:
             try:
                 self._heartbeat = ControlHeartbeat(self._dial, self.who)
             except OSError:
-                raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
+                raise ConnectionLost(
+                    f"the rig (process {self.pid}) has ended or disconnected"
+                ) from None
         return reply
 
     def _end_heartbeat(self) -> None:
@@ -526,7 +530,7 @@ def connect_to_all(which: int | str | None = None, who: str = "") -> list[RobotC
     pid = None if which is None else int(which)
     uid = user_id()
     place = socket_folder(os.environ, uid)
-    if not is_private(place, uid):  # who put a socket there is not known
+    if not is_private(place, uid):  # any user may have put a socket there
         return []
     found: list[RobotClient] = []
     for path, number in find_sockets(place).items():
@@ -546,7 +550,7 @@ def _connect_wire(path: Path) -> Wire:
 
 
 def rig_name(rig: str) -> str:
-    """Return the name of a rig without a name of its own: that of its file."""
+    """Return the name of an unnamed rig: that of its file."""
     return Path(rig).stem
 
 
@@ -561,7 +565,7 @@ def _select_by_name(rigs: list[RobotClient], name: str) -> list[RobotClient]:
     for rig in rigs:
         try:
             named = rig.name == name
-        except DriverError:  # it ends or hangs
+        except DriverError:  # it is ending or hangs
             named = False
         if named:
             found.append(rig)

@@ -79,7 +79,7 @@ class Schemas:
 
 
 def _message_schema(name: str, description: str, properties: Schema, needed: list[str]) -> Schema:
-    tag = {"type": ["string", "integer"], "description": "comes back with the answer"}
+    tag = {"type": ["string", "integer"], "description": "returned with the answer"}
     return {
         "title": name,
         "type": "object",
@@ -125,7 +125,7 @@ def api_description(base: str) -> dict[str, Any]:
         code: _response(what, of_answer)
         for code, what in {
             "400": "Not a message", "403": "Wrong token or another site", "409": "Refused",
-            "413": "Too long", "429": "Too many requests", "503": "No head takes requests",
+            "413": "Too long", "429": "Too many requests", "503": "No head accepts requests",
         }.items()
     }  # fmt: skip
     bad = {code: refusals[code] for code in ("400", "403", "429", "503")}
@@ -153,7 +153,7 @@ def api_description(base: str) -> dict[str, Any]:
         ),
         "socket": (
             "get",
-            "Websocket: messages as of do, answers and outcomes; states at rate_hz; events",
+            "Websocket: messages as in do, answers and outcomes; states at rate_hz; events",
             [
                 _query_parameter("rate_hz", {"type": "number", "minimum": 1, "maximum": MOST_RATE_HZ}),
                 _query_parameter("events", {"type": "boolean", "default": False}),

@@ -50,8 +50,8 @@ _WORDS = 20
 """Number of recent messages in the status."""
 
 _HANGS = (
-    f"the control loop has not taken it up within {_TAKEN_UP_S:g} s: it hangs, "
-    "starts or ends; what moves is stopped by the emergency stop"
+    f"the control loop has not executed it within {_TAKEN_UP_S:g} s: it hangs, "
+    "starts or ends; use the emergency stop if anything moves"
 )
 
 
@@ -132,7 +132,7 @@ class LoopMonitor:
             "phase": does.phase,
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
             "estimated": list(estimated_joints(tick)),
-            "reckoned": list(estimated_joints(tick)),  # the key until this version
+            "reckoned": list(estimated_joints(tick)),  # the former key, for compatibility
             "said": [event.text for event in self._feed.messages()[-_WORDS:]],
         }
 
@@ -152,12 +152,12 @@ class RequestHandler:
         robot: Executes commands.
         params: Parameters; None if they cannot be read or changed.
         pulse: State of the loop.
-        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         refusals: Exceptions besides ValueError that ``params`` raises if a value breaks a rule.
         saved: Called with each file that was written.
         fixed: Reason why parameters cannot be changed, if they cannot.
         fault: Executes a fault command of emulated servos; None if the servos are real.
-        changing: Returns the other fields of the status, as {"page": address}.
+        changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
     """
 
@@ -198,9 +198,9 @@ class RequestHandler:
         """Execute one request; return {"ok": result} or {"refused": every broken rule}.
 
         Args:
-            request: Request {"do": verb, ...}. Its "tag" comes back with the answer; the page's
+            request: Request {"do": verb, ...}. Its "tag" is returned with the answer; the page's
                 process marks requests of the network by "network": true.
-            peer: Client at the other end, as "process 123", "" if unknown.
+            peer: Client at the other end, e.g. "process 123", "" if unknown.
         """
         tag: dict[str, object] = {}
         handler = self._handler
@@ -271,7 +271,7 @@ class RequestHandler:
 
 
 def _set_client(peer: str, command: Command) -> Command:
-    """Return a command with the client's process: it cannot pose as another, or as the page."""
+    """Return a command with the client's process: it cannot pose as another one or the page."""
     who = str(getattr(command, "who", ""))
     return set_client(command, f"{who} ({peer})" if who else peer) if peer else command
 

@@ -1,8 +1,8 @@
 """Guard between desired angles and the bus; it uses limits, measurements and ages, not gaze.
 
-For any desired angles, the commands are finite, inside every joint's range, within its speed
-and acceleration, always able to stop before the end of the range, and without collisions
-between joints. A joint that is hot, overloaded, short of voltage or stuck slows down or stops
+For any desired angles, the commands are finite, inside every joint's range, within its speed and
+acceleration, always able to stop before the end of the range, and without collisions between
+joints. A joint that is hot, overloaded, stuck or has too low a voltage slows down or stops
 independently of the others. Angles are in rad.
 """
 
@@ -45,7 +45,7 @@ class Guard:
         params: Thresholds and times.
         limits: One limit per joint.
         joints: The joints' names.
-        reach: Returns the ranges and speeds that the servos themselves keep, which apply in
+        reach: Returns the ranges and speeds in the servos' own configuration, which apply in
             addition to changed limits; None for servos without limits of their own.
         period_s: Nominal time between ticks. Motion missed by a late tick is not made up for.
 
@@ -64,7 +64,9 @@ class Guard:
         self._set_params(params)
         self._late = LateTicks(period_s)
         self._soft = False
-        self._calm = False  # every joint followed in the last tick, and nothing has changed since
+        self._calm = (
+            False  # every joint followed in the last tick, and nothing has changed since then
+        )
         self._names, self._numbers = joints, range(len(limits))
         self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(limits)
@@ -92,8 +94,8 @@ class Guard:
     def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
         """Change the limits without a jump; counters and findings stay.
 
-        A joint whose motion does not keep its new limit first comes to rest under the old one.
-        A joint outside its new range then moves inside slowly.
+        A joint whose motion exceeds its new limit first comes to rest under the old one. A joint
+        outside its new range then moves inside slowly.
 
         Raises:
             ValueError: A collision leaves no pose inside the limits; nothing has changed.
@@ -119,7 +121,7 @@ class Guard:
         self._slow_down(i)
 
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
-        """Start from the present goals on the bus, at rest, slowly."""
+        """Start slowly and at rest from the present goals on the bus."""
         self._t_s = t_s
         self._change.reset()
         self._held = [False] * len(self._limits)
@@ -132,7 +134,7 @@ class Guard:
         self.start_gently()
 
     def start_gently(self) -> None:
-        """Move slowly for some time, and each joint until it first reaches its desired angle."""
+        """Move slowly for some time; each joint also until it first reaches its desired angle."""
         self._calm = False
         for i in range(len(self._limits)):
             self._motion.forget_gaps(i)
@@ -172,8 +174,8 @@ class Guard:
         since_s = t_s - self._t_s
         if not (since_s > 0.0 and isfinite(since_s)):
             command = tuple(self._motion.command)
-            reasons = ("all: time stands still",)
-            why = ("time stands still",) * len(command)
+            reasons = ("all: time does not advance",)
+            why = ("time does not advance",) * len(command)
             return GuardResult(command, "hold", reasons, desired_rad, why, reasons, self._names)
         self._t_s = t_s
         if self._change.waiting or self._change.outside:
@@ -192,7 +194,7 @@ class Guard:
     def _joints(
         self, desired_rad: JointAngles, joints: JointState, no_frame: bool, dt_s: float
     ) -> GuardResult:
-        """Move all joints; nearly every desired angle is passed on unchanged."""
+        """Move all joints; nearly every desired angle is returned unchanged."""
         motion, far = self._motion, self._stuck.far_rad
         if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
             motion.update_easy_range(dt_s)
@@ -226,7 +228,7 @@ class Guard:
             return tuple.__new__(
                 GuardResult, (desired_rad, "ok", (), desired_rad, (), (), self._names)
             )
-        if short != self._short:  # findings last for many ticks
+        if short != self._short:  # findings often stay the same for many ticks
             self._short, self._findings = short, _findings(short, self._names)
         level, reasons, why, critical = self._findings
         return GuardResult(tuple(command), level, reasons, desired_rad, why, critical, self._names)
@@ -263,7 +265,7 @@ class Guard:
         )
 
     def _slow_down(self, i: int) -> None:
-        """Make a joint continue slowly, as after torque-on."""
+        """Make a joint continue slowly, as after torque is switched on."""
         self._calm = False
         if not self._gentle[i]:
             self._motion.forget_gaps(i)
@@ -301,11 +303,11 @@ class Guard:
         return (3, fault) if fault else (rank, reason)
 
     def _servo_hold(self, i: int, joints: JointState, fault: str, fresh: bool) -> _Hold | None:
-        """Return the hold of a joint whose servo cannot or must not follow, else None."""
+        """Return the hold of a joint whose servo cannot or must not follow, otherwise None."""
         position = joints.position_rad[i]
         powered = joints.torque[i] if joints.torque else not fault
         if not powered:
-            # The command follows the position, so that nothing jumps when the torque comes on.
+            # The command follows the position, so that nothing jumps when torque is switched on.
             self._stuck.forget(i)
             return _Hold("torque off", position if isfinite(position) else None, restart="slowly")
         if "encoder" in fault:
@@ -320,7 +322,7 @@ class Guard:
         return _Hold(strain, restart="slowly") if strain else None
 
     def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
-        """Return the hold of a joint for reasons other than its servo, else None."""
+        """Return the hold of a joint for reasons other than its servo, otherwise None."""
         if i in self._change.waiting:
             return _Hold("new limits")
         if i in self._collisions.exits:
@@ -368,7 +370,7 @@ class Guard:
         self._motion.seek(i, goal, dt_s, speed, soft, regain=min(accel, self._late_accel))
 
     def _move_towards(self, i: int, desired: float, position: float, dt_s: float) -> str:
-        """Move a joint towards its desired angle; return why it fell short, "" if it did not."""
+        """Move a joint towards its desired angle; return why it does not reach it, or ""."""
         motion, limit, share = self._motion, self._limits[i], self._health.share[i]
         began = motion.command[i]
         target = min(max(desired, motion.low[i]), motion.high[i])

@@ -22,8 +22,8 @@ class MotionLimiter:
     Attributes:
         command, speed: Newest commands and their speeds.
         goal: Newest desired angles; the command itself if it was reached.
-        low, high: Present ranges. A wall inside a joint's own range may be put up while the
-            joint can stop before it (``keeps_below``, ``keeps_above``).
+        low, high: Present ranges. A wall inside a joint's own range may be set while the joint can
+            stop before it (``keeps_below``, ``keeps_above``).
         easy_s, easy_speed, easy_low, easy_high: A joint keeps every limit in a step of at least
             ``easy_s`` if its speeds before and after are within ``easy_speed`` and its angle is
             between ``easy_low`` and ``easy_high``.
@@ -261,7 +261,7 @@ def _highest_speed(v: float, accel: float, soft: float, dt_s: float) -> float:
 
 
 class LimitChange:
-    """The present limits of all joints, and new ones that wait until joints can keep them.
+    """The present limits of all joints, and pending new ones until joints can keep them.
 
     Attributes:
         waiting: Joints that come to rest before their new limits apply.
@@ -270,7 +270,7 @@ class LimitChange:
     Args:
         motion: Limiter with the present limits.
         wanted: One limit per joint.
-        reach: Returns the ranges and speeds that the servos themselves keep; None for servos
+        reach: Returns the ranges and speeds in the servos' own configuration; None for servos
             without limits of their own.
     """
 
@@ -296,7 +296,7 @@ class LimitChange:
         in_force = self._motion.limits
         self.waiting = {i for i, limit in enumerate(self._within_reach()) if limit != in_force[i]}
         for i in range(len(wanted)):
-            self._motion.reset_range(i)  # walls of a collision that is gone
+            self._motion.reset_range(i)  # walls of a collision that no longer applies
 
     def begin(self, i: int, angle_rad: float) -> None:
         """Start a joint at its present goal on the bus, at rest."""
@@ -325,7 +325,7 @@ class LimitChange:
             self._update_outside(i)
 
     def _within_reach(self) -> tuple[JointLimit, ...]:
-        """Return the wanted limits, reduced to those that the servos keep."""
+        """Return the wanted limits, reduced to those of the servos' configuration."""
         if self._reach is None:
             return self._wanted
         return tuple(map(JointLimit.reduced_to, self._wanted, self._reach()))
@@ -341,11 +341,13 @@ class LimitChange:
 
 
 LATE_PERIODS = 1.5
-"""A tick that comes more than this number of periods after the previous one is late."""
+"""A tick is late if it starts more than this number of periods after the previous one."""
 
 STEADY_TICKS, SLOWEST_S = 5, 0.05
-"""This number of late ticks in a row, up to this interval apart, set a new pace: the bus or the
-host is too slow for its rate. If each counted as a gap, a neck would reach only 10 deg/s."""
+"""After this number of late ticks in a row, at most this interval apart, the pace is changed: the
+bus or the host is too slow for its rate. If each counted as a gap, a neck would reach only 10
+deg/s.
+"""
 
 
 class LateTicks:

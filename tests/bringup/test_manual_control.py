@@ -197,7 +197,7 @@ def test_several_joints_arrive_together(bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     ("joint", "angle", "says"),
-    [("neck", 0.0, "no joint 'neck'; there is left_eye_pan"), ("neck_yaw", nan, "not an angle")],
+    [("neck", 0.0, "no joint 'neck'; available: left_eye_pan"), ("neck_yaw", nan, "not an angle")],
 )
 def test_nonsense_is_refused_before_anything_moves(
     bench: Bench, joint: str, angle: float, says: str
