@@ -94,6 +94,14 @@ def rotation_matrix(quat: Floats) -> Floats:
     )
 
 
+def rotation_vector(R: Floats) -> Floats:
+    """Return the axis (3,) of a rotation (3, 3) of less than half a turn, as long as its angle."""
+    sines = 0.5 * (R - R.T)[(2, 0, 1), (1, 2, 0)]
+    sine = float(np.linalg.norm(sines))
+    angle = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
+    return np.asarray(sines * (angle / sine if sine > 0.0 else 1.0))
+
+
 def two_bones(
     start: Floats, end: Floats, upper_m: float, lower_m: float, pole: Floats
 ) -> tuple[Floats, Floats, Floats]:

@@ -7,9 +7,11 @@ ticks, and other data (``RunState``) when it has changed.
 
 import json
 import pickle
+import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -54,6 +56,8 @@ TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
 """First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, one with
 its pixels."""
 
+_DRAWING_SHARE = 0.1
+"""Largest share of a processor for pictures of a simulated camera that delivers none."""
 _NEAREST_M = 0.05
 """Smallest distance from the plane of the camera of points in the image, m."""
 
@@ -193,6 +197,7 @@ class LiveFeed:
         self.watched = True
         self.shown_s: float | None = None
         self._picture: SceneView | None = None
+        self._undrawn_s = inf, -inf
         self._world: WorldShapes | None = None
         self._detector = ""
         self._trail, self._gaze = GazeTrail(), GazeHistory()
@@ -278,6 +283,9 @@ class LiveFeed:
             return None
         if tick is None or found is None or builder is None or poses is None:
             return None
+        begin_s, end_s = self._undrawn_s
+        if _has_no_image(found) and begin_s < found.captured_s < end_s:
+            return None
         self._new_frame = False
         assert builder.rig is not None  # it came with the first message
         field_rad = builder.rig.horizontal_rad
@@ -287,7 +295,10 @@ class LiveFeed:
         if _has_no_image(found) and self._picture is not None and start_s is not None:
             size_px = found.width_px, found.height_px
             seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
+            began_s = time.thread_time()
             found = replace(found, image=self._picture.draw(seen_by).image)
+            pause_s = (time.thread_time() - began_s) / _DRAWING_SHARE
+            self._undrawn_s = found.captured_s, found.captured_s + pause_s
         # The page's process draws; the control loop's imports this module too, without OpenCV.
         from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
 
