@@ -27,8 +27,8 @@ CARD, SOFTWARE, NOTHING = False, True, None
         (8, 0.02, 0.70, CARD, "small"),
         (8, 0.20, 0.95, CARD, "small"),
         (8, 0.30, 0.95, CARD, "busy"),
-        (2, 0.02, 0.67, SOFTWARE, "busy"),  # two busy processes
-        (2, 0.20, 0.90, SOFTWARE, "busy"),
+        (2, 0.02, 0.67, SOFTWARE, "least"),  # two busy processes
+        (2, 0.20, 0.90, SOFTWARE, "least"),
         (2, 0.02, 0.40, SOFTWARE, "least"),  # four
         (2, 0.45, 0.90, CARD, "least"),
         (1, 0.00, 1.00, SOFTWARE, "least"),

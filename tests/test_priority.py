@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import time_slices
 
-from gazerig.drivers.process.priority import SHORT_S
+from gazerig.drivers.process.priority import SHORT_S, share_priority
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux groups sessions")
 LOWER = (
@@ -67,3 +67,33 @@ def test_real_time_priority_stays() -> None:
     )
     words = [sys.executable, "-c", code]
     assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+RAISE = (
+    "from pathlib import Path; from gazerig.drivers.process.priority import raise_priority; "
+    "raise_priority(Path({group!r}))"
+)
+
+
+@pytest.mark.parametrize(("leads", "text"), [(True, "-10"), (False, "")])
+def test_only_the_leader_of_a_session_raises_its_priority(
+    tmp_path: Path, leads: bool, text: str
+) -> None:
+    group = tmp_path / "autogroup"
+    group.touch()
+    words = [sys.executable, "-c", RAISE.format(group=str(group))]
+    subprocess.run(words, check=True, start_new_session=leads)
+    assert group.read_text() == text
+
+
+@pytest.mark.parametrize(("nice", "shared"), [(-10, "-10"), (0, ""), (3, "")])
+def test_a_raised_priority_is_shared_with_a_process(tmp_path: Path, nice: int, shared: str) -> None:
+    for name, text in (("self", f"/autogroup-7 nice {nice}\n"), ("12", "")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "autogroup").write_text(text)
+    share_priority(12, tmp_path)
+    assert (tmp_path / "12/autogroup").read_text() == shared
+
+
+def test_a_system_without_groups_shares_nothing(tmp_path: Path) -> None:
+    share_priority(12, tmp_path)

@@ -63,11 +63,11 @@ def load_level(figures: ComputerFigures) -> str:
     have that only next to a slower loop.
     """
     cores, late, share, software = figures
+    weak = cores == 1 or (cores == 2 and software is not False)
     if share < 0.5 or late >= 0.4 or (cores == 1 and software is not False):
         return "least"
-    weak = cores == 1 or (cores == 2 and software is not False)
     if share < 0.75 or late >= 0.15:
-        return "busy" if weak or late >= 0.25 else "small"
+        return "least" if weak else "busy" if late >= 0.25 else "small"
     return "small" if weak or late >= 0.05 else "full"
 
 

@@ -9,7 +9,8 @@ loop, the camera, the world, the page and the browser, and the computer's load a
 minute counts, from the first tick. Options after ``--`` replace those of ``make run``.
 
 ``--ahead`` moves all sessions of the bench before those of other users of a busy computer (their
-autogroups by 15 steps of nice, which needs root); their order among each other stays.
+autogroups by 9 steps of nice, which needs root); their order among each other stays. ``--user``
+runs without the privilege to raise priorities, also as root.
 """
 
 import argparse
@@ -31,6 +32,8 @@ sys.path.insert(0, str(TESTS))
 from browser import browsing  # noqa: E402
 from page_layout import value  # noqa: E402
 
+ALONE = [sys.executable, "-m", "gazerig.drivers.process.own_session"]
+USER = ["setpriv", "--inh-caps", "-sys_nice", "--bounding-set", "-sys_nice"]
 BUSY = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum(range(100000))"
 COUNT = """(() => {
   window.pictures = 0;
@@ -64,6 +67,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--no-browser", action="store_true")
     parser.add_argument("--ahead", action="store_true")
+    parser.add_argument("--user", action="store_true")
     parser.add_argument("options", nargs="*")
     args = parser.parse_args()
     if os.getsid(0) != os.getpid():
@@ -78,7 +82,7 @@ def main() -> None:
 
 def go_ahead() -> None:
     """Move each new session of this process and its descendants ahead."""
-    moved: set[int] = set()
+    moved: dict[int, int] = {}
     while True:
         parents: dict[int, int] = {}
         sessions: dict[int, int] = {}
@@ -91,18 +95,23 @@ def go_ahead() -> None:
             above = pid
             while above in parents and above != os.getpid():
                 above = parents[above]
-            if above == os.getpid() and session not in moved:
-                with suppress(OSError):
-                    group = Path(f"/proc/{pid}/autogroup")
-                    nice = int(group.read_text().split()[-1])
-                    group.write_text(str(nice - 15))
-                    moved.add(session)
+            if above != os.getpid():
+                continue
+            with suppress(OSError):
+                group = Path(f"/proc/{pid}/autogroup")
+                nice = int(group.read_text().split()[-1])
+                if nice != moved.get(session):  # new, or it has set its own niceness meanwhile
+                    moved[session] = max(-20, nice - 9)
+                    group.write_text(str(moved[session]))
         time.sleep(0.2)
 
 
-def chosen() -> list[str]:
-    """Return the options that ``make run`` adds."""
-    words = [sys.executable, "-m", "gazerig.features.world.run.first_world"]
+def chosen(begin: list[str]) -> list[str]:
+    """Return the options that ``make run`` adds.
+
+    begin: words before the command
+    """
+    words = [*begin, sys.executable, "-m", "gazerig.features.world.run.first_world"]
     return subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
 
 
@@ -110,9 +119,10 @@ def row(load: int, args: argparse.Namespace) -> str:
     """Return one row."""
     began_s = time.monotonic()
     busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(load)]
-    options = args.options or chosen()
+    begin = USER if args.user else []
+    options = args.options or chosen(begin)
     start = "from gazerig.robot.cli.entry_point import main; main()"
-    words = [sys.executable, "-c", start, "run", "--mock", *options]
+    words = [*begin, *ALONE, sys.executable, "-c", start, "run", "--mock", *options]
     summary = Path(tempfile.mkdtemp()) / "summary.json"
     words += ["--no-browser", "--page", "127.0.0.1:8790", "--summary", str(summary)]
     run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -162,7 +172,7 @@ def row(load: int, args: argparse.Namespace) -> str:
         for one in (*busy, run):
             one.kill()
             one.wait()
-    said = [line for line in lines if re.search("busy|late[ :]|faults", line)]
+    said = [line for line in lines if re.search("busy[ ,;:]|late[ :]|faults", line)]
     ticks, late = figures["ticks"], figures["overruns"]
     slots, cores = ticks + late, " ".join(f"{role} {cpu:.2f}" for role, cpu in spent.items())
     cells = (
@@ -192,10 +202,11 @@ def times(pid: int) -> dict[str, float]:
         part = fields.split()
         spent = (int(part[11]) + int(part[12])) / tick
         rows[int(file.parent.name)] = int(part[1]), f"{name} {words}", spent
-    roles: dict[str, float] = {"loop": rows[pid][2]} if pid in rows else {}
     kinds = {"page_main": "page", "pty.server": "servos", "spawn_main": "camera"}
-    for _, (parent, words, spent) in rows.items():
-        kind = next((k for w, k in kinds.items() if w in words and parent == pid), None)
+    loop = next((one for one, (parent, _, _) in rows.items() if parent == pid), pid)
+    roles: dict[str, float] = {"loop": rows[loop][2]} if loop in rows else {}
+    for parent, words, spent in rows.values():
+        kind = next((k for w, k in kinds.items() if w in words and parent == loop), None)
         if "chrom" in words.lower():
             kind = "browser"
         if kind is not None:
