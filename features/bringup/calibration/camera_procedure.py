@@ -177,7 +177,7 @@ def neck_angles(
     far_deg = (min(par.yaw_deg, 0.55 * half[0]), min(par.pitch_deg, 0.5 * half[1]), par.roll_deg)
 
     def within(axis: int, share: float) -> float:
-        # A tenth of the range is left alone: nothing is looked for at the neck's ends.
+        # A tenth of the range is left out: no view is taken at the neck's ends.
         low, high = (0.9 * end for end in ranges_rad[axis])
         return min(max(share * radians(far_deg[axis]), low), high)
 

@@ -162,7 +162,7 @@ def _round_to_tenths(place_mm: Vec3) -> Vec3:
 
 
 def _step_within_range(value: float, by: float) -> float:
-    # A place that was written down farther out stays, but moves only inwards.
+    # A place stored farther out stays, but moves only inwards.
     far = max(FARTHEST_MM, abs(value))
     return max(-far, min(far, value + by))
 

@@ -176,7 +176,7 @@ class SmartServoAccess:
         self._at_s = self._clock.now_s()
         return value, self._at_s
 
-    # --- driven gently
+    # --- motion with low drive
 
     def enable_torque(self, params: StopSearchParams) -> None:
         """Switch the torque on at its position, weak and slow; goals may be anywhere in the turn.

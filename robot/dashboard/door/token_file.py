@@ -32,7 +32,7 @@ def read_token(path: Path) -> str:
             new.write(f"{token}\n")
         return token
     try:
-        # A pipe would be waited for.
+        # Opening a pipe without a writer would block.
         file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         with open(file, encoding="ascii", errors="replace") as there:
             about, text = os.fstat(file), there.read(300)
