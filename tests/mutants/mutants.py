@@ -213,6 +213,10 @@ MUTANTS = (
     # ---- description
     Mutant("robot/description/build.py", "edge = meet - up * shut", "edge = meet",
            "lids do not meet where the rig says that they are shut", ("describe",)),
+    Mutant("robot/description/statics.py", "if ta * tb < 0.0", "if ta * tb > 0.0",
+           "a head is parked where its weight pulls", ("mass",)),
+    Mutant("robot/control/sag.py", "-self._share * shares[name] / stiff", "self._share * shares[name] / stiff",
+           "goals go along with the sag", ("mass",)),
     Mutant("robot/description/weights.py",
            "c + share * (c - off)", "c", "a weighed head leaves out its eyes and jaw", ("describe",)),
     Mutant("robot/description/clearance.py", "(free, middle) if deep else (middle, met)", "(free, met)",
