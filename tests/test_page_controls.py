@@ -1,4 +1,4 @@
-"""What people do on the page reaches the rig: menus, joints, parameters; and its answers return."""
+"""Actions on the page reach the rig: menus, joints, parameters; and its answers return."""
 
 import json
 import socket
@@ -478,7 +478,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
     view.show(replace(SNAPSHOT, t_s=1.0))
     assert (
         slider.value == pytest.approx(5.7) and mouth.parse_request == []
-    )  # 0.1 rad, and nobody asked
+    )  # 0.1 rad, without a request
     slider.receive_input(20.0, WHO)
     assert mouth.parse_request == [(Jog((("neck_yaw", radians(20.0)),)), WHO)]
 
@@ -488,10 +488,10 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
         return float(slider.value)
 
     assert wished(1.1, 6.0) == 20.0  # not yet obeyed
-    assert wished(1.2, 20.0) == 20.0  # obeyed; the joint is still on its way
+    assert wished(1.2, 20.0) == 20.0  # executed; the joint is still moving
     assert wished(5.0, 20.0) == 20.0
     assert wished(5.2, -3.0) == 20.0
-    assert wished(5.8, -3.0) == pytest.approx(5.7)  # somebody let go elsewhere
+    assert wished(5.8, -3.0) == pytest.approx(5.7)  # another person released it
     slider.receive_input(20.0, WHO)
     assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
 
@@ -653,7 +653,7 @@ def test_who_searches_before_the_parameters_have_come_finds_them_then() -> None:
     slider.receive_input(4.0, client)
     assert mouth.parse_request == [({"do": "set", "changes": {"a.b": 4.0}}, f"{client}:tuning")]
     state.update_values({"values": {"a.b": 3.5}, "unsaved": []})
-    assert slider.value == 4.0  # not yet answered: it stays where the hand has put it
+    assert slider.value == 4.0  # not yet answered: it stays at the place of the hand
     state.record_answer(f"{client}:tuning")
     assert slider.value == 3.5 and slider.label == "a.b (deg)"
 

@@ -1,4 +1,4 @@
-"""A browser that connects and reads nothing any more, as one behind a lost Wi-Fi: it harms nobody.
+"""A browser that connects and stops reading, as behind a lost Wi-Fi, harms no one.
 
 Its share of what the page sends fills the buffers on the way; what counts is that the rig, the
 other browsers and the stop button do not notice.
@@ -123,7 +123,7 @@ def rig() -> Iterator[Rig]:
 
 
 def drained(there: ClientConnection) -> int:
-    """How many bytes were kept for the deaf one when it reads at last."""
+    """Return the bytes kept for the deaf browser when it finally reads."""
     taken = 0
     with suppress(TimeoutError, ConnectionClosed):  # sent away in the end
         while True:

@@ -1,4 +1,4 @@
-"""Only those come in who may: no other origin, nobody without the token, nobody by the back."""
+"""Only allowed visitors enter: no other origin, no one without the token, no one by the back."""
 
 import asyncio
 import json
@@ -173,7 +173,7 @@ def test_a_pointer_is_taken_without_an_answer_that_could_be_a_stops(near: Rig) -
     who = near.door.browsers.name("ana")
     assert near.points == [({"x": x, "y": 0.5, "aspect": 1.5}, who) for x in (0.1, 0.2, 0.3)]
     assert [asked["do"] for asked in near.asked[before:]] == ["nonsense"]
-    # Its lead lasts as long as its points come, and no other is renewed meanwhile.
+    # Its control lasts while its points arrive, and no other is renewed meanwhile.
     assert near.door.browsers._leads == ""
 
 
@@ -257,7 +257,7 @@ def test_the_stop_button_is_told_of_every_change(near: Rig) -> None:
 
 
 def stop_by_line(line: ClientConnection, why: str) -> int:
-    """Press STOP over a connection that stands; the answer's status."""
+    """Press STOP over an open connection; return the answer's status."""
     line.send(json.dumps({"do": "stop", "why": why}))
     while True:
         said = json.loads(line.recv(timeout=PATIENCE_S))
@@ -267,7 +267,7 @@ def stop_by_line(line: ClientConnection, why: str) -> int:
 
 def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> None:
     near.stops.clear()
-    near.takes = False  # the way of all else is full
+    near.takes = False  # the path of all other messages is full
     try:
         assert near.post(b'{ "do": "stop",\n "why": "a test" }')[0] == 204
         assert near.stops == [{"do": "stop", "why": "a test (the page)", "who": "the page"}]
@@ -285,7 +285,7 @@ def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> No
 
 
 def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
-    """200 of somebody's lines, 200 silent connections: another's line and STOP stay."""
+    """200 lines of one visitor, 200 silent connections: another's line and STOP stay."""
     with near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as ana:
         greedy = [
             near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=bob")
@@ -487,7 +487,7 @@ def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
     assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
 
 
-# --- What a browser of the page may take and ask for, and a stop that nobody answers
+# --- Limits of a browser of the page, and a stop without an answer
 
 
 def test_a_place_is_left_by_the_browser_with_the_most() -> None:

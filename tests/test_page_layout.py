@@ -69,7 +69,7 @@ class Shown:
         self.t_s = 0.0
 
     def state(self, name: str) -> None:
-        """Show a state and wait until the page says it."""
+        """Show a state and wait until the page shows it."""
         self.t_s += 1.0
         shot = replace(snapshot(name), t_s=self.t_s)
         self.page.show(shot)
@@ -120,7 +120,7 @@ def size(shown: Shown, request: pytest.FixtureRequest) -> str:
 def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size: str) -> None:
     shown.state(state)
     assert faults(shown.browser) == []
-    # STOP is where it always is, whatever else there is to say.
+    # STOP is at its usual place, whatever else is shown.
     stop = boxes(shown.browser)["rig-stop"]
     assert stop is not None and stop[3] - stop[1] >= 44.0
 
@@ -207,7 +207,7 @@ def test_the_camera_picture_is_large_and_leaves_the_head_free(shown: Shown, size
 
 
 def head_share(shown: Shown) -> float:
-    """The head's share of its canvas's height: from its top to where the neck begins.
+    """The head's share of its canvas's height: from its top to the start of the neck.
 
     The head is what differs from a canvas on which nothing is drawn.
     """
@@ -219,7 +219,7 @@ def head_share(shown: Shown) -> float:
         shown.browser.run(f"{view}.dispatchEvent(new Event('resize'))")
         left, top, right, bottom = present(boxes(shown.browser)["stage"])
         camera = present(boxes(shown.browser)["camera"])
-        right = min(right, camera[0]) if camera[1] < bottom else right  # it lies over the corner
+        right = min(right, camera[0]) if camera[1] < bottom else right  # it covers the corner
         png = shown.browser.photograph_part(left, top, right - left, bottom - top)
         seen = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
         return np.asarray(present(seen), int)
@@ -262,7 +262,7 @@ def test_picture_and_head_change_places_with_one_click(shown: Shown, size: str) 
         picture, head = present(after["camera"]), present(after["stage"])
         was = present(before["stage"])
         assert apart(picture, head)
-        # What was large is small now, and the picture has most of the place.
+        # The former large part is small now, and the picture has most of the space.
         assert head[2] - head[0] < 0.5 * (was[2] - was[0]) or size == "phone"
         assert picture[:2] == pytest.approx(was[:2], abs=1.0)
         assert picture[3] == pytest.approx(was[3], abs=1.0)

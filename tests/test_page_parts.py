@@ -1,4 +1,4 @@
-"""What the page is made of: shapes, words, traces, and the picture with what was found."""
+"""Elements of the page: shapes, words, traces, and the picture with its detections."""
 
 import math
 import re
@@ -223,7 +223,7 @@ def test_what_stands_still_shouts() -> None:
     assert "somebody pressed &lt;STOP&gt;" in health_table(
         stopped
     ) and "guard: stopped" in health_table(stopped)
-    assert alarms(stopped) == ""  # it is said beside the stop button, once
+    assert alarms(stopped) == ""  # it is shown next to the stop button, once
     held = alarms(replace(snapshot(reasons=("neck_yaw: hot",)), level="hold"))
     assert "class='banner hold'><b>guard: hold" in held and "neck_yaw: hot" in held
     assert "the frame is 2.5 s old" in alarms(replace(snapshot(), frame_age_s=2.5))
@@ -311,7 +311,7 @@ def test_health_says_how_many_joints_nobody_measures() -> None:
 
 
 def turn(q: tuple[float, float, float, float], v: tuple[float, float, float]) -> np.ndarray:
-    """Turn a vector by a quaternion, the long way."""
+    """Turn a vector by a quaternion, by two products."""
     w, x, y, z = q
     R = np.array((
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -611,7 +611,7 @@ def test_the_edge_of_the_field_lies_at_its_limits() -> None:
 
 
 def told(count: int, speed: float, seconds: float = 60.0) -> dict[str, RunFigure]:
-    """Figures of a minute with so many saccades of 5 deg, of so much of people's speed."""
+    """Figures of a minute with n saccades of 5 deg, of a share of people's speed."""
     figures, dwell = RunFigures(), DwellChart()
     for k in range(count):
         t_s = seconds * k / count
@@ -656,7 +656,7 @@ def test_the_table_shows_the_range_of_people_and_its_source() -> None:
     assert "75 to 100" in table and "Bahill" in table and "outside" in table
 
 
-# --- The health of servos, loop and picture in words and colours, and why the gaze is where it is
+# --- The health of servos, loop and picture in words and colours, and the reason of the gaze
 
 
 LIMITS = ServoLimits((55.0,) * 9, (65.0,) * 9, (3.8,) * 9, (6.7,) * 9, (0.5,) * 9)
@@ -713,7 +713,7 @@ def test_without_limits_nothing_is_coloured() -> None:
 
 
 def strained(html: str) -> int:
-    """How many figures are coloured."""
+    """Number of coloured figures."""
     return html.count("<td class='near'>") + html.count("<td class='over'>")
 
 
@@ -752,7 +752,7 @@ def test_only_the_joints_nobody_measures_are_without_figures() -> None:
     table = servo_table(WELL, GAZE_JOINTS, ("left_upper_lid",))
     assert table.count(f">{NO_FEEDBACK}</td>") == 1 and table.count("+10 %") == 8
     silent = servo_table(WELL._replace(age_s=(1.25,) * 9), GAZE_JOINTS, GAZE_JOINTS)
-    assert silent.count("silent for 1.2 s") == 9  # a board that is gone is told all the same
+    assert silent.count("silent for 1.2 s") == 9  # a lost board is reported as well
 
 
 def test_loop_figures_are_told_and_coloured_when_late() -> None:
@@ -870,7 +870,7 @@ def test_what_nobody_measured_is_drawn_and_named_otherwise() -> None:
 
 
 class Nobody:
-    """A stop button and an ear that take whatever they are told."""
+    """A stop button and a receiver that accept all messages."""
 
     def tell(self, state: Mapping[str, object]) -> None:
         self.reported = dict(state)
@@ -881,7 +881,7 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(server: viser.ViserServe
     widgets = Widgets()
     view = PageView(server, widgets, Outbox(None), button.tell)  # type: ignore[arg-type]
     view.show(News((replace(healthy(1.0), target_name="the first"),), None, ended=False))
-    for k in range(20):  # nobody looks
+    for k in range(20):  # no one looks
         view.show(News((healthy(1.1 + 0.1 * k),), None, ended=False))
     last = replace(of_six(healthy(4.0)), target_name="the last", stopped="a test")
     view.show(News((last,), None, ended=False))

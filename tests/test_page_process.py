@@ -1,4 +1,4 @@
-"""The page's process: it holds up nobody, ends with its parent and finds itself a port."""
+"""The page's process: it delays no one, ends with its parent and finds a free port."""
 
 import json
 import os
@@ -183,7 +183,7 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
         assert words.startswith("the page has stopped") and "started again" in words
-        page.show(SNAPSHOT)  # hurts nobody
+        page.show(SNAPSHOT)  # has no effect
         assert wait_for(page.url, "the page") == url  # the same port and token
         assert not folder.exists() and Path(page._folder).stat().st_mode & 0o077 == 0
         assert page_here() not in (None, first) and page.started == 2
@@ -247,7 +247,7 @@ def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> No
             if beats:
                 theirs.send(BEAT)
                 wait_for(lambda: page._silent_s == 0.0, "the beat")
-        now_s[0] += 3600.0  # this machine slept: nobody can say what the page did
+        now_s[0] += 3600.0  # this machine slept: the page's activity is unknown
         killed.clear()
         page._silent_s = 0.0
         page.show(SNAPSHOT)
@@ -271,7 +271,7 @@ def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
     view = SimpleNamespace(
         choices={}, emulated=None, watched=lambda: False, silent=lambda: None, show=show
     )
-    # A door whose thread is stuck takes what is to be done and never does it.
+    # A door whose thread is stuck accepts tasks and never does them.
     door = SimpleNamespace(is_open=lambda: True, soon=lambda do: None if stuck == "door" else do())
     served = SimpleNamespace(door=door, pointer=SimpleNamespace(), outbox=Outbox(cast(Any, theirs)))
     run = threading.Thread(
@@ -310,7 +310,7 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
         if asked.get("do") == "stop":
             heard.append(asked["why"])
         else:
-            slow.wait(PATIENCE_S)  # what is asked for takes for ever
+            slow.wait(PATIENCE_S)  # the request takes for ever
         return None
 
     page = PageProcess("127.0.0.1", free_port(), hear)
@@ -318,7 +318,7 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     try:
         visitor = Visitor(wait_for(page.url, "the page's address"))
         answers = [visitor.ask({"do": "resume", "pad": "x" * 1500}) for _ in range(60)]
-        assert 429 in answers  # and no more than the rig can be told
+        assert 429 in answers  # and no more than the rig accepts
         assert visitor.ask({"do": "stop", "why": "a test"}) == 204 and len(heard) == 1
     finally:
         slow.set()

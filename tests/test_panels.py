@@ -110,7 +110,7 @@ def test_what_one_does_the_others_see_and_handlers_hear_once(widgets: Widgets) -
     one.send({"set": [1, 2.5]})
     assert heard == [(2.5, one.client.name)] and slider.value == 2.5
     assert one.read() == [] and other.read() == [1]
-    slider.value = 3.0  # set by the program: nobody is called
+    slider.value = 3.0  # set by the program: no handler is called
     assert len(heard) == 1 and one.read() == [1]
 
 
@@ -152,7 +152,7 @@ def test_what_a_field_cannot_hold_is_refused_in_words(
     tab.read()
     assert heard == [] and field.props.get("value") == before
     assert len(tab.notices) == len(wrong) and all(refused for _, refused in tab.notices)
-    assert tab.seen[1].get("value") == before  # the browser is told what is in force
+    assert tab.seen[1].get("value") == before  # the browser gets the present value
 
 
 def test_whole_numbers_stay_whole(widgets: Widgets) -> None:
@@ -203,7 +203,7 @@ def test_a_button_that_was_removed_a_moment_ago_is_pressed_in_good_faith(widgets
     tab.send({"set": [2, "nod"]})
     tab.read()
     assert tab.seen == {} and tab.notices == []
-    buttons.options = ("shake",)  # hurts nobody
+    buttons.options = ("shake",)  # has no effect
     assert tab.read() == []
 
 

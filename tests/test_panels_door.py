@@ -139,7 +139,7 @@ def test_a_person_types_ticks_and_clicks(near: Rig) -> None:
         tab.go(f"{near.url}/?token={near.door.token}")
         wait_for(lambda: person.reads("Steer"), "the page")
         person.open("Steer")
-        # A number on its way to what is meant is another number.
+        # A number that is still being typed is another number.
         person.fill(field, "45")
         assert heard == []
         enter(person)
@@ -156,7 +156,7 @@ def test_a_person_types_ticks_and_clicks(near: Rig) -> None:
         person.fill(field, "7")
         person.run(f"{field}.blur()")
         hears(7)
-        # What is refused goes back, in words.
+        # A refusal is returned, in words.
         person.fill(field, "500")
         enter(person)
         wait_for(lambda: person.reads("goes from -70 to 70"), "the refusal")
@@ -174,7 +174,7 @@ def test_a_person_types_ticks_and_clicks(near: Rig) -> None:
 
 
 def picked(near: Rig, person: Person, image: Any) -> None:
-    """A click in the picture says where, also where the picture does not fill its place."""
+    """A click in the picture sends its place, also if the picture does not fill its area."""
     image.show(cv2.imencode(".png", np.zeros((100, 200, 3), np.uint8))[1].tobytes())
     element = "document.querySelector('[data-panel=camera] img')"
     wait_for(lambda: person.run(f"{element}?.naturalWidth === 200"), "the picture")

@@ -76,7 +76,7 @@ def test_all_have_words_and_structure_waits_for_the_next_start() -> None:
 def test_the_order_is_that_of_the_file() -> None:
     groups = [parameter.key.split(".")[0] for parameter in PARAMETERS]
     firsts = list(dict.fromkeys(groups))
-    # The desk rig has one bus, no coupled servos, no meshes and no joints beside those of gaze.
+    # The desk rig has one bus, no coupled servos, no meshes and no joints except those of gaze.
     empty = {"buses", "couplings", "expressions", "levels", "meshes"}
     assert firsts == [f.name for f in fields(Rig) if f.name not in empty]
 

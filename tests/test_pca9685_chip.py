@@ -242,7 +242,7 @@ class CircuitPythonI2C:
 
 
 def test_adafruits_library_finds_a_board_that_does_as_a_real_one(bench, monkeypatch):
-    # What it needs of Blinka are names for its annotations.
+    # It needs only names of Blinka, for its annotations.
     names = dict.fromkeys(("I2C", "ReadableBuffer", "WriteableBuffer", "I2CDeviceDriver"), object)
     for module in ("busio", "circuitpython_typing", "circuitpython_typing.device_drivers"):
         monkeypatch.setitem(sys.modules, module, SimpleNamespace(**names))

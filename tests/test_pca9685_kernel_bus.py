@@ -28,7 +28,7 @@ def world():
 
 
 class Kernel:
-    """A bus of the kernel: opened by its path, and what the kernel says of it."""
+    """A bus of the kernel: opened by its path, and the kernel's errors."""
 
     def __init__(self, world):
         self.bus, self.refuses = EmulatedSMBus(world.device.body), None

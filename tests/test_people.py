@@ -81,7 +81,7 @@ class Seen:
 def found_in(
     size: tuple[int, int], lefts: list[float], *people: tuple[float, float, float, float]
 ) -> list[list[DetectedPerson]]:
-    """What is found in each square of a frame."""
+    """Detections in each square of a frame."""
     network = Seen(people, float(max(size[1], size[0] if len(lefts) == 1 else 0)))
     network.left_of = lefts
     detector = PeopleDetector(FaceDetectorParams(), network)
@@ -277,7 +277,7 @@ def test_a_person_who_turns_away_and_back_stays_the_same() -> None:
     there = {"people": (person_at(p_m),)}
     (face,) = at_30_hz(perception, 1, 45, **there, faces=(face_at(p_m),)).faces
     assert face.looks_at_head
-    # The face was missed where a person is found: it is not gone.
+    # The face was missed but the person is found: it is not gone.
     (missed,) = at_30_hz(perception, 46, 1, **there).faces
     assert missed.id == face.id
     away = at_30_hz(perception, 47, 75, **there)

@@ -91,7 +91,7 @@ def test_a_face_is_as_far_as_the_camera_measures_and_says_so() -> None:
     assert face.distance_from == "camera"
     assert face.p_world_m == pytest.approx((0.8, 0.0, 0.0), abs=0.01)
     assert face.across_sd_m < 0.005 and 0.0 < face.along_sd_m < 0.02
-    # Its parts are where a face of that size has them.
+    # Its parts are at the places of a face of that size.
     left_eye = np.subtract(face.parts_world_m[2], face.p_world_m)
     assert left_eye[1] == pytest.approx(-0.8 * PARTS_FACE_M["LE"][1], abs=0.002)
 
@@ -213,7 +213,7 @@ def _the(turn: Vec3) -> Vec3:
 
 
 def turning_head(late_s: float, moves: bool = False, bound_by: float = 1.0) -> EgomotionResidual:
-    """Let a head turn there and back before something still, with pictures that lie in time."""
+    """Let a head turn there and back before something still, with pictures of wrong times."""
     residual = EgomotionResidual()
     rng = np.random.default_rng(0)
 
@@ -316,7 +316,7 @@ def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(
 
 
 def body_at(x: float) -> DetectedPerson:
-    """Return a person 2 m away who is turned away, so far to the right."""
+    """Return a person 2 m away who is turned away, some way to the right."""
     ((x_px, y_px),) = project([(x, 0.0, 2.0)], LENS).tolist()
     worn = Clothing((1.0, *[0.0] * 23), 1.0)
     return DetectedPerson((0.0, 0.0, 1.0, 1.0), (x_px, y_px), 193.0, 0.9, worn)

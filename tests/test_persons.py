@@ -100,7 +100,7 @@ def test_the_newest_came_last_and_who_came_together_is_named_together() -> None:
     for t_s in (4.0, 9.0):
         persons.update(percept(t_s, {5: LEFT, 1: FAR, 2: RIGHT}), EYE)
         assert persons.ids_with_trait("newest") == {1}
-    # Out of view for a while, they did not come anew.
+    # Out of view for a while, they are not new.
     persons.update(percept(12.0, {1: FAR}), EYE)
     persons.update(percept(15.0, {5: LEFT, 1: FAR, 2: RIGHT}), EYE)
     assert persons.ids_with_trait("newest") == {1}

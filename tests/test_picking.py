@@ -44,7 +44,7 @@ def looking(
 
 
 def place(p_world_m: Vec3, mount: CameraMount, poses: PoseHistory) -> tuple[float, float]:
-    """Where a point was in the picture, 0..1."""
+    """Return the place of a point in the picture, 0..1."""
     R, p = mount.pose(*poses.head_pose(1.0))
     in_camera = np.array(R).T @ np.array(sub(p_world_m, p))
     lens = intrinsics_of_view(np.radians(70.0), WIDTH, HEIGHT)

@@ -291,7 +291,7 @@ class Neck(StandIn):
 def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float = 0.0) -> list:
     """Let a head turn there and back before a scene; give percepts with the time of each.
 
-    placed_s: pictures are said to be taken so much later than they were
+    placed_s: error of the pictures' times
     """
     poses = PoseHistory(Neck())
     perception = Perception(MOUNT, 69.0, Tracker(TrackParams()))
@@ -338,7 +338,7 @@ def test_people_who_pass_each_other_are_two_and_keep_their_numbers(
     assert len(first) == len(last) == 2
     nearer = [min(faces, key=lambda face: face.p_world_m[0]).id for faces in (first, last)]
     farther = [max(faces, key=lambda face: face.p_world_m[0]).id for faces in (first, last)]
-    # The face that the detector finds between the two as they overlap is nobody.
+    # The face that the detector finds between two overlapping ones is false.
     assert nearer[0] == nearer[1] != farther[0] == farther[1]
     eye_to_nearer = sub(min(last, key=lambda face: face.p_world_m[0]).p_world_m, (0.0, 0.0, 0.0))
     assert np.degrees(np.arctan2(eye_to_nearer[1], eye_to_nearer[0])) < -10.0

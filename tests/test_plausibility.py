@@ -1,4 +1,4 @@
-"""Which positions are believed, from how far a joint can have come."""
+"""Accepted positions, by the distance that a joint can have moved."""
 
 import pytest
 from hypothesis import given, settings
@@ -71,7 +71,7 @@ def test_no_motion_that_the_motor_can_make_is_refused(speeds, data):
 
 
 def test_on_a_disturbed_line_a_joint_comes_no_farther_than_its_motor_can_turn_it():
-    """Two servos with one id answer at the same time: what both say passes the sum twice."""
+    """Two servos with one id answer at the same time: the mixture passes the sum twice."""
     within, beyond = SPEED * (0.019 + LATE_S), SPEED * (0.019 + LATE_S) + PAIR_STEPS + 1
     assert known(1000).is_plausible(0, round(1000 + beyond), 1.019)
     for way, believed in ((within, True), (beyond, False), (-beyond, False)):

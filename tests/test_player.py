@@ -78,7 +78,7 @@ def test_seeking_goes_on_playing_from_there_and_stays_inside(player: PlaybackClo
 
 def test_seeking_back_from_the_end_waits_there(player: PlaybackClock) -> None:
     player.play(0.0)
-    player.seek(4.0, 15.0)  # nobody looked since it ended
+    player.seek(4.0, 15.0)  # no one looked since it ended
     assert player.state(16.0)[:3] == (4.0, 10.0, False)
 
 

@@ -200,7 +200,7 @@ NO_IMAGE: Any = None
 
 
 class Camera:
-    """A camera that returns what it is told to."""
+    """A camera that returns given values."""
 
     def __init__(self, *answers):
         self.answers, self.closed = list(answers), 0

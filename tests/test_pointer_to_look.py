@@ -1,4 +1,4 @@
-"""The eyes look at a pointer over the view: the point lies where the viewer sees the pointer."""
+"""The eyes look at a pointer over the view: the point is under the viewer's pointer."""
 
 from math import atan2, inf, nan, radians, tan
 
@@ -55,7 +55,7 @@ def test_the_point_is_drawn_under_the_pointer(
 ) -> None:
     point = present(gaze_target(Pointer(*at, aspect), camera, EYES))
     assert seen_at(point, camera, aspect) == pytest.approx(at)
-    # All lie on one plane, across the way from the viewer to the head.
+    # All are on one plane, across the line from the viewer to the head.
     to_head = sub(EYES, camera.p_world_m)
     share = dot(sub(point, camera.p_world_m), to_head) / dot(to_head, to_head)
     assert share == pytest.approx(TOWARDS_HEAD)
@@ -107,7 +107,7 @@ def test_a_pointer_is_handed_on_with_who_points_and_no_faster_than_a_burst() -> 
     to_look = PointerToLook(known.get, lambda *look: looks.append(look), SimulatedClock())
     asked = {"x": 0.5, "y": 0.5, "aspect": 1, "more": "is passed over"}
     assert parse_pointer(asked) == Pointer(0.5, 0.5, 1.0)
-    assert not to_look.look_at_pointer(asked, "ana")  # it is not known where the head is
+    assert not to_look.look_at_pointer(asked, "ana")  # the head's place is unknown
     to_look.p_world_eyes_m = EYES
     assert not to_look.look_at_pointer(asked, "bob")  # who does not see the view
     taken = sum(to_look.look_at_pointer(asked, "ana") for _ in range(int(3 * BURST)))

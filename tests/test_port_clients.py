@@ -1,4 +1,4 @@
-"""What a client may do with the emulator's terminal: flush, break, lock, die, shout."""
+"""Actions of a client on the emulator's terminal: flush, break, lock, die, shout."""
 
 import os
 import termios

@@ -128,7 +128,7 @@ def reached(process: subprocess.Popen[Any]) -> RobotClient:
 
 @pytest.fixture(autouse=True)
 def free(rig: Rig) -> Iterator[None]:
-    """Leave each test with a head that moves and chooses by itself."""
+    """Leave each test with a head that moves and chooses its targets."""
     yield
     time.sleep(0.5)  # the limits of rates fill again
     if rig.client.status()["stopped"]:
@@ -155,7 +155,7 @@ def ask(end: Connection, **message: object) -> None:
 LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
 
 
-# What they are for
+# Purpose
 
 
 def test_state_is_that_of_the_socket(rig: Rig) -> None:
@@ -259,7 +259,7 @@ def test_a_posted_order_ends_by_its_time_or_after_its_request(rig: Rig) -> None:
 
 
 def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
-    """Who leads on this computer is not disturbed by the leaving of a program of the network."""
+    """A leaving program of the network does not disturb the client in control on this computer."""
     with rig.dial() as end:
         ask(end, do="look_at", p_world_m=LEFT, tag=1)
         heard(end, "tag", 1)
@@ -357,7 +357,7 @@ def test_binary_and_huge_frames(rig: Rig) -> None:
     assert rig.get("/state")[0] == 200
 
 
-# Who may come in
+# Allowed visitors
 
 
 def test_without_the_token_nothing_is_answered(rig: Rig) -> None:

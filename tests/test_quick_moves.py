@@ -1,4 +1,4 @@
-"""The five buttons under the head say why they are grey."""
+"""The five buttons under the head show why they are grey."""
 
 import pytest
 from desk import GAZE_JOINTS

@@ -1,4 +1,4 @@
-"""What is told of a point or a jog before the head has moved is what comes of it."""
+"""The reply about a point or a jog before the head moves equals the result."""
 
 from functools import cache
 from math import degrees, radians

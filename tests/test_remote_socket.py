@@ -269,10 +269,10 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
                 rig.get()
 
 
-# Other programs steer a running rig: what is asked is done, what is rubbish costs nobody
+# Other programs steer a running rig: requests are executed, rubbish has no effect
 
 
-# What can be asked
+# Requests
 
 
 def test_values_rules_and_changes(rig: RobotClient) -> None:
@@ -422,7 +422,7 @@ def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
     assert rig.get(RATE) == {RATE: 200.0}
 
 
-# Rubbish, several programs at once, who leads, and floods: a running rig goes on
+# Rubbish, several programs at once, control, and floods: a running rig continues
 
 
 def raw(folder: Path) -> socket.socket:

@@ -350,7 +350,7 @@ def test_poses_survive_the_packing(frames: SnapshotIndex, ticks: list[Tick]) -> 
 
 
 class Shelf:
-    """A view of a recording with what it asked for, on a page without a browser."""
+    """A view of a recording with its requests, on a page without a browser."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, Mapping[str, object]]] = []

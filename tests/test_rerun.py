@@ -1,4 +1,4 @@
-"""A recorded run done again: to the bit with what was in force, followed with what changed."""
+"""A recorded run repeated: to the bit with the same parameters, followed with changed ones."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -171,7 +171,7 @@ def test_another_character_is_followed_by_the_servos(once: Once, tmp_path: Path)
     assert found.joints == "emulated" and not found.is_same
     assert len(seen) == found.ticks == 419
     assert found.agreeing_ticks < found.ticks and found.difference
-    # What was seen is the same, and the servos went where the new commands sent them.
+    # The percepts are the same, and the servos follow the new commands.
     assert [captured(t.percept) for t in seen] == [captured(t.percept) for t in once.ticks]
     behind = [
         abs(now - sent)

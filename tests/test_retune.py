@@ -172,7 +172,7 @@ def test_every_live_knob_has_an_effect_on_the_running_parts(
     for knob in of_section(section):
         base = apply_changes(RIG, in_use(knob.key))
         other = acceptable(knob, base, dice, walk)
-        if base != in_force:  # nearly every knob has the same one, which the last left in force
+        if base != in_force:  # nearly every knob has the same one, which the last one left
             put(made, base)
             first, in_force = running_parameters(made, names), base
         said = put(made, other)
@@ -231,7 +231,7 @@ def acceptable(knob: Parameter, base: Rig, dice: np.random.Generator, walk: str)
     raise AssertionError(f"no value will do for {knob.key}")
 
 
-# What a running head does with a changed range, zero, rate or detector
+# A running head with a changed range, zero, rate or detector
 
 
 def test_a_running_head_keeps_its_joints() -> None:

@@ -18,7 +18,7 @@ from gazerig.robot.app.options import RunOptions
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The desk rig at half its rate, where the rate is not what is asked about."""
+    """The desk rig at half its rate, for tests that do not concern the rate."""
     return at_rate(tmp_path_factory.mktemp("rigs"), "desk", 100.0)
 
 

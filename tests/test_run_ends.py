@@ -1,4 +1,4 @@
-"""How the command run ends in real time: by a signal, or because the bus is lost."""
+"""Ends of the command run in real time: by a signal, or because the bus is lost."""
 
 import json
 import os
@@ -39,7 +39,7 @@ def begun(*words: str) -> "subprocess.Popen[str]":
         stderr=subprocess.PIPE,
         text=True,
     )
-    # What start-up set on the servos is told once torque is on.
+    # Registers set at start-up are reported once torque is on.
     assert process.stderr is not None
     assert any("Indirect Addresses set" in line for line in iter(process.stderr.readline, ""))
     return process

@@ -20,7 +20,7 @@ def photo(path: Path) -> Path:
 
 
 def faces_alone(file: Path, network: str = "mtcnn") -> str:
-    """Write a rig at half the rate that looks for no motion: faces are what is asked about."""
+    """Write a rig at half the rate without motion detection: the tests concern faces."""
     text = DESK.read_text(encoding="utf-8")
     text = text.replace("  enabled: true  # look", "  enabled: false  # look")
     text = text.replace("rate_hz: 200.0  # Hz, 20", "rate_hz: 100.0  # Hz, 20")

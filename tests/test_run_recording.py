@@ -1,4 +1,4 @@
-"""Recordings of runs: every tick comes back bit for bit, and what cannot be read says why."""
+"""Recordings of runs: every tick is read back bit for bit, and reading errors have a reason."""
 
 import base64
 import json
@@ -259,7 +259,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
         for _, channel, message in reader.iter_messages():
             assert channel.message_encoding == "json"
             count[channel.topic] += 1
-            assert message.sequence == count[channel.topic]  # whoever misses one can tell
+            assert message.sequence == count[channel.topic]  # a missing one is detectable
             data = seen[channel.topic] = json.loads(message.data)
             assert unexplained(data, schemas[channel.topic]) == []
             if channel.topic == fmt.TICK:

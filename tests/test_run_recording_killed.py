@@ -22,7 +22,7 @@ TICK_S = 0.05
 
 
 def rig(path: Path) -> None:
-    """Record a rig that goes on until it is killed, and say when each tick was handed over."""
+    """Record a rig until it is killed, and print the time of each tick's transfer."""
     info = RunInfo("desk", "robot", "a: 1", 0, 1.0 / TICK_S, "2026-01-31T00:00:00+00:00")
     recorder = Recorder(path, info)
     recorder.open()

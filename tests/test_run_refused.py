@@ -1,4 +1,4 @@
-"""What a person can mend, said in one line before a run begins; check and schema."""
+"""Errors of users, in one line before a run begins; check and schema."""
 
 import dataclasses
 import inspect

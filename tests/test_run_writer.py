@@ -30,7 +30,7 @@ MESSAGES, A_CHUNK = 40, 10
 class Written:
     """A file of noise, a chunk every ten messages.
 
-    kept: how long it was at its beginning and after each chunk; failed: what the writer says
+    kept: how long it was at its beginning and after each chunk; failed: the writer's error
     """
 
     def __init__(self, path: Path) -> None:

@@ -257,14 +257,14 @@ def test_time_that_stands_still_moves_nothing() -> None:
         assert again.command_rad == tuple(guard._motion.command)
 
 
-# Joints that are told to move and do not are found, let go, and tried again
+# Joints that do not follow commands are found, released, and tried again
 
 
 STEP = radians(360.0 / 4096.0)
 
 
 class World:
-    """One joint with a dead time, a dead band and, if wanted, a finger in its way."""
+    """One joint with a dead time, a dead band and, if wanted, a finger that blocks it."""
 
     def __init__(self, joint: int, lag_s: float = 0.02, band_deg: float = 0.0) -> None:
         self.joint = joint
@@ -322,7 +322,7 @@ def test_a_jammed_joint_is_found_within_200_ms_and_let_go(joint: int, lag_s: flo
     limit = LIMITS[joint]
     assert np.abs(np.diff(speeds, prepend=0.0)).max() <= limit.accel_rad_s2 * DT + 1e-6
     assert np.abs(speeds).max() <= limit.speed_rad_s + 1e-9
-    assert min(world.path[peak:]) >= -STEP  # and not pulled the other way
+    assert min(world.path[peak:]) >= -STEP  # and not pulled back
 
 
 def test_a_joint_that_is_met_on_its_way_gives_way_too() -> None:
@@ -333,7 +333,7 @@ def test_a_joint_that_is_met_on_its_way_gives_way_too() -> None:
     for _ in range(120):
         world.tick(0.6)
     assert world.path[-1] == pytest.approx(radians(12.0), abs=STEP)
-    world.wall = radians(5.0)  # pushed back: it gives way once more
+    world.wall = radians(5.0)  # pushed back: it yields once more
     for _ in range(60):
         world.tick(0.6)
     assert world.path[-1] == pytest.approx(radians(5.0), abs=STEP)

@@ -52,7 +52,7 @@ class World:
         return degrees(self.path[-1][joint])
 
     def crossed(self) -> bool:
-        """Whether the straight way between any two commands in turn touches a box."""
+        """Whether the straight path between any two successive commands touches a box."""
         path = np.degrees(np.array(self.path))
         begin, end = path[:-1], path[1:]
         return any(

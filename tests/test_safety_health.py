@@ -21,7 +21,7 @@ NAME = GAZE_JOINTS[JOINT]
 
 
 class World:
-    """Joints that are where their commands were one tick ago, and whose servos say things."""
+    """Joints that follow their commands one tick later, with given feedback of servos."""
 
     def __init__(self) -> None:
         self.guard = Guard(GuardParams(soft_start_ms=0.0), LIMITS, GAZE_JOINTS)
@@ -32,7 +32,7 @@ class World:
         self.path = [0.0]
 
     def tick(self, desired: float, *, stray: float | None = None, **said: object) -> GuardResult:
-        """One tick with the joint told to go to ``desired``; stray: where it is instead."""
+        """One tick with the joint commanded to ``desired``; stray: its true place."""
         self.t_s += DT
         at = list(self.position)
         if stray is not None:

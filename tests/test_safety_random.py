@@ -39,7 +39,7 @@ ODD = np.array([nan, inf, -inf, 1e300, -1e300, 1e-300, -0.0])
 
 
 class Trial:
-    """One guard and what it gave: begin is where a tick began, after restarts."""
+    """One guard and its results: begin is the start of a tick, after restarts."""
 
     def __init__(self, limits: tuple[JointLimit, ...], boxes: tuple[CollisionParams, ...]) -> None:
         self.limits = np.array(limits)
@@ -105,7 +105,7 @@ class Trial:
             stays_out(k, span, p0, v0, 1e-6) * stays_out(k, span, p1, v1, 1e-6)
             for k, span in ((i, first), (j, second))
         ]
-        # Out on one and the same side before and after: the straight way misses the box.
+        # Outside on the same side before and after: the straight path misses the box.
         assert ((ways[0] > 0) | (ways[1] > 0))[safe].all()
 
 
@@ -208,7 +208,7 @@ def test_any_shape_of_wishes_keeps_the_limits(
     trial.judge()
 
 
-# Limits changed at random in full flight: every command keeps those in force, and new ones come
+# Limits changed at random in full flight: every command keeps the present ones, and new ones come
 
 
 DT_S = 0.005
@@ -249,7 +249,7 @@ class Watched:
         speed, accel = (np.maximum(before[:, k], after[:, k]) for k in (2, 3))
         assert (np.abs(v) <= speed + 1e-6).all()
         assert (np.abs(v - self.v) <= accel * DT_S + 1e-6).all()
-        # Who is outside its range never goes farther out than braking takes it.
+        # A joint outside its range moves no farther out than its braking distance.
         out = np.maximum(after[:, 0] - p, p - after[:, 1])
         was = np.maximum(after[:, 0] - self.p, self.p - after[:, 1])
         assert (out <= np.maximum(was, 0.0) + 1e-9).all()

@@ -225,12 +225,12 @@ def test_any_reading_begins_at_the_shortest_dwell_and_keeps_the_means_above(diag
 def test_a_face_is_entered_at_the_part_nearest_to_the_gaze(
     gaze_m: tuple[float, float, float], part: str
 ) -> None:
-    # The parts of FACE stand in a row, the first in the middle, the last farthest to the left.
+    # The parts of FACE are in a row, the first in the middle, the last farthest to the left.
     walk = walker(6, ONE_REST)
     wanted = {"first": PARTS[0], "last": PARTS[-1], "RE": PARTS[3]}[part]
     head = (0.0, 0.0, 0.2)
     assert walk.wander(TARGET, PERCEPT, 0.0, False, head, gaze_m).part == wanted
-    # Once on the face, the walk goes on from where it is, wherever the gaze points.
+    # Once on the face, the walk continues from its part, wherever the gaze points.
     assert walk.wander(TARGET, PERCEPT, 0.1, False, head, (0.0, 1.0, 0.2)).part == wanted
     away = TARGET._replace(kind="away")
     assert walk.wander(away, PERCEPT, 0.2, True, head, (1.0, 0.9, 0.2)).part is None
@@ -336,7 +336,7 @@ def test_counts_are_of_neighbours_on_the_face_only() -> None:
     seen = {(i, j): c for i, row in enumerate(fitted.counts) for j, c in enumerate(row) if c}
     assert seen == {(n, re): 1, (le, le): 1}
     assert fitted.outside_fixations == 1
-    # Laplace: (1 + 1/2) / (1 + 8/2), and even odds from where nothing was seen.
+    # Laplace: (1 + 1/2) / (1 + 8/2), and even odds from unseen parts.
     assert fitted.matrix[n][re].value == pytest.approx(0.3)
     assert fitted.matrix[0][3].value == pytest.approx(0.125)
     assert "M" in fitted.pooled_parts and "LE" not in fitted.pooled_parts

@@ -65,7 +65,7 @@ def test_e41_simple_model() -> None:
     assert [part for part, _ in seen[:6]] == ["N", "RE", "LE"] * 2
     wanted = {"N": 0.45942, "RE": 0.40821, "LE": 0.40821}
     for part, time_s in seen:
-        # A tick passes before the gaze is said to have arrived, up to one before the end shows.
+        # A tick passes before the arrival of the gaze is reported, up to one before the end.
         assert 0.0 <= time_s - wanted[str(part)] <= 2.0 * dt + 1e-9
     assert len(seen) / 60.0 == pytest.approx(2.35, abs=0.02)
     assert {look.centre_world_m for look in looks} == {FACE.p_world_m}

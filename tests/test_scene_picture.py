@@ -46,7 +46,7 @@ def test_the_picture_turns_with_the_camera() -> None:
     picture = ScenePicture(load_scene("visitor"))
 
     def middle(yaw: float) -> float:
-        """The column about which the visitor's blue shirt lies."""
+        """The column of the centre of the visitor's blue shirt."""
         image = picture.draw(PinholeView(2.0, LENS, SIZE_PX, camera(yaw), EYE_M)).image.astype(int)
         shirt = (image[..., 0] > image[..., 2] + 40) & (np.arange(400) > 260)[:, None]
         return float(np.argwhere(shirt)[:, 1].mean())

@@ -1,4 +1,4 @@
-"""A camera that is shaken, bumped or panned without anybody knowing sees what really moves."""
+"""A camera that is shaken, bumped or panned unknowingly detects true motion."""
 
 import pytest
 from seeing.moving_room import FIELD_RAD, Pose, frames, still
@@ -11,7 +11,7 @@ from gazerig.robot.perception.motion_source import MotionSource
 
 @pytest.mark.parametrize("name", FILMS)
 def test_e82_what_is_reported_moves_however_the_camera_is_moved(name: str) -> None:
-    # What a motion of the camera leaves behind in the detector takes a second to be seen.
+    # Effects of a camera's motion on the detector appear after a second.
     figures = rendered(name, 0.7 if name.startswith("still") else 1.2)
     judged_by = [figure for figure in figures if figure in WANTED]
     assert judged_by
@@ -25,7 +25,7 @@ def test_a_slow_drift_is_the_cameras() -> None:
 
 
 def test_whether_the_camera_moved_is_forgotten_with_the_scene() -> None:
-    """Two sources, one of which was shaken before: from the next scene on they say the same."""
+    """Two sources, one of which was shaken before: from the next scene on they are equal."""
     shaken, fresh = (MotionSource(MotionParams(), None, FIELD_RAD, None) for _ in range(2))
     for one in frames(FILMS["shake"][0], 0.3):
         shaken(Shot(one.t_s, 1, one.image))

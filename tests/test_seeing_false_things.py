@@ -1,4 +1,4 @@
-"""What compression, light and shadows do to a room that stands still is no moving thing."""
+"""Compression, light and shadows in a still room are no moving things."""
 
 from dataclasses import replace
 from types import ModuleType

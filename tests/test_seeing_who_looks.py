@@ -1,4 +1,4 @@
-"""Who looks at the head, by five points and by dense meshes: row 7 in short (check E87)."""
+"""Looks at the head, by five points and by dense meshes: row 7 in short (check E87)."""
 
 from importlib.util import find_spec
 

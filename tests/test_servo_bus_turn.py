@@ -1,4 +1,4 @@
-"""Which turn a position of an STS servo belongs to."""
+"""The turn of a position of an STS servo."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""Who is on the bus: every baud rate, pieces, shared ids, echoes, the old protocol; homing."""
+"""Servos on the bus: every baud rate, pieces, shared ids, echoes, the old protocol; homing."""
 
 from typing import Any
 
@@ -126,7 +126,7 @@ def test_two_servos_with_one_id_are_seen(family):
     bench = Bench(family, 57_600, 1, 2).opened()
     assert bench.corrupt(1) == 0 == bench.corrupt(77)
     bench.command("collide 1")
-    # What they say they are is equal and looks healthy.
+    # Their identities are equal and look healthy.
     assert bench.corrupt(1) >= 2
     assert bench.corrupt(2) == 0
     (one,) = scan(bench.port, family, (57_600,), ids=range(5))
@@ -192,7 +192,7 @@ def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
     list(scan(bench.port, FEETECH, thorough=True, **reported))
     assert len(asked) == 8 * 254
     asked.clear()
-    # Unless thorough only where a servo answers at all.
+    # Unless thorough only if a servo answers at all.
     list(scan(bench.port, FEETECH, **reported))
     assert asked == [(500_000, servo_id) for servo_id in range(254)]
     assert FEETECH.format_firmware(353) == "3.53"

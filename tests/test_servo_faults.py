@@ -1,8 +1,8 @@
-"""What can go wrong on a bus of smart servos, whatever their make, and what the driver makes of it.
+"""Faults of a bus of smart servos of every make, and the driver's reactions.
 
-What must be true of each: a read takes a bounded time; no value is delivered that was not
+Requirements of each: a read takes a bounded time; no value is delivered that was not
 true in its cycle (the rigs assert it in every tick); one bad servo does not blind the others.
-What faults only one make has is in test_dynamixel_listed_faults and test_feetech_faults.
+Faults of only one make are in test_dynamixel_listed_faults and test_feetech_faults.
 """
 
 from collections.abc import Callable
@@ -70,7 +70,7 @@ PASSING = [
 def test_a_passing_fault_costs_little_and_passes(rig, fault):
     weak = rig.bus._family.weak_check
     fault = fault.replace("BITS", "32" if weak else "7")
-    # One that is late or stalls keeps the line from all servos so long.
+    # A late or stalled one blocks the line for all servos meanwhile.
     late_ms = int(fault.split()[2]) if fault.split()[0] in ("delay", "stall") else 0
     for times in (1, 5):
         rig.command(f"{fault} count {times}")

@@ -139,7 +139,7 @@ def test_a_refusal_is_no_value_and_no_exception(rig):
     assert rig.registers.refusal == 7
     assert rig.read() == 2002
     assert rig.registers.refusal == 0
-    assert len(rig.sent) == 2  # a refusal is an answer: nothing is asked again
+    assert len(rig.sent) == 2  # a refusal is an answer: nothing is repeated
 
 
 def test_a_write_to_the_eeprom_under_torque_is_refused(rig):

@@ -120,7 +120,7 @@ def test_a_proved_block_in_the_place_of_another_s_makes_its_id_doubtful():
     for command in ("wrong-id 9 4", "reorder"):
         kind.chain.faults.command(command)
     group, raw = kind.asked()
-    # Two servos say they are 4, and which of them is in its place is not known.
+    # Two servos answer as 4, and the right one is unknown.
     verified_parts = group.verified_parts(raw)
     assert {i: a.position for i, a in verified_parts.samples.items()} == {1: PLACES[1]}
     assert 4 in verified_parts.damaged
@@ -143,7 +143,7 @@ def test_a_refusal_without_bytes_is_an_answer_with_its_error():
     assert group.verified_parts(status(1, 0x80, b"")).samples == {}
 
 
-# --- numbers with a sign of their own, windows that tell more
+# --- numbers with an own sign, windows with more values
 
 
 def sts_status(servo_id, params, error=0):
@@ -324,15 +324,15 @@ def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
     assert not is_plausible(200, 0.04)
     assert not is_plausible(3000, 0.05)
     assert not is_plausible(2990, 0.06)
-    # Three in a row that agree: somebody has turned it by hand.
+    # Three equal ones in a row: it was turned by hand.
     assert is_plausible(2980, 0.07)
-    # What the motor can do in a second is no leap, nor is anything after a port was gone.
+    # The motor's motion in a second is no leap, nor is any after a port was gone.
     assert is_plausible(200, 1.07)
     columns.places.forget()
     assert is_plausible(4000, 1.08)
 
 
-# --- who is asked
+# --- queried servos
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Several people who stand still, seen by the whole robot: nobody is left out."""
+"""Several standing people, seen by the whole robot: no one is left out."""
 
 import pytest
 from seeing import row_08_several_people as row
@@ -26,7 +26,7 @@ def test_surpluses_grow_with_the_looks_and_are_those_over_the_one_looked_at_leas
     shared = SharedAttention()
     assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 0.0) == [0.0, 0.0, 0.0]
     assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], 2, 0.5) == pytest.approx([0.0, 0.5, 0.0])
-    # Who joins is behind nobody; the heaviest of those who are alike comes first.
+    # A new person is behind no one; the heaviest of similar ones comes first.
     assert shared.step([2, 4], [0.5, 1.0], 4, 0.5)[1] == 0.0
     surpluses = shared.step([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
     assert surpluses[2] == 0.0 and surpluses[0] == pytest.approx(0.4) and 0.45 < surpluses[1] < 0.5

@@ -1,4 +1,4 @@
-"""When the gaze jumps: the rule by itself, with errors and slips given. Degrees."""
+"""Times of saccades: the rule alone, with given errors and slips. Degrees."""
 
 from math import radians
 

@@ -97,7 +97,7 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
         rerun(maker.recording, rig="desk", joints="recorded")
 
 
-# --- what is said of the run
+# --- messages of the run
 
 
 def test_figures_and_status_say_what_is_estimated(maker: Run, desk: Run) -> None:

@@ -1,4 +1,4 @@
-"""What people are shown of a running rig: nothing of it is lost between two snapshots."""
+"""Snapshots of a running rig for people: nothing is lost between two of them."""
 
 from functools import cache
 from math import degrees, radians
@@ -33,7 +33,7 @@ TICKS_BETWEEN = 8
 
 @cache
 def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple[Tick, ...]]:
-    """Some seconds of a rig that talks with somebody."""
+    """Some seconds of a rig that talks with a person."""
     rig = load_rig(name)
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="face-to-face"))
     ticks: list[Tick] = []
@@ -130,7 +130,7 @@ def test_what_a_tick_does_not_tell_is_said() -> None:
     assert shot.timing is not None
     assert shot.timing.rate_hz == pytest.approx(RATE_HZ)
     assert shot.rate_hz == shot.timing.rate_hz
-    assert shot.target_id == shot.faces[0].id  # also while it is looked beside
+    assert shot.target_id == shot.faces[0].id  # also during a look next to it
     assert shot.target_kind in ("face", "away")
     assert any(one.target_kind == "face" for one in taken())
     assert shot.frame_age_s is not None and 0.0 < shot.frame_age_s < 0.2

@@ -28,7 +28,7 @@ NECK = slice(GAZE_JOINTS.index("neck_yaw"), GAZE_JOINTS.index("neck_roll") + 1)
 
 
 class Passer(EmptyScene):
-    """A scene: somebody who walks from one side to the other, and on."""
+    """A scene: a person who walks from one side to the other, and on."""
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         y = 0.8 - 0.25 * t_s
@@ -36,7 +36,7 @@ class Passer(EmptyScene):
 
 
 class BackAndForth(Passer):
-    """A scene: somebody who is aside and steps to and fro in it."""
+    """A scene: a person aside who steps back and forth."""
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         y = 0.35 + 0.1 * float(np.sin(2.0 * t_s))
@@ -221,5 +221,5 @@ def test_it_goes_on_with_the_first_new_pictures(
 
 
 def look(tick: Tick) -> Vec3:
-    """Return where the eyes are meant to look, from the head."""
+    """Return the intended direction of the eyes, from the head."""
     return sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m)

@@ -142,11 +142,11 @@ def test_a_gamepad_that_goes_says_so() -> None:
         pad.news()
 
 
-# ---- leading
+# ---- control
 
 
 class Rig:
-    """Stands in for a RobotClient: keeps what it is told."""
+    """Stands in for a RobotClient: records its calls."""
 
     def __init__(self) -> None:
         self.who, self.in_control, self.told = "me", False, list[object]()
@@ -216,7 +216,7 @@ def test_a_lead_that_was_taken_is_taken_back_while_the_stick_is_held() -> None:
 
     class Taken(Moves):
         def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-            rig.in_control = False  # somebody clicked on the page
+            rig.in_control = False  # a person clicked on the page
             return super().update(steering, now_s)
 
     run_steering(rig, Taken(held, held), Steering(), Clock(), str)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""A head that turns in a still room sees nobody move: drawn pictures through the whole chain."""
+"""A turning head in a still room detects no motion: drawn pictures through the whole chain."""
 
 from dataclasses import replace
 from math import degrees, radians
@@ -21,7 +21,7 @@ SECONDS = 3.0
 
 
 class Room(EmptyScene):
-    """A scene: a room, and a ball that flies through it if asked for."""
+    """A scene: a room, and optionally a ball that flies through it."""
 
     def __init__(self, ball: bool) -> None:
         self._ball = ball

@@ -169,7 +169,7 @@ def test_torque_that_comes_on_after_a_stop_is_taken_off_again(machine: Machine) 
     machine.go(0.5)
     machine.made.robot.command(Stop("a hand"))
     machine.go(0.5)
-    machine.made.robot.body.bus.enable_torque()  # somebody else on the line
+    machine.made.robot.body.bus.enable_torque()  # another program on the line
     assert all(machine.holding())
     machine.go(1.0)
     assert not any(machine.holding())

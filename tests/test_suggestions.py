@@ -1,4 +1,4 @@
-"""Commands that messages suggest: typed as they stand, they reach the same rig and port."""
+"""Commands that messages suggest: typed unchanged, they reach the same rig and port."""
 
 from pathlib import Path
 from threading import Thread

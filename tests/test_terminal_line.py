@@ -16,7 +16,7 @@ BOARD = MaestroLine(6)
 
 
 class Bench:
-    """A line, what it said, and a client that has its terminal open."""
+    """A line, its messages, and a client that has its terminal open."""
 
     def __init__(self, device=STS, **settings):
         self.now_s = 5.0

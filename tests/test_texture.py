@@ -98,7 +98,7 @@ def test_parts_do_not_bleed_into_each_other() -> None:
     blue = red._replace(colours=red.colours[:, ::-1])
     both = merge_meshes([one._replace(normals=smooth_normals(ball)) for one in (red, blue)])
     image = add_texture(both).image.astype(int)
-    # Half a texel further than any vertex lies every colour is still the part's own.
+    # Half a texel outside the vertices every colour is still the part's own.
     assert not ((image[..., 0] > 0) & (image[..., 2] > 0)).any()
     assert (image.sum(axis=-1) > 0).mean() > 0.5
 

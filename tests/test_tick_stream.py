@@ -59,7 +59,7 @@ def test_every_tick_is_in_one_batch_with_every_field(recorded: Recorded) -> None
         same = [name for name in Tick._fields if name in row._fields and name not in ("percept", "commands")]  # fmt: skip
         assert len(same) == len(Tick._fields) - 3
         back = tick._replace(**{name: getattr(row, name) for name in same})
-        assert back == tick  # exact(...) of it tells 30 of 30.0
+        assert back == tick  # exact(...) of it distinguishes 30 from 30.0
         percept = None if row.percept is None else percepts[row.percept]
         assert repr(percept) == repr(tick.percept)
 

@@ -69,7 +69,7 @@ def test_a_run_is_refused_in_one_line_before_anything_is_done(tmp_path: Path) ->
     done = invoked("run", "--mock", "--seconds", "1", "--token-file", str(path))
     assert done.code == 2 and done.err.count("\n") == 1
     assert done.err.startswith(f"--token-file {path}: a token is 22 to 200 random letters")
-    # Without a page nobody is asked for it.
+    # Without a page it is not requested.
     assert RunOptions(mock=True, fast=True, page="127.0.0.1:1", token_file=path).page_token == ""
 
 

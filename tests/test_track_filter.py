@@ -15,7 +15,7 @@ def begun() -> TrackFilter:
 
 
 def walked(unseen_pictures: int, stops_after: int) -> TrackFilter:
-    """Follow somebody at 1.8 m/s who is then unseen, stands still meanwhile, and is seen again."""
+    """Follow a person at 1.8 m/s who is then unseen, stops meanwhile, and is seen again."""
     track = begun()
     for k in range(1, 31):
         track.predict(DT_S)
