@@ -353,7 +353,7 @@ def begun(words: list[str], breaks: str, **options: Any) -> Branch:
     return Branch(gazerig(*words), **options)
 
 
-# Parking takes a bounded time, in which a starved machine does not come all the way.
+# Parking takes a bounded time, in which a starved machine does not reach the end.
 @pytest.mark.own_timeouts
 @pytest.mark.usefixtures("branched_children_here")
 @pytest.mark.parametrize(

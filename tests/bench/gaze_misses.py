@@ -1,4 +1,4 @@
-"""How far the gaze is off the true faces in a run of a world, and what the largest misses are."""
+"""Errors of the gaze from the true faces in a run of a world, and the largest misses."""
 
 import time
 from bisect import bisect_left, bisect_right
@@ -30,7 +30,7 @@ class Look(NamedTuple):
 
     off_deg: measured gaze from the nearest person's true part
     face_deg: the target's place from the true part that it is meant to be
-    point_deg: where the eyes are meant to point from the target
+    point_deg: intended direction of the eyes from the target
     """
 
     t_s: float

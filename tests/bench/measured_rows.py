@@ -97,10 +97,10 @@ def word(row: dict[str, Any], name: str) -> str:
 def measure_all(
     folder: str, args: argparse.Namespace, parser: argparse.ArgumentParser, measure: Measure
 ) -> str:
-    """Measure and print the rows that were asked for; return how many figures are inside.
+    """Measure and print the requested rows; return how many figures are inside.
 
     Args:
-        folder: of the tests, where the rows are.
+        folder: of the tests with the rows.
         args: what the parser of ``arguments`` read.
         parser: of the command line; a row that is not there ends it.
         measure: calls a row's own function.

@@ -1,4 +1,4 @@
-"""What those who look on cost the control loop's process, in microseconds of processor a tick.
+"""Cost of observers for the control loop's process, in microseconds of processor a tick.
 
     python tests/bench/observer_cost.py [SECONDS]
 

@@ -99,7 +99,7 @@ class Timers:
         self.calls = 0
 
     def own_ns(self) -> tuple[float, float]:
-        """Return what a timer costs: what it adds to its stage, and what beside it."""
+        """Return the cost of a timer: what it adds to its stage, and outside it."""
         count, plain = 2000, lambda *_: None
         timed = self.timed(plain, 0)
         inside, whole = [], []
@@ -121,7 +121,7 @@ class Timers:
 
 
 class Noted:
-    """What was noted of the ticks: whole, stage by stage, with and without timers."""
+    """Times of the ticks: whole, stage by stage, with and without timers."""
 
     def __init__(self) -> None:
         self.whole: list[tuple[bool, bool, int]] = []

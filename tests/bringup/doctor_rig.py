@@ -91,7 +91,7 @@ class Rig:
 
 
 def one(findings, level, where, words):
-    """Return the finding of this level at this place that says these words."""
+    """Return the finding of this level at this place with these words."""
     named = [f for f in findings if f.level == level and f.where == where and words in f.what]
     assert len(named) == 1, [str(f) for f in findings]
     return named[0]

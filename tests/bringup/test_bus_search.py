@@ -1,4 +1,4 @@
-"""Searching a port for every kind: who is found, and that nobody is moved or changed by it."""
+"""Searching a port for every kind: servos are found, and none is moved or changed."""
 
 import pytest
 
@@ -97,7 +97,7 @@ def test_pulses_go_on_while_it_is_asked():
 def test_kinds_that_are_named_are_asked_and_no_other():
     assert {kind for kind, _ in plan_search("", ("feetech",), None)} == {"feetech"}
     assert {kind for kind, _ in plan_search("", ("dynamixel",), None)} == {"dynamixel"}
-    # Whether a board is there is asked at whatever rate, before servo packets are sent.
+    # A board is searched at any rate, before servo packets are sent.
     assert plan_search("", ALL, (4_500_000,)) == (
         ("maestro", BOARD_RATES[0]),
         ("dynamixel", 4_500_000),

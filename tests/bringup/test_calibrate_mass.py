@@ -84,7 +84,7 @@ def test_loads_of_both_directions_give_balance_and_friction(name: str) -> None:
     true = heavy(name, head=LinkMassParams(0.9, (40.0, 3.0, 30.0)))
     found = fitted(true, load_rig(name))
     changes = mass_changes(load_rig(name), found, 0.9)
-    aside = 3.0 if "neck_roll" in true.joints else 0.0  # only roll tells
+    aside = 3.0 if "neck_roll" in true.joints else 0.0  # only roll shows it
     assert changes["mass.head.com_mm"] == pytest.approx((40.0, aside, 30.0), abs=0.1)
     assert [*found.friction_nm.values()] == pytest.approx([0.03] * len(found.friction_nm))
     # Without a scale the mass is the rig's own, and the product is right.

@@ -92,7 +92,7 @@ VIEWS = 16
 def corners(
     number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics
 ) -> DetectedBoard:
-    """What a detector would find of the board, without a picture."""
+    """Detections of the board, without a picture."""
     return seen_board(
         *hand_held_pose(number, BoardCameraParams(), lens, BOARD), lens, noise_px, rng
     )
@@ -380,7 +380,7 @@ FEW = NeckStepParams(frames=2, timeout_s=1.0)
 
 
 class MovedNeck:
-    """A head that is at once where it is told to go."""
+    """A head that reaches its commands immediately."""
 
     def __init__(self, scene: BoardScene, clock: SimulatedClock) -> None:
         self.scene, self.clock = scene, clock
@@ -511,7 +511,7 @@ def test_a_board_out_of_sight_is_said(scene: BoardScene, neck: MovedNeck) -> Non
     assert step.view is None and step.corners == 0 and step.why == "no board seen"
 
 
-# --- Where the camera sits on the head, found from a board that hangs still
+# --- The camera's pose on the head, from a stationary board
 
 
 def scene_of(seed: int) -> BoardScene:
@@ -699,7 +699,7 @@ def test_angles_planned_stay_inside_the_neck_and_turn_about_all_axes() -> None:
 
 
 WIDTH, HEIGHT = 640, 480
-# The face's axes (out of it, to its left, up) in the camera's, for one that faces the camera.
+# The face's axes (out of it, to its left, up) in the camera's, for a frontal face.
 FACING = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
 
 

@@ -1,4 +1,4 @@
-"""Bad conditions of a camera are told once as they begin and once as they end; good ones never."""
+"""Bad conditions of a camera are reported once at their start and end; good ones never."""
 
 from dataclasses import replace
 from functools import cache
@@ -60,7 +60,7 @@ def blurred(image: np.ndarray, px: float) -> np.ndarray:
 def looked(
     images: list[np.ndarray], detector: Any = None, rotation: int = 0
 ) -> tuple[list[str], tuple[str, ...]]:
-    """Return what is told of frames that are a second apart, and the conditions at their end."""
+    """Return the reports on frames that are a second apart, and the conditions at their end."""
     health, told = CameraHealth(rotation), list[str]()
     conditions: tuple[str, ...] = ()
     for k, image in enumerate(images):

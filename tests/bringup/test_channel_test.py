@@ -1,4 +1,4 @@
-"""One channel led slowly for a person to look at: how it moves, and that its pulses end."""
+"""One channel moved slowly for a person to watch: its motion, and the end of its pulses."""
 
 import pytest
 
@@ -57,7 +57,7 @@ def test_the_first_place_at_once_the_others_slowly_and_the_pulses_end():
     ways = [abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)]
     assert 0 < max(ways) <= 0.011 * (SLOW_STEPS_S + 100.0)
     assert {4780, 5220} <= set(pulses)
-    # The servo has been seen at both places, and nobody else has moved.
+    # The servo was seen at both places, and no other one has moved.
     places = [place for _, _, place in bench.seen]
     assert min(places) < 4810 and max(places[-100:]) > 5190
     assert [c["position"] for c in bench.board.faults.reports()] == [0] * 12
@@ -125,7 +125,7 @@ def test_a_cable_that_is_pulled_out():
 
 
 class I2cBench(Bench):
-    """The same on a PCA9685, whose pulses the driver leads."""
+    """The same on a PCA9685, whose pulses the driver ramps."""
 
     pulse = "target"
 

@@ -402,7 +402,7 @@ def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     process.send_signal(signal.SIGTERM)
     _, words = process.communicate(timeout=30)
     assert process.returncode == 1 and "SIGTERM" in words
-    # A starved machine has no time left for the way.
+    # A starved machine has no time left for the motion.
     assert re.search(r"parked( \(not there in time\))?, torque off on all servos", words)
     assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
 

@@ -60,7 +60,7 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     answers = answers_in(tmp_path, "turn -400", "", "turn 700", "", "turn -290", "", "y")
     done = calibrated(str(rig), "--mock", "--joint", "left_eye_pan", "--answers", answers)
     found = load_rig(str(rig)).joints["left_eye_pan"]
-    # The emulated stops lie at 1604 and 2492, the hand starts at 2116.
+    # The emulated stops are at 1604 and 2492, the hand starts at 2116.
     assert found.sign == -1 and found.zero_step == pytest.approx(2126, abs=12)
     assert found.min_deg < -20.0 < 20.0 < found.max_deg
     (backup,) = tmp_path.glob("desk.yaml.bak-*")
@@ -76,7 +76,7 @@ def test_by_motion_needs_no_answer_with_yes(rig: Path) -> None:
     save_rig(rig, near, datetime(2026, 1, 1))
     words = ("--joint", "left_eye_tilt", "--by", "motion", "--margin", "1", "--yes", "--mock")
     done = calibrated(str(rig), *words)
-    # The emulated stops lie 4 deg beyond the range: -6..7.
+    # The emulated stops are 4 deg beyond the range: -6..7.
     found = load_rig(str(rig)).joints["left_eye_tilt"]
     assert found.max_deg == pytest.approx(5.5, abs=0.5) and found.sign == 1
     assert found.min_deg == pytest.approx(-5.5, abs=0.5)
@@ -162,7 +162,7 @@ def test_an_sts_joint_is_calibrated_by_motion(rigs: dict[str, str]) -> None:
     path.write_text(narrow, encoding="utf-8")
     words = ("--mock", "--joint", "neck_roll", "--by", "motion", "--yes", "--margin", "1")
     done = calibrated(str(path), *words)
-    # The emulated stops lie 4 deg beyond the range: -7..8.
+    # The emulated stops are 4 deg beyond the range: -7..8.
     joint = load_rig(str(path)).joints["neck_roll"]
     assert joint.sign == 1 and joint.max_deg == pytest.approx(6.5, abs=0.7)
     assert "no watchdog" in done.err
@@ -308,7 +308,7 @@ NO_NOSE = "no such joint; there is left_eye_pan"
         (("joints", "--joint", "nose"), NO_NOSE),
         (("joints", "desk", "--joint", "nose"), NO_NOSE),
         (("--mock", "desk", "--joint", "nose"), NO_NOSE),
-        # Nothing said is the joints of the shipped rig, which is never written.
+        # Without arguments these are the joints of the shipped rig, which is never written.
         ((), "desk.yaml"),
         ((), "copy it"),
         (("nose",), "nothing named 'nose' is shipped"),

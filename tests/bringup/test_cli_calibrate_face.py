@@ -202,7 +202,7 @@ def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
     assert load_rig(str(rig)).face_parts_mm == {"N": (0.0, 5.0, 0.0)}
 
 
-# Parking takes a bounded time, in which a starved machine does not come all the way.
+# Parking takes a bounded time, in which a starved machine does not reach the end.
 @pytest.mark.own_timeouts
 def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
@@ -235,7 +235,7 @@ def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
         sitting.reads("5 mm left, 0 mm up")
         sitting.types(b"w")
         sitting.reads("5 mm left, 5 mm up")
-        # Nothing else leads the head meanwhile: it would leave the face that is measured.
+        # No client controls the head meanwhile: it would leave the measured face.
         visitor.ask({"do": "look_at", "p_world_m": [1.0, 0.5, 0.0]})
         sitting.enters(lambda: visitor.ask({"steer": "enter"}), "2/8 your left eye")
         visitor.ask({"steer": "down"})

@@ -212,7 +212,7 @@ def test_a_twelve_volt_servo_that_is_still_set_for_less():
     found = one(findings, "error", PAN, "limits are 4.0..8.0 V")
     assert "must come off this supply" in found.remedy
     assert "Max Voltage (14) to 140" in found.remedy
-    assert not found.fixes  # nobody but a person can see which servo it is
+    assert not found.fixes  # only a person can see which servo it is
 
 
 def test_a_joint_that_asks_for_more_speed_than_there_is():
@@ -365,7 +365,7 @@ def test_reading_changes_nothing(kind):
     assert rig.kept() == before
 
 
-# --- What the doctor mends, what it says of ports, and its words
+# --- Fixes of the doctor, its findings about ports, and its texts
 
 
 def test_fix_mends_what_is_safe_and_says_it():

@@ -61,7 +61,7 @@ def test_what_was_chosen_on_one_face_is_there_on_the_face_at_any_other_pose(
         state = apply_key(state, key)
         if key != "enter" or part is None:
             continue
-        # Where the gaze met the face as it was then, carried along with the face to now.
+        # The former point of the gaze on the face, moved with the face.
         met = point_world_m(place, p_then, rotation(turn_then))
         in_face = place_in_face_mm(met, p_then, rotation(turn_then))
         carried = add(p_now, rotate(rotation(turn_now), tuple(v / 1e3 for v in in_face)))  # type: ignore[arg-type]
@@ -120,7 +120,7 @@ def test_back_and_skip_take_a_choice_back() -> None:
 def test_a_rigs_own_places_are_where_it_begins() -> None:
     own = {"N": (-4.0, 3.0, 160.0)}
     state = after("up", "right", "enter", own=own)
-    # Farther out than keys lead: it stays, and moves only inwards.
+    # Farther out than keys reach: it stays, and moves only inwards.
     assert changed_places(state) == {"face_parts_mm.N": (-4.0, -2.0, 160.0)}
     assert after("down", own=own).place_mm("N")[2] == 155.0
 
@@ -222,7 +222,7 @@ def made(steered: FaceSteering) -> Iterator[Assembly]:
 
 
 def ticks(made: Assembly, steered: FaceSteering, seconds: float) -> Tick:
-    """Run in simulated time, where nothing stands against an Enter."""
+    """Run in simulated time, in which nothing prevents an Enter."""
     start_s, last_s, tick = made.clock.now_s(), made.clock.now_s(), None
     for slot in range(1, int(seconds * 200) + 1):
         made.clock.sleep_until(start_s + slot / 200)
@@ -276,7 +276,7 @@ def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
     made.robot.start(made.clock)
     tick = ticks(made, steered, 1.0)
     steered.press("enter", tick.t_s)
-    # Eyes that are measured elsewhere, whatever was asked of them.
+    # Eyes that are measured elsewhere, whatever their command.
     aside = tick.pose._replace(eye_left_rad=(0.3, 0.0))
     assert steered.update(tick._replace(t_s=tick.t_s + 0.1, pose=aside)) is None
     why = steered.update(tick._replace(t_s=tick.t_s + WAIT_S + 0.1, pose=aside))

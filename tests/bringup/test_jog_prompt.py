@@ -17,7 +17,7 @@ from gazerig.features.bringup.cli.prompts import Lines
 
 
 class Servo(HobbyMarker):
-    """Keeps what it is told."""
+    """Records its calls."""
 
     def __init__(self) -> None:
         self.reported: list[tuple[str, float]] = []

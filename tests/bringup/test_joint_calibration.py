@@ -224,7 +224,7 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
     turn_deg = float(words[words.index("by") + 1])
     more = "towards more steps" in str(refused.value)
     reseated = (start + span // 2) % TURN + (1 if more else -1) * turn_deg * STEPS_PER_DEG
-    assert abs(reseated - 2048) < 8.0  # told in whole degrees
+    assert abs(reseated - 2048) < 8.0  # reported in whole degrees
 
 
 @pytest.mark.parametrize(
@@ -670,7 +670,7 @@ def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
 
 
 class Reader(Bench):
-    """Who turns a joint by hand and says the angles read off, those proposed where it is None."""
+    """A person who turns a joint by hand and types the angles; None: the proposed ones."""
 
     angles: list[float | None]
 
@@ -771,7 +771,7 @@ def test_proposals_keep_the_shape_of_the_curve_and_meet_the_marks() -> None:
     one, other = (0.0, 1500.0), (40.0, 1776.0)
     assert likely_angle(PAN, 1500.0, one, other) == 0.0
     assert likely_angle(PAN, 1776.0, one, other) == 40.0
-    # What was 10 deg of 20 is 20 of 40 now.
+    # 10 deg of 20 are now 20 of 40.
     assert likely_angle(PAN, 1634.0, one, other) == pytest.approx(20.0, abs=0.1)
     assert likely_angle(PAN, 1634.0, (0.0, 1776.0), (-40.0, 1500.0)) == pytest.approx(-20, abs=0.1)
 
@@ -799,8 +799,8 @@ BOARD = MAKER.bus.maestro
 class LinkageBench:
     """The maker's board, one of its servos, and a person with a script.
 
-    Answers: "+40" and "1480" steer, "" is Enter where it is steered and the proposed number
-    where one is asked for.
+    Answers: "+40" and "1480" steer, "" is Enter while steering and the proposed number
+    at a question for one.
     """
 
     def __init__(self, name: str, *answers: str, pulses: tuple[float, float] = (500, 2500)) -> None:
@@ -818,7 +818,7 @@ class LinkageBench:
         self.placer = HobbyMarker(self.hobby, self)
 
     def place_us(self) -> float:
-        """Return where the shaft truly is."""
+        """Return the true position of the shaft."""
         return cast(Any, self.board).find_servo(self.channel).place_steps / 4
 
     def pulse(self) -> int:
@@ -879,7 +879,7 @@ def test_places_between_are_gone_to_and_asked_for() -> None:
     made = bench.measure(more=1)
     assert [at for _, at in made.transmission_points] == [1790.0, 1650.0, 1510.0, 1360.0, 1210.0]
     assert made.transmission_points[1][0] == -13.5 and made.transmission_points[2] == (0.0, 1510.0)
-    # What is proposed is what the file says of that pulse.
+    # The proposed angle is that of the file at this pulse.
     assert made.transmission_points[-1][0] == pytest.approx(22.4, abs=0.2)
 
 

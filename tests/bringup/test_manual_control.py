@@ -34,7 +34,7 @@ class Bench(EmulatedRig):
 
     def __init__(self, rig: Rig = RIG, params: JogParams | None = None) -> None:
         lines = None
-        if rig is RIG:  # without a rig's mechanical stops, where the test says
+        if rig is RIG:  # without a rig's mechanical stops, if the test needs it
             joints = ((name, rig.joints[name]) for name in GAZE_JOINTS)
             specs = tuple(
                 ServoSpec(j.id, j.model, round(j.steps(radians(CROOKED.get(name, 0.0)))))
@@ -283,7 +283,7 @@ def test_eyes_on_one_linkage_are_judged_by_their_mean_line_of_sight(
     looked = other.look(point, 2.0)
     assert not looked.converges and looked.error < 1.0
     assert looked.vergence == pytest.approx(0.0, abs=1e-6)
-    # Each eye by itself is beside the point by half the vergence that it needs.
+    # Each eye alone is off the point by half its vergence.
     worst = max(looked.left_error, looked.right_error)
     assert worst == pytest.approx(looked.desired_vergence / 2.0, abs=1.0)
     words = "\n".join(gaze_result_text(looked))

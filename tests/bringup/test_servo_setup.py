@@ -25,7 +25,7 @@ RATES = DYNAMIXEL.family.scan_rates
 
 
 class Bench:
-    """Servos on a table, factory fresh unless told otherwise, heard at their own rate only."""
+    """Servos on a table, factory fresh by default, which answer at their own rate only."""
 
     def __init__(self, *specs, baud=None, kind=DYNAMIXEL):
         self.now = 10.0

@@ -1,4 +1,4 @@
-"""Telemetry of servos of every kind: what is shown is what they say, and nothing is written."""
+"""Telemetry of servos of every kind: their values are shown, and nothing is written."""
 
 import json
 from collections.abc import Callable
@@ -52,7 +52,7 @@ WRITES = {
 
 
 def two_servos(kind: str) -> Rig:
-    """Return a rig of an eye and a geared neck on one kind of servo, and where they stand."""
+    """Return a rig of an eye and a geared neck on one kind of servo, and their positions."""
     joints = {"left_eye_pan": EYE, "neck_yaw": NECK}
     if kind == "feetech":
         joints = {name: replace(one, model="sts3215") for name, one in joints.items()}
@@ -283,7 +283,7 @@ class HandBench:
         return cast(Any, self.rig.devices[""]).find_servo(DESK.joints[joint].id)
 
     def hold(self, joint: str, deg: float) -> None:
-        """Turn a joint by hand to an angle from where it was at first."""
+        """Turn a joint by hand by an angle from its first position."""
         joint_params = DESK.joints[joint]
         steps = joint_params.steps(np.radians(deg)) - joint_params.steps(0.0)
         self.servo(joint).turn(steps - self._at.get(joint, 0.0))

@@ -1,4 +1,4 @@
-"""Films of plain pictures whose grey tells which picture it is."""
+"""Films of plain pictures whose grey is the number of the picture."""
 
 from pathlib import Path
 

@@ -28,7 +28,7 @@ class Looks:
     t_s: (n,); gaze_deg, plan_deg: (n, 2) measured gaze in space; the planned gaze point
     eyes_deg: (n, 2, 2) left and right eye in the head, measured
     target_deg: (n, 2) of the point to look at; look: (n,) its number
-    flight: (n,) whether a saccade is planned in this tick; saccades: (n,) how many so far
+    flight: (n,) whether a saccade is planned in this tick; saccades: (n,) their number until then
     """
 
     t_s: np.ndarray
@@ -48,7 +48,7 @@ def point(yaw_deg: float, pitch_deg: float = 0.0) -> Vec3:
 
 
 def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, seed: int) -> Looks:
-    """Return what a rig does that is told to look at points at times after ``STARTS_S``."""
+    """Return the motion of a rig with commands to look at points at times after ``STARTS_S``."""
     options = RunOptions(rig=rig_name, mock=True, fast=True, seed=seed, scene="sits-still")
     rows, number = [], -1
     with looked_at(load_rig(rig_name), options) as (made, clock):

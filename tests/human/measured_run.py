@@ -49,7 +49,7 @@ class MeasuredRun:
     plan_deg: (n, 2) direction of the planned gaze point from the head
     lids, lids_goal: (n, 2) opening of left and right upper lid, 0 shut .. 1 open, measured; planned
     phase: (n,) "fixate", "saccade" or "pursue", as planned; blink: (n,) whether a blink lasts
-    saccades, blinks: (n,) number of those planned so far
+    saccades, blinks: (n,) number of those planned until then
     target_m: (n, 3) the target's position at the tick; target_deg: (n, 2) direction from the head
     shift: (n,) counts up with each newly chosen target
     target_name: (n,) such as "face 3"; part: (n,) face part or ""; salience: (n,)

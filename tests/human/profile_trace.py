@@ -1,4 +1,4 @@
-"""Which functions of the gaze models run in a profile, and what docs/profiles.md says of it."""
+"""Functions of the gaze models that run in a profile, compared with docs/profiles.md."""
 
 import re
 from collections import Counter
@@ -70,7 +70,7 @@ class Claim(NamedTuple):
 
     @property
     def is_key(self) -> bool:
-        """Return whether the row tells a parameter's value."""
+        """Return whether the row has a parameter's value."""
         return self.name.startswith(("gaze.", "ranges."))
 
 
@@ -83,7 +83,7 @@ def claims() -> Iterator[Claim]:
 
 
 class Trace(NamedTuple):
-    """What a run showed: calls of functions of gaze/ by qualified name, kinds of its targets."""
+    """Record of a run: calls of functions of gaze/ by qualified name, kinds of its targets."""
 
     calls: Counter[str]
     kinds: frozenset[str]

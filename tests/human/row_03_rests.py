@@ -37,7 +37,7 @@ WANTED = {
 
 
 class Visit(NamedTuple):
-    """A visit to a part: from the shift that leads there to the next; its rest."""
+    """A visit to a part: from the shift to it until the next one; its rest."""
 
     part: str
     seconds: float
@@ -59,7 +59,7 @@ def visits(run: MeasuredRun) -> list[Visit]:
             continue  # the face was entered, or is lost
         flown = np.flatnonzero(flight[begin:end])
         if run.part[begin] and len(flown):
-            # Where a target moves, later saccades catch up within the rest.
+            # If a target moves, later saccades catch up within the rest.
             landed = begin + int(np.argmin(flight[begin + flown[0] : end])) + flown[0]
             found.append(
                 Visit(

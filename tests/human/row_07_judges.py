@@ -1,6 +1,6 @@
 """Independent judges find the saccades the robot commanded in its export, and hardly any other.
 
-All the time is judged. What a judge finds in a blink, of which the export tells, is the blink's own
+All the time is judged. Findings within a blink of the export are the blink's own
 motion of the eyes.
 """
 

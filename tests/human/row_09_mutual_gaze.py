@@ -39,7 +39,7 @@ def nearest(run: MeasuredRun, begin: int) -> set[str]:
 
 
 def _part_deg(run: MeasuredRun, at: int, part: str) -> np.ndarray:
-    """Return where a part is on a face that is turned to the head, from the face's centre."""
+    """Return the place of a part on a face that is turned to the head, from the face's centre."""
     _, left, up = PARTS_FACE_M[part]
     distance_m = np.linalg.norm(run.target_m[at] - run.head_m[at])
     # The owner's left is on the right of who looks.

@@ -1,4 +1,4 @@
-"""Reaction: from a hand that appears beside a face to the measured start of the gaze towards it."""
+"""Reaction: from a hand that appears next to a face to the measured start of the gaze to it."""
 
 from collections.abc import Sequence
 from math import pi, sin
@@ -32,7 +32,7 @@ class Appearance(NamedTuple):
     near: bool
 
     def place(self, t_s: float) -> Vec3:
-        """Return where the hand is."""
+        """Return the place of the hand."""
         since_s = t_s - self.start_s
         y = self.side * (0.22 + 0.01 * sin(2 * pi * 1.0 * since_s))
         if not self.near:
@@ -50,7 +50,7 @@ def appearances(until_s: float) -> list[Appearance]:
 
 
 class Appearing:
-    """A person who stands before the robot, and hands that appear out of nothing."""
+    """A person before the robot, and hands that appear out of nothing."""
 
     name = "appearing-hands"
     round_s = 3600.0
@@ -84,7 +84,7 @@ def reaction_ms(run: MeasuredRun, hand: int, start_s: float) -> float | None:
         return None
     first = shown[0]
     window = slice(first, first + np.searchsorted(run.t_s[first:], run.t_s[first] + _LATEST_S))
-    # Half of the way to where the hand is by then: a corrective saccade is no reaction.
+    # Half of the angle to the hand at that time: a corrective saccade is no reaction.
     way, done = there[window] - run.gaze_deg[first], run.gaze_deg[window] - run.gaze_deg[first]
     near = np.flatnonzero((done * way).sum(axis=1) > 0.5 * (way * way).sum(axis=1))
     if not len(near) or near[0] == 0:

@@ -58,7 +58,7 @@ def changed(
             continue
         flight = looks.flight[rows]
         first = int(np.argmax(flight))
-        if first:  # a blink came with the look and led it: the jump was at another time of it
+        if first:  # a blink came before the look: the jump was at another time of it
             continue
         landed = first + int(np.argmin(flight[first:]))
         counts.append(1 + int(np.any(flight[landed : landed + 21])))

@@ -32,7 +32,7 @@ WANTED = {
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
-    """Return the figures of a person who sits still (at rest) and of one who talks."""
+    """Return the figures of a still person (at rest) and of a talking one."""
     rest = [run("visitor", seed=seed, seconds=seconds) for seed in seeds]
     talk = [
         run("face-to-face", seed=seed, seconds=seconds, conversation="listen") for seed in seeds

@@ -45,7 +45,7 @@ class Lights:
         return ()
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the one that is lit."""
+        """Return the lit one."""
         number = int(t_s / _EACH_S)
         yaw = radians(_YAWS[number % len(_YAWS)])
         x, y, z = _EYES_M

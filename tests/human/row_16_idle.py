@@ -27,7 +27,7 @@ _PLACES: tuple[Vec3, ...] = ((1.4, 0.55, 0.20), (1.6, -0.75, 0.10), (1.3, 0.05, 
 
 
 class Room:
-    """A room without any person, with things that lie still."""
+    """A room without any person, with still things."""
 
     round_s = 60.0
     behaviours: tuple[str, ...] = ()
@@ -43,7 +43,7 @@ class Room:
         return ()
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return what lies about."""
+        """Return the things of the room."""
         return self._things
 
     def events(self) -> tuple[Event, ...]:

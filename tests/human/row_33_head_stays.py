@@ -41,7 +41,7 @@ class LongLooks:
         return ()
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the one that is there now."""
+        """Return the present one."""
         number = int(t_s / _EACH_S)
         yaw, (x, y, z) = radians(_YAWS[number % len(_YAWS)]), _EYES_M
         return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)

@@ -45,7 +45,7 @@ class EqualLights:
         return ()
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the one that is lit."""
+        """Return the lit one."""
         number = int(t_s / _EACH_S)
         yaw, (x, y, z) = radians(_YAWS[number % len(_YAWS)]), _EYES_M
         return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)

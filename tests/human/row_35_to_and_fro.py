@@ -41,7 +41,7 @@ class ToAndFro(SwingingFace):
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
-    """Return gains by speed, the lead and the saccades, over all seeds."""
+    """Return gains by speed, the phase lead and the saccades, over all seeds."""
     gains, leads, rate = {}, [], []
     for speed in _SPEEDS_DEG_S:
         scene, found = ToAndFro(speed), []

@@ -29,7 +29,7 @@ WANTED = {
 
 
 class Talker:
-    """A person who speaks for 6 s and is silent for 6 s, in turn, at one place."""
+    """A person who alternately speaks and is silent for 6 s, at one place."""
 
     round_s = 12.0
     behaviours: tuple[str, ...] = ()

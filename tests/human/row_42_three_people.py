@@ -1,4 +1,4 @@
-"""Three people: most of the time on the speaker, stays of every length, nobody left out.
+"""Three people: most of the time on the speaker, stays of every length, no one left out.
 
 The person looked at is the one listened to in 88 % of the time (Vertegaal et al. 2001). Listeners
 turn to the next speaker about when the turn begins (Holler & Kendrick 2015). A head without ears

@@ -37,7 +37,7 @@ class Exported(NamedTuple):
     """The columns of an exported run that judges and their marks rest on.
 
     time_s: (n,); gaze_deg: (n, 2), yaw and pitch in space
-    commanded: (m, 2) onset and end of each commanded saccade as the export's events tell them;
+    commanded: (m, 2) onset and end of each commanded saccade by the export's events;
     amplitude_deg: (m,) of it
     fast: (n,) whether what the robot followed moved faster than ``FAST_DEG_S``
     blinks: (b, 2) onset and end of each blink, in which the eyes turn down and back

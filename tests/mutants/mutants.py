@@ -6,7 +6,7 @@ from typing import NamedTuple
 class Mutant(NamedTuple):
     """One piece of text replaced by another.
 
-    file: from the root of the repository; old: stands there exactly once
+    file: from the root of the repository; old: occurs there exactly once
     effect: what is wrong then
     tests: NAME of a file test_NAME.py, or NAME::test_function; one of them has to fail
     rows: what it breaks of docs/checks.md, by number, or of the table of docs/gaze.md

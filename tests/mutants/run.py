@@ -41,7 +41,7 @@ COPIED = (
 
 
 def copied(to: Path) -> None:
-    """Make a copy of sources and tests that runs by itself."""
+    """Make an independent copy of sources and tests."""
     for folder in COPIED:
         passed_over = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / folder, to / folder, symlinks=True, ignore=passed_over)

@@ -110,7 +110,7 @@ class BinocularController:
         """Return the left and right eye angle in the head for the next period.
 
         left_rad, right_rad: direction in space of the target from each eye; None: not seen
-        saccade: version and vergence that a saccade under way prescribes
+        saccade: version and vergence that a present saccade prescribes
         """
         par = self._params
         eye_left, eye_right = self._eyes
@@ -154,7 +154,7 @@ class BinocularController:
         return 0.5 * u_c, -side * par.converge_1_s * u_c / par.gain_1_s
 
     def _demand(self, dt_s: float) -> float | None:
-        """Return the vergence that the target asked for when it was seen."""
+        """Return the target's vergence at the time when it was seen."""
         then = self._ago(self._params.vergence_delay_ms / 1e3, dt_s)
         if then is None or then.left is None or then.right is None:
             return None
@@ -181,7 +181,7 @@ class BinocularController:
         return self._past[-1 - back] if len(self._past) > back else None
 
     def _angles(self, u_c: float, u_d: float) -> tuple[float, float]:
-        """Return both eyes' angles, led by the servos' lag and kept in range."""
+        """Return both eyes' angles, advanced by the servos' lag and kept in range."""
         lead = self._params.servo_lead_ms / 1e3
         c, v = self.version_rad, self.vergence_rad
         return (
