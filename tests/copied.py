@@ -1,6 +1,6 @@
 """Copies of machines that have been running: made and started once, for many tests.
 
-A copy is as good as a machine of its own. What a closure or a list's method holds on to is
+A copy is as good as a machine of its own. Objects that a closure or a list's method holds on to is
 copied as well, which copy.deepcopy alone leaves with the original.
 """
 

@@ -201,7 +201,7 @@ def test_what_only_one_eye_sees_is_seen() -> None:
     right = (left[0], -left[1], 0.0)
     both = bodies(body(1, "x", left), body(2, "x", right))
     assert visible(view, both, looking()) == [True, True]
-    # With the left eye turned in, nothing sees the left body any more, and so the other way.
+    # With the left eye turned in, nothing sees the left body any more, and vice versa.
     turned = looking()._replace(eye_left_rad=(radians(-30), 0.0))
     assert visible(view, both, turned) == [False, True]
     turned = looking()._replace(eye_right_rad=(radians(30), 0.0))

@@ -123,7 +123,7 @@ def test_the_mask_is_no_easy_target(masks: list[NDArray[np.uint8]]) -> None:
 
 
 def test_the_gaze_lies_on_what_moves(fixations: list[Fixation]) -> None:
-    """A saccade that falls short is corrected after 100 to 200 ms: shorter rests may lie beside."""
+    """A saccade that falls short is corrected after 100 to 200 ms: shorter rests may exist."""
     pictures = [on for fixation in fixations for on in fixation.on]
     assert np.mean(pictures) >= 0.75, f"{sum(pictures)} of {len(pictures)} pictures"
     shown = [fixation for fixation in fixations if fixation.on and fixation.seconds > CORRECTED_S]

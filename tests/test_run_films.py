@@ -43,7 +43,7 @@ def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> 
 @pytest.mark.skipif(not MEDIA.is_dir(), reason=f"films are not at {MEDIA}")
 @pytest.mark.parametrize("network", ["mtcnn", "yunet"])
 def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
-    # The detector's own test looks all through the film; a quarter of it shows the way to the gaze.
+    # The detector's own test looks all through the film; a quarter of it suffices here.
     rig = faces_alone(tmp_path / "rig.yaml", network)
     run = figures(rig, "--video", str(MEDIA / "Megamind.avi"), "--seconds", "2")
     assert run["pictures"] >= 45

@@ -308,7 +308,7 @@ NO_NOSE = "no such joint; there is left_eye_pan"
         (("joints", "--joint", "nose"), NO_NOSE),
         (("joints", "desk", "--joint", "nose"), NO_NOSE),
         (("--mock", "desk", "--joint", "nose"), NO_NOSE),
-        # Without arguments these are the joints of the shipped rig, which is never written.
+        # Without arguments: the shipped rig, which is never written.
         ((), "desk.yaml"),
         ((), "copy it"),
         (("nose",), "nothing named 'nose' is shipped"),
