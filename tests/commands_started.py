@@ -61,7 +61,7 @@ class OnTerminal:
         os.write(self.fd, keys)
 
     def enters(self, press: Callable[[], object], words: str) -> None:
-        """Press Enter, as a person does again where the eyes were too late, until words come."""
+        """Press Enter, again if the eyes were too late, until there is output."""
         while True:
             press()
             taken = self.reads_one_of(words, "not taken: the eyes are")

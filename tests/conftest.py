@@ -64,7 +64,7 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_collection(session: pytest.Session) -> Iterator[None]:
-    """Share compiling among processes, and let what is imported lie.
+    """Share compiled modules among processes, and keep imported ones.
 
     It stays, and looking it through takes a third of the time. Garbage of the tests is looked for
     less often than by default: that takes a twentieth of the time of them all. Nor

@@ -65,7 +65,7 @@ class Bench:
         self.level = ""
 
     def tick(self, desired: float | tuple[float, ...], age_s: float = 0.0, **said: Any) -> float:
-        """One tick; said: a column for JOINT, or ``at`` and ``old_s`` for where it is."""
+        """One tick; said: a column for JOINT, or ``at`` and ``old_s`` for its position."""
         self.t_s += DT
         at, old_s = said.pop("at", None), said.pop("old_s", 0.0)
         position = tuple(

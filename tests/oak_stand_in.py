@@ -127,7 +127,7 @@ class Queue:
 
 
 class Rig:
-    """A whole stand-in for depthai with one device."""
+    """A complete substitute for depthai with one device."""
 
     def __init__(self, speed="SUPER", start_fault=None) -> None:
         self.device = Device(getattr(real().UsbSpeed, speed))

@@ -20,7 +20,7 @@ BLINKS = "gaze.lids.blinks_per_min"
 
 
 class Broken(Exception):
-    """A rule is broken, as gazerig.config.load.ConfigError says it."""
+    """A broken rule, like gazerig.config.load.ConfigError."""
 
 
 class SecondTuning:

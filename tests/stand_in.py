@@ -1,4 +1,4 @@
-"""What stands in for a port or a camera has only the part of it that the test needs."""
+"""Substitutes for a port or a camera have only the parts that the test needs."""
 
 from typing import TYPE_CHECKING, Any
 

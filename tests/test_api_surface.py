@@ -109,7 +109,7 @@ def test_the_import_alone_loads_nothing() -> None:
 
 @pytest.mark.usefixtures("ideal_servos")
 def test_a_program_typed_as_strictly_as_can_be_runs() -> None:
-    """``make check`` has mypy read it; here it does what it says."""
+    """``make check`` has mypy read it; here it runs."""
     with gazerig.open("desk", fast=True, scene="face-to-face", say=lambda line: None) as head:
         head.step(2.0)
         assert users_program.follow(head, 5.0) == "arrived"

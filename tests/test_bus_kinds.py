@@ -19,7 +19,7 @@ class TestEveryKind(BusSuite):
         return lambda: in_process(request.param)
 
 
-# What every kind of servo bus does when a servo, a port or a supply goes away, over both twins
+# Every kind of servo bus without a servo, a port or a supply, over both twins
 
 
 class TestEveryKindOfLoss(BusLossSuite):

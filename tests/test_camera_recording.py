@@ -304,7 +304,7 @@ def test_a_picture_taken_late_does_not_delay_those_that_follow(file):
     replay.open()
     due_s = [70.0 + t - TIMES_S[0] for t in TIMES_S]
     present(replay.take(clock, clock))
-    clock.now_s = due_s[2] + 0.01  # nobody has looked meanwhile
+    clock.now_s = due_s[2] + 0.01  # no one has looked meanwhile
     late = present(replay.take(clock, clock))
     assert late.number == 3 and late.captured_s == pytest.approx(due_s[2], abs=1e-6)
     for number in (4, 5, 6):

@@ -188,7 +188,7 @@ def test_camera_that_comes_back_is_told_and_counts_on(source):
     assert (present(old).number, present(old).captured_s) == (
         3,
         3.0,
-    )  # the old one stays; its age tells
+    )  # the old one stays; its age shows it
     assert camera.events() == ("camera lost (camera gone: check its cable): trying it again",)
     source.fault = None
     feed(source, camera, 1)

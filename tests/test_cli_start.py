@@ -188,7 +188,7 @@ def test_a_shell_completes_rigs_scenes_and_characters(
         typed()
         return capfd.readouterr().out.split()
 
-    # Whose program is running tells the name that is completed: not "python -m pytest".
+    # The name of the running program is completed: not "python -m pytest".
     monkeypatch.setattr(sys.modules["__main__"], "__package__", None)
     assert completed("check de") == ["desk"] == gazerig().stdout.split()
     assert completed("run --character bo") == ["bold"]

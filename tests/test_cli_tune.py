@@ -175,7 +175,7 @@ def test_save_takes_a_path_from_the_folder_it_is_typed_in(
         other = tmp_path / "other.yaml"
         assert load_rig(str(other)).loop.rate_hz == 150.0
         assert load_rig(str(rig.path)).loop.rate_hz == 200.0
-        # The copy is the rig's file from now on: it is the one that is watched.
+        # The copy is the rig's file from now on and is watched.
         text = other.read_text(encoding="utf-8")
         other.write_text(text.replace("rate_hz: 150", "rate_hz: 160"), encoding="utf-8")
         assert rig.hears("other.yaml was edited: its values are applied"), rig.log.read_text()
@@ -194,7 +194,7 @@ def test_stop_and_resume() -> None:
     assert done.returncode == 0 and "torque is off" in done.stderr
     with RobotClient.connect() as rig:
         assert rig.status()["stopped"] == "finger"
-    unsure = gazerig("ctl", "resume")  # nobody there to say that no hand is in it
+    unsure = gazerig("ctl", "resume")  # no person confirms that no hand is in it
     assert unsure.returncode != 0 and "no hand" in unsure.stdout + unsure.stderr
     with RobotClient.connect() as rig:
         assert rig.status()["stopped"] == "finger"

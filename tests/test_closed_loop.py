@@ -105,7 +105,7 @@ def walk() -> Seen:
 
 
 def overshoot_deg(seen: Seen) -> float:
-    """Return how far the head's yaw goes past where it would face the person who has arrived."""
+    """Return the overshoot of the head's yaw past the direction of the person who has arrived."""
     after = seen.t_s > STEP_AT_S
     return float(seen.head_deg[after].max() - seen.facing_deg[-1])
 

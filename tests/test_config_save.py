@@ -141,7 +141,7 @@ def test_anchors_and_aliases(small):
         "joints:\n  pan: {id: 1, zero_step: &mid 2048}\n  tilt: {id: 2, zero_step: *mid}\n"
         "  roll: &roll\n    id: 3\n  nod: *roll\n"
     )
-    # An alias gives way to a value of its own.
+    # An alias is replaced by a value of its own.
     save(small, {"joints.tilt.zero_step": 2100}, NOW, check, Head)
     assert "zero_step: &mid 2048}\n  tilt: {id: 2, zero_step: 2100}" in small.read_text()
     # Nobody is tied to the anchor now: it stays, with another value.
@@ -349,7 +349,7 @@ def as_yaml(tree, flow_below, depth=0):
 def test_any_path_into_any_tree(tmp_path_factory, tree, path, value, flow_below):
     text = "\n".join(as_yaml(tree, flow_below))
     key = ".".join(path)
-    # The plain way: follow the path, make what is missing.
+    # The plain method: follow the path, create missing parts.
     wanted, at = {"": tree}, ""
     holder, possible = tree, True
     for step in path[:-1]:

@@ -243,7 +243,7 @@ def _in_yourdfpy(description: Description, angles: Mapping[str, float]) -> Poses
     text = urdf(description, looks=False).xml.encode()
     robot = yourdfpy.URDF.load(io.BytesIO(text), load_meshes=False)
     assert robot.validate()
-    # What follows another joint it moves by itself.
+    # It moves joints that follow another one.
     robot.update_cfg({name: angles[name] for name in robot.actuated_joint_names})
     found = {link.name: robot.get_transform(link.name) for link in description.links}
     return {name: (matrix[:3, :3], matrix[:3, 3]) for name, matrix in found.items()}

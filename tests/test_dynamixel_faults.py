@@ -60,7 +60,7 @@ def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
     rig.port.spoil = garble
     for _ in range(3):
         assert rig.places() == [2001, None, 2003]
-    # Out of the group now: asked alone at once, then the others have the line to themselves.
+    # Now out of the group: queried alone immediately, then the others have the whole line.
     rig.sent.clear()
     for _ in range(2):
         assert rig.places() == [2001, None, 2003]
@@ -78,7 +78,7 @@ def test_a_truncated_answer_gives_what_arrived(rig, kept):
     block = (14 if fast else 21) + (0 if rig.bus._plan.indirect_block is None else 3)
     size = (8 if fast else 0) + block * kept + 3
     rig.port.spoil = once(lambda raw: raw[:size])
-    # Those behind the one that fell silent are asked again without it, in the same cycle.
+    # Servos behind the silent one are queried again without it, in the same cycle.
     assert rig.places() == [None if i == kept + 1 else 2000 + i for i in IDS]
     assert rig.places() == [2001, 2002, 2003]
 

@@ -366,7 +366,7 @@ def test_the_eeprom_is_locked_under_torque_and_nothing_changes(model):
     assert bytes(servo.memory.bytes[:64]) == before
 
 
-# Who listens on the emulated Dynamixel chain, and what it does where documents differ
+# Servos on the emulated Dynamixel chain, and its behaviour where documents differ
 
 
 # --- who listens

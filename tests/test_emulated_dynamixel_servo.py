@@ -216,7 +216,7 @@ def test_a_time_based_profile_needs_its_bit_and_firmware():
         bench.write(112, 4, 1000)
         bench.enable_torque(2000)
         bench.now_s = 0.5
-        # 1000 register units of velocity have long arrived; of time they are half way.
+        # 1000 register units of velocity have long arrived; of time they are at half.
         assert bench.read(140, 4) == (1500 if firmware == 53 else 2000), at
 
 

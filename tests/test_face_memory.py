@@ -60,7 +60,7 @@ def test_a_remembered_face_is_looked_for_when_no_other_is_there() -> None:
     looks(model, [FACE, OTHER], 0.0, 0.5)
     looks(model, [FACE], 0.5, 1.0)
     alone = [t.id for t in looks(model, [HAND], 1.5, 14.0)]
-    # Who is not found is forgotten.
+    # Missing people are forgotten.
     assert 0.5 < alone.count(2) / 30 < 3.0
 
 

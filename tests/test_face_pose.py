@@ -132,7 +132,7 @@ def test_longer_or_shorter_face_is_seen_as_such_and_not_as_a_nod(length):
     pose, found_R, found_p = pose_of(seen)
     assert degrees(angle_between(R, found_R)) < 5.0
     assert np.linalg.norm(found_p) == pytest.approx(np.linalg.norm(p), rel=0.04)
-    # A mouth that lies higher is a shorter face in part only: the rest is left to the mouth.
+    # A higher mouth is a shorter face in part only: the rest is due to the mouth.
     assert 0.4 < (pose.length - 1.0) / (length - 1.0) < 1.0
     parts_px = project(face_parts(pose), CAMERA)
     assert np.linalg.norm(parts_px[PARTS.index("LE")] - seen[1]) < 1.0

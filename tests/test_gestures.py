@@ -261,7 +261,7 @@ def test_paths_of_gestures_begin_at_the_rig_s_file_and_bare_names_stay(
     mine = tmp_path / "rigs" / "mine.yaml"
     whole = shipped_path("rigs", "desk").read_text(encoding="utf-8")
     mine.write_text(f"{whole}\ngesture_files: [hello.yaml]\n", encoding="utf-8")
-    monkeypatch.chdir(tmp_path)  # not where the rig is
+    monkeypatch.chdir(tmp_path)  # not in the rig's folder
     rig = load_rig("rigs/mine.yaml")
     assert "hello" in gestures_of(rig.gesture_files)
     mine.write_text(f"{whole}\ngesture_files: [hello]\n", encoding="utf-8")

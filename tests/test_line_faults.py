@@ -351,7 +351,7 @@ def test_forbidden_and_blocked(world):
     assert world.one() == good(2)
 
 
-# The language of faults: how long they last, what tells of them, and what is refused
+# The language of faults: durations, reports and refusals
 
 
 def test_faults_last_for_a_count_a_time_or_until_cleared(world):

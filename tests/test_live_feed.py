@@ -1,4 +1,4 @@
-"""What the page makes of a running rig's ticks: what a snapshot made beside the loop would say."""
+"""The page's snapshots of a running rig's ticks equal those made next to the loop."""
 
 import socket
 from collections.abc import Iterator
@@ -205,7 +205,7 @@ def test_a_simulated_scene_is_drawn_as_its_camera_sees_it(ran: Run, page: Page) 
     image = read_waiting(page.feed, page.live).image
     assert image is not None and image.shape == (400, 640, 3)
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 500  # a picture, and no dark ground
-    # Who is found is where somebody is drawn: hair and skin differ from the wall behind.
+    # Detections are at drawn people: hair and skin differ from the wall behind.
     found = ran.ticks[-1].detections
     assert found is not None and found.faces
     x, y = found.faces[0].landmarks_px[2]

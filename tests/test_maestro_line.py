@@ -29,7 +29,7 @@ class SlowPort(StandIn):
     def read_until(self, length, deadline_s):
         came = self.answers.pop(0) if self.answers else b""
         if came is None:
-            # It is still on its way: whoever only throws away what is here misses it.
+            # It is still in transit: clearing the received bytes misses it.
             self.answers.insert(0, self.late)
             return b""
         return came
@@ -77,7 +77,7 @@ def test_more_than_was_asked_for_is_damage():
 
 
 def test_pulses_that_differ_when_asked_twice_are_damage():
-    """Answers carry no check, and a channel is held at the pulse that it is said to give."""
+    """Answers carry no check, and a channel is held at its reported pulse."""
     line = MaestroLink(SlowPort(b"\x70\x17", b"\x70\x1b", *[b"\x70\x17"] * 2), MaestroParams())
     assert line.read_pulses((0,)) is None
     assert line.errors == {"damaged": 1}

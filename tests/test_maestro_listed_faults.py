@@ -90,7 +90,7 @@ def test_a_fault_on_the_way(fault):
             SETUPS, bench.goals, bench.pulses(), readings, strict=True
         ):
             assert pulse == 0 or LOW <= pulse <= HIGH
-            # A reading is where the servo was sent of late, or no reading.
+            # A reading is a recent goal of the servo, or no reading.
             if reading is not None and reading.torque and n > 60:
                 assert abs(reading.position_steps - goal) < 700, (n, setup.id)
         now = bench.board.positions_steps()

@@ -66,7 +66,7 @@ def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
     while ramp.pulse_steps < 8000.0:
         ramp.advance(8000.0, 0.01)
         seconds += 0.01
-    # 4000 steps are too short a way to reach 4000 steps/s: a triangle.
+    # 4000 steps are too short to reach 4000 steps/s: a triangle.
     assert seconds == pytest.approx(2.0 * sqrt(4000.0 / 5000.0), rel=0.05)
 
 

@@ -25,7 +25,7 @@ def row_at(steps, now_s):
 class Scripted:
     """A bus of a few servos that records its calls, and fails in the given ones.
 
-    Servos are called by a letter and stand at steps of their own; wrong: methods that raise
+    Servos are named by a letter and are at steps of their own; wrong: methods that raise
     """
 
     def __init__(self, name, steps, log):

@@ -171,7 +171,7 @@ def test_nor_where_nothing_is_known_of_the_joints() -> None:
 def test_nor_what_stands_close_where_its_depth_is_known() -> None:
     close = still(0.1, 0.1, 0.5, 0.1)
     plain, _ = watch(ramp(20.0), close)
-    assert any(plain)  # without depth the lens's own way cannot be taken out
+    assert any(plain)  # without depth the lens's own motion cannot be removed
     with_depth, _ = watch(ramp(20.0), close, depth_known=True)
     assert not any(with_depth)
 

@@ -106,7 +106,7 @@ def answering(dai, pipeline, make, source) -> Any:
 
 
 def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock=None):
-    """Make what stands for device_nodes: a replayed film and nodes that answer each picture."""
+    """Make a substitute for device_nodes: a replayed film and nodes that answer each picture."""
 
     def looked_through(frame):
         if lens is not None:
@@ -338,11 +338,11 @@ def test_keys_reach_the_parameters(tmp_path):
     assert (oak.imu_rotation_deg, oak.undistort, oak.gyro) == ((0.0, 0.0, 90.0), False, False)
 
 
-# Which nodes are asked of a camera, and with what; the nodes themselves are stood in for
+# Requested nodes of a camera and their settings; the nodes themselves are substitutes
 
 
 class Pipeline:
-    """Makes a stand-in for each node, and keeps them by name."""
+    """Makes a substitute for each node, and keeps them by name."""
 
     def __init__(self, dai, platform="RVC4") -> None:
         self.made: dict[str, list[MagicMock]] = {}

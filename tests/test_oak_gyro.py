@@ -176,7 +176,7 @@ def test_gyro_that_falls_silent_or_never_speaks_is_told_once():
 
 
 def frames_and_readings(film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=readings):
-    """Make what stands for device_nodes: a film, and readings about its frames' device times."""
+    """Make a substitute for device_nodes: a film, and readings about its frames' device times."""
     rng = np.random.default_rng(9)
 
     def nodes(dai, pipeline, params) -> PipelineOutputs:
@@ -254,7 +254,7 @@ def test_frames_of_the_host_pipeline_carry_the_turn(dai, film):
     found, told = shots(frames_and_readings(film, turning), 20)
     assert told == () and all(shot.turn is not None for shot in found)
     first, last = found[0], found[-1]
-    # Frames may have been skipped, so the stamps, not the numbers, tell what lies between.
+    # Frames may have been skipped, so the interval follows from the stamps, not the numbers.
     angle = moved(last.turn, first.turn)
     seconds = angle[1] / 30.0
     assert abs(seconds * 60.0 - round(seconds * 60.0)) < 0.15 and round(seconds * 60.0) >= 19

@@ -1,4 +1,4 @@
-"""The chosen camera, and messages without one; device calls have stand-ins."""
+"""The chosen camera, and messages without one; device calls are replaced."""
 
 import gc
 import threading

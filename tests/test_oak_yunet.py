@@ -146,7 +146,7 @@ def film(tmp_path_factory):
 
 
 def nodes_of(film, outputs):
-    """Make what stands for device_nodes: a film, and a network that gives the same for each."""
+    """Make a substitute for device_nodes: a film, and a network that gives the same for each."""
 
     def nodes(dai, pipeline, params) -> PipelineOutputs:
         replay = pipeline.create(dai.node.ReplayVideo)

@@ -1,7 +1,7 @@
 """Eyes, head and lids together on a body that follows perfectly.
 
 Numbered checks are listed in docs/checks.md. The head's centre of rotation is put
-between the eyes, as in the sources of those numbers, unless a test says otherwise.
+between the eyes, as in the sources of those numbers, unless a test states otherwise.
 """
 
 from dataclasses import replace

@@ -64,7 +64,7 @@ def test_pixels_depth_and_lens_go_where_the_image_goes(orientation: FrameOrienta
 def test_faces_and_gyro_of_the_camera_are_turned_along(orientation: FrameOrientation) -> None:
     upright_marks = np.array([(300.0, 100.0), (340.0, 100.0), (320, 120), (305, 140), (335, 140)])
     size = (HEIGHT, WIDTH) if orientation.rotation in (90, 270) else (WIDTH, HEIGHT)
-    # Where the upright face is in the frame as it comes: found by trying every pixel's inverse.
+    # Place of the upright face in the raw frame: found by trying every pixel's inverse.
     zero, right, down = orientation.turn_points(
         np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), WIDTH, HEIGHT
     )

@@ -96,7 +96,7 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     assert shut_deg is not None
     assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(shut_deg))
     assert ticks[at].gaze.lower_left == 0.0
-    # Between blinks the lids go with the eyes: upper and lower the same way.
+    # Between blinks the lids follow the eyes: upper and lower in the same direction.
     open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 600]
     tilt = desired[open_, i["eyes_tilt"]]
     upper, lower = desired[open_, i["left_upper_lid"]], desired[open_, i["left_lower_lid"]]

@@ -76,7 +76,7 @@ def looking(
     lids: tuple[float, float] = (0.8, 0.8),
     bodies: tuple[SeenBody, ...] = (),
 ) -> Snapshot:
-    """A snapshot of a head that looks at a part of a face; the neck takes a share of the way."""
+    """A snapshot of a head that looks at a part of a face; the neck takes a share of the angle."""
     face = face_at((0.9, 0.1, 0.25)) if face is None else face
     target = np.array(face.parts_world_m[part])
     head_yaw = 0.6 * math.atan2(target[1], target[0])
@@ -195,7 +195,7 @@ def test_page_shows_a_head_that_turns() -> None:
             wait_for(lambda: reads("face 3: left eye", "pulls with", "fixate"), "the words")
             Person(browser).open("Health")
             wait_for(lambda: reads("bus:", "guard: ok"), "the health")
-        # Six servos that tell nothing: a person is told so before the torque comes on again.
+        # Six servos without feedback: a person is informed before torque is switched on again.
         limp = replace(of_six(there), stopped="a test")
         with feeding(page, lambda t_s: replace(limp, t_s=3.0 + t_s)):
             wait_for(lambda: reads("6 of 6 joints without feedback", "Resume"), "the other rig")

@@ -57,7 +57,7 @@ def opened(tab: Browser) -> Iterator[tuple[Rig, Person]]:
 
 @pytest.fixture
 def at_the_rig(opened: tuple[Rig, Person]) -> tuple[Rig, Person]:
-    """Return both, the rig not stopped: one that a test has left so would fail all others."""
+    """Return both, the rig not stopped: a rig left stopped by a test would fail all others."""
     rig, person = opened
     if rig.robot.stopped:
         resumed(rig, person)
@@ -148,7 +148,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     rig, person = at_the_rig
     person.open("Watch")
 
-    # What stands above it may grow between looking and clicking, which then hits something else.
+    # Elements above it may grow between looking and clicking, which then hits something else.
     def unfolded() -> bool:
         if person.run(f"{saying('view', 'summary')}?.parentElement.open") is True:
             return True
@@ -186,7 +186,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     arrow, farther = ((*there[:2], there[2] + up) for up in (0.08, 0.2))
     before = len(rig.orders)
 
-    # A drag that began beside a gizmo not yet drawn would turn the view for good.
+    # A drag that began next to a gizmo not yet drawn would turn the view permanently.
     def dragged() -> bool:
         if any(isinstance(order, LookAt) for order in rig.orders[before:]):
             return True
@@ -210,7 +210,7 @@ def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Per
     rig, person = at_the_rig
     person.run("document.querySelector('#view').scrollIntoView()")
     toggle = "document.querySelector('#pointer')"
-    # On a rig that may be a real one it leads only when asked to.
+    # On a rig that may be real it takes control only on request.
     assert person.run(f"{toggle}.getAttribute('aria-pressed')") == "false"
     person.click(toggle)
     width, height, left, top = cast(
@@ -365,7 +365,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     file = tmp_path / "tuned at midnight.yaml"
     cast(Any, present(rig.audience._page)._on_request)._handler._paths = AllowedFolder(
         tmp_path
-    )  # as if the rig's file lay there
+    )  # as if the rig's file were there
     person.fill(beside("save as", "input"), str(file))
     person.press("\r", "Enter", 13)
     wait_for(lambda: person.reads(f"saved in {file}", "all saved"), "the words")

@@ -316,7 +316,7 @@ def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(
 
 
 def body_at(x: float) -> DetectedPerson:
-    """Return a person 2 m away who is turned away, some way to the right."""
+    """Return a person 2 m away who is turned away, somewhat to the right."""
     ((x_px, y_px),) = project([(x, 0.0, 2.0)], LENS).tolist()
     worn = Clothing((1.0, *[0.0] * 23), 1.0)
     return DetectedPerson((0.0, 0.0, 1.0, 1.0), (x_px, y_px), 193.0, 0.9, worn)

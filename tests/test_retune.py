@@ -128,7 +128,7 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
     assert len(turned) > 0.8 * len(todo)
 
 
-# Where the parameters of a section are; what bends or limits joints concerns both worlds.
+# Return the place of a section's parameters; limits of joints concern both worlds.
 OF_GAZE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion",
     "oculomotor", "saccade", "pursuit", "head", "breathing", "lids",
@@ -204,7 +204,7 @@ def test_parts_retuned_go_by_what_new_parts_would_go_by(
 
 
 def in_use(key: str) -> dict[str, Value]:
-    """Choose what a knob belongs to, where that is a choice."""
+    """Choose the model of a knob, if it is one of several."""
     name = key.split(".")[-1]
     if key.startswith("gaze.scanpath.") and name.split("_")[0] in ("simple", "random"):
         return {"gaze.scanpath.model": name.split("_")[0]}

@@ -156,7 +156,7 @@ def test_all_faults_come_in_one_message(tmp_path: Path) -> None:
         assert part in text
 
 
-# Rigs with other joints and other buses than the desk's: what a file may say, and what is made
+# Rigs with other joints and other buses than the desk's: valid files, and the result
 
 
 @pytest.fixture

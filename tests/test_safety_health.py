@@ -79,7 +79,7 @@ def test_heat_slows_a_joint_down_before_it_stops_it(world: World, celsius: float
     assert speeds.max() <= share * NECK.speed_rad_s + 1e-9
     assert np.diff(speeds, prepend=0.0).max() <= share * NECK.accel_rad_s2 * DT + 1e-9
     assert reason(verdicts[5]) == ("hot" if celsius > 55.0 else "too fast")
-    assert verdicts[5].reasons == (f"{NAME}: {reason(verdicts[5])}",)  # and nobody else
+    assert verdicts[5].reasons == (f"{NAME}: {reason(verdicts[5])}",)  # and no one else
     assert verdicts[5].level == "limited"
 
 

@@ -63,7 +63,7 @@ def matrices(track: TrackFilter) -> np.ndarray:
 
 
 def turn(x: np.ndarray, onto: np.ndarray, share: float) -> np.ndarray:
-    """Return the rotation that takes one unit vector a share of the way to another."""
+    """Return the rotation of one unit vector by a share of the angle to another."""
     axis = np.cross(x, onto)
     sin = np.linalg.norm(axis)
     angle = share * np.arctan2(sin, x @ onto)

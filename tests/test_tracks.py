@@ -138,7 +138,7 @@ def test_people_who_cross_keep_their_identities(apart_m: float) -> None:
 
 
 def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker) -> None:
-    """A man walks behind a woman; a third person turns up half a metre beside them."""
+    """A man walks behind a woman; a third person appears half a metre from them."""
     near, far = across(0.0, 1.0), across(0.02, 2.0)
     for k in range(30):
         tracks = tracker.step([near, far], CAMERA, k / 30)
@@ -304,7 +304,7 @@ def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
 
 
 def visit(tracker: Tracker, start_s: float, *found: LocalisedDetection) -> list[int]:
-    """Show a person in consecutive frames, then nobody for 2 s; return the numbers."""
+    """Show a person in consecutive frames, then no one for 2 s; return the numbers."""
     tracker.step([], CAMERA, start_s - 1.0)
     shown = [
         tracker.step([one], CAMERA, start_s + k / 30)[0].id for k, one in enumerate(found)

@@ -1,4 +1,4 @@
-"""What a program gives to a head may block, fail or end: the loop ticks on, and parks."""
+"""A program's parts of a head may block, fail or end: the loop continues, and parks."""
 
 import io
 import json
@@ -38,7 +38,7 @@ from gazerig.sim_mock.devices import build
 LIMIT_S = 60.0
 
 
-# --- how a user's function misbehaves; each says in ``begun`` that it was called
+# --- faults of a user's function; each records in ``begun`` that it was called
 
 
 class Misbehaviour:
@@ -127,7 +127,7 @@ class Frames(Parts):
         return Shot(now_s(), self.number, np.zeros((48, 64, 3), np.uint8))
 
 
-# --- whole heads, on emulated servos in this process that are asked afterwards
+# --- whole heads, on emulated servos in this process that are read afterwards
 
 
 @pytest.fixture(autouse=True)
@@ -173,7 +173,7 @@ def assert_it_runs_and_lets_go(
     """See that the loop ticks on, orders are answered, the block ends; return the events."""
     assert isinstance(opened, gazerig.local_head.RunningHead)
     with opened as head:
-        head.look_at(1.0, 0.0, 0.3)  # there is something to say
+        head.look_at(1.0, 0.0, 0.3)  # there is a message
         wait_for(called)
         ticks = head._feed.ticks
         assert not head.look_at(1.0, 0.1, 0.3).refused

@@ -26,7 +26,7 @@ SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 
 
 def refused(read: Callable[[], object]) -> str:
-    """Return what is said of a file that cannot be used: one line."""
+    """Return the message about a file that cannot be used: one line."""
     with pytest.raises((ConfigError, SetupError)) as reported:
         read()
     text = str(reported.value)

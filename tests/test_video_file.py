@@ -1,4 +1,4 @@
-"""Films and stills give the right picture at the right film time, and say what is wrong."""
+"""Films and stills give the right picture at the right film time, and report errors."""
 
 import os
 import subprocess
@@ -35,7 +35,7 @@ def film(film_file):
 
 
 def shade(picture: np.ndarray) -> int:
-    """Which picture of the film this is, from 0."""
+    """Return the number of the film's picture, from 0."""
     return round(float(picture.mean()) / 10)
 
 

@@ -27,7 +27,7 @@ def eye(iris_x: float = 32.0, seed: int = 0, light: float = 1.0, shut: bool = Fa
 
 
 class Network:
-    """Counts its looks; the iris is where the crop is darkest."""
+    """Counts its looks; the iris is the darkest part of the crop."""
 
     def __init__(self) -> None:
         self.looks = 0
@@ -73,7 +73,7 @@ def test_eyes_that_never_rest_are_looked_at_in_every_fourth_frame_and_unknown_be
 
 @NEEDS_NETWORKS
 def test_eyes_at_rest_go_along_with_the_face() -> None:
-    """The networks see the face 9 pixels farther on; that of the eyes is not asked again."""
+    """The networks see the face 9 pixels farther on; that of the eyes does not run again."""
     shown = portrait("astronaut")
     moved = cv2.warpAffine(shown.image, np.array([(1.0, 0, 9.0), (0, 1.0, -4.0)]), (512, 512))
     detector = MeshedDetector(_Shown(), 1)

@@ -28,7 +28,7 @@ from gazerig.robot.control.power_down import PowerDown
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 
-# --- the door by itself
+# --- the door alone
 
 
 class Head:
@@ -205,7 +205,7 @@ def test_handlers_are_put_back_and_nohup_is_heeded() -> None:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
-# --- runs in simulated time, on emulated servos that are asked afterwards
+# --- runs in simulated time, on emulated servos that are read afterwards
 
 
 @pytest.fixture

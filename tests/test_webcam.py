@@ -294,7 +294,7 @@ def test_controls_are_set_in_the_cameras_units(device, monkeypatch):
     wanted = WebcamParams(exposure_ms=10.0, gain=64, anti_flicker="60hz", focus=30)
     assert events_with(device, wanted) == ()
     assert [at.get(name) for name in WHOLE] == [1, 100, 0, 64, 2, 0, 30]
-    # What an earlier run has fixed is automatic again.
+    # Settings fixed by an earlier run are automatic again.
     assert events_with(device, WebcamParams()) == ()
     assert [at.get(name) for name in ("AUTO_EXPOSURE", "AUTO_GAIN", "AUTO_FOCUS")] == [3, 1, 1]
 

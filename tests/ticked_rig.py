@@ -1,4 +1,4 @@
-"""A rig that ticks whenever a command comes, for tests of the ways to it."""
+"""A rig that ticks at every command, for tests of clients."""
 
 from collections.abc import Iterator
 from math import degrees
@@ -74,7 +74,7 @@ def gazerig(*words: str, typed: str = "") -> str:
 
 
 class Outbox:
-    """What a page asks for, in the place of a robot."""
+    """Requests of a page, in place of a robot."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[Command, str]] = []

@@ -1,4 +1,4 @@
-"""How long a process computes before another one has its turn.
+"""Time for which a process computes before another one.
 
 Workers that compute share the processors with other workers. Linux lets them take turns of one to
 three milliseconds, and after each turn the caches of the processor hold what the others used: on
@@ -41,7 +41,7 @@ def ask_for(slice_s: float | None) -> bool:
 
 
 def granted_s() -> float | None:
-    """Return the length of the calling thread's turns, None where the system does not tell."""
+    """Return the length of the calling thread's turns, None if the system does not report it."""
     call = _SCHED_SETATTR.get(platform.machine())
     if sys.platform != "linux" or call is None:
         return None

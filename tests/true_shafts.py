@@ -63,7 +63,7 @@ class Shafts(SimulatedClock):
         return {name: InProcessPort(device) for name, device in self.devices.items()}
 
     def truth(self) -> JointAngles:
-        """Return where the joints truly are now."""
+        """Return the true present positions of the joints."""
         steps = {name: device.positions_steps() for name, device in self.devices.items()}
         return tuple([made.angle_rad(steps[bus][place]) for made, bus, place in self._joints])
 
@@ -146,12 +146,12 @@ class Judge:
 
 
 def fastest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
-    """Return the highest speed of each column over so many rows, one a millisecond."""
+    """Return the highest speed of each column over n rows, one a millisecond."""
     return np.abs(angles[over_ms:] - angles[:-over_ms]).max(axis=0) / (over_ms * MS_S)
 
 
 def hardest(angles: NDArray[np.float64], over_ms: int) -> NDArray[np.float64]:
-    """Return the highest change of the mean speed of so many rows to the next so many."""
+    """Return the highest change of the mean speed of n rows to the next n."""
     way = angles[2 * over_ms :] - 2.0 * angles[over_ms:-over_ms] + angles[: -2 * over_ms]
     return np.abs(way).max(axis=0) / (over_ms * MS_S) ** 2
 
@@ -261,7 +261,7 @@ class Bench:
             device.servos[place].drive.turn(steps)  # type: ignore[attr-defined]
 
     def start(self) -> None:
-        """Torque on where the joints are."""
+        """Switch torque on at the present positions."""
         goals = self.body.start()
         self.guard.reset(self.shafts.now_s(), goals)
         self._began_s = self.shafts.now_s()
@@ -281,14 +281,14 @@ class Bench:
         self.body.disable_torque()
 
     def resume(self) -> None:
-        """Torque on again where the joints are."""
+        """Switch torque on again at the present positions."""
         goals = self.body.enable_torque()
         self._began_s, self.slot = self.shafts.now_s(), 0
         self.guard.reset(self._began_s, goals)
 
 
 def restless(rig: Rig, seed: int, holds_s: float = 0.6) -> Callable[[float], JointAngles]:
-    """Return wishes that jump, each joint by itself, up to 5 deg outside its range."""
+    """Return desired angles that jump, each joint separately, up to 5 deg outside its range."""
     rng, over = np.random.default_rng(seed), np.radians(5.0)
     ranges = [(limit.low_rad - over, limit.high_rad + over) for limit in limits(rig.joints)]
     until_s, wished = [-1.0] * len(ranges), [0.0] * len(ranges)

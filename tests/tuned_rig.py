@@ -41,7 +41,7 @@ def here(work: Callable[..., Any], *words: Any, **named: Any) -> Any:
 
 
 def serve(path: Path) -> None:
-    """Run until SIGTERM; says what the rig says on standard error."""
+    """Run until SIGTERM; passes the rig's messages to standard error."""
     commands.MIN_HOLD_S = commands.MIN_RESUME_GAP_S = 0.0  # time is slow here
     # What takes time for the loop's sake is tested where it is done: shares of the processor,
     # files that are read in another process, and a file that is looked at twice a second.
@@ -86,7 +86,7 @@ class Running(NamedTuple):
     log: Path
 
     def hears(self, words: str) -> bool:
-        """Wait until it says something."""
+        """Wait for a message."""
         for _ in range(400):
             if words in self.log.read_text(encoding="utf-8"):
                 return True

@@ -22,7 +22,7 @@ class Block(NamedTuple):
 
 
 def steps() -> list[str]:
-    """Return the text of each step, without what stands before the first."""
+    """Return the text of each step, without the text before the first."""
     text = TUTORIAL.read_text(encoding="utf-8")
     found = re.split(r"^## (\d+)\. ", text, flags=re.MULTILINE)
     assert [int(number) for number in found[1::2]] == list(range(1, len(found) // 2 + 1))
