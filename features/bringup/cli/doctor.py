@@ -60,7 +60,7 @@ def doctor(
     mock: MockOption = False,
     camera: Annotated[
         int | None,
-        typer.Option(min=0, metavar="N", help="Look through webcam N for some seconds, too."),
+        typer.Option(min=0, metavar="N", help="Also check webcam N for some seconds."),
     ] = None,
     fix: Annotated[
         bool,

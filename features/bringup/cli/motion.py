@@ -41,10 +41,10 @@ SpeedOption = Annotated[
     float, typer.Option(metavar="DEG_S", min=0.5, max=200.0, help="Top speed on the way.")
 ]
 HoldOption = Annotated[
-    bool, typer.Option("--hold", help="Stay there, torque on, until Enter or Ctrl-C.")
+    bool, typer.Option("--hold", help="Stay there with torque on until Enter or Ctrl-C.")
 ]
 YesOption = Annotated[
-    bool, typer.Option("--yes", help="Hobby servos: no hand is in the mechanism, do not ask.")
+    bool, typer.Option("--yes", help="Hobby servos: do not ask; no hand is in the mechanism.")
 ]
 NoParkOption = Annotated[
     bool,
@@ -59,7 +59,7 @@ def jog(
     rig: RigArgument = "desk",
     *,
     joint: Annotated[str, typer.Argument(metavar="JOINT", help="A joint, e.g. neck_yaw.")],
-    deg: Annotated[float, typer.Argument(metavar="DEG", help="Where to, in degrees.")],
+    deg: Annotated[float, typer.Argument(metavar="DEG", help="Joint angle in degrees.")],
     speed: SpeedOption = 20.0,
     seconds: Annotated[float, typer.Option(min=0.0, help="Stay there for S seconds.")] = 1.0,
     hold: HoldOption = False,
@@ -110,7 +110,7 @@ def look_at_command(
     seconds: Annotated[float, typer.Option(min=1.0, help="Look for S seconds.")] = 4.0,
     hold: HoldOption = False,
     no_park: NoParkOption = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of blinks.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of blinks.")] = 0,
     yes: YesOption = False,
     mock: MockOption = False,
     port: PortOption = None,

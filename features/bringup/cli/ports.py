@@ -24,7 +24,7 @@ from gazerig.sim_mock.pty.client import PtyBuses
 host = Host()
 """Source of data about the ports of this computer."""
 
-YesOption = Annotated[bool, typer.Option("--yes", help="Yes to every question.")]
+YesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every question.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one line of JSON instead of text.")]
 
 

@@ -43,12 +43,12 @@ def record_gesture(
     *,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the gesture.")],
     seconds: Annotated[
-        float, typer.Option(min=0.5, max=LONGEST_S, help="Longest time; Enter ends it before.")
+        float, typer.Option(min=0.5, max=LONGEST_S, help="Longest time, s; Enter ends it earlier.")
     ] = LONGEST_S,
     folder: FolderOption = Path("."),
     force: ForceOption = False,
     yes: Annotated[
-        bool, typer.Option("--yes", help="The head is held, the torque may go off: do not ask.")
+        bool, typer.Option("--yes", help="Do not ask: the head is held, torque may go off.")
     ] = False,
     mock: MockOption = False,
     port: PortOption = None,

@@ -19,9 +19,9 @@ OutOption = Annotated[
     Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
 ]
 DryRunOption = Annotated[
-    bool, typer.Option("--dry-run", help="Show what would change, write nothing.")
+    bool, typer.Option("--dry-run", help="Show the changes and write nothing.")
 ]
-AllYesOption = Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")]
+AllYesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every question.")]
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:

@@ -59,7 +59,7 @@ def scan(
         str | None,
         typer.Option(
             help="dynamixel, feetech, maestro, pca9685 or all; default: one after the other until "
-            "one answers, and of an I2C bus pca9685. Name it where a Maestro only listens."
+            "one answers, on an I2C bus pca9685. Required for a Maestro that cannot answer."
         ),
     ] = None,
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",

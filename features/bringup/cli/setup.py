@@ -51,7 +51,7 @@ def setup(
     yes: YesOption = False,
     settings: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write a Maestro's settings as a file of Pololu's."),
+        typer.Option(metavar="FILE", help="Write a Maestro's settings in Pololu's file format."),
     ] = None,
 ) -> None:
     """Set id and baud rate of the servos, connected one at a time; test a Maestro's channels."""

@@ -17,7 +17,9 @@ def fit_scanpath(
         Path | None, typer.Option(help="YAML of part rectangles, needed for samples.")
     ] = None,
     out: Annotated[Path, typer.Option(help="YAML to write.")] = Path("walk.yaml"),
-    smoothing: Annotated[str, typer.Option(help="laplace, bootstrap or none.")] = "laplace",
+    smoothing: Annotated[
+        str, typer.Option(help="Smoothing: laplace, bootstrap or none.")
+    ] = "laplace",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     force: ForceOption = False,
 ) -> None:

@@ -39,16 +39,18 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUES",
-        help="A key of the rig's YAML and what it takes: LOW:HIGH:STEPS or A,B,C; with --samples "
+        help="A key of the rig's YAML and its values: LOW:HIGH:STEPS or A,B,C; with --samples "
         "or --fit also LOW:HIGH. Repeat it for more keys.",
     ),
 ]
 Seeds = Annotated[
     int, typer.Option(min=1, max=_MOST_SEEDS, help="Runs at each point, each with a seed.")
 ]
-FirstSeed = Annotated[int, typer.Option(min=0, help="The first of them, and of the samples.")]
+FirstSeed = Annotated[
+    int, typer.Option(min=0, help="First seed of the runs, and seed of the samples.")
+]
 Seconds = Annotated[
-    float | None, typer.Option(min=0.1, help="Length of a run; default: the scene's round.")
+    float | None, typer.Option(min=0.1, help="Length of a run, s; default: the scene's round.")
 ]
 Samples = Annotated[
     int | None,
@@ -68,12 +70,13 @@ Out = Annotated[
     Path | None, typer.Option(help="Folder; default: sweep-RIG-SCENE or fit-RIG-SCENE.")
 ]
 Jobs = Annotated[
-    int | None, typer.Option(min=1, max=_MOST_JOBS, help="Processes; default: one a processor.")
+    int | None,
+    typer.Option(min=1, max=_MOST_JOBS, help="Number of processes; default: one per processor."),
 ]
 Show = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="MEASURE", help="Draw this one; default: those that respond most. Repeatable."
+        metavar="MEASURE", help="Draw this measure; default: the most responsive. Repeatable."
     ),
 ]
 Bus = Annotated[str, typer.Option(help=f"Servos: {' or '.join(BUSES)}.")]

@@ -63,7 +63,7 @@ def design(
     study: StudyArgument = DEFAULT,
     data: DataOption = None,
     example: Annotated[
-        bool, typer.Option("--example", help="Write a study of two gazes to start from as STUDY.")
+        bool, typer.Option("--example", help="Write an example with two gazes to STUDY.")
     ] = False,
     force: ForceOption = False,
 ) -> None:

@@ -40,12 +40,15 @@ def run(
         str,
         typer.Option(
             metavar="HOST:PORT",
-            help="Where the pages are served; for a phone or another computer 0.0.0.0:8090.",
+            help="Address of the pages; for a phone or another computer 0.0.0.0:8090.",
         ),
     ] = PAGE,
     no_browser: options.NoBrowser = False,
     simulate: Annotated[
-        int, typer.Option(metavar="N", min=0, max=5000, help="Instead, N simulated participants.")
+        int,
+        typer.Option(
+            metavar="N", min=0, max=5000, help="Simulate N participants instead; 0: none."
+        ),
     ] = 0,
     effect: Annotated[
         float,

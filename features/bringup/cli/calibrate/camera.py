@@ -116,18 +116,20 @@ def calibrate_board(
 def calibrate_camera(
     rig: RigArgument = "desk",
     what: Annotated[
-        CalibrationTarget, typer.Option(help="The lens, its mount on the head, or all of it.")
+        CalibrationTarget, typer.Option(help="Calibrate the lens, its mount, or all.")
     ] = CalibrationTarget.all,
     camera: Annotated[int | None, typer.Option(min=0, help="Webcam N (default: 0).")] = None,
     oak: Annotated[
-        bool, typer.Option("--oak", help="An OAK camera: the lens is read from its memory.")
+        bool, typer.Option("--oak", help="Use an OAK camera, whose memory has its lens.")
     ] = False,
     oak_calibration: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="A file of depthai's instead of the memory of a camera."),
+        typer.Option(
+            metavar="FILE", help="Calibration file of depthai instead of a camera's memory."
+        ),
     ] = None,
     ruler: Annotated[
-        float, typer.Option(metavar="MM", help="Length of the printed 100 mm ruler as measured.")
+        float, typer.Option(metavar="MM", help="Measured length of the printed 100 mm ruler, mm.")
     ] = float(RULER_MM),
     columns: ColumnsOption = _BOARD.columns,
     rows: RowsOption = _BOARD.rows,
@@ -146,7 +148,7 @@ def calibrate_camera(
     yes: AllYesOption = False,
     seed: Annotated[int, typer.Option(min=0, help="With --mock: seed of the noise.")] = 0,
     mock: Annotated[
-        bool, typer.Option("--mock", help="Emulated servos, and a simulated board to look at.")
+        bool, typer.Option("--mock", help="Use emulated servos and a simulated board.")
     ] = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:

@@ -74,7 +74,7 @@ def calibrate_face(
     out: OutOption = None,
     yes: AllYesOption = False,
     answers: Annotated[
-        Path | None, typer.Option(help="File with one key a line, e.g. left 3; empty is Enter.")
+        Path | None, typer.Option(help="File with one key per line, e.g. left 3; empty is Enter.")
     ] = None,
     page: Annotated[
         str,
@@ -85,7 +85,7 @@ def calibrate_face(
         ),
     ] = "127.0.0.1:8080",
     no_page: Annotated[
-        bool, typer.Option("--no-page", help="Without the page; with --answers there is none.")
+        bool, typer.Option("--no-page", help="Serve no page, as with --answers.")
     ] = False,
     mock: MockOption = False,
     port: PortOption = None,

@@ -267,29 +267,30 @@ def calibrate_joints(
     ] = 2.0,
     zero: Annotated[
         ZeroReference,
-        typer.Option(help="With --by motion: zero half-way, or where you put it."),
+        typer.Option(help="With --by motion: zero in the middle, or set by hand."),
     ] = ZeroReference.middle,
     strength: Annotated[
-        float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
+        float,
+        typer.Option(min=0.05, max=1.0, help="With --by motion: drive as a share of the full one."),
     ] = 0.3,
     clear_offset: Annotated[
-        bool, typer.Option("--clear-offset", help="Set the offset in a servo to 0 first.")
+        bool, typer.Option("--clear-offset", help="Set the servo's own offset to 0 first.")
     ] = False,
     set_middle: Annotated[
         bool,
-        typer.Option("--set-middle", help="Feetech: make the middle of its travel 2048 first."),
+        typer.Option("--set-middle", help="Feetech: store the middle of the travel as 2048 first."),
     ] = False,
     pulses: Annotated[
-        str, typer.Option(metavar="US:US", help="Hobby servos: never narrower or wider pulses.")
+        str, typer.Option(metavar="US:US", help="Hobby servos: shortest and longest pulse, us.")
     ] = "500:2500",
     more: Annotated[
-        int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
+        int, typer.Option(min=0, max=5, help="Push rods: positions between each two marks.")
     ] = 1,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
     answers: Annotated[
-        Path | None, typer.Option(help="File with one answer a line; empty is Enter.")
+        Path | None, typer.Option(help="File with one answer per line; empty is Enter.")
     ] = None,
     mock: MockOption = False,
     port: PortOption = None,
