@@ -41,22 +41,22 @@ def report(
     scene: Annotated[
         str | None, typer.Option(help="Instead of a file: run this scene in simulated time.")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run.")] = 180.0,
-    character: Annotated[str | None, typer.Option(help="A character laid over it.")] = None,
-    profile: Annotated[str | None, typer.Option(help="Its style of gaze.")] = None,
-    scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of its own.")] = None,
-    saccade: Annotated[str | None, typer.Option(help="Saccades instead of its own.")] = None,
-    conversation: Annotated[str | None, typer.Option(help="talk, listen or think.")] = None,
+    seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run, s.")] = 180.0,
+    character: Annotated[str | None, typer.Option(help="Character applied over the rig.")] = None,
+    profile: Annotated[str | None, typer.Option(help="Style of gaze.")] = None,
+    scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of the rig's.")] = None,
+    saccade: Annotated[str | None, typer.Option(help="Saccade profile instead of the rig's.")] = None,
+    conversation: Annotated[str | None, typer.Option(help="Conversation: talk, listen or think.")] = None,
     bus: Annotated[
         str | None, typer.Option(help="With --scene: emulated servos (default) or ideal ones.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
+        Path | None, typer.Option(help="Page to write; .html is added if it is missing.")
     ] = None,
     other: Annotated[
         Path | None,
-        typer.Option("--with", help="The recording of the run's other head: mutual gaze, too."),
+        typer.Option("--with", help="Recording of the run's other head, for mutual gaze."),
     ] = None,
     force: ForceOption = False,
 ) -> None:
@@ -119,7 +119,7 @@ def compare(
     first: Annotated[Path, typer.Argument(metavar="A", help="A recording.")],
     second: Annotated[Path, typer.Argument(metavar="B", help="Another recording.")],
     out: Annotated[
-        Path, typer.Option(help="The page to write; .html is added where it is missing.")
+        Path, typer.Option(help="Page to write; .html is added if it is missing.")
     ] = Path("compare.html"),
     force: ForceOption = False,
 ) -> None:
