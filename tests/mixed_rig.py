@@ -6,7 +6,9 @@ from gazerig.config.schema import Rig, load_rig
 
 MAKER = Path(__file__).parents[1] / "config" / "rigs" / "maker.yaml"
 
+# Its head is balanced, so that a limp neck stays where a hand has turned it.
 NECK = """
+mass: {head: {com_mm: [0, 0, 0]}}
 buses:
   neck:
     port: /dev/ttyUSB0

@@ -87,7 +87,7 @@ def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
         ("head: {mass_kg: -1}", "mass.head.mass_kg", "below"),
         ("head: {mass_kg: 0.02}", "mass.head.mass_kg", "weigh 0.029"),
         ("head: {com_mm: [200, 0, 30]}", "mass.head.com_mm", "outside the head"),
-        ("head: {inertia_kg_mm2: [1, 1, 3, 0, 0, 0]}", "mass.head", "larger than the other two"),
+        ("head: {inertia_kg_mm2: [1, 1, 3, 0, 0, 0]}", "mass.head", "exceed the sum of the other two"),
         ("head: {inertia_kg_mm2: [-1, 1, 1, 0, 0, 0]}", "mass.head", "must be above 0"),
         ("head: {inertia_kg_mm2: [2, 2, 2, 0, 0, 0]}", "mass.head.inertia_kg_mm2", "less than"),
         ("head: {inertia_kg_mm2: [9e4, 9e4, 9e4, 0, 0, 0]}", "mass.head.inertia_kg_mm2", "at most"),

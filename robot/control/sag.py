@@ -14,7 +14,7 @@ FASTEST_DEG_S = 3.0
 """Speed of a change of a goal, so that nothing jumps when torque is switched on or a gain changes.
 """
 MOST_DEG = 4.0
-"""Largest change of a goal, whatever masses the rig's file gives."""
+"""Largest change of a goal, for any masses in the rig's file."""
 _NEW_RAD = 0.002
 """Turn of a joint of the neck after which the torques are computed again."""
 
@@ -60,7 +60,7 @@ class SagCompensation:
             since = 0.0 if self._last_s is None else max(0.0, t_s - self._last_s)
             room = radians(FASTEST_DEG_S) * since
             self._now = tuple(
-                now + min(max(wanted - now, -room * steepest), room * steepest)
+                _approach(now, wanted, room * steepest)
                 for now, wanted, steepest in zip(
                     self._now, self._wanted, self._steepest(), strict=True
                 )
@@ -83,6 +83,12 @@ class SagCompensation:
             most = linkage.steepest * radians(MOST_DEG)
             steps = min(max(-self._share * shares[name] / stiff, -most), most)
             yield steps if linkage.rising else -steps
+
+
+def _approach(now: float, wanted: float, room: float) -> float:
+    if abs(wanted - now) <= room:
+        return wanted
+    return now + room if wanted > now else now - room
 
 
 def _distance(a: float, b: float) -> float:
