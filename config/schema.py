@@ -117,7 +117,7 @@ def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
         own = [name for name in (f"left_eye_{way}", f"right_eye_{way}") if name in rig.joints]
         both = f"eyes_{way}"
         if both in rig.joints and own:
-            yield f"joints.{both}", f"turns both eyes, which {' and '.join(own)} do too"
+            yield f"joints.{both}", f"turns both eyes, so it conflicts with {' and '.join(own)}"
         elif both not in rig.joints and len(own) < 2:
             yield (
                 f"joints.{both}",

@@ -228,7 +228,7 @@ def test_an_eye_has_one_master(tmp_path: Path) -> None:
         "\nlid_joints:", own[0].replace("eyes_pan", "left_eye_pan").join(("\n", "\nlid_joints:"))
     )
     said = faults(tmp_path, text.replace("id: 0", "id: 9", 1))
-    assert "joints.eyes_pan: turns both eyes, which left_eye_pan does too" in said
+    assert "joints.eyes_pan: turns both eyes, so it conflicts with left_eye_pan" in said
 
 
 def test_a_lid_needs_its_ends(tmp_path: Path) -> None:
@@ -242,7 +242,7 @@ def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
     assert bus_ports(mixed, None)["tilt"] == "/dev/ttyACM1"
     given = bus_ports(mixed, "/dev/x,neck=/dev/y")
     assert (given[""], given["neck"], given["tilt"]) == ("/dev/x", "/dev/y", "/dev/ttyACM1")
-    with pytest.raises(SetupError, match="it can be PORT, neck=PORT, tilt=PORT"):
+    with pytest.raises(SetupError, match="expected PORT, neck=PORT, tilt=PORT"):
         bus_ports(mixed, "lids=/dev/z")
     assert bus_ports(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
 

@@ -72,7 +72,7 @@ class Plausibility:
         """Return whether all positions of one answer are plausible; only then are they recorded."""
         # Fast path of every tick: servos last read together have one common time.
         since_s = at_s - self._whole_s
-        if not since_s >= 0.0:  # also if they were not
+        if not since_s >= 0.0:  # nan if they were not read together
             return False
         ways = tuple(map(sub, positions, self._last))
         if max(ways) > self._nearest or min(ways) < -self._nearest:

@@ -57,7 +57,7 @@ class VideoTimestamps(NamedTuple):
             showing = int(film_s // self.length_s)
             rest_s = film_s - showing * self.length_s
             number = showing * len(self.starts_s) + bisect_right(self.starts_s, rest_s)
-        # Rounding may cross a due time; only due_s decides.
+        # Rounding may pass the due time, so only due_s is compared.
         while self.due_s(number + 1) <= film_s:
             number += 1
         while self.due_s(number) > film_s:

@@ -100,7 +100,8 @@ def series_read_plan(window: Callable[[int], ReadWindow], every: int) -> ReadPla
         usual.append(window(ARMED_AT - 1))
     spare = [window(SENSED_AT - more) for more in range(2, 7)]
     second = [window(SENSED_AT - more) for more in range(7, 11)]
-    # For servos read alone: never as long as a group read, and never twice the same.
+    # Windows for servos that are read alone: their lengths differ from each other and from those of
+    # group reads.
     alone = [window(ARMED_AT - more) for more in range(1, 11)]
     return ReadPlan(
         WindowSchedule(usual, spare),
@@ -141,7 +142,7 @@ FEETECH = Family(
     weak_check=True,
     read_spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted_settings=wanted_settings,
-    # Of Phase only one bit is changed, the others stay as set.
+    # Only one bit of Phase is changed; the others keep their values.
     corrected_value=lambda name, found, wanted: found & ~MULTI_TURN if name == "phase" else wanted,
     correction_passes=1,
     answer_level=1,

@@ -278,7 +278,7 @@ class Pca9685Board:
         counts: dict[int, int] = {}
         for channel in channels:
             servo_id, setup, steps = channel.id, channel.setup, round(channel.ramp.pulse_steps)
-            # Its intermediate pulse, inside its limits.
+            # The intermediate pulse, within the limits of the channel.
             width = counts_within(
                 steps, setup.min_steps, setup.max_steps, self._resolution_steps[servo_id]
             )

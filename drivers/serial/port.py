@@ -384,7 +384,7 @@ WAIT_PIECE_S = 0.1
 
 def wait_until(port: BusPort, until_s: float) -> None:
     """Wait and discard bytes that arrive meanwhile."""
-    # In pieces, as each is a sign of life for the guardian that watches this port.
+    # Wait in pieces: each read is a heartbeat for the guardian that monitors this port.
     while (now_s := port.now_s()) < until_s:
         got = port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
         if not got and port.now_s() <= now_s:

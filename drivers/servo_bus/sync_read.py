@@ -278,7 +278,7 @@ class SyncRead:
             elif not status.params and status.error & self._codec.REFUSAL:
                 samples[status.id] = Sample(status.error)
             else:
-                # A valid answer of another length: late, or the servo is confused.
+                # A valid answer of another length: it is late, or the servo misread the request.
                 damaged.add(status.id)
         missing = len(samples) < len(self.ids)
         unproved = samples.keys() - in_place if missing else set[int]()

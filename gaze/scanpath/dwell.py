@@ -92,7 +92,8 @@ def _truncated_normal(mean_s: float, sd_s: float) -> Draw:
 
 def _draw_above(rng: np.random.Generator, tail: float) -> float:
     """Draw a standard normal number from its upper ``tail`` of more than a half."""
-    # From the other end, so that the probability keeps its digits if the tail is nearly 1.
+    # Computed from the other end, so that the probability does not lose digits if the tail is
+    # nearly 1.
     p = (1.0 - tail) + tail * rng.random()
     return _NORMAL.inv_cdf(min(max(p, 1e-300), 1.0 - 1e-16))
 

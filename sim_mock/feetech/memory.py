@@ -95,7 +95,7 @@ _STS_KEPT = (
     EmulatedFeetechRegister("acceleration_factor", 86, initial=1),
 )
 _SCS_KEPT = (
-    # The values of STS servos are assumed for these, too [A].
+    # The values of STS servos are assumed for these servos as well [A].
     *_with_start_values(
         _KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25
     ),

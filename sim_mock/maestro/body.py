@@ -170,7 +170,7 @@ class MaestroBody:
                 channel.set_target(self.settings.home_steps if where == "home" else 0)
 
     def reset_timeout(self) -> None:
-        """Restart the time without valid commands."""
+        """Restart the timeout, because a valid command has arrived."""
         self._fed, self._timed_out = self._period, False
 
     def limit(self, low: int | None, high: int | None) -> None:

@@ -106,7 +106,7 @@ class Gyro:
         self._turned: deque[_Quaternion] = deque(maxlen=_KEPT)
         self._rates: deque[Rates] = deque(maxlen=_KEPT)
         self._epoch = 0
-        self._last: Rates | None = None  # as read
+        self._last: Rates | None = None  # the rates that were read
         self._first_s: float | None = None
         self._same_since_s: float | None = None
         self._absurd_since_s: float | None = None

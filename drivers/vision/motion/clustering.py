@@ -95,7 +95,7 @@ def _connected_groups(
 ) -> list[PixelGroup]:
     """Return the connected components of the mask; gaps up to ``close_px`` are bridged.
 
-    Of very many, the ``most`` largest are returned.
+    At most ``most`` groups are returned, the largest ones.
     """
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (close_px, close_px))
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)

@@ -24,7 +24,7 @@ _NEAR_PX = 5
 _LEFT_SHARE = 0.5
 # Smallest ratio of a change to the noise (variances), and a grey level for rounding.
 _NOISE_RATIO, _ROUNDING = 3.0, 1.0
-# Share by which a still thing behind most of the room moves less than the room.
+# Share by which a static object behind most of the room moves less in the picture than the room.
 _BEHIND = 0.03
 # Share of a motion that must be across the edges there.
 _ACROSS = 0.15
