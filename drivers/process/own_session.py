@@ -30,8 +30,8 @@ def run(words: list[str]) -> int:
     if sys.platform != "linux":
         os.execvp(words[0], words)
     numbers = {signal.Signals[name] for name in _PASSED_ON}
-    # A program started with nohup outlives the terminal.
-    numbers = {number for number in numbers if signal.getsignal(number) != signal.SIG_IGN}
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:  # with nohup it outlives the terminal
+        numbers.remove(signal.SIGHUP)
     prctl = ctypes.CDLL(None).prctl  # loaded before the fork
 
     def prepare() -> None:
