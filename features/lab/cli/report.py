@@ -44,9 +44,15 @@ def report(
     seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run, s.")] = 180.0,
     character: Annotated[str | None, typer.Option(help="Character applied over the rig.")] = None,
     profile: Annotated[str | None, typer.Option(help="Style of gaze.")] = None,
-    scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of the rig's.")] = None,
-    saccade: Annotated[str | None, typer.Option(help="Saccade profile instead of the rig's.")] = None,
-    conversation: Annotated[str | None, typer.Option(help="Conversation: talk, listen or think.")] = None,
+    scanpath: Annotated[
+        str | None, typer.Option(help="Face scanpath instead of the rig's.")
+    ] = None,
+    saccade: Annotated[
+        str | None, typer.Option(help="Saccade profile instead of the rig's.")
+    ] = None,
+    conversation: Annotated[
+        str | None, typer.Option(help="Conversation: talk, listen or think.")
+    ] = None,
     bus: Annotated[
         str | None, typer.Option(help="With --scene: emulated servos (default) or ideal ones.")
     ] = None,
@@ -258,14 +264,17 @@ def _run_header(
     """Return a run's description with the style of its gaze."""
     from gazerig.features.lab.report.face import rig_walk
     from gazerig.features.lab.report.page import RunHeader
+    from gazerig.robot.app.servo_saccades import eye_servo_text
 
     gaze = rig.gaze
     styles = (
         f"saccade {gaze.saccade.profile}",
         f"scanpath {gaze.scanpath.model}",
     )
+    servo = eye_servo_text(rig)
     shown = (
         ("saccades", gaze.saccade.profile),
+        *(() if servo is None else (("eye servo", servo),)),
         ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.transition_matrix}"),
     )
     return RunHeader(name, (*facts, *shown), frozenset(styles), rig_walk(gaze.scanpath, walk))
