@@ -163,7 +163,7 @@ CLAIMS = (
     Mutant("gaze/attention/persons.py", "hand.repeats += 1.0", "hand.repeats += 0.0",
            "a wave never becomes known",
            ("human_pursuit::test_e62_a_waving_hand_gets_a_glance_and_no_more",), ("E62",)),
-    Mutant("gaze/scanpath/dwell.py", "return lambda rng: shortest_s + beyond(rng)", "return lambda rng: max(shortest_s, beyond(rng))",
+    Mutant("gaze/scanpath/dwell.py", "shortest_s + beyond(rng))", "max(shortest_s, beyond(rng)))",
            "rests are cut off at the shortest one",
            ("human_face::test_e63_rests_on_a_face_are_as_different_as_peoples",), ("E63",)),
     Mutant("sim_mock/dynamixel/drive.py", '        d=get("position_d_gain") / 16.0 / PWM_FULL,\n', "",
