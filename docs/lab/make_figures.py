@@ -6,6 +6,7 @@ import matplotlib as mpl
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
+import people_figure  # noqa: E402
 import trace_figure  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
@@ -37,7 +38,15 @@ def traces() -> None:
     plt.close(figure)
 
 
+def people() -> None:
+    """Twenty seconds before a face, a walker and three people, and in a talk."""
+    figure = people_figure.figure_of(people_figure.all_traces())
+    figure.savefig(HERE.parent / "figures" / "people.png", dpi=110, bbox_inches="tight")
+    plt.close(figure)
+
+
 if __name__ == "__main__":
     plt.rcParams.update({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3})
     sweep()
     traces()
+    people()

@@ -16,6 +16,7 @@ from gazerig.gaze.angles import yaw_pitch
 from gazerig.robot.analysis.human_norms import evoked_blink_probability, mean_head_deg
 from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.tick import Tick
 
@@ -37,7 +38,14 @@ class Trace(NamedTuple):
 
 
 def of_profile(profile: str) -> Trace:
-    """Return what a profile's head did, as its servos measured it."""
+    """Return what a profile's head did before the visitor."""
+    return recorded(
+        RunOptions(True, True, 1, "visitor", profile=profile, seconds=BEGIN_S + SECONDS)
+    )
+
+
+def recorded(options: RunOptions) -> Trace:
+    """Return what the head did in a run after ``BEGIN_S``, as its servos measured it."""
     rows: list[tuple[float, float, float, float]] = []
 
     def watch(tick: Tick) -> None:
@@ -45,8 +53,9 @@ def of_profile(profile: str) -> Trace:
         head = np.degrees(tick.pose.head_rad[0])
         rows.append((tick.t_s, yaw, head, max(tick.pose.lid_left, tick.pose.lid_right)))
 
-    options = RunOptions(True, True, 1, "visitor", profile=profile, seconds=BEGIN_S + SECONDS)
-    simulate(load_rig("desk", None, profile), options, watch=watch)
+    options = options.check_and_complete()
+    rig = load_rig(options.rig, options.character, options.profile)
+    simulate(with_options(rig, options), options, watch=watch)
     table = np.array(rows)
     return Trace(*table[table[:, 0] >= BEGIN_S].T)
 
