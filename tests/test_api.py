@@ -200,7 +200,7 @@ def test_states_and_events_step_the_head(head: gazerig.SimulatedHead) -> None:
     assert head.time_s - began_s == pytest.approx(0.4, abs=0.02)
     head.look_at(1.0, 0.0, 0.3)
     texts = [event.text for event in head.events(timeout_s=0.2)]
-    assert "led by the program: look at 1 0 0.3" in texts
+    assert "controlled by the program: look at 1 0 0.3" in texts
 
 
 def test_states_end_after_their_seconds(head: gazerig.SimulatedHead) -> None:

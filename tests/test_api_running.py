@@ -353,7 +353,7 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         here, there = head.joints, far.joints
         assert here.keys() == there.keys()
         texts = [event.text for event in far.events(timeout_s=0.0)]
-        assert any("led by the program" in text for text in texts)
+        assert any("controlled by the program" in text for text in texts)
         far.stop("a hand")
         assert head.state.stopped == "a hand"
         assert far.play("nod").wait(100.0) == "refused" and far.resume().refused

@@ -59,8 +59,8 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
     [
         (None, "available: ask, look_at"),
         ({"do": "dance"}, "available: ask, look_at"),
-        ({"do": "ask", "menu": "lids"}, "takes menu, choice"),
-        ({"do": "ask", "menu": "lids", "choice": "sleepy", "x": 1}, "takes menu, choice"),
+        ({"do": "ask", "menu": "lids"}, "has the fields menu, choice"),
+        ({"do": "ask", "menu": "lids", "choice": "sleepy", "x": 1}, "has the fields menu, choice"),
         ({"do": "look_at", "p_world_m": [1e200, 0.0, 0.0]}, "none beyond .-1000 m"),
         ({"do": "look_at", "p_world_m": [0.0, 10**400, 0.0]}, "none beyond .-1000 m"),
         ({"do": "look_at", "p_world_m": None, "stay": 1}, "true or false"),
@@ -324,7 +324,7 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None
     led = [tick for tick in ticks if tick.controlled_by]
     assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
     words = [event for tick in ticks for event in tick.events]
-    assert "led by a show (process 7): jog neck_yaw 17.2" in words
+    assert "controlled by a show (process 7): jog neck_yaw 17.2" in words
     assert (
         "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze models are in control again"
         in words

@@ -24,7 +24,7 @@ def test_an_expression_from_the_command_line(rig: TickedRig) -> None:
     )
     assert rig.tick(200)["jaw"] == pytest.approx(3.0)
     assert "expression: happy (in force), neutral, sad" in gazerig("ctl", "ask", "expression")
-    assert "there is neutral, happy, sad, surprised" in gazerig("ctl", "express", "glad")
+    assert "available: neutral, happy, sad, surprised" in gazerig("ctl", "express", "glad")
 
 
 def test_a_level_from_the_command_line_is_kept_up_and_let_go(

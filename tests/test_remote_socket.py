@@ -447,7 +447,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
         (b"[]\n", "unknown request"),
-        (b'{"do": "dance"}\n', 'there is hello, "version"; status; '),
+        (b'{"do": "dance"}\n', 'available: hello, "version"; status; '),
         (b'{"do": "get"}\n', "unknown request"),
         (b'{"do": "get", "prefix": 1}\n', "unknown request"),
         (b'{"do": "get", "prefix": "", "more": 1}\n', "unknown request"),
