@@ -207,7 +207,7 @@ BAD = {
     "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names no motion"),
     "frames:\n  - {time_s: 0.2, head_pich_deg: 3}\n": ("frames.0.head_pich_deg", "head_pitch_deg"),
     "frames:\n  - {time_s: 0.2, head_pitch_deg: 300}\n": ("frames.0.head_pitch_deg", "90"),
-    "frames:\n  - {time_s: 0.2, lids: {top: 0.5}}\n": ("frames.0", "no lids 'top'"),
+    "frames:\n  - {time_s: 0.2, lids: {top: 0.5}}\n": ("frames.0", "unknown lids 'top'"),
     "frames:\n  - {time_s: 0.2, head_yaw_deg: .nan}\n": ("frames.0.head_yaw_deg", ""),
     "frames: []\n": ("", "at least one frame"),
     "frames:\n  - {time_s: 0.5, head_yaw_deg: 1}\n  - {time_s: 0.5, head_yaw_deg: 2}\n": (

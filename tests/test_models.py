@@ -178,7 +178,7 @@ def test_the_command_fetches_lists_and_says_what_fails(
 
 def test_a_name_that_there_is_not_is_answered_with_those_there_are() -> None:
     done = invoked("models", "fetch", "nonsense")
-    assert done.code == 2 and "'nonsense': there is yunet, people, hands, mesh" in done.err
+    assert done.code == 2 and "'nonsense'; available: yunet, people, hands, mesh" in done.err
 
 
 def test_the_folder_is_that_of_the_user_unless_another_is_named(

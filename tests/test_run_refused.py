@@ -62,7 +62,7 @@ def test_a_point_of_two_numbers_names_the_missing_one(
     pytest.importorskip("gazerig.features.bringup")
     assert typed("look-at", *rig, "1", "2") == 2
     said = " ".join(re.sub(r"[│\n]", " ", capfd.readouterr().err).split())
-    assert "Y (Metres to the left), Z (Metres up): there is no Z" in said
+    assert "Y (Metres to the left), Z (Metres up): Z is missing" in said
 
 
 def test_no_option_is_a_double_negation() -> None:
