@@ -121,11 +121,11 @@ def test_about_a_third_of_large_saccades_are_corrected_100_to_200_ms_later() -> 
 
 
 def test_refixations_stay_near_the_middle_and_come_one_to_two_a_second() -> None:
-    rig = Rig(params=replace(EXACT, refixation_deg=1.5), saccade=HUMAN, dice=3)
+    rig = Rig(params=replace(EXACT, refixation_deg=1.7), saccade=HUMAN, dice=3)
     trace = rig.run(still(2.0), 60.0)
     jumps = trace.commands[-1].saccades - 1
     assert 1.0 < jumps / 60.0 < 2.0
-    assert trace.error.max() < 2.3 and 0.2 < np.median(trace.error[200:]) < 1.13
+    assert trace.error.max() < 2.3 and 0.2 < np.median(trace.error[200:]) < 1.28
     phases = np.array([c.phase == "saccade" for c in trace.commands])
     on = np.flatnonzero(phases[1:] & ~phases[:-1])[1:]
     off = np.flatnonzero(~phases[1:] & phases[:-1])[1:] + 1
@@ -134,7 +134,7 @@ def test_refixations_stay_near_the_middle_and_come_one_to_two_a_second() -> None
         degrees(angle_between(tuple(points[a]), tuple(points[b])))
         for a, b in zip(on, off, strict=False)
     ]
-    assert min(sizes) > 0.45 and max(sizes) < 1.55
+    assert min(sizes) > 0.45 and max(sizes) < 1.75
 
 
 def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_followed() -> None:
@@ -142,7 +142,7 @@ def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_follow
     times = np.arange(0.0, 20.0, 0.005)
     assert not any(points.is_due(t, still=False) for t in times)
     assert any(points.is_due(20.0 + t) for t in times)
-    assert 0.0 < degrees(hypot(*points.offset_rad)) <= 1.13
+    assert 0.0 < degrees(hypot(*points.offset_rad)) <= 1.28
     points.reset()
     assert points.offset_rad == (0.0, 0.0)
 

@@ -20,8 +20,8 @@ class OculomotorParams:
 
     # fmt: off
     refixation_deg: Annotated[float, Bounds(0, 5),
-        "largest re-fixation, a small saccade within the target; 0: none"] = 1.5
-    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest re-fixation; smaller ones are hidden by servo steps and play"] = 0.9
+        "largest re-fixation, a small saccade within the target; 0: none"] = 1.7
+    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest re-fixation; smaller ones are hidden by servo steps and play"] = 1.15
     refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
     refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is extended by a random time of up to this"] = 700.0
     undershoot: Annotated[float, Bounds(0, 0.3),
