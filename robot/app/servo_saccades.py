@@ -10,6 +10,7 @@ from math import degrees, radians
 from typing import NamedTuple
 
 from gazerig.config.rig import Rig
+from gazerig.drivers.errors import DriverError
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.robot.app.run_bus import emulated_lines, in_process_run_bus
 from gazerig.robot.model.clock import SimulatedClock
@@ -39,17 +40,22 @@ def eye_joint(rig: Rig) -> str | None:
 def eye_servo_text(rig: Rig) -> str | None:
     """Return in words which saccades the eye servo of a rig can make, None if unknown."""
     joint = eye_joint(rig)
-    times = [] if joint is None else saccade_times(rig, joint)
-    if joint is None or not times:
+    if joint is None:
+        return None
+    try:
+        times = saccade_times(rig, joint)
+    except DriverError:  # a servo that cannot be emulated with these settings
+        return None
+    if not times:
         return None
     longest = f"more than {_LONGEST_S * 1e3:.0f}"
-    servo = [longest if t.servo_ms is None else str(t.servo_ms) for t in times]
-    rows = {
-        f"of {', '.join(f'{t.amplitude_deg:g}' for t in times)} deg": servo,
-        "the model": [str(t.model_ms) for t in times],
-    }
-    told = "; ".join(f"{what} after {', '.join(ms)} ms" for what, ms in rows.items())
-    return f"{rig.joints[joint].model}, emulated: within 1 deg {told}"
+    sizes = ", ".join(f"{one.amplitude_deg:g}" for one in times)
+    model = ", ".join(str(one.model_ms) for one in times)
+    servo = ", ".join(longest if one.servo_ms is None else str(one.servo_ms) for one in times)
+    return (
+        f"{rig.joints[joint].model}, emulated: within 1 deg of {sizes} deg after {servo} ms; "
+        f"the model after {model} ms"
+    )
 
 
 def saccade_times(
