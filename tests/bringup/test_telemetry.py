@@ -37,6 +37,7 @@ from gazerig.robot.model.coupling import Differential
 from gazerig.robot.model.coupling_params import CoupledPair
 from gazerig.robot.model.gesture_fit import gesture_motions
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -271,7 +272,9 @@ class HandBench:
     """The desk rig, emulated, with a hand on its neck."""
 
     def __init__(self) -> None:
-        self.rig = EmulatedRig(DESK)
+        # Its head is balanced, so that the limp neck stays where the hand has turned it.
+        balanced = MassParams(head=LinkMassParams(com_mm=(0.0, 0.0, 0.0)))
+        self.rig = EmulatedRig(replace(DESK, mass=balanced))
         self.port = self.rig.ports[""]
         self.port.setBaudRate(DESK.bus.baud)
         joints = {name: DESK.joints[name] for name in DESK.names}
