@@ -34,6 +34,7 @@ from gazerig.robot.model.coupling import (
     joint_rates,
 )
 from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
+from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -64,7 +65,9 @@ EACH = pytest.mark.parametrize("kind", list(KINDS))
 
 
 def rig_with(coupling: CouplingParams) -> Rig:
-    return replace(load_rig("desk"), couplings={"neck": coupling})
+    # With a balanced head goals have no part that makes up for its weight.
+    balanced = MassParams(head=LinkMassParams(com_mm=(0.0, 0.0, 0.0)))
+    return replace(load_rig("desk"), couplings={"neck": coupling}, mass=balanced)
 
 
 @EACH
