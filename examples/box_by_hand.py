@@ -38,7 +38,7 @@ def fist_m(face: DetectedFace, palm: DetectedPalm, width_px: int) -> list[float]
 def box(head: gazerig.Head, camera: cv2.VideoCapture, detector: BodyDetector) -> None:
     """Move the opponent's fist to the palm that is held out farthest, until the camera ends."""
     while (frame := camera.read())[0]:
-        image = frame[1]
+        image = np.asarray(frame[1], np.uint8)
         faces = detector.find(image)
         palms = detector.palms(image, time.monotonic(), faces, ())
         if faces and palms:
