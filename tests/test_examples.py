@@ -162,7 +162,7 @@ def test_the_hand_before_a_webcam_moves_the_fist_of_the_opponent(
     motion = opponent.OpponentMotion((0.7, 0.0, 0.0))
     for number in range(400):
         if number % 5 == 0:
-            motion.order(fists[number // 5], 0.01 * number)
+            motion.set_target(fists[number // 5], 0.01 * number)
         motion.step(number)
     assert "punch" in [event.name for event in motion.events]
 
