@@ -1,12 +1,11 @@
 """Process of the page: receives the newest snapshot from the socket and draws it.
 
 Started by ``gazerig.robot.dashboard.feed.page_process.PageProcess`` as ``python -m
-gazerig.robot.dashboard.page_main FD STOP_FD PARENT HOST PORT``, with the token and a folder of its
-own in its environment, which other users cannot read as they can its arguments. It
-ends when the other side of the socket closes. Nothing is fetched from anywhere: the
-page's script comes from the viser package and all shapes are made here. Browsers come in
-by ``gazerig.robot.dashboard.door.auth_proxy``; what people do there goes to the rig over the same
-socket.
+gazerig.robot.dashboard.page_main FD STOP_FD PARENT HOST PORT``. The token and a private folder are
+in its environment, because other users can read its arguments. It ends when the other side of the
+socket closes. Nothing is downloaded: the page's script is part of the viser package and all shapes
+are made here. Browsers connect through ``gazerig.robot.dashboard.door.auth_proxy``; their users'
+requests are sent to the rig over the same socket.
 """
 
 import contextlib
@@ -57,19 +56,19 @@ _BEAT_S = 0.5
 _PORTS_TRIED = 100
 _PORTS = 65536
 _NICENESS = 5  # the control loop has priority on a shared core
-_MOST_FILES = 8192  # a burst of connections must not use all
+_MOST_FILES = 8192  # a burst of connections must not use all file descriptors
 
 
 def free_port(host: str, port: int) -> int:
     """Find the first port from this one on that can be bound.
 
     Raises:
-        OSError: the address is not this machine's, or none of the ports is free.
+        OSError: the address does not belong to this machine, or none of the ports is free.
     """
     family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     for candidate in range(port, min(port + _PORTS_TRIED, _PORTS)):
         with socket.socket(family, socket.SOCK_STREAM) as trial:
-            # As the server itself does: a port in TIME_WAIT is free, one with a listener is not.
+            # Like the server itself: a port in TIME_WAIT is free, one with a listener is not.
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 trial.bind((address[0], candidate))
@@ -84,8 +83,8 @@ def free_port(host: str, port: int) -> int:
 class ServedPage(NamedTuple):
     """Open page: the server behind the door, the door and the address.
 
-    outbox: of requests to the rig; pointer: receives pointers of browsers
-    words: message for the terminal, None for none
+    outbox: sends requests to the rig; pointer: receives pointers of browsers
+    words: message for the terminal, None if there is none
     """
 
     server: viser.ViserServer
@@ -110,7 +109,7 @@ def serve(
     browsers, widgets = Browsers(token), Widgets()
 
     def name(client: str) -> str:
-        """Return the name of a client's browser; client: its number, maybe with a suffix."""
+        """Return the name of a client's browser; client: its number, possibly with a suffix."""
         number = client.partition(":")[0]
         in_view = browser_of(server, int(number)) if number.isdecimal() else ""
         return widgets.browser(client) or in_view
@@ -122,7 +121,7 @@ def serve(
     )
     pointer = PointerToLook(
         lambda browser: camera_of(server, browser),
-        # Not as a browser in control: only its points show that a pointer is present.
+        # Do not mark the browser as in control: only its points show that a pointer is present.
         lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
         move_opponent=lambda point: outbox.ask(as_json(MoveOpponent(point)), DOOR),
     )
@@ -177,7 +176,7 @@ def main(arguments: list[str]) -> int:
     """Run the page; return the exit code of the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority(_NICENESS)
-    with contextlib.suppress(ImportError):  # nor a limit on open files
+    with contextlib.suppress(ImportError):  # this system has no limit on open files either
         import resource
 
         least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -186,7 +185,7 @@ def main(arguments: list[str]) -> int:
     logging.disable(logging.CRITICAL)
     fd, stop_fd, parent, host, port = arguments
     token = os.environ.pop(TOKEN_VARIABLE)
-    # Not closed explicitly: its end makes the other side read this process's last messages,
+    # Do not close it explicitly: its end makes the other side read this process's last messages,
     # and those of an exception are written only after the end of a ``with`` block.
     shown = os.environ.pop(message_link.TOKEN_VARIABLE, "")
     feed = message_link.open_link(fd, shown)

@@ -38,8 +38,8 @@ _REFUSED = "refused: "
 class PageView:
     """Scene and panels of one server.
 
-    emulated: whether the rig's servos are emulated, so that pointer control is on from the start
-    choice: what was chosen for this computer, shown to each new browser; "" shows nothing
+    emulated: whether the rig's servos are emulated; then pointer control is on from the start
+    choice: settings chosen for this computer, shown to each new browser; "" shows nothing
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class PageView:
         return self._panel.layers
 
     def _greet(self, client: str) -> None:
-        """Show a new browser what was chosen for this computer."""
+        """Show a new browser the settings chosen for this computer."""
         if self.choice:
             self._widgets.notify(self.choice, client)
 
@@ -96,7 +96,7 @@ class PageView:
         return self._widgets.is_watched or bool(self._server.get_clients())
 
     def show(self, news: News) -> None:
-        """Draw the newest data; without a browser it is kept until one connects."""
+        """Draw the newest data; without a browser, keep it until one connects."""
         for kind, data in news.others:
             self._take(kind, data)
         self._panel.update(news.snapshots)
@@ -125,7 +125,7 @@ class PageView:
             self._panel.draw_all()
         self._watched = watched
         if watched or not self._drawn:
-            # Browsers receive a snapshot as a whole.
+            # Browsers receive all changes of a snapshot together.
             with self._server.atomic(), self._widgets.hold_changes():
                 self._draw()
 
@@ -153,7 +153,8 @@ class PageView:
             elif kind == REPLAY:
                 if self._replay is None:
                     duration_s = data.get("duration_s")
-                    assert isinstance(duration_s, int | float)  # the rig's side writes it first
+                    # the first message always contains it
+                    assert isinstance(duration_s, int | float)
                     self._controls.remove_controls()
                     self._tell({"recording": True})
                     self._replay = ReplayView(
@@ -168,7 +169,7 @@ class PageView:
     def _draw(self) -> None:
         if self._newest is not None:
             self._viewpoints.fit(self._newest)
-            # A simulated world draws its room and people; detections are then only marked.
+            # A simulated world draws its own room and people; then only mark the detections.
             if self._world_now is not None:
                 self._world.show(*self._world_now)
             self._head.on_table = self._world_now is not None
@@ -188,7 +189,7 @@ class PageView:
         self._newest = self._jpeg = self._image = None
 
     def silent(self) -> None:
-        """Show that no data arrives any more, with the last data."""
+        """Show that no more data arrives, together with the last data."""
         self.show(News((), None, ended=False))
         if self._drawn and self._replay is None:  # a recording may be paused
             self._panel.silence.content = no_data_text()

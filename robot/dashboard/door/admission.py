@@ -1,9 +1,10 @@
 """Admission of requests to a page, and the addresses of pages.
 
-A client shows a token, once, in the query of the first address; a cookie takes its place. That
-holds on this machine as well, which may have other users. The Origin of every websocket and of
-everything that is sent must be the address of the page, and on the loopback that address must be a
-name of the loopback, or a foreign name made to point here would do (DNS rebinding).
+A client presents a token once, in the query of the first URL; after that a cookie replaces it.
+This also applies to clients on this machine, which may have other users. The Origin of every
+websocket and of every sent request must be the address of the page. On the loopback that address
+must be a name of the loopback; otherwise a foreign name that resolves to this machine would be
+accepted (DNS rebinding).
 """
 
 import hmac
@@ -42,7 +43,7 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 API = "/api/"
-"""Beginning of the paths for programs, which show the token with each request."""
+"""Prefix of the paths for programs, which present the token with each request."""
 
 
 _SHOW = (
@@ -60,18 +61,18 @@ def _bearer(request: web.Request) -> str:
 class Admission:
     """Accepts or refuses requests by one token.
 
-    one_time_token: another token, which opens the page one time; "" for none
+    one_time_token: a second token, which opens the page once; "" for none
     """
 
     def __init__(self, host: str, port: int, token: str, cookie: str, otherwise: str) -> None:
-        """Know what a client must show.
+        """Store what a client must present.
 
         Args:
-            host: the address that is listened on
+            host: address to listen on
             port: its port
-            token: what a client must show
-            cookie: name of the cookie that takes its place
-            otherwise: what who is refused should do instead
+            token: token that a client must present
+            cookie: name of the cookie that replaces it
+            otherwise: what a refused client should do instead
         """
         self._host, self._port = host, port
         self._token, self._cookie = token, cookie
@@ -87,7 +88,7 @@ class Admission:
         if program and sends and origin is None and not shown:
             return f"refused: {_SHOW}"
         if program and origin == "null" and shown:
-            origin = None  # a page from a file of a user, who gave it the token
+            origin = None  # a page opened from a user's file, who gave it the token
         if origin is None and sends and not program:
             return "refused: no Origin; only a browser with this page open may ask for anything"
         if origin is not None and netloc(origin) != request.host:

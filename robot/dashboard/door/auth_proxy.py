@@ -1,11 +1,11 @@
-"""Door of the page: its only entrance, for admitted browsers, at the configured address.
+"""Door of the page: the only access to it, for admitted browsers, at the configured address.
 
 Viser itself listens where no other program can reach it
-(``gazerig.robot.dashboard.door.viser_server``). Who is let in:
+(``gazerig.robot.dashboard.door.viser_server``). The rules of access are in
 ``gazerig.robot.dashboard.door.admission``.
 
 It serves the page itself (``gazerig.robot.dashboard.door.page_files``), so that the stop button and
-what it talks to work whatever viser does; viser draws the view in a frame of the page
+its connection work even if viser fails; viser draws the view in a frame of the page
 (``gazerig.robot.dashboard.door.viser_server``).
 """
 
@@ -76,7 +76,7 @@ Point = Callable[[object, str], bool]
 class AuthProxy:
     """Proxy that admits browsers to the server behind it, in its own thread.
 
-    webcam: receives pictures of browsers' own cameras; admission: who is let in
+    webcam: receives pictures of browsers' own cameras; admission: decides who has access
     """
 
     def __init__(
@@ -97,15 +97,16 @@ class AuthProxy:
 
         Args:
             host: the address
-            port: a free port of it
+            port: a free port of that address
             inside: address of the server
-            ask: called in the door's thread with what is sent to the rig
+            ask: called in the door's thread with each request for the rig
             stop: receives stops, before all other requests
             token: what a client must show
-            browsers: names them by that token
+            browsers: names the browsers by their cookies
             widgets: of the panels
-            point: receives positions of a browser's pointer, without an answer
-            picture: receives pictures of browsers' own cameras; False: it does not take them
+            point: receives positions of a browser's pointer; sends no answer
+            picture: receives pictures of browsers' own cameras; returns False if it does not accept
+                them
             rig: the rig's command socket, for programs; None without one
         """
         self._host = host
@@ -125,7 +126,8 @@ class AuthProxy:
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
-        self._loop = asyncio.SelectorEventLoop()  # that of Windows cannot wait for sockets
+        # The default loop of Windows cannot wait for Unix sockets
+        self._loop = asyncio.SelectorEventLoop()
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
         self._relay = RigRelay(rig)
@@ -138,7 +140,7 @@ class AuthProxy:
         """Listen.
 
         Raises:
-            OSError: the address cannot be listened on.
+            OSError: it is not possible to listen on the address.
         """
         self._thread.start()
         if not self._opened.wait(_OPEN_TIMEOUT_S):
@@ -150,7 +152,7 @@ class AuthProxy:
         """Let the thread that serves browsers call a function.
 
         Raises:
-            RuntimeError: it has ended.
+            RuntimeError: the thread has ended.
         """
         self._loop.call_soon_threadsafe(do)
 
@@ -260,7 +262,7 @@ class AuthProxy:
     # --- the stop button ------------------------------------------------------------------
 
     async def _handle_post(self, request: web.Request) -> web.Response:
-        """Send a request to the rig; answer whether it was accepted."""
+        """Send a request to the rig; answer the browser with its acceptance or refusal."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
         who = self._browser_name(request)
@@ -290,7 +292,7 @@ class AuthProxy:
     async def _handle_line(self, request: web.Request) -> web.StreamResponse:
         """Send the state whenever it changes, with heartbeats in between; receive stops.
 
-        It is already open when STOP is pressed; a browser opens only six others.
+        This connection is already open when STOP is pressed; a browser opens only six others.
         """
         line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False, autoping=False)
         await line.prepare(request)
@@ -341,7 +343,7 @@ class AuthProxy:
     # --- the panels -----------------------------------------------------------------------
 
     async def _panels(self, request: web.Request) -> web.StreamResponse:
-        """Send the panels to a browser, as fast as it reads them."""
+        """Send the panels to a browser, no faster than it reads them."""
         socket = web.WebSocketResponse(max_msg_size=RECEIVED_BYTES, compress=False)
         who = self._browser_name(request)
         return await self._keep_open(
@@ -379,8 +381,9 @@ class AuthProxy:
     async def _ping(self, line: web.WebSocketResponse, who: str) -> None:
         """Ping the browser in control; each answer renews its control.
 
-        An open connection proves nothing: if a computer is suspended or loses its network, it stays
-        open for minutes. Browsers also answer for pages in the background.
+        An open connection does not prove that the browser is present: after a computer is suspended
+        or loses its network, the connection stays open for minutes. Browsers also answer pings for
+        pages in the background.
         """
         while True:
             await asyncio.sleep(_RENEWED_EVERY_S)

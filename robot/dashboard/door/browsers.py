@@ -1,8 +1,8 @@
 """Browsers of the page: their names, and limits on their connections and tabs.
 
-A browser needs a handful of connections. A client that opens hundreds and sends nothing, or sends a
-byte a second, must not keep others from pressing STOP, so that the one who has been idle longest
-goes when another comes.
+A browser needs a handful of connections. A client that opens hundreds and sends nothing, or sends
+one byte per second, must not prevent others from pressing STOP. So a new connection over the limit
+closes the one that has been idle longest.
 """
 
 import asyncio
@@ -66,7 +66,7 @@ class Browsers:
 
 
 class TabLimits:
-    """Limited number of open tabs; for one more, the browser with most tabs loses its oldest.
+    """Limit on open tabs; a tab over it closes the oldest tab of the browser with most tabs.
 
     Belongs to one event loop.
     """
@@ -92,7 +92,7 @@ class TabLimits:
 
 
 class _ConnectionState:
-    """State of a connection and the time since it has it."""
+    """State of a connection and the time at which the state began."""
 
     def __init__(self, since_s: float) -> None:
         self.since_s = since_s
@@ -108,14 +108,14 @@ class Connections:
         self._trimming = False
 
     def accept(self) -> RequestHandler:
-        """Return the handler of a new connection; if there are too many, close the idlest."""
+        """Return the handler of a new connection; over the limit, close the longest idle one."""
         handler: RequestHandler = self._server()
         self._states[handler] = _ConnectionState(asyncio.get_running_loop().time())
         self._trim_soon()
         return handler
 
     def _trim_soon(self) -> None:
-        """If there are too many connections, close the idlest after the new ones have started."""
+        """Over the limit, close the longest idle connection after the new ones have started."""
         if len(self._states) > MOST and not self._trimming:
             self._trimming = True
             asyncio.get_running_loop().call_later(_TRIM_AFTER_S, self._trim)

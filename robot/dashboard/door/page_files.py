@@ -14,8 +14,8 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".json": "application/json",
 }
-# Scripts and connections of this address alone; panels come with styles of their own, and the
-# picture of the camera and the icon of the tab are made here.
+# Allow scripts and connections of this address only. Panels contain their own styles, and the page
+# itself creates the camera image and the icon of the tab.
 _MAY = {
     "Content-Security-Policy": (
         "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "

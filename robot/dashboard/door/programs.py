@@ -40,9 +40,9 @@ from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
 
 BASE = f"{API}v{VERSION}"
 MOST_PROGRAMS = 32
-"""Largest number of websockets of programs, as of tabs of the page."""
+"""Largest number of websockets of programs; equal to that of tabs of the page."""
 _EVENTS_HZ = 20.0
-"""Rate at which the head is read for events and outcomes."""
+"""Rate at which the state of the head is read for events and outcomes."""
 _PER_S, _BURST = 50.0, 100.0
 _ALL_PER_S, _ALL_BURST = 100.0, 200.0
 _FLOOD_PAUSE_S = 0.01
@@ -58,10 +58,10 @@ _STATUS = {"ok": 200, "refused": 409, "failed": 503}
 
 
 class MessageRefused(ValueError):
-    """A message that is not sent to the rig; the text names the reason.
+    """Error: a message was not sent to the rig; the text gives the reason.
 
     Attributes:
-        status: of an HTTP answer.
+        status: Status of the HTTP answer.
     """
 
     def __init__(self, text: str, status: int = 400) -> None:
@@ -70,7 +70,7 @@ class MessageRefused(ValueError):
 
 
 def parse_message(data: str | bytes) -> dict[str, Any]:
-    """Return a message that came as text.
+    """Parse a message that was received as text.
 
     Raises:
         MessageRefused: it is too long, or not a JSON object.
@@ -92,10 +92,10 @@ def parse_message(data: str | bytes) -> dict[str, Any]:
 
 
 def parse_rate(text: str, name: str, least: float, most: float) -> float:
-    """Return a number of a query.
+    """Parse a rate from a query.
 
     Raises:
-        MessageRefused: it is not within the bounds.
+        MessageRefused: it is outside the bounds.
     """
     try:
         value = float(text)
@@ -107,18 +107,18 @@ def parse_rate(text: str, name: str, least: float, most: float) -> float:
 
 
 class ProgramSocket:
-    """One program's websocket: what waits to be sent, and what it controls.
+    """Websocket of one program: the messages that wait to be sent, and what it controls.
 
-    States that it does not read in time are replaced by newer ones; of events and answers the
-    oldest are dropped.
+    States that the program does not read in time are replaced by newer ones. If too many events
+    or answers wait, the oldest are dropped.
 
     Args:
         rate_hz: rate of states, 0 for none.
-        events: whether it receives events.
+        events: whether the program receives events.
 
     Attributes:
-        news: set when there is something to send; alive: when the program has answered a ping.
-        controls_as: name under which it controls the head, "" if it does not.
+        news: set when a message waits; alive: set when the program has answered a ping.
+        controls_as: name under which the program controls the head, "" if it does not.
     """
 
     def __init__(self, rate_hz: float, events: bool) -> None:
@@ -132,13 +132,14 @@ class ProgramSocket:
         self.controls_as = ""
 
     def wanted_hz(self) -> float:
-        """Return the rate at which it needs the state of the head."""
+        """Return the rate at which the program needs the state of the head."""
         return max(self._rate_hz, _EVENTS_HZ if self._events or self._open else 0.0)
 
     def add_news(self, news: HeadNews, now_s: float) -> None:
-        """Take news that it wants."""
+        """Store the news that the program wants."""
         period_s = self._period_s
-        if period_s and now_s >= self._due_s - 0.25 * period_s:  # early is better than much later
+        # A little early is better than one period late
+        if period_s and now_s >= self._due_s - 0.25 * period_s:
             self._due_s = max(self._due_s, now_s - 0.5 * period_s) + period_s
             self._state = news.state
             self.news.set()
@@ -173,7 +174,7 @@ _Handler = Callable[["ProgramRoutes", web.Request], Awaitable[web.StreamResponse
 
 
 def _answer_refusals(handler: _Handler) -> _Handler:
-    """Return a handler that answers a bad message with its reason."""
+    """Return a handler that answers a refused message with the reason."""
 
     async def answer(programs: "ProgramRoutes", request: web.Request) -> web.StreamResponse:
         try:
@@ -188,10 +189,10 @@ class ProgramRoutes:
     """Routes for programs; used in the door's event loop.
 
     Args:
-        relay: to the rig.
+        relay: relay to the rig.
         stop: receives stops, before all other requests.
         over: set when the page closes.
-        headers: of all answers.
+        headers: headers of all answers.
     """
 
     def __init__(
@@ -207,7 +208,7 @@ class ProgramRoutes:
         self._limits = TabLimits(MOST_PROGRAMS)
 
     def add_to(self, router: web.UrlDispatcher, connections: Callable[[], Connections]) -> None:
-        """Add the routes; ``connections`` are those of the door, once it is open."""
+        """Add the routes; ``connections`` returns those of the door, once it is open."""
         self._connections = connections
         router.add_get(f"{BASE}/state", self._state)
         router.add_post(f"{BASE}/do", self._post)
@@ -238,7 +239,8 @@ class ProgramRoutes:
         if message.get("do") != "stop" and not self._is_within_rate():
             raise MessageRefused(BUSY, 429)
         if takes_control(message) and message.get("for_s") is not None:
-            message["stay"] = True  # it ends by its time; a request has no connection to lose
+            # The order ends after its duration; a request has no connection that could be lost
+            message["stay"] = True
         return await self._forward_request(message, wait_s)
 
     async def _forward_request(self, message: dict[str, Any], wait_s: float = 0.0) -> web.Response:
@@ -375,7 +377,7 @@ class ProgramRoutes:
     async def _carry_out(
         self, program: ProgramSocket, orders: "asyncio.Queue[dict[str, Any]]"
     ) -> None:
-        """Send a program's messages to the rig, in their order."""
+        """Send a program's messages to the rig, in order."""
         while True:
             message = await orders.get()
             answer = await self._send_to_rig(message)
@@ -393,7 +395,8 @@ class ProgramRoutes:
     async def _renew(self, socket: web.WebSocketResponse, program: ProgramSocket) -> None:
         """Ping a program in control; each answer renews its control.
 
-        One that hangs or does not read loses it within a second, as one that has gone.
+        A program that hangs or does not read loses control within a second, like one that has
+        disconnected.
         """
         while True:
             await asyncio.sleep(0.25 * HEARTBEAT_S)
@@ -405,7 +408,7 @@ class ProgramRoutes:
                 await program.alive.wait()
             answer = await self._relay.ask({"do": "renew", "who": who})
             if "refused" in answer and BUSY_WORDS not in answer["refused"]:
-                program.controls_as = ""  # another client is in control, or none
+                program.controls_as = ""  # another client, or no client, is in control
 
     # --- the rig ------------------------------------------------------------------------
 
@@ -416,7 +419,7 @@ class ProgramRoutes:
         """Send a message to the rig, a stop by its own channel; return the answer."""
         if message.get("do") != "stop":
             return await self._relay.ask(message)
-        # The command socket adds the process to the name; whoever stopped may resume.
+        # The command socket adds the process to the name; the client that stopped may resume.
         who = f"{message['who']} (process {os.getpid()})"
         try:
             text = await self._stop.send(f"{message.get('why', '')!s:.100}", who)
@@ -427,7 +430,7 @@ class ProgramRoutes:
 
 
 def _add_client(message: dict[str, Any], request: web.Request) -> dict[str, Any]:
-    """Return a message with the name of its program, which it may choose, and the address."""
+    """Return a message with the program's address and its name, which the program may choose."""
     kind = ORDERS.get(str(message.get("do")))
     if kind is None or "who" not in kind._fields:
         return message

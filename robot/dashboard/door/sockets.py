@@ -13,12 +13,12 @@ from gazerig.robot.dashboard.requests.outbox import TokenBucket
 from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
-"""Messages of one browser; a person who drags with two hands sends some 60 a second."""
+"""Rate limit of one browser's messages; dragging with two hands sends about 60 a second."""
 BYTES_PER_S, BYTES_BURST = 1e6, 4e6
 TAKES_S = 20.0
 """Timeout of sending to a browser, s; it reconnects after it is disconnected."""
 _CLOSES_WITHIN_S = 1.0
-"""Timeout of a browser's answer to the closing message, s."""
+"""Timeout for a browser's answer to the closing message, s."""
 
 Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
@@ -39,10 +39,10 @@ async def relay_in(browser: web.WebSocketResponse, inside: Socket) -> None:
 
 
 async def relay_out(inside: Socket, browser: web.WebSocketResponse) -> None:
-    """Relay the server's messages, as fast as the browser reads them.
+    """Relay the server's messages, no faster than the browser reads them.
 
     Raises:
-        TimeoutError: it takes nothing any more.
+        TimeoutError: the browser reads no more messages.
     """
     async for message in inside:
         async with asyncio.timeout(TAKES_S):
@@ -116,11 +116,11 @@ async def _send_text(socket: web.WebSocketResponse, text: str) -> None:
 
 
 _PAUSE_S = 0.04
-"""Time between messages to a browser, s: 25 a second, more cannot be read."""
+"""Time between messages to a browser, s: 25 a second; nobody could read more."""
 
 
 class WidgetSocket:
-    """Sends the panels to browsers, to each as fast as it reads them."""
+    """Sends the panels to browsers, to each no faster than it reads them."""
 
     def __init__(self, widgets: Widgets) -> None:
         self._widgets = widgets

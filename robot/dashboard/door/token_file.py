@@ -1,4 +1,4 @@
-"""A page's token that survives restarts, in a file that only its owner can read."""
+"""Token of a page that survives restarts, in a file that only its owner can read."""
 
 import os
 import re
@@ -10,15 +10,15 @@ from gazerig.drivers.errors import SetupError
 
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{22,200}")
 _KINDS = 8
-"""Fewest different characters: 22 of hexadecimal digits have fewer once in 10,000 files."""
+"""Fewest different characters; 22 random hexadecimal digits have fewer in one of 10,000 files."""
 _CURE = "remove it, and the next start writes a new one"
 
 
 def read_token(path: Path) -> str:
-    """Return the token in a file; a file that is not there gets a new one.
+    """Return the token in a file; if the file does not exist, write a new token.
 
     Raises:
-        SetupError: others may read the file or it is theirs, or its token is too weak.
+        SetupError: other users can read or own the file, or its token is too weak.
     """
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)

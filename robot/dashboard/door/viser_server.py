@@ -1,8 +1,8 @@
 """Viser server behind the page's door, and the door's proxy to it.
 
 Viser draws the 3-D view in a frame of the page. It authenticates no client: on a port of the
-loopback every user of the machine, and every page that is open in a browser here, could talk to it
-past the door. So it listens on a Unix socket that no other user can reach.
+loopback every user of the machine, and every page that is open in a browser here, could connect to
+it and bypass the door. So it listens on a Unix socket that no other user can reach.
 """
 
 import asyncio
@@ -37,19 +37,19 @@ from gazerig.robot.dashboard.requests.pointer_to_look import ViewCamera
 BROWSER_HEADER = "X-Gazerig-Browser"
 """Header with the name of a websocket's browser."""
 KEY_HEADER = "X-Gazerig-Key"
-"""Header with the key by which a server on a port recognises the door."""
+"""Header with the key by which a server on a TCP port recognises the door."""
 HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX")
 TO_BROWSER_BYTES = 1 << 25
 """Longest message to a browser, bytes."""
 FROM_BROWSER_BYTES = 1 << 20
-"""Longest message from a browser, bytes; those of the page's script have some kB."""
+"""Longest message from a browser, bytes; messages of the page's script have a few kB."""
 
 
 class ViewAddress(NamedTuple):
     """Address of the server, for the door.
 
-    path: of its Unix socket; None: it listens on a port of the loopback
-    key: what must be shown there with each request, as others could reach a port
+    path: path of its Unix socket; None: it listens on a port of the loopback
+    key: key that each request to that port must contain, because other users can reach it
     """
 
     path: Path | None
@@ -60,10 +60,10 @@ class ViewAddress(NamedTuple):
 def open_server(socket_path: Path) -> tuple[viser.ViserServer, ViewAddress]:
     """Open a server on a new Unix socket, in a folder of this user only.
 
-    On a system without such sockets it uses a port of the loopback and answers only with a key.
+    On a system without Unix sockets it uses a port of the loopback and requires a key.
 
     Raises:
-        OSError: the socket cannot be made.
+        OSError: the socket cannot be created.
     """
     inside = ViewAddress(socket_path)
     if not HAS_SOCKET_FILES:
@@ -99,9 +99,9 @@ def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
 
 @contextlib.contextmanager
 def _listening_inside(inside: ViewAddress) -> Iterator[None]:
-    """Within the block, make viser's server, which supports only ports, listen only for the door.
+    """Within the block, make viser's server, which supports only ports, serve only the door.
 
-    It listens on a socket file, or on its port for requests with the key.
+    It listens on a socket file, or accepts only requests with the key on its port.
     """
     serve = websocket_server.serve
 
@@ -136,7 +136,7 @@ MOST_TABS = 16
 
 _OWN_TAGS = b'<link rel="stylesheet" href="/rig/view.css"><script src="/rig/view.js"></script>'
 _HEAD_END = b"</head>"
-_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each receives the whole state, which takes a moment
+_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each tab receives the whole state, which takes a moment
 # Headers of a single connection, which a proxy must not forward (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _PLAIN = {"Accept-Encoding": "identity"}
@@ -199,7 +199,7 @@ class ViewProxy:
         self._tab_rate = TokenBucket(_TABS_PER_S, _TABS_BURST)
 
     async def get(self, request: web.Request) -> web.StreamResponse:
-        """Return a file of viser; its document gets the page's style and script for the view."""
+        """Return a file of viser; add the page's style and script for the view to its document."""
         async with self._client.get(_address("http", request), headers=_PLAIN) as inside:
             body = await inside.read()
             headers = {k: v for k, v in inside.headers.items() if k.lower() not in _ONE_LEG}

@@ -13,7 +13,7 @@ from gazerig.robot.model.intrinsics import project
 
 IMAGE_WIDTH_PX = 640
 NEAREST_M, FARTHEST_M = 0.3, 6.0
-"""Ends of the colour scale of the depth image: an arm's reach and the end of a room."""
+"""Ends of the colour scale of the depth image: an arm's reach and the length of a room."""
 
 _JPEG_QUALITY = 80
 _FACE = (120, 220, 90)  # BGR
@@ -39,10 +39,10 @@ def draw_detections(
 
     image: the camera's image, None if the source has none: a dark background
     gaze_px: gaze point of the rig in the full image, pixels; None draws none
-    lens: of the full image; it places the blobs
+    lens: lens of the full image; it places the blobs
     faces: whether faces, landmarks and blobs are drawn
-    heat_px: points (n, 2) of the full image that the gaze has been on; None draws none
-    Returns an image of at most IMAGE_WIDTH_PX; the one given is left as it is.
+    heat_px: past gaze points (n, 2) in the full image, pixels; None draws none
+    Returns an image at most IMAGE_WIDTH_PX wide; the input is not changed.
     """
     scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
     drawn = _shrink(image, detections, scale)
@@ -109,14 +109,14 @@ def no_pictures_image() -> ImageArray:
 
 
 def depth_image(depth_m: Depth) -> ImageArray:
-    """Return distances as colours, at most IMAGE_WIDTH_PX wide, with their scale at the foot.
+    """Return distances as colours, at most IMAGE_WIDTH_PX wide, with a colour scale at the bottom.
 
     depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
-    blue FARTHEST_M or more; equal ratios of distance are equal steps of colour.
+    blue FARTHEST_M or more; the colour scale is logarithmic.
     """
     scale = min(1.0, IMAGE_WIDTH_PX / depth_m.shape[1])
     size = (max(1, round(depth_m.shape[1] * scale)), max(1, round(depth_m.shape[0] * scale)))
-    # Not averaged: no surface is between a hand and the wall behind it.
+    # No averaging: no surface is at the mean distance of a hand and the wall behind it.
     small = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
     known = np.isfinite(small)
     metres = np.clip(np.where(known, small, FARTHEST_M), NEAREST_M, FARTHEST_M)
@@ -163,13 +163,13 @@ def _pixel(x: float, y: float, scale: float) -> Point:
 
 
 def _clip(value: float) -> int:
-    """Round; OpenCV draws nothing sensible at coordinates beyond 16 bits."""
+    """Round and limit; OpenCV draws wrongly at coordinates beyond 16 bits."""
     return round(min(max(value, -30_000.0), 30_000.0))
 
 
 _SMALL = 8  # pixels of the image for each pixel of the map
 _BLUR = 2.6  # in pixels of the map
-_FULL = 0.05  # of the map's blurred seconds: there it is hottest
+_FULL = 0.05  # blurred seconds of the map at which the colour is hottest
 _STRONGEST = 0.62
 
 

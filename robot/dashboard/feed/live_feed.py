@@ -1,7 +1,7 @@
 """State of a running rig as the page shows it, computed in the page's process from ticks.
 
-Everything that is only shown is worked out here, at the page's rate: words, eye movements, the pose
-that was commanded, what was found drawn into the camera's image. The control loop sends plain
+All data that is only shown is computed here, at the page's rate: texts, eye movements, the
+commanded pose, and the camera image with the detections drawn in. The control loop sends plain
 ticks, and other data (``RunState``) when it has changed.
 """
 
@@ -53,13 +53,14 @@ from gazerig.robot.model.types import Level, LoopFigures, OtherHead, Snapshot
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
-"""First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, one with
+"""First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, and a frame
+with
 its pixels."""
 
 _DRAWING_SHARE = 0.1
-"""Largest share of a processor for pictures of a simulated camera that delivers none."""
+"""Largest share of a processor for drawing images of a simulated camera that delivers none."""
 _NEAREST_M = 0.05
-"""Smallest distance from the plane of the camera of points in the image, m."""
+"""Smallest distance of drawn points from the plane of the camera, m."""
 
 
 class LiveRig(NamedTuple):
@@ -67,9 +68,9 @@ class LiveRig(NamedTuple):
 
     emulated: whether its servos are emulated and not being calibrated
     picture: draws the image of a simulated camera; None without one, or if it returns images
-    world: how the simulated world about the rig looks; None without one
-    detector: what finds faces and people, and what it lacks; "" if none runs
-    choice: what was chosen for this computer, in one line; "" if nothing was measured
+    world: appearance of the simulated world around the rig; None without one
+    detector: detector of faces and people, and what it lacks; "" if none runs
+    choice: settings chosen for this computer, in one line; "" if nothing was measured
     """
 
     rate_hz: float
@@ -91,12 +92,12 @@ class ShownWorld(NamedTuple):
 class RunState(NamedTuple):
     """State of a run that ticks do not contain.
 
-    errors: of the bus, by kind; behaviour, conversation, character: the present ones
+    errors: errors of the bus, by kind; behaviour, conversation, character: the present ones
     residual: see ``ResidualFigures``
-    scene_start_s: when a simulated scene or world began, None before that and without one
+    scene_start_s: start of a simulated scene or world, None before it and without one
     others: the other heads of the same world, as fields of ``OtherHead``
-    timing: the loop's own figures, as fields of ``LoopFigures``; None: unknown. Ticks that a busy
-        page did not take would look late in the page's own.
+    timing: the loop's own figures, as fields of ``LoopFigures``; None: unknown. In the page's own
+        figures, ticks that a busy page did not accept would appear late.
     expression: the present one, "" without any
     """
 
@@ -115,11 +116,11 @@ class FrameHeader(NamedTuple):
     """Detections of a frame that are drawn, and properties of its image.
 
     faces: box, landmarks and confidence; blobs: id, kind, position and radius
-    people: box, middle of the head, size of the trunk and confidence
-    conditions: why the camera sees badly
-    lens: by which the frame was located, else as the camera reports it: fx, fy, cx, cy in pixels
-        and five numbers of distortion
-    shape, dtype: of the array in the memory that goes along; None, "" without one
+    people: box, centre of the head, size of the trunk and confidence
+    conditions: reasons for poor detection
+    lens: the one with which the frame was located, else the one that the camera reports: fx, fy,
+        cx, cy in pixels and five distortion coefficients
+    shape, dtype: those of the array in the attached memory; None, "" without one
     depth: whether it is the depth image; wants_depth: whether depth should be shown
     """
 
@@ -151,7 +152,7 @@ def state_message(state: RunState) -> bytes:
 def frame_message(
     found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
 ) -> bytes:
-    """Return a message with what was found in a frame; see ``FrameHeader``."""
+    """Return a message with the detections of a frame; see ``FrameHeader``."""
     lens = found.located.intrinsics if found.located is not None else found.lens
     head = FrameHeader(
         found.captured_s,
@@ -174,7 +175,7 @@ def frame_message(
 def frame_with_pixels(
     found: Detections, array: NDArray[Any], depth: bool, wants_depth: bool
 ) -> bytes:
-    """Return a message like ``frame_message`` with the pixels in it: no memory goes along."""
+    """Return a message like ``frame_message`` that contains the pixels: no memory is attached."""
     image = PassedImage(-1, array.shape, array.dtype.str)
     head = frame_message(found, image, depth, wants_depth)[1:]
     return PIXELS + len(head).to_bytes(4, "little") + head + np.ascontiguousarray(array).tobytes()
@@ -185,9 +186,9 @@ class LiveFeed:
 
     emulated: whether the servos are emulated; False before the first message
     choice: see ``LiveRig``
-    choices: what is wanted in the camera's image
-    watched: someone sees the images; otherwise none is drawn
-    shown_s: the time of what is shown: of the newest tick, or of a recording's snapshot
+    choices: layers selected for the camera image
+    watched: whether a browser shows the images; otherwise none is drawn
+    shown_s: time of the shown data: of the newest tick, or of a recording's snapshot
     """
 
     def __init__(self) -> None:
@@ -213,7 +214,7 @@ class LiveFeed:
     def handle_message(self, message: bytes, fd: int = -1) -> bool:
         """Handle a message of one of the kinds above; return False for others.
 
-        Only ever fed by the process that started this one.
+        Messages must come from the process that started this one.
         """
         kind, body = message[:1], message[1:]
         if kind == TICKS:
@@ -229,7 +230,8 @@ class LiveFeed:
             self._builder.retune(rig.rate_hz)
             self.emulated, self.choice = rig.emulated, rig.choice
             self._picture, self._detector = rig.picture, rig.detector
-            # Sent again with every change of the rig; what is equal stays, for it is drawn already.
+            # Sent again with every change of the rig; equal parts are kept, because they are
+            # already drawn.
             if pickle.dumps(rig.world) != pickle.dumps(self._world):
                 self._world = rig.world
         elif kind == DETECTED:
@@ -287,7 +289,7 @@ class LiveFeed:
         if _has_no_image(found) and begin_s < found.captured_s < end_s:
             return None
         self._new_frame = False
-        assert builder.rig is not None  # it came with the first message
+        assert builder.rig is not None  # it was in the first message
         field_rad = builder.rig.horizontal_rad
         lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
         R, p_m = builder.rig.mount.pose(*poses.head_pose(found.captured_s))
@@ -367,13 +369,13 @@ def _has_no_image(found: Detections) -> bool:
 
 
 def gaze_pixel(point_m: Vec3, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:
-    """Return where in the image of a camera at (R, p_m) a gaze point is, None when it is behind."""
+    """Return the gaze point in the image of a camera at (R, p_m), None if it is behind it."""
     found = project_points(np.array([point_m]), R, p_m, lens).tolist()
     return (found[0][0], found[0][1]) if found else None
 
 
 def project_points(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floats:
-    """Return where points (n, 3) are in the image of a camera at (R, p_m); without those behind."""
+    """Return points (n, 3) in the image of a camera at (R, p_m), without those behind it."""
     seen: Floats = (points_world_m - np.array(p_m)) @ np.array(R)
     return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
 
@@ -383,7 +385,7 @@ GAZE_KEPT_S = 2.0
 
 
 class GazeHistory:
-    """Gaze points of the last seconds, for frames that arrive later than they were captured."""
+    """Gaze points of the last seconds, for frames that arrive after their capture."""
 
     def __init__(self) -> None:
         self._points: deque[tuple[float, Vec3]] = deque()
@@ -449,12 +451,12 @@ class OverlayChoices:
 
 
 class News(NamedTuple):
-    """Messages that waited on the socket: all snapshots, the last frame, whether it has closed.
+    """Messages that waited on the socket: all snapshots, the last frame, and whether it has closed.
 
-    jpeg: a recording's frame; image: a running rig's, with what was found in it, BGR
-    world: the simulated world about the rig, if there is one
-    shape: how the rig is built, if it is known
-    others: what must not be lost or passed over, as (kind, what its JSON holds), oldest first
+    jpeg: frame of a recording; image: frame of a running rig with its detections, BGR
+    world: the simulated world around the rig, if any
+    shape: geometry of the rig, if known
+    others: messages that must not be lost or skipped, as (kind, content of the JSON), oldest first
     """
 
     snapshots: tuple[Snapshot, ...]
@@ -467,9 +469,9 @@ class News(NamedTuple):
 
 
 def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
-    """Return everything that waits, without waiting for more.
+    """Return all messages that wait, without waiting for more.
 
-    live: takes what a running rig sends
+    live: receives the messages of a running rig
     """
     snapshots: list[Snapshot] = []
     others: list[tuple[bytes, object]] = []

@@ -1,10 +1,9 @@
 """Page process: shows the running rig on a web page and never delays the control loop.
 
 The page is a process of its own (``gazerig.robot.dashboard.page_main``), fed through a socket pair
-with frozen values. Every call here returns at once: what the page cannot take is dropped and
-counted, and a page that is slow, stopped or dead changes nothing for the caller. The
-page ends when this side of the socket closes, so it never outlives the program, however
-that ends.
+with frozen values. Every call here returns immediately: data that the page cannot accept is dropped
+and counted, and a page that is slow, stopped or dead does not affect the caller. The page ends when
+this side of the socket closes, so it never outlives the program, however the program ends.
 """
 
 import json
@@ -41,7 +40,7 @@ from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 # The first byte of a message is its kind. To the page: a snapshot and a frame of a
 # recording, menus, the parameters, their values, a reply or a message to all users, the position
-# of a replay; what a running rig sends is in live_feed.py.
+# of a replay; the messages of a running rig are in live_feed.py.
 SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
@@ -50,7 +49,7 @@ TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
 ONCE_VARIABLE = "GAZERIG_PAGE_ONCE"
 """Environment variable with a token that opens the page once, "" for none."""
 FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
-"""Environment variable with a folder of this user only, for its server's socket."""
+"""Environment variable with a folder that only this user can read, for the socket of its server."""
 COMMANDS_VARIABLE = "GAZERIG_PAGE_COMMANDS"
 """Environment variable with the path of the rig's command socket, "" for none."""
 CANNOT_OPEN = 3
@@ -68,22 +67,22 @@ OnRequest = Callable[[dict[str, object]], str | None]
 _CLOSE_TIMEOUT_S = 2.0
 _CHECK_S = 0.25  # between two checks that the process neither hangs nor was suspended
 _HANG_S = 5.0
-"""Time without a message after which a page that receives snapshots hangs, s."""
+"""Time without a message after which a page that receives snapshots counts as hung, s."""
 _LAST_LINES_BYTES = 4096
 _MOST_PIXELS = 1 << 23  # of a message that contains images
-_MOST_WORDS = 20_000  # of one answer, in characters
-_MAX_PENDING = 100  # answers to a page that takes none
+_MOST_WORDS = 20_000  # length of one answer, in characters
+_MAX_PENDING = 100  # waiting answers to a page that accepts none
 _AGAIN_AFTER_S = 0.5
 _AGAIN_LATEST_S = 30.0
 _WELL_AFTER_S = 60.0  # after this time the wait before a restart is short again
 _TOKEN_BYTES = 16
 
 SHOWN_EVERY_S = 0.0095
-"""Snapshots closer together than some 10 ms are passed over: 100 a second show a saccade of
-40 ms as a slope. A little under 10 ms, so that rounding does not turn it into 15."""
+"""Snapshots less than about 10 ms apart are skipped: 100 a second show a saccade of 40 ms as a
+slope. The value is a little below 10 ms, so that rounding does not turn it into 15 ms."""
 
-# A frozen dataclass with slots is pickled field by field in Python; taking all fields at
-# once, by names found ahead, costs a third of that.
+# A frozen dataclass with slots is pickled field by field in Python; reading all fields in one
+# call, by names found in advance, costs a third of that.
 _PLAIN = tuple(field.name for field in fields(Snapshot) if field.name not in ("faces", "bodies"))
 _plain_values = attrgetter(*_PLAIN)
 _face_values = attrgetter(*(field.name for field in fields(SeenFace)))
@@ -91,7 +90,7 @@ _body_values = attrgetter(*(field.name for field in fields(SeenBody)))
 
 
 def encode_snapshot(snapshot: Snapshot) -> bytes:
-    """Write a snapshot as one message."""
+    """Encode a snapshot as one message."""
     faces = [_face_values(face) for face in snapshot.faces]
     bodies = [_body_values(body) for body in snapshot.bodies]
     values = (_plain_values(snapshot), faces, bodies)
@@ -99,7 +98,7 @@ def encode_snapshot(snapshot: Snapshot) -> bytes:
 
 
 def decode_snapshot(message: bytes) -> Snapshot:
-    """Read a message of ``encode_snapshot``, which must come from the parent process."""
+    """Decode a message of ``encode_snapshot``, which must come from the parent process."""
     values, faces, bodies = pickle.loads(memoryview(message)[1:])
     return Snapshot(
         **dict(zip(_PLAIN, values, strict=True)),
@@ -111,13 +110,13 @@ def decode_snapshot(message: bytes) -> Snapshot:
 class PageProcess:
     """Live page, for the control loop.
 
-    ``show`` belongs to one thread; everything else may be called from any.
+    Only one thread may call ``show``; any thread may call the other methods.
 
-    A page process that dies is started again, at the same address, after a while that grows.
+    A page process that dies is restarted at the same address, after a wait that grows.
 
-    dropped: snapshots and ticks the page did not take; frames_dropped: the same for frames
-    started: how often the page has come up; its feed starts again when this changes
-    gone: it has ended and is not started again
+    dropped: snapshots and ticks that the page did not accept; frames_dropped: the same for frames
+    started: number of starts of the page; its feed starts again when this changes
+    gone: whether it has ended and is not restarted
     """
 
     def __init__(
@@ -174,7 +173,8 @@ class PageProcess:
     def _begin(self) -> None:
         """Start a process and connect to it."""
         links = message_link.create_links(2)
-        # A file: the page's messages matter only if it dies, and a pipe without a reader fills.
+        # A file: the page's messages matter only if it dies, and a pipe without a reader would fill
+        # up.
         self._errors = _errors_file()
         self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
         try:
@@ -202,7 +202,7 @@ class PageProcess:
     def join(self, link: MessageLink, stops: MessageLink | None = None) -> None:
         """Use these links from now on; ``open`` creates them with a process at the other ends.
 
-        stops: for stops alone
+        stops: link for stops only
         """
         link.setblocking(False)
         self._socket = link
@@ -227,7 +227,7 @@ class PageProcess:
             self.dropped += 1
 
     def show_frame(self, jpeg: bytes) -> None:
-        """Send an encoded camera image with the detections drawn in."""
+        """Send an encoded camera image into which the detections are drawn."""
         if not self.send(FRAME + jpeg):
             self.frames_dropped += 1
 
@@ -248,14 +248,14 @@ class PageProcess:
     def send(self, message: bytes, fd: int = -1) -> bool:
         """Send an encoded message; return False if the page does not accept it now.
 
-        fd: goes along, unless it is -1; it stays the caller's
+        fd: file descriptor to send with it, -1 for none; the caller still owns it
         """
         page = self._socket
         if page is None or len(message) > (MESSAGE_BYTES if CAN_PASS else _MOST_PIXELS):
             return False
         try:
             send(page, message, fd)
-        except OSError:  # full, gone, or just closed by close()
+        except OSError:  # its buffer is full, it has ended, or close() has just closed it
             return False
         return True
 
@@ -264,14 +264,14 @@ class PageProcess:
         return self._url
 
     def url_once(self) -> str | None:
-        """Return an address that opens the page once, for a program that is handed it.
+        """Return an address that opens the page once, to pass to a program as an argument.
 
         All users of this computer can read a program's arguments.
         """
         return self._url and self._url.replace(self._token, self._once)
 
     def notice(self) -> str | None:
-        """Return the next line for the terminal, each one once."""
+        """Return the next line for the terminal; each line is returned once."""
         return self._notices.popleft() if self._notices else None
 
     def _take(self, message: bytes) -> None:
@@ -330,7 +330,7 @@ class PageProcess:
         if process is not None:
             try:
                 code = process.wait(_CLOSE_TIMEOUT_S)
-            except subprocess.TimeoutExpired:  # it has closed its link and hangs
+            except subprocess.TimeoutExpired:  # it has closed its link but hangs
                 code = None
         self.gone = code == CANNOT_OPEN
         if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
@@ -352,18 +352,18 @@ class PageProcess:
             self._end_process()
             try:
                 self._begin()
-            except OSError as error:  # no memory, no processes, no files
+            except OSError as error:  # out of memory, processes or files
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
 
     def _kill_if_hung(self) -> None:
         """Kill and restart a page that hangs or is suspended: its STOP button may not work.
 
-        One that is still starting, without an address, does not hang.
+        A page that is still starting and has no address does not count as hung.
         """
         now_s, process = self._clock.now_s(), self._process
         if now_s < self._check_s or process is None or process.returncode is not None:
             return
-        # If no check ran, the whole machine may have been suspended: not all of it counts.
+        # If no check ran, the whole machine may have been suspended: count only part of that time.
         looked_s = min(now_s - self._check_s + _CHECK_S, 2.0 * _CHECK_S)
         self._silent_s = self._silent_s + looked_s if self._url is not None else 0.0
         self._check_s = now_s + _CHECK_S
@@ -401,7 +401,7 @@ class PageProcess:
         if self._errors is not None:
             self._errors.close()
             self._errors = None
-        shutil.rmtree(self._folder, ignore_errors=True)  # it may have been killed
+        shutil.rmtree(self._folder, ignore_errors=True)  # close() may have killed it
 
 
 def _errors_file() -> BinaryIO:

@@ -1,7 +1,7 @@
 """Publisher of a running robot to the page, in the loop's thread: ticks and changes.
 
-Nothing is worked out here that is only shown: the page's process makes of the ticks what people
-see (robot/dashboard/feed/live_feed.py). Other data is sent when it has changed.
+Data that is only shown is not computed here but in the page's process, from the ticks
+(robot/dashboard/feed/live_feed.py). Other data is sent when it has changed.
 """
 
 import json
@@ -30,17 +30,17 @@ from gazerig.robot.model.commands import Command, Tune, Value
 
 _FRAME_S = 0.08
 _STATE_S = 0.3
-_PIECE = 40  # parameters in a message: some 20 kB, a tenth of the limit
+_PIECE = 40  # parameters in a message: about 20 kB, a tenth of the limit
 
 
 class ParamFeed:
     """Sends the parameters to the page, and after that all changes.
 
-    The first messages are written by the constructor: it takes a moment, so make it before the
+    The constructor writes the first messages. This takes a moment, so construct it before the
     torque is on.
 
     Args:
-        send: sends a message to the page; False: not now.
+        send: sends a message to the page; returns False if the page does not accept it now.
         tuning: the parameters.
     """
 
@@ -70,9 +70,10 @@ class ParamFeed:
             self._due.popleft()
 
     def _write(self) -> None:
-        """Create messages: all parameters the first time, then changed values."""
+        """Create messages: first with all parameters, then with changed values."""
         first = self._version is None
-        self._version = self._tuning.version  # before reading: a change meanwhile is seen next
+        # Before reading, so that a change in the meantime is sent next
+        self._version = self._tuning.version
         if first:
             params = [to_plain(param._asdict()) for param in self._tuning.parameters()]
             for start in range(0, len(params), _PIECE):
@@ -93,9 +94,9 @@ class ParamFeed:
 
 
 class ParamThread:
-    """Lets a thread send the parameters: writing them takes milliseconds, which a tick has not.
+    """Sends the parameters in a thread: writing them takes milliseconds, too long for a tick.
 
-    It waits until there is something to send.
+    The thread waits until there is data to send.
     """
 
     def __init__(self, feed: ParamFeed, tell: Callable[[str], None]) -> None:
@@ -148,8 +149,8 @@ class Publisher:
 
     Args:
         page: the page.
-        rig: returns how the rig is built now.
-        state: Returns the state that ticks do not contain.
+        rig: returns the present geometry of the rig.
+    state: returns the state that ticks do not contain.
         feed: sends the parameters to the page.
         tell: Prints a line on the terminal, such as the page's address.
         browse: opens an address in the user's browser, once; None: leaves that to the user.
@@ -179,7 +180,7 @@ class Publisher:
         self._images = False
 
     def process_commands(self, commands: Iterable[Command]) -> None:
-        """Process executed commands: tuning may have changed the rig's geometry."""
+        """Process executed commands; a tuned parameter may have changed the rig's geometry."""
         if any(isinstance(command, Tune) for command in commands):
             self.resend_geometry()
 
@@ -199,7 +200,7 @@ class Publisher:
             self._tell(note)
         new = page.started != self._started
         if new:
-            # Send everything to a new page: only the one before has received it.
+            # Send everything to a new page: only the previous page has received it.
             if self._params is not None and self._started:
                 self._params.restart()
             self._started = page.started
@@ -225,7 +226,7 @@ class Publisher:
         return taken and not new  # a new page needs the present percept
 
     def close(self) -> None:
-        """Send no more parameters."""
+        """Stop sending parameters."""
         if self._params is not None:
             self._params.close()
 
@@ -237,7 +238,7 @@ class Publisher:
         depth = self.depth and found.depth_m is not None
         array = found.depth_m if depth else found.image
         if array is None and self._images:
-            return  # its slot has been written again
+            return  # its slot has been overwritten
         if array is None:
             self._page.show_detections(frame_message(found, None, False, self.depth))
             return

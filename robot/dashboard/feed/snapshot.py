@@ -1,4 +1,4 @@
-"""Snapshot of a tick for people: words and shapes of the page."""
+"""Snapshot of a tick for people: texts and shapes of the page."""
 
 from collections import Counter, deque
 from dataclasses import replace
@@ -39,7 +39,7 @@ from gazerig.robot.model.types import (
 )
 
 _TICKS_KEPT = 600
-"""Largest number of waiting ticks: three seconds, if the reader is delayed."""
+"""Largest number of waiting ticks: those of three seconds, for a delayed reader."""
 _TRAIL_S = 0.0095
 """Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
 _TIMING_S = 0.5
@@ -50,7 +50,7 @@ _GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "torque_off": 3}
 class ShownRig(NamedTuple):
     """Geometry of a rig as it is shown.
 
-    shape: of all its parts; None where only its kinematics are known
+    shape: geometry of all its parts; None if only its kinematics are known
     """
 
     kinematics: Kinematics
@@ -83,7 +83,7 @@ class SnapshotTexts(NamedTuple):
 class SnapshotBuilder:
     """Creates snapshots of a running rig, with all events since the previous one.
 
-    ``update`` only keeps the tick; ``build`` does the work.
+    ``update`` only stores the tick; ``build`` does the work.
     """
 
     def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
@@ -143,7 +143,7 @@ class SnapshotBuilder:
         reasons = plain.reasons
         others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
         if busy and len(others) < len(reasons):
-            reasons = (*others, busy)  # a busy computer is why readings are old
+            reasons = (*others, busy)  # old readings are due to a busy computer
         return replace(
             plain,
             character=said.character,
@@ -172,7 +172,7 @@ def snapshot(
 ) -> Snapshot:
     """Return the snapshot of a single tick.
 
-    rig: how it is built, for the commanded pose, the camera and the servos' limits
+    rig: geometry of the rig, for the commanded pose, the camera and the servos' limits
     """
     pose, percept, target = tick.pose, tick.percept, tick.target
     does, leads = head_activity(tick), tick_control_source(tick)
@@ -262,7 +262,7 @@ def _faces(tick: Tick) -> tuple[SeenFace, ...]:
 
 
 def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
-    """Return targets without a visible face: moving things and people who are turned away."""
+    """Return targets without a visible face: moving objects and people who are turned away."""
     if tick.percept is None:
         return ()
     bodies = tick.percept.bodies

@@ -17,7 +17,7 @@ _BECAUSE = {
 _LEAST_TOLD, _SHARE_TOLD = 0.005, 0.1
 """Smallest salience, and smallest share of the largest, of terms in the text."""
 _LEAST_FULL = 1.0
-"""Salience of a bar over the whole panel; the highest salience if that is more."""
+"""Salience of a bar as wide as the panel; the highest salience if that is larger."""
 
 
 def target_text(snapshot: Snapshot) -> str:
@@ -40,7 +40,7 @@ def target_text(snapshot: Snapshot) -> str:
 def reason_text(snapshot: Snapshot) -> str:
     """Return the reason for the target as text, e.g. "because it moves (translation 0.38)".
 
-    During manual control, or without saliences, it is the rig's own reason.
+    During manual control, or without saliences, return the rig's own reason.
     """
     if snapshot.control_source.overrides_gaze or not snapshot.saliences:
         return snapshot.why

@@ -73,12 +73,12 @@ class Controls:
         self._jog.show(snapshot)
 
     def record_answer(self, who: str) -> None:
-        """Record that the rig has answered a browser's change."""
+        """Record the rig's answer to a browser's change."""
         self._tuning.record_answer(who)
 
 
 class GazeTargetPanel:
-    """Controls of the gaze, with a target to drag through the scene, and menus."""
+    """Controls of the gaze: menus, and a target that can be dragged through the scene."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class GazeTargetPanel:
         self.free.on_press(look_freely)
         self.let_go = look_freely
 
-        # A coroutine: viser runs these in order, plain functions in any order.
+        # A coroutine: viser runs coroutines in order, but plain functions in any order.
         @self._gizmo.on_update
         async def look_at_gizmo(event: viser.TransformControlsEvent) -> None:
             x, y, z = map(float, event.target.position)
@@ -165,7 +165,7 @@ class GazeTargetPanel:
         return self.menus[name]
 
     def show(self, snapshot: Snapshot) -> None:
-        """Mark the present choices; the target to drag starts at the gaze target."""
+        """Mark the present choices; the draggable target starts at the gaze target."""
         self._target_m = snapshot.p_world_target_m
         in_force = {
             BEHAVIOUR: snapshot.behaviour,
@@ -220,7 +220,7 @@ class FirstMenus:
             menu.on_press(ask)
 
     def show(self, shown: Mapping[str, Buttons]) -> None:
-        """Mark the same present choices as other menus."""
+        """Mark the present choices, like the other menus."""
         for name, menu in self.menus.items():
             if name in shown:
                 menu.current = shown[name].current
@@ -297,7 +297,7 @@ _NO_JOINTS = "this rig has none of the joints that it moves"
 def refused_moves(
     menus: Mapping[str, Sequence[str]], joints: Sequence[str] | None
 ) -> dict[str, str]:
-    """Return button -> reason of the buttons that this rig cannot do.
+    """Return button -> reason for the buttons whose action this rig cannot do.
 
     Args:
         menus: Menus of the rig; empty before they are received.
@@ -322,7 +322,7 @@ _FIRST, _LAST = 1, 100
 _FOLLOWS_DEG = 0.15
 """Step in which a slider follows its joint, deg."""
 _FREE_AFTER_S = 0.5
-"""Time after which a joint with another desired angle counts as no longer jogged, s."""
+"""Time with another desired angle after which a joint no longer counts as jogged, s."""
 _SAME_DEG = 0.3
 ESTIMATED = "estimated from the goals, not measured: the servos give no feedback"
 
@@ -378,7 +378,7 @@ class JogPanel:
         self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Update the sliders of joints that are not jogged, and list joints without measurement."""
+        """Update the sliders of joints that are not jogged; list joints that are not measured."""
         if snapshot.t_s < self._now_s:  # the rig's clock was restarted
             self._held.clear()
         self._now_s = snapshot.t_s

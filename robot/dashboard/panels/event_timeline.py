@@ -153,7 +153,7 @@ def _axes() -> Iterable[str]:
 def _band(
     row: str, stretch: _Interval, now_s: float, high: float, colour: str, label: str
 ) -> Iterable[str]:
-    """Return one interval as a bar, with its name if it fits."""
+    """Return one interval as a bar, with its name if there is space."""
     x0, x1 = _x(stretch.start_s, now_s), _x(stretch.end_s, now_s)
     says = PART_NAMES.get(stretch.what, stretch.what)
     yield box(x0, _ROWS_PX[row], x1 - x0 - 0.3, high, colour, says)

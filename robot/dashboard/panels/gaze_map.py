@@ -1,4 +1,4 @@
-"""Heat map of the gaze on the faces that the rig looks at, accumulated during the run."""
+"""Heat map of the gaze on the faces that the rig fixates, accumulated during the run."""
 
 from functools import cache
 
@@ -20,7 +20,7 @@ WIDE_PX, HIGH_PX = WIDTH_PX // SHRINK, HEIGHT_PX // SHRINK
 _PLANE_M = -0.028
 """x coordinate in the face's frame of a plane between nose tip and eyes, m."""
 _SPREAD_M = 0.0085
-"""Width of half a degree at 1 m, about the fovea, m."""
+"""Width of half a degree, about the size of the fovea, at 1 m, in m."""
 _LONGEST_GAP_S = 0.2
 _LONGEST_FORESEEN_S = 0.3
 _FAINT, _PLAIN, _COVER = 0.02, 0.45, 0.82

@@ -26,7 +26,7 @@ _ESTIMATED = ("estimated, not measured", "estimated")
 
 
 class ChartGroup(NamedTuple):
-    """Joints of which the mean is drawn."""
+    """Joints whose mean angle is drawn."""
 
     title: str
     joints: tuple[str, ...]
@@ -91,7 +91,7 @@ def chart_groups(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
 class JointSeries:
     """Joint angles of the last half minute.
 
-    joints: their names; estimated: those that are not measured
+    joints: names of the joints; estimated: joints that are not measured
     """
 
     def __init__(self) -> None:
@@ -110,7 +110,8 @@ class JointSeries:
                 self._rows.clear()
             self._rows.append(row)
         while len(self._rows) > 1 and self._rows[-1].t_s - self._rows[1].t_s >= TRACE_S:
-            self._rows.popleft()  # one older row fills the axis
+            # Keep one older row, so that the lines start at the edge of the axis
+            self._rows.popleft()
 
     def table(self, over_s: float) -> tuple[Floats, Floats]:
         """Return the last seconds, thinned to MOST_POINTS: times and joints.
@@ -128,7 +129,7 @@ class JointSeries:
 
 
 def mean_deg(angles_deg: Floats, group: ChartGroup, joints: tuple[str, ...]) -> Floats:
-    """Return desired, commanded and measured (n, 3) of a group, from those of the joints."""
+    """Return the mean desired, commanded and measured angles (n, 3) of a group."""
     mean: Floats = angles_deg[:, :, [joints.index(name) for name in group.joints]].mean(axis=2)
     return mean
 
@@ -162,7 +163,7 @@ class JointCharts:
             chart.draw(x, dict(zip(chart.names(), columns, strict=True)))
 
     def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
-        """Create the charts of these groups; True: the values of a group are estimated."""
+        """Create the charts of these groups; True: the values of the group are estimated."""
         for chart in self.charts:
             chart.remove()
         shown = [(*line, "&#8212;") for line in _COMMANDS]

@@ -1,4 +1,4 @@
-"""Panels of the drawer Watch that are one file each.
+"""Panels of the drawer Watch, each in one file.
 
 A panel is a subclass of ``PagePanel``, in a module of this folder or behind an entry point of the
 group ``gazerig.page_panel``.
@@ -22,7 +22,7 @@ from gazerig.robot.model.types import Snapshot
 class PagePanel(ABC):
     """A section of the page's drawer Watch.
 
-    The page's process constructs it without arguments, and again when a run starts again.
+    The page's process constructs it without arguments, once more whenever a run restarts.
 
     Attributes:
         title: Title of the section.
@@ -42,7 +42,7 @@ class PagePanel(ABC):
 
     @abstractmethod
     def drawing(self) -> str:
-        """Return the section as HTML without scripts; called once in ``period`` frames."""
+        """Return the section as HTML without scripts; called once every ``period`` frames."""
 
 
 def core_panels() -> Iterator[type[PagePanel]]:
@@ -59,7 +59,7 @@ def core_panels() -> Iterator[type[PagePanel]]:
 class PagePanels:
     """All panels of the drawer Watch; ``begin`` constructs them.
 
-    A panel that raises shows the reason and is dropped.
+    A panel that raises an exception shows the reason and is dropped.
     """
 
     def __init__(self, place: Container) -> None:
@@ -87,7 +87,7 @@ class PagePanels:
         for part, html in self._shown:
             try:
                 self._panels[html] = part()
-            except Exception as error:  # a package's code may do anything
+            except Exception as error:  # code of a package may raise anything
                 html.content = note(f"the panel has failed: {describe_error(error)}")
 
     def update(self, snapshot: Snapshot) -> None:

@@ -86,7 +86,7 @@ class PanelView:
     def update(self, snapshots: tuple[Snapshot, ...]) -> None:
         """Add snapshots to traces and statistics, also those that are not drawn.
 
-        One with an earlier time than the last, after a restart, resets all.
+        A snapshot with an earlier time than the last one, after a restart, resets all.
         """
         if snapshots:
             self.silence.content = ""
@@ -139,7 +139,7 @@ class PanelView:
 
 
 def estimation_note(snapshot: Snapshot) -> str:
-    """Return a note that eye movements are estimated, "" if they are measured."""
+    """Return a note that the eye movements are estimated, "" if they are measured."""
     if not any("eye" in joint for joint in snapshot.estimated):
         return ""
     return note(

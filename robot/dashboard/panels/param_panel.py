@@ -1,7 +1,7 @@
 """Parameters as controls, separately in each browser, one group at a time.
 
-A rig has some five hundred parameters. Their controls are built when a group is chosen or
-it is searched for, never all: a browser takes seconds to build all of them.
+A rig has about five hundred parameters. Controls are built only for the chosen group or for the
+results of a search: a browser takes seconds to build all of them.
 """
 
 import json
@@ -22,7 +22,7 @@ Put = Callable[[str, object], None]
 
 _SLIDER_STEPS = 500
 _FAR = 20.0
-"""Ratio of range to value from which a number is typed instead of set by a slider."""
+"""Ratio of range to value above which a number is typed instead of set by a slider."""
 
 
 def param_tooltip(param: Parameter) -> str:
@@ -40,9 +40,9 @@ def param_tooltip(param: Parameter) -> str:
 
 
 def param_label(param: Parameter, unsaved: bool, title: str = "") -> str:
-    """Return a control's label: a mark if it is unsaved, its name and its unit.
+    """Return the label of a control: a mark if the value is unsaved, its name and its unit.
 
-    title: plain name, without a unit; "": the last parts of the key
+    title: plain name without a unit; "": use the last parts of the key
     """
     unit = f" ({param.unit})" if param.unit and not title else ""
     name = title or ".".join(param.key.split(".")[-2:])
@@ -50,7 +50,7 @@ def param_label(param: Parameter, unsaved: bool, title: str = "") -> str:
 
 
 def slider_step(low: float, high: float) -> float:
-    """Return a slider's step: 1, 2 or 5 times a power of ten, some hundreds in the range."""
+    """Return the step of a slider: 1, 2 or 5 times a power of ten, some hundred in the range."""
     fine = (high - low) / _SLIDER_STEPS
     ten = 10.0 ** floor(log10(fine))
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
@@ -60,7 +60,7 @@ def fits_slider(param: Parameter, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
     if param.kind not in ("number", "whole") or isinstance(value, bool):
         return False
-    if param.optional and param.default is None:  # a slider cannot be set to null
+    if param.optional and param.default is None:  # a slider cannot be null
         return False
     low, high = param.low, param.high
     if low is None or high is None or not low < high or not isinstance(value, int | float):
@@ -70,7 +70,7 @@ def fits_slider(param: Parameter, value: object) -> bool:
 
 
 def format_value(param: Parameter, value: object) -> str:
-    """Return a value as a person types it: text unchanged, other values as in the file."""
+    """Return a value as a person would type it: text unchanged, other values as in the file."""
     if isinstance(value, str) and param.kind in ("text", "choice"):
         return value
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
@@ -82,7 +82,7 @@ def parse_value(param: Parameter, text: str) -> object:
     """Parse text that a person typed.
 
     Raises:
-        ValueError: it is not of the parameter's kind; the message describes valid values.
+        ValueError: the type is wrong; the message describes valid values.
     """
     text = text.strip()
     if param.optional and text in ("null", ""):
@@ -148,7 +148,7 @@ class ParamControl:
         return place.text(text, shown, hint=f"{tooltip}; Enter sets it", order=order)
 
     def _ask(self, shown: object) -> None:
-        """Request what a person has set: the choice of a name, the value of a text, or a value."""
+        """Request the value that a person has set: a chosen name, a typed text, or a number."""
         value = next((c for c in self.param.choices if str(c) == shown), shown)
         if isinstance(self.field, TextField):
             try:
@@ -327,7 +327,7 @@ class ParamPanel:
             self._refresh()
 
     def record_answer(self) -> None:
-        """Record that the rig has applied or refused a change."""
+        """Record whether the rig has applied or refused a change."""
         self._unanswered = max(0, self._unanswered - 1)
         if not self._unanswered:
             self._refresh()

@@ -1,7 +1,7 @@
 """Panel of a recording: a time slider, play and pause, speed, steps, events.
 
-Input of users goes to the rig's process, which plays. This panel shows only the state that it
-returns, so that every browser shows the same.
+Input of users is sent to the rig's process, which plays the recording. This panel shows only the
+state that the process returns, so that every browser shows the same.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +25,7 @@ _PLAY, _PAUSE = "play", "pause"
 
 
 class ReplayView:
-    """Controls of a recording that is shown."""
+    """Controls of a shown recording."""
 
     def __init__(self, place: Container, tell: Tell, duration_s: float) -> None:
         self._tell = tell
@@ -66,14 +66,15 @@ class ReplayView:
     def show(self, state: Mapping[str, Any]) -> None:
         """Show the player's state, as gazerig.robot.recording.playback sends it.
 
-        Once there are also marks, counts along the recording by kind, and events, (at_s, words).
+        The first state also contains marks, which are counts along the recording by kind, and
+        events, (at_s, words).
         """
         if (marks := state.get("marks")) is not None:
             self.strip.content = event_strip(marks)
         if (events := state.get("events")) is not None:
             self._events = [(float(at_s), str(text)) for at_s, text in events]
         at_s, sought_s = float(state["at_s"]), state["sought_s"]
-        # The played position lags behind a slider that is being moved and must not reset it.
+        # The played position lags behind a slider that a user moves, and must not reset it.
         if self._asked_s is None or sought_s == self._asked_s:
             self._asked_s = None
             self.slider.value = min(round(at_s, 3), self._duration_s)
@@ -90,13 +91,13 @@ class ReplayView:
 def event_strip(marks: Mapping[str, Sequence[int]]) -> str:
     """Return the density of saccades, blinks and events along the recording, as SVG.
 
-    marks: counts of equal shares of the recording, by kind
+    marks: counts in equal parts of the recording, by kind
     """
     bars = ""
     for kind, colour, top, height in _ROWS:
         counts = marks.get(kind, ())
         most, width = max(counts, default=0), _WIDTH / max(len(counts), 1)
-        bars += "".join(  # darker for parts of the recording with more marks
+        bars += "".join(  # darker for parts with more marks
             f"<rect x='{i * width:.1f}' y='{top}' width='{width:.1f}' height='{height}' "
             f"fill='var(--{colour})' fill-opacity='{0.25 + 0.75 * n / most:.2f}'/>"
             for i, n in enumerate(counts)

@@ -1,8 +1,8 @@
 """Measures and charts of the present run's eye movements, with the ranges of people.
 
-They are computed from the eye movements in the snapshots. The report of a recording computes these
-and more from every tick; its bands are used here. Mean dwell times on the parts of a face are those
-of Nakamoto & Tsuruno, table 1.
+The measures are computed from the eye movements in the snapshots. The report of a recording
+computes these and more from every tick; its ranges are also used here. Mean dwell times on the
+parts of a face are those of Nakamoto & Tsuruno, table 1.
 """
 
 from collections import Counter, defaultdict, deque
@@ -133,7 +133,7 @@ MEASURED_MEAN_S = dict(zip(PARTS, DWELL_MEAN_S, strict=True))
 """Mean dwell times of a person, s (Nakamoto & Tsuruno, table 1)."""
 
 BIN_S, BINS = 0.1, 12
-"""Width, s, and number of the bins; the last also has all longer fixations."""
+"""Width, s, and number of the bins; the last one also counts all longer fixations."""
 
 _ROW_PX, _ROWS_TOP_PX = 23.0, 18.0
 _SHARE_PX, _SHARE_WIDE_PX = 70.0, 78.0
@@ -224,7 +224,7 @@ _SMALL_PEAK_DEG, _SMALL_DURATION_DEG, _LARGE_DEG = 8.0, 12.0, 15.0
 _SOON_S, _PAUSE_S = 0.1, 2.0
 _LEAST_RATE_S = 60.0
 _SURE = 1.96
-"""Distance to a range, in standard errors, that is chance in one of twenty cases."""
+"""Distance to a range, in standard errors, that occurs by chance in one of twenty cases."""
 _TALKING = ("talk", "listen", "think")
 
 HOW_TO = note(
@@ -235,7 +235,7 @@ HOW_TO = note(
 
 
 class RunFigure(NamedTuple):
-    """Measure: its value and its number of events."""
+    """Measure: its value and the number of events."""
 
     key: str
     value: float
@@ -246,7 +246,7 @@ class RunFigures:
     """Counter of eye movements since the start."""
 
     def __init__(self) -> None:
-        self._inside: dict[str, list[int]] = {}  # key -> number inside, total number
+        self._inside: dict[str, list[int]] = {}  # key -> number inside the range, total number
         self._first_s: float | None = None
         self._now_s = 0.0
         self._blinks = self._saccades = 0
@@ -318,7 +318,7 @@ class RunFigures:
 def compare_with_band(figure: RunFigure, band: NormBand) -> str:
     """Return the relation of a measure to the range of people as text.
 
-    As in the report, a measure is not called outside if its distance may be chance.
+    As in the report, a measure does not count as outside if the difference may be chance.
     """
     if figure.events < band.min_events:
         return f"too few: {figure.events} of {band.min_events}"

@@ -14,7 +14,7 @@ _HARD_LOAD = 0.9
 _LATE_SHARE = 0.5
 
 NO_FEEDBACK = "no feedback"
-"""Text in the place of values that a servo does not report."""
+"""Text instead of values that a servo does not report."""
 
 
 def health_table(snapshot: Snapshot) -> str:
@@ -168,7 +168,7 @@ _STANDS_STILL = {
     "torque_off": "guard: torque off - joints are released",
 }
 OLD_FRAME_S = 0.5
-"""Age from which a frame is old, s; the guard stops the neck at three times that."""
+"""Age above which a frame is old, s; the guard stops the neck at three times that age."""
 
 
 def alarms(snapshot: Snapshot) -> str:
@@ -206,7 +206,8 @@ def no_data_text() -> str:
 def group_reasons(reasons: tuple[str, ...]) -> str:
     """Return each reason once, with its first joint and the number of others.
 
-    For example "too fast (neck_yaw, +2)": a short limitation must not move the elements below it.
+    For example "too fast (neck_yaw, +2)": the text stays short, so that a brief limitation does not
+    move the elements below it.
     """
     joints: dict[str, list[str]] = {}
     for reason in reasons:
@@ -219,7 +220,7 @@ def group_reasons(reasons: tuple[str, ...]) -> str:
 
 
 def one_line(text: str) -> str:
-    """Return text that is cut at the panel's edge, with all of it as tooltip."""
+    """Return text that is cut off at the panel's edge, with the full text as tooltip."""
     said = escape(text)
     return f"<div class='line' title='{said}'>{said}</div>"
 
@@ -232,7 +233,7 @@ def no_feedback_note(snapshot: Snapshot) -> str:
     torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
     without_torque = sum(not torque.get(joint, True) for joint in estimated)
     where = "shown where they should be"
-    if without_torque:  # a finger moves them, and no sensor sees it
+    if without_torque:  # a finger can move them without being measured
         where += f"; {'all' if without_torque == len(estimated) else without_torque} without torque: may be anywhere"
     return (
         f"<div class='warn'>{len(estimated)} of "

@@ -1,8 +1,8 @@
 """Inbox of the page's requests, outside the control loop; urgent ones are handled first.
 
-One thread waits on the socket and handles commands the moment they come, so that a stop is
-executed at the next tick. Slow requests, such as the check of a changed parameter, are
-handled by a second thread, and a stop never waits for them.
+One thread waits on the socket and handles commands as soon as they arrive, so that a stop is
+executed at the next tick. A second thread handles slow requests, such as the check of a changed
+parameter, and a stop never waits for them.
 """
 
 import contextlib
@@ -18,17 +18,17 @@ from gazerig.robot.model.commands import COMMANDS
 REQUEST = b"t"
 """First byte of a request of a user of the page."""
 BEAT = b"b"
-"""Complete message of a page that draws and serves browsers."""
+"""Complete message by which a page reports that it draws and serves browsers."""
 PICTURE = b"j"
 """First byte of an image of a browser's webcam."""
 MESSAGE_BYTES = 200_000
-"""Longest message, bytes; a socket's default send buffer in Linux has 212,992."""
+"""Longest message, bytes; the default send buffer of a socket in Linux has 212,992."""
 
 _URGENT = tuple(f'{{"do":"{name}"'.encode() for name in COMMANDS if name != "tune")
 _CHANGE = b'{"do":"set",'
 _OVER = b""
 _MOST_WAITING = 100
-"""Largest number of requests that wait for the slow thread; one more is refused."""
+"""Largest number of requests that wait for the slow thread; further ones are refused."""
 _CHANGES_EVERY_S = 0.1
 """Time between changes, s; each takes a few ms of the processor from the control loop."""
 _CLOSE_TIMEOUT_S = 2.0
@@ -37,7 +37,7 @@ _CLOSE_TIMEOUT_S = 2.0
 def request_message(who: str, data: bytes) -> bytes:
     """Return the message with a request of a user.
 
-    who: a word that comes back with the answer
+    who: name that is returned with the answer
     data: a JSON object, compact (no blanks between its parts), its "do" first
     """
     return REQUEST + who.encode() + b" " + data
@@ -74,11 +74,11 @@ class Inbox:
         lost: Callable[[], None],
         refuse: Callable[[bytes], None] | None = None,
     ) -> None:
-        """Listen at once.
+        """Start listening.
 
         take: called with each message, commands in one thread and the rest in another
-        refuse: called with each message that is dropped, as too many wait
-        lost: called once when the other side is gone, unless this side was closed first
+        refuse: called with each message that is dropped because too many wait
+        lost: called once when the other side has closed, unless this side was closed first
         """
         self._link = link
         self._take = take
@@ -100,7 +100,7 @@ class Inbox:
                 message = self._link.recv(MESSAGE_BYTES)
             except BlockingIOError:
                 continue
-            except OSError:  # reset by a page that died, or closed here
+            except OSError:  # reset because the page died, or closed here
                 message = b""
             if not message:
                 break
@@ -128,7 +128,7 @@ class Inbox:
         while waiting[0]:
             while len(waiting) < _MOST_WAITING and not self._later.empty():
                 waiting.append(self._later.get())
-            # A dragged slider sends more than can be checked: only its last value counts.
+            # A dragged slider sends more values than can be checked: only the last one counts.
             message = waiting.pop(0)
             if not any(is_superseded(message, later) for later in waiting if later):
                 self._take(message)
@@ -143,7 +143,7 @@ class Inbox:
         try:
             self._link.shutdown(socket.SHUT_RDWR)  # wakes the thread that waits on it
         except OSError:
-            return  # the other side was quicker
+            return  # the other side has already closed it
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(_CLOSE_TIMEOUT_S)

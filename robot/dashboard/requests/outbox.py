@@ -15,16 +15,16 @@ from gazerig.robot.remote.socket_io import parse_json
 DOOR = "door"
 """Name of the sender for the stop button and clicks in the image."""
 ASKED_BYTES = 2048
-"""Longest request, bytes; a stop with its reason has a hundred."""
+"""Longest request, bytes; a stop with a reason has about a hundred."""
 _LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
 _SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
 """Commands with the name of the client."""
 _PER_S, _BURST = 100.0, 200.0
-"""Rate limit of all browsers together; dragging sends some 20 changes a second."""
+"""Rate limit of all browsers together; dragging sends about 20 changes a second."""
 
 
 class Outbox:
-    """Sends requests over the page's socket; from any thread."""
+    """Sends requests over the page's socket; safe to call from any thread."""
 
     def __init__(
         self,
@@ -54,13 +54,13 @@ class Outbox:
         """Send an image of a browser's webcam; return False if the rig does not accept it."""
         try:
             self._feed.send(PICTURE + jpeg, DONT_WAIT)
-        except OSError:  # full, gone, or too long
+        except OSError:  # the buffer is full, the rig has ended, or the message is too long
             return False
         return True
 
     def send_heartbeat(self) -> None:
-        """Tell the rig that this page is alive."""
-        with contextlib.suppress(OSError):  # full, or gone
+        """Report to the rig that this page is alive."""
+        with contextlib.suppress(OSError):  # the buffer is full, or the rig has ended
             self._feed.send(BEAT, DONT_WAIT)
 
     def forward(self, data: bytes, who: str = DOOR) -> bool:
@@ -72,17 +72,17 @@ class Outbox:
         try:
             # A rig that accepts nothing must not delay other requests.
             self._feed.send(message, DONT_WAIT)
-        except OSError:  # full, or closed: then the page ends
+        except OSError:  # the buffer is full, or the socket has closed; then the page ends
             return False
         return True
 
 
 def add_client(body: bytes | str, who: str) -> dict[str, object] | None:
-    """Return a request with the browser's name written in, None if it is not valid.
+    """Return a request with the browser's name added, None if it is not valid.
 
     Args:
-        body: as it came
-        who: the name of the browser; what it calls itself in the request is overwritten
+        body: the request as received
+        who: name of the browser; it replaces a name in the request
     """
     try:
         asked = parse_json(body)
@@ -115,14 +115,14 @@ class TokenBucket:
         self._left, self._at_s = burst, -1.0
 
     def take(self, now_s: float, amount: float = 1.0) -> bool:
-        """Take tokens; return whether any were left before."""
+        """Take tokens; return whether any token was left before."""
         if self.wait_s(now_s) > 0.0:
             return False
         self._left -= amount
         return True
 
     def wait_s(self, now_s: float) -> float:
-        """Return the time until there is a token, s."""
+        """Return the time until a token is available, s."""
         if self._at_s >= 0.0:
             gained = max(0.0, now_s - self._at_s) * self._per_s
             self._left = min(self._burst, self._left + gained)

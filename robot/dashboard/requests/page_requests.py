@@ -29,7 +29,7 @@ PAGE = "the page"
 """Name of the sender if a browser sends none."""
 
 Point = Callable[[float, float], Vec3 | None]
-"""Place in the image, 0..1 from the left and from the top -> point in the world."""
+"""Position in the image, 0..1 from the left and from the top -> point in the world."""
 
 
 class PageRequestHandler:
@@ -37,14 +37,14 @@ class PageRequestHandler:
 
     Args:
         command: executes commands.
-        params: the parameters; None: there are none to change.
-        point: the point in the world under a position in the image; None: there is no image.
+        params: parameters that can be changed; None: there are none.
+        point: returns the point in the world at a position in the image; None: there is no image.
         steer: handles a steering button; None: there are no buttons.
         replay: controls a replay; None: there is none.
         depth: switches the depth image on or off; None: there is none.
-        refusals: what ``params`` raises if a value breaks a rule, besides ValueError.
-        saved: called with each file that was written.
-        paths: which files may be named; None: any.
+        refusals: exceptions besides ValueError that ``params`` raises for values that break a rule.
+        saved: called with each written file.
+        paths: permitted files; None: any.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class PageRequestHandler:
                     case QuestionAnswer(list(found)) if verb == "differs":
                         lines = [f"{c['key']}: {c['new']} (default {c['old']})" for c in found]
                         return "\n".join(lines) or "all is as by default"
-                return None  # the page gets these by other messages
+                return None  # the page receives these in other messages
             case {"pick": {"x": int() | float() as x, "y": int() | float() as y, **rest}}:
                 if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
                     raise ValueError(
@@ -128,7 +128,7 @@ class PageRequestHandler:
             return f"refused: {reply.refused}"
         if not reply.limited:
             return None
-        # One message is enough for a while if a user drags a target out of reach.
+        # If a user drags a target out of reach, send only one message per interval.
         now_s = self._clock.now_s()
         if now_s - self._limited_s < _SAID_EVERY_S:
             return None
@@ -137,7 +137,7 @@ class PageRequestHandler:
 
 
 class _CommandSink:
-    """Robot of which the page only uses the commands."""
+    """Robot interface of which the page only uses the commands."""
 
     def __init__(self, take: CommandTaker) -> None:
         self._take = take
@@ -147,11 +147,11 @@ class _CommandSink:
         return self._take(command)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return none: the page receives them separately."""
+        """Return no menus: the page receives them separately."""
         return {}
 
     def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return none: the page receives their names separately."""
+        """Return no gestures: the page receives their names separately."""
         return ()
 
 

@@ -1,8 +1,8 @@
 """Conversion of a pointer over the view, or a click in the image, to a gaze target.
 
-The target of a pointer is between viewer and head: the eyes seem to look at the pointer because
-they look at a point of the line of sight on which the viewer sees it. A pointer controls the gaze
-only while its points arrive: after a second the gaze models take over again.
+The target of a pointer is between viewer and head. The eyes seem to look at the pointer because
+they look at a point on the viewer's line of sight to it. A pointer controls the gaze only while its
+points arrive; one second after the last point the gaze models regain control.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from gazerig.robot.perception.pixel_to_world import PixelToWorld
 PER_S, BURST = 40.0, 40.0
 """Rate limit of points of all browsers together; one sends 20 a second."""
 TOWARDS_HEAD = 0.6
-"""Position of the pointer's plane, as a share of the distance to the head."""
+"""Distance of the pointer's plane, as a fraction of the distance to the head."""
 _NEAREST_M = 0.02
 _GUARD_M: Vec3 = (0.7, 0.0, 0.0)
 _WIDEST, _NARROWEST = 10.0, 0.1  # aspect ratios of the view
@@ -29,7 +29,7 @@ _WIDEST, _NARROWEST = 10.0, 0.1  # aspect ratios of the view
 class ViewCamera(NamedTuple):
     """Camera of a browser's view of the scene.
 
-    R_world_camera: x right, y down, z ahead; fov_rad: from the upper to the lower edge
+    R_world_camera: rotation; x right, y down, z ahead; fov_rad: vertical field of view
     """
 
     p_world_m: Vec3
@@ -38,7 +38,7 @@ class ViewCamera(NamedTuple):
 
 
 class Pointer(NamedTuple):
-    """A pointer over the view: 0..1 from the left and from the top, width by height of the view."""
+    """Pointer over the view: 0..1 from the left and from the top, and the view's aspect ratio."""
 
     x: float
     y: float
@@ -60,9 +60,9 @@ def gaze_target(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> V
     """Return the point in the world, None if the viewer is inside the head.
 
     Args:
-        pointer: over the view.
-        camera: Camera of the view.
-        p_world_eyes_m: the middle between the eyes, world frame.
+        pointer: pointer over the view.
+        camera: camera of the view.
+        p_world_eyes_m: midpoint between the eyes, world frame.
     """
     to_head = sub(p_world_eyes_m, camera.p_world_m)
     if norm(to_head) < _NEAREST_M:
@@ -73,7 +73,8 @@ def gaze_target(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> V
 def opponent_target(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
     """Return the point at a pointer for the opponent's fist, None if that is behind the viewer.
 
-    It is in the plane parallel to the screen through the fist's guard, and within its box.
+    The point is in the plane through the fist's guard position parallel to the screen, and within
+    the fist's box.
     """
     ahead = tuple(row[2] for row in camera.R_world_camera)
     normal = (ahead[0], ahead[1], ahead[2])
@@ -90,13 +91,13 @@ def opponent_target(pointer: Pointer, camera: ViewCamera) -> Vec3 | None:
 def _intersect_plane(
     pointer: Pointer, camera: ViewCamera, normal: Vec3, away: float
 ) -> Vec3 | None:
-    """Return where the line of sight of a pointer meets a plane, None if it does not."""
+    """Return the intersection of a pointer's line of sight with a plane, None if there is none."""
     half = tan(0.5 * camera.fov_rad)
     right, down, ahead = zip(*camera.R_world_camera, strict=True)
     across = scale(right, (2.0 * pointer.x - 1.0) * half * pointer.aspect)
     ray = add(ahead, add(across, scale(down, (2.0 * pointer.y - 1.0) * half)))
     towards = dot(ray, normal)
-    if towards <= 0.0:  # it is behind the viewer
+    if towards <= 0.0:  # the intersection is behind the viewer
         return None
     point = add(camera.p_world_m, scale(ray, away / towards))
     return point if all(map(isfinite, point)) else None
@@ -105,7 +106,7 @@ def _intersect_plane(
 class PointerToLook:
     """Converts pointers to gaze targets; safe to call from any thread.
 
-    p_world_eyes_m: the middle between the eyes, world frame; None before it is known
+    p_world_eyes_m: midpoint between the eyes, world frame; None before it is known
     """
 
     def __init__(
@@ -145,7 +146,7 @@ class PointerToLook:
 class ClickToLook:
     """Stores the newest frame and the pose of the camera at its capture.
 
-    newest: the newest tick, left here by the loop
+    newest: the newest tick, written by the loop
     """
 
     def __init__(self, pixels: PixelToWorld) -> None:

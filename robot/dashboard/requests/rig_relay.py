@@ -1,7 +1,7 @@
 """Relay from the page's process to the command socket of the rig, for programs of the network.
 
-A few connections carry the requests of all programs. The newest state is read while a program
-wants it, at the highest rate that one wants, and given to all.
+A few connections carry the requests of all programs. While any program requests states, the newest
+state is read at the highest requested rate and distributed to all programs.
 """
 
 import asyncio
@@ -21,17 +21,17 @@ from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire,
 
 _THREADS = 4
 _MOST_WAITING = 64
-"""Largest number of requests that wait for an answer; one more is refused."""
+"""Largest number of requests that wait for an answer; further ones are refused."""
 _ANSWER_S, _FILES_S = 10.0, 40.0
 _AGAIN_S = 0.5
 
 Answer = dict[str, Any]
 NO_RIG = "no head takes requests here: it shows a recording, starts or has ended"
 BUSY_WORDS = "too many requests"
-"""Beginning of the rig's refusals and of the page's, if a program sends too much."""
+"""Prefix of the refusals of the rig and of the page if a program sends too much."""
 BUSY = f"{BUSY_WORDS}; try again"
 NEWEST = 10**15
-"""Number above that of any event."""
+"""Number greater than that of any event."""
 
 
 class RigRelay:
@@ -48,7 +48,7 @@ class RigRelay:
         self._waiting = 0
 
     async def ask(self, request: Mapping[str, object]) -> Answer:
-        """Send a request as one of the network; return the rig's answer, "failed" without one."""
+        """Send a request of a network client; return the rig's answer, "failed" without one."""
         if self._path is None:
             return {"failed": NO_RIG}
         if self._waiting >= _MOST_WAITING:
@@ -72,7 +72,7 @@ class RigRelay:
     def _exchange(self, path: Path, request: Mapping[str, object]) -> Answer:
         """Exchange one request and answer; called by a thread."""
         within_s = _FILES_S if request.get("do") in CHANGES else _ANSWER_S
-        # A connection may have been closed meanwhile, as that of the least recently active program.
+        # The rig may have closed this connection as the least recently active one.
         for first in (True, False):
             wire = None
             with suppress(queue.Empty):
@@ -116,21 +116,21 @@ class StateFeed:
         self._after: int | None = None
 
     def add(self, take: Callable[[HeadNews, float], None], rate_hz: Callable[[], float]) -> None:
-        """Give all news to a reader, with the time.
+        """Send all news to a reader, with the time.
 
         Args:
-            take: Receives them; it must not wait.
-            rate_hz: Returns the rate that it wants now, 0 for none.
+            take: receives the news; it must not block.
+            rate_hz: returns the rate that the reader wants now, 0 for none.
         """
         self._readers[take] = rate_hz
         self._wanted.set()
 
     def remove(self, take: Callable[[HeadNews, float], None]) -> None:
-        """Give nothing to a reader any more."""
+        """Stop sending news to a reader."""
         self._readers.pop(take, None)
 
     def wake(self) -> None:
-        """Read again soon: a reader wants more than before."""
+        """Read again soon, because a reader wants a higher rate."""
         self._wanted.set()
 
     async def run(self) -> None:
@@ -139,7 +139,7 @@ class StateFeed:
         while True:
             rate_hz = max((rate() for rate in self._readers.values()), default=0.0)
             if rate_hz <= 0.0:
-                self._after = None  # what happens meanwhile is no news later
+                self._after = None  # events in the meantime are not reported later
                 self._wanted.clear()
                 await self._wanted.wait()
                 continue
@@ -157,7 +157,7 @@ class StateFeed:
             case {"ok": {"state": dict(state), "events": list(events), "number": int(number)}}:
                 known = number if self._after is None else self._after
                 self._after = max([event["number"] for event in events], default=known)
-            case _:  # busy, starting or gone
+            case _:  # the rig is busy, starting or has ended
                 return None
         progress = Progress(
             ControlState(**state["client_control"]),

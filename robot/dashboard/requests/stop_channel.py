@@ -1,7 +1,8 @@
 """Channel for STOPs from the page's process to the rig: a separate socket pair.
 
-All other requests share one socket, which a flood can fill. Only stops use this one, one at a
-time: those that arrive while one is pending get the same answer.
+All other requests share one socket, which a flood of requests can fill. Only stops use this one,
+one
+at a time: stops that arrive while one is pending receive the same answer.
 """
 
 import contextlib
@@ -14,11 +15,11 @@ from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 
 MESSAGE_BYTES = 4096
 _CLOSE_TIMEOUT_S = 2.0
-WORDS = 150  # of who and why, in characters
+WORDS = 150  # length of who and why, in characters
 
 
 class StopListener:
-    """End of the rig: a thread that only waits for stops."""
+    """Rig's end of the channel: a thread that only waits for stops."""
 
     def __init__(self, link: MessageLink, take: Callable[[Mapping[str, object]], str]) -> None:
         """Start listening.
@@ -34,7 +35,7 @@ class StopListener:
         while True:
             try:
                 data = self._link.recv(MESSAGE_BYTES)
-            except OSError:  # reset by a page that died, or closed here
+            except OSError:  # reset because the page died, or closed here
                 data = b""
             if not data:
                 return
@@ -42,12 +43,12 @@ class StopListener:
             answer = [asked.pop("number"), self._take(asked)[:WORDS]]
             try:
                 self._link.send(json.dumps(answer).encode(), DONT_WAIT)
-            except OSError:  # no client waits any more; the stop is executed
+            except OSError:  # no client waits any more; the stop has been executed
                 continue
 
     def close(self) -> None:
         """Stop listening and close the socket."""
-        with contextlib.suppress(OSError):  # the other side was quicker
+        with contextlib.suppress(OSError):  # the other side has already closed it
             self._link.shutdown(socket.SHUT_RDWR)  # wakes the thread that waits on it
         if self._thread is not threading.current_thread():
             self._thread.join(_CLOSE_TIMEOUT_S)

@@ -1,6 +1,6 @@
-"""End of the page of the stop channel; see gazerig.robot.dashboard.requests.stop_channel.
+"""Page's end of the stop channel; see gazerig.robot.dashboard.requests.stop_channel.
 
-The process of the loop has the other end, and imports no event loop.
+The other end is in the process of the control loop, which imports no event loop.
 """
 
 import asyncio
@@ -14,7 +14,7 @@ _ANSWERED_WITHIN_S = 1.0
 
 
 class StopSender:
-    """End of the page, in the event loop that serves the browsers."""
+    """Page's end of the channel, in the event loop that serves the browsers."""
 
     def __init__(self, link: MessageLink) -> None:
         link.setblocking(False)
@@ -31,7 +31,7 @@ class StopSender:
         if self._waiting is None:
             self._number += 1
             stop = {"number": self._number, "do": "stop", "why": why[:WORDS], "who": who[:WORDS]}
-            # It may be full of stops, which a rig that hangs receives when it resumes.
+            # The buffer may be full of stops; a rig that hangs receives them when it resumes.
             with contextlib.suppress(BlockingIOError):
                 self._link.send(json.dumps(stop).encode())
             self._waiting = asyncio.get_running_loop().create_future()
@@ -39,7 +39,7 @@ class StopSender:
         try:
             return await asyncio.wait_for(asyncio.shield(waiting), _ANSWERED_WITHIN_S)
         except TimeoutError:
-            if self._waiting is waiting:  # the next one sends again
+            if self._waiting is waiting:  # the next call sends again
                 self._waiting = None
             raise OSError("the rig does not answer") from None
 

@@ -1,7 +1,7 @@
-"""Shapes with colours by vertex and a surface finish, as binary glTF that browsers draw.
+"""Shapes with vertex colours and a surface finish, as binary glTF for browsers.
 
-All but the eyes are lit here, once, as under the lights of the scene, so that a browser without a
-graphics card need not light every pixel of every picture.
+All shapes but the eyes are lit here, once, by the lights of the scene, so that a browser without a
+graphics card does not have to light every pixel of every frame.
 """
 
 import json
@@ -36,8 +36,8 @@ class Light(NamedTuple):
 
 SKY, GROUND, SKY_INTENSITY = (255, 250, 244), (186, 170, 166), 2.1
 """Ambient light: colours from above and from below."""
-# The key light comes from above and the head's left, where a window would be; then there is a
-# fill from the right, and a light from behind.
+# The key light comes from above and the head's left, like a window; a fill light comes from the
+# right, and a third light from behind.
 LIGHTS = (
     Light((0.9, 0.75, 1.25), (255, 244, 228), 2.6),
     Light((0.8, -1.2, 0.25), (214, 228, 255), 0.9),
@@ -50,10 +50,10 @@ _TO_EYE = np.array((0.88, -0.47, 0.07))
 class Finish(NamedTuple):
     """Reflection of a surface.
 
-    shine: how bright its reflection of a light is; tight: how small that is, an exponent
-    roughness: below 1 the browser lights every pixel, and lights are seen in the surface the
-        smaller the less it is; 1: lit here
-    is_lit: False shows the colours as they are
+    shine: brightness of the highlight of a light; tight: exponent; a larger one makes it smaller
+    roughness: below 1 the browser lights every pixel, and a lower value gives smaller
+        highlights; 1: lit here
+    is_lit: False shows the colours unlit
     """
 
     shine: float = 0.0
@@ -84,7 +84,7 @@ def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
     gain = float(light.max())
     colours = np.ones((len(light), 4))
     colours[:, :3] = light / gain
-    # In glTF the first row of an image is its top, and v grows downwards; trimesh turns v over.
+    # In glTF the first row of an image is its top, and v grows downwards; trimesh inverts v.
     visual: Any = trimesh.visual.TextureVisuals(  # type: ignore[no-untyped-call]
         uv=shape.uv * (1.0, -1.0) + (0.0, 1.0),
         material=trimesh.visual.material.PBRMaterial(  # type: ignore[no-untyped-call]
@@ -114,9 +114,9 @@ def painted_glb(painted: Painted, finish: Finish, pose: Floats | None = None) ->
     """Return a painted mesh as a binary glTF file.
 
     Args:
-        painted: the mesh; colours with a fourth number are translucent.
-        finish: how it answers light.
-        pose: rotation (3, 3) of the mesh in the scene in which it is lit; None: as it is.
+        painted: the mesh; colours with four components are translucent.
+        finish: its reflection of light.
+        pose: rotation (3, 3) of the mesh in the scene when it is lit; None: no rotation.
     """
     mesh, colours, normals = painted
     rgba = np.ones((len(mesh.vertices), 4))
@@ -152,12 +152,12 @@ def shade_colours(colours: Floats, normals: Floats, finish: Finish) -> Floats:
     """Return the colours of surfaces under the scene's lights.
 
     Args:
-        colours: (n, 3), what they reflect, 0..1 in proportion to light.
-        normals: (n, 3) out of them.
-        finish: how they shine.
+        colours: reflectances (n, 3), 0..1, linear.
+        normals: outward normals (n, 3).
+        finish: reflection of the surfaces.
 
     Returns:
-        (n, 3); may exceed 1.
+        Colours (n, 3); may exceed 1.
     """
     up = 0.5 + 0.5 * normals[:, 2:]
     sky, ground = _to_linear(np.array((SKY, GROUND)) / 255.0)
@@ -187,13 +187,13 @@ _TRIANGLES: Final = 4
 def glb_file(
     mesh: Mesh, rgba: npt.NDArray[np.uint8], normals: Floats | None, material: dict[str, Any]
 ) -> bytes:
-    """Return the file.
+    """Return a mesh as a binary glTF file.
 
     Args:
-        mesh: what is drawn.
-        rgba: (n, 4), of the vertices.
-        normals: (n, 3) of the vertices, for what the browser lights.
-        material: as glTF has it.
+        mesh: the mesh.
+        rgba: colours (n, 4) of the vertices.
+        normals: normals (n, 3) of the vertices, for surfaces that the browser lights.
+        material: material in the format of glTF.
     """
     columns: dict[str, tuple[npt.NDArray[Any], int, str]] = {
         "": (mesh.faces.astype("<u4").reshape(-1, 1), _UNSIGNED_INT, "SCALAR"),
@@ -208,7 +208,7 @@ def glb_file(
         bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         normalized = {"normalized": True} if kind == _UNSIGNED_BYTE else {}
         accessors.append({**accessor, "type": shape, **bounds, **normalized})
-        part = values.tobytes()  # every column is of whole words of four bytes
+        part = values.tobytes()  # every column consists of whole words of four bytes
         views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(part)})
         data += part
     attributes = {name: number for number, name in enumerate(columns) if name}
@@ -237,7 +237,7 @@ def glb_file(
 
 
 def glow_disc(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
-    """Return a flat disc of radius 1, facing up, that fades out from its middle."""
+    """Return a flat disc of radius 1, facing up, that fades out from its centre."""
     radius = np.linspace(1.0, 0.0, rings)
     mesh = lathe([(r, 0.0) for r in radius.tolist()])
     alpha = np.repeat(
@@ -248,14 +248,15 @@ def glow_disc(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
 
 
 def add_lights(scene: viser.SceneApi) -> None:
-    """Add the lights; the scene has no background, so that of the page is visible."""
+    """Add the lights; the scene has no background, so that the page's background is visible."""
     scene.world_axes.visible = False
     scene.configure_environment_map(None)
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.add_light_hemisphere(
         "/light/sky", sky_color=SKY, ground_color=GROUND, intensity=SKY_INTENSITY
     )
-    # The light from behind is only for surfaces lit in advance; it does not reach the eyes' front.
+    # The light from behind is only for surfaces lit in advance; it does not reach the front of the
+    # eyes.
     for number, light in enumerate(LIGHTS[:2]):
         scene.add_light_directional(
             f"/light/{number}",

@@ -49,7 +49,7 @@ _SHADE = 4.4
 _LIT_OPEN = 0.7
 """Opening for which upper lids are lit: their usual one."""
 _LIT_LOWER_LID: Mat3 = rotation((0.0, radians(12.0), 0.0))
-"""Rotation by which lower lids are lit as if a little higher; otherwise they look tired."""
+"""Rotation of lower lids for the lighting, as if a little higher; otherwise they look tired."""
 
 
 _FACES_DEG: Mapping[str, tuple[float, float]] = {
@@ -60,7 +60,7 @@ _FACES_DEG: Mapping[str, tuple[float, float]] = {
     "sleepy": (-4.0, 3.0),
     "laugh": (5.0, 9.0),
 }
-"""Brows up and jaw down in an expression or a gesture of this name, as of the rig expressive."""
+"""Brows up and jaw down in an expression or a gesture of this name, as in the rig "expressive"."""
 _DRAWN_ONLY = ("left_brow", "right_brow", "jaw")
 """Joints that are drawn even if the rig does not have them."""
 _FACE_TAU_S = 0.15
@@ -78,7 +78,7 @@ class HeadView:
     """Rig in the scene, with all parts that its joints move.
 
     shape: geometry of the rig; None: derived from snapshots
-    on_table: whether it is on an object of a drawn world, and needs no shade of its own
+    on_table: whether it is on an object of a drawn world and needs no shadow of its own
     lid_edges: positions of the lid edges; without lids before the first snapshot
     """
 
@@ -105,9 +105,9 @@ class HeadView:
         """Move all parts to their measured positions.
 
         Args:
-            snapshot: of the rig.
-            sight: with the lines of sight.
-            camera: with the camera's housing, which else is left out of the face.
+            snapshot: snapshot of the rig.
+            sight: whether to show the lines of sight.
+            camera: whether to show the camera's housing, which otherwise does not cover the face.
         """
         shape = with_shown_face(self.shape) if self.shape is not None else None
         if shape is None:
@@ -133,7 +133,8 @@ class HeadView:
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
         for line, p_world_m in zip(self._sights, snapshot.p_world_eyes_m, strict=True):
             if sight:
-                # As long as the target's distance: the lines meet there only if the eyes fixate it.
+                # Their length is the target's distance: they meet at the target only if the eyes
+                # fixate it.
                 line.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
             line.visible = sight
             if colour != self._colour:
@@ -141,7 +142,7 @@ class HeadView:
         self._colour = colour
 
     def _blend_face(self, snapshot: Snapshot) -> tuple[float, float, float]:
-        """Return the angles of brows and jaw that are drawn only, in radians."""
+        """Return the angles of brows and jaw that are only drawn, in radians."""
         share = 1.0 - exp(-max(0.0, snapshot.t_s - self._face_s) / _FACE_TAU_S)
         self._face_s = snapshot.t_s
         known = (_FACES_DEG[name] for name in snapshot.expressed if name in _FACES_DEG)
@@ -153,9 +154,9 @@ class HeadView:
         return brows, brows, jaw
 
     def _draw(self, description: Description, shape: RigShape) -> None:
-        """Draw a rig; if it has the same links, only those that look different."""
+        """Draw a rig; if it has the same links, draw only those that look different."""
         before, self._description = self._description, description
-        paths: dict[str, str] = {}  # link -> path of its node, in that of its parent
+        paths: dict[str, str] = {}  # link -> path of its node, below that of its parent
         for link in description.links:
             paths[link.name] = f"{paths[link.parent] if link.parent else '/rig'}/{link.name}"
         if self._paths != paths:
@@ -214,9 +215,9 @@ def lid_angles(
     """Return the angles of a rig's lid joints, in radians.
 
     Args:
-        shape: of the rig.
-        upper: how far the left and the right upper lid are open, 0..1.
-        lower: the same for lower lids.
+        shape: geometry of the rig.
+        upper: opening of the left and the right upper lid, 0..1.
+        lower: the same for the lower lids.
     """
     openings = dict(zip(LIDS, (*upper, *lower), strict=True))
     return {
@@ -227,7 +228,7 @@ def lid_angles(
 
 
 def head_dimensions(snapshot: Snapshot) -> HeadMeasures:
-    """Return the measures of the head in a snapshot, from its eyes and the pivot of its neck."""
+    """Return the dimensions of the head in a snapshot, from its eyes and the pivot of its neck."""
     pivot_m = None
     if snapshot.p_world_pivot_m is not None:
         off = sub(snapshot.p_world_pivot_m, snapshot.p_world_head_m)
@@ -240,7 +241,7 @@ class LidEdges(NamedTuple):
     """Elevations above the eye's equator, in radians.
 
     meeting_rad: elevation at which the lids of each side meet
-    span_rad: how far each lid opens from there, by its name
+    span_rad: full opening of each lid from there, by its name
     """
 
     meeting_rad: Mapping[str, float]
@@ -267,8 +268,8 @@ def lid_edges(shape: RigShape) -> LidEdges:
 
 
 _LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
-"""Rotation of shown lids from closed to open, about that of a person. Servos of a small head
-move them less, so that it would always look sleepy."""
+"""Rotation of shown lids from closed to open, about that of a person. Servos of a small head move
+its lids less, so that the head would always look sleepy."""
 _JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
 
 
@@ -286,9 +287,9 @@ def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot
 
 
 def with_shown_face(shape: RigShape) -> RigShape:
-    """Return a rig whose lids have the rotation that is shown, and whose brows and jaw move.
+    """Return a rig whose lids have the shown rotation, and whose brows and jaw move.
 
-    A rig with meshes of its own gets no joints that it does not have.
+    Do not add joints to a rig with its own meshes.
     """
     drawn = {} if shape.meshes else dict.fromkeys(_DRAWN_ONLY, _JOINT)
     shape = shape._replace(joints=drawn | dict(shape.joints))

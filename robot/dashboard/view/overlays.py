@@ -1,4 +1,4 @@
-"""Layers of the page's scene around the rig: desired pose, camera, field of the eyes."""
+"""Layers of the page's scene around the rig: desired pose, camera, fields of the eyes."""
 
 from math import atan, radians, tan
 from typing import NamedTuple
@@ -38,7 +38,7 @@ _FIELD: dict[str, Colour] = {"left": (20, 150, 120), "right": (190, 90, 30)}
 _DEPTH_M = 0.12
 """Distance of the drawn frame from the camera, m."""
 _RADIUS_M = 0.22
-"""Distance of the drawn edge of its field from the eye, m."""
+"""Distance of the drawn edge of the field from the eye, m."""
 _AROUND = 72
 
 
@@ -113,8 +113,8 @@ class EyeFields:
 def field_edge(field_deg: tuple[float, float, float, float], *, left: bool) -> Floats:
     """Return points (72, 3) on the edge of an eye's field in the eye's frame, x ahead, in metres.
 
-    field_deg: limits towards temple, nose, above and below; between two of them the edge is
-    a quarter of an ellipse (gaze.field_of_view)
+    field_deg: limits towards temple, nose, up and down; between two of them the edge is a quarter
+        of an ellipse (gaze.field_of_view)
     """
     temporal, nasal, up, down = np.radians(field_deg)
     turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND  # from the left, towards above
@@ -126,7 +126,8 @@ def field_edge(field_deg: tuple[float, float, float, float], *, left: bool) -> F
 
 _GHOST: Colour = (70, 110, 255)
 _SIGHT = 5.6  # length of its lines of sight, in distances between the eyes
-_SWELL = 0.04  # in distances between the eyes: the ghost's skin is outside the rig's, or both would flicker
+# In distances between the eyes: the ghost's skin is outside the rig's; otherwise both would flicker
+_SWELL = 0.04
 _IRIS_RAD = radians(29.0)
 _APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
 

@@ -32,7 +32,7 @@ _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 
 @lru_cache(maxsize=len(LOOKS))
 def _person_glb(look: int) -> tuple[bytes, bytes]:
-    """Return head and chest of a person's look as files for browsers."""
+    """Return the head and chest of a person as files for browsers."""
     return painted_glb(head(look, _FINENESS), SKIN), painted_glb(torso(look, _CHEST_M), CLOTH)
 
 
@@ -76,7 +76,7 @@ class _Person:
         set_rotation(self._chest, rotation_to((ahead, aside, 0.0)))
 
     def fit(self, size: float) -> None:
-        """Scale the person by a factor on the usual size."""
+        """Scale the person by a factor relative to the usual size."""
         self._head.scale = self._chest.scale = size
 
     def remove(self) -> None:
@@ -85,7 +85,7 @@ class _Person:
 
 
 class _Outline:
-    """Line around a detected face, if the person is drawn by the world."""
+    """Line around a detected face, used if the world draws the person."""
 
     def __init__(self, scene: viser.SceneApi, frame: str) -> None:
         line = ring(_OUTLINE_M, 0.0025)
@@ -98,17 +98,17 @@ class _Outline:
         set_pose(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
 
     def fit(self, size: float) -> None:
-        """Scale it to the measured size of the face."""
+        """Scale the line to the measured size of the face."""
         self._line.scale = (size, 0.8 * size, 1.12 * size)
 
     def remove(self) -> None:
-        """Remove nothing: it is a child of the face's frame."""
+        """Do nothing: the line is removed with the face's frame."""
 
 
 class _FaceView:
-    """Face in the scene, with its name and parts: a person, or marks on one.
+    """Face in the scene, with its name and parts: a person, or marks on a person.
 
-    marks: whether the world draws the person, and the detected face is only marked
+    marks: whether the world draws the person, so that the detected face is only marked
     """
 
     def __init__(self, scene: viser.SceneApi, face: SeenFace, *, marks: bool) -> None:
@@ -129,7 +129,7 @@ class _FaceView:
         )
 
     def show(self, face: SeenFace, p_world_target_m: Vec3, parts: bool) -> None:
-        """Move the person; ``parts``: with marks at the parts, a halo around the one looked at."""
+        """Move the person; ``parts``: mark the face's parts, with a halo at the fixated one."""
         set_pose(self._frame, face.p_world_m, quaternion(face.R_world_face))
         self._label.text = face_label(face)
         from_centre_m = np.array(face.parts_world_m) - face.p_world_m
@@ -162,7 +162,7 @@ class _FaceView:
 class _BodyView:
     """Moving body in the scene: a hand or a ball, and its kind.
 
-    marks: whether the world draws the hand or thing, and its detection is only marked
+    marks: whether the world draws the hand or object, so that its detection is only marked
     """
 
     def __init__(self, scene: viser.SceneApi, body: SeenBody, *, marks: bool) -> None:
@@ -188,7 +188,7 @@ class _BodyView:
         self._shade = None if marks else _Shadow(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
 
     def show(self, body: SeenBody) -> None:
-        """Move it; a hand shows the rig its palm."""
+        """Move the body; the palm of a hand faces the rig."""
         x, y, z = body.p_world_m
         set_pose(self._frame, body.p_world_m)
         set_rotation(self._frame, rotation_to((-x, -y, 0.0)))
@@ -219,7 +219,7 @@ class PeopleView:
         )
 
     def mark_only(self, on: bool) -> None:
-        """Draw only marks of detections, or people, if no world draws them."""
+        """Draw only marks of detections, or also the people if no world draws them."""
         if on != self._as_marks:
             self._as_marks = on
             while self._faces:
@@ -259,7 +259,7 @@ def face_label(face: SeenFace) -> str:
 
 
 def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:
-    """Return the row of the target's face part, None if it is on none."""
+    """Return the row of the target's face part, None if the target is on no part."""
     away_m = np.linalg.norm(np.array(face.parts_world_m) - p_world_target_m, axis=1)
     nearest = int(away_m.argmin())
     return nearest if away_m[nearest] < FIXATED_WITHIN_M else None

@@ -1,6 +1,6 @@
 """Place the objects of the page's 3-D scene, and send browsers only what has moved.
 
-Turns are quaternions (w, x, y, z).
+Rotations are quaternions (w, x, y, z).
 """
 
 from collections.abc import Sequence
@@ -11,8 +11,9 @@ from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.model.frames import Quaternion
 
 _STILL_M, _STILL = 1e-4, 3e-4
-"""Smallest motion that is sent, in metres and in parts of a quaternion (0.04 deg): otherwise a
-servo's noise would be sent to every browser, for each part, 25 times a second."""
+"""Smallest motion that is sent, in metres and in components of a quaternion (0.04 deg). Without
+this
+limit, servo noise would be sent to every browser, for each part, 25 times a second."""
 
 
 class Placeable(Protocol):

@@ -22,20 +22,20 @@ HALF_WIDTH = 0.84
 HEAD_SHARE = 0.64
 """Share of the canvas's height that the head fills in the view of the face."""
 _FACE_UP_RAD = radians(4.0)
-"""Elevation of the view of the face, from straight ahead: the head looks at whoever sees it."""
+"""Elevation of the view of the face; almost straight ahead: the head faces the viewer."""
 _FACE_AWAY = 10.5
-"""Distance of the view of the face, in eye distances: near, without a distorted nose."""
+"""Distance of the view of the face, in eye distances: near, but without distortion of the nose."""
 _FACE_WIDTH = 3.3
 """Smallest visible width, in eye distances."""
 _FACE_MIDDLE: Vec3 = (-0.45, 0.0, 0.5 * (TOP + CHIN) - 0.30)
-"""Centre of the view: a little below that of the head, so that the neck is visible."""
+"""Centre of the view: a little below the centre of the head, so that the neck is visible."""
 
 
 class View(NamedTuple):
     """Position of the camera and the point in the centre of its view.
 
     vertical_rad: vertical field of view, None if the horizontal one is given
-    least_width: tangent of half the horizontal field that must be in sight
+    least_width: tangent of half the horizontal field that must be visible
     """
 
     position_m: Vec3
@@ -61,7 +61,7 @@ NAMES = (FACE, *_FIXED)
 
 
 def named_view(name: str, snapshot: Snapshot | None = None) -> View:
-    """Return a view by its name; that of the face is fitted to the head of a snapshot."""
+    """Return a view by its name; the view of the face is fitted to the head of a snapshot."""
     if name in _FIXED:
         return _FIXED[name]
     # A close-up of the head with its neck straight.
@@ -114,7 +114,7 @@ class Viewpoints:
         """Move the cameras of a browser's tabs to a view, now or when its scene has loaded."""
         if not browser:  # it has disconnected
             return
-        # Stored first: the scene may finish loading in between.
+        # Store it first: the scene may finish loading before the next line.
         self._asked_early[browser] = name
         while len(self._asked_early) > _KEPT:
             self._asked_early.pop(next(iter(self._asked_early)), None)
@@ -145,7 +145,7 @@ class Viewpoints:
             name = self._views.get(client.client_id, FACE)
             _fit_field(camera, named_view(name, self._snapshot))
 
-        # Viser knows a client after its scene has loaded; the buttons work before.
+        # Viser lists a client only after its scene has loaded; the buttons work before that.
         early = self._asked_early.pop(self._browser_of(client.client_id), None)
         if early is not None:
             self._take(client, early)

@@ -25,7 +25,7 @@ _FINISHES: Mapping[WorldFinish, Finish] = {
     "flat": FLAT,
 }
 _FOG_M: Final = (1.2, 10.0)
-"""Distances at which the room starts and ends to fade, so that the head stays the subject, m."""
+"""Distances at which the room begins to fade and is fully faded, m; the head stays the subject."""
 _FOG_COLOUR: Final = (233, 236, 240)
 
 
@@ -72,7 +72,7 @@ class WorldView:
 
 
 def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
-    """Return the static objects as few files: one for each finish and each texture."""
+    """Return the static objects as a few files: one for each finish and each texture."""
     files: list[bytes] = []
     plain: dict[WorldFinish, list[Painted]] = {}
     for part in parts:

@@ -1,1 +1,1 @@
-"""Elements of the page's panels on the side of Python."""
+"""Elements of the page's panels, the Python side."""

@@ -1,6 +1,6 @@
 """Small pieces of HTML and SVG that the page's panels share.
 
-They carry classes, whose colours are in browser/panels.css, so that they fit both themes.
+Their CSS classes have colours in browser/panels.css, so that they fit both themes.
 """
 
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ LINE_PX = 320
 """Width in which drawings are made; they are scaled to the panel."""
 
 LETTER_PX = 13.2
-"""Size of letters in a drawing: 13 px in the narrowest drawer."""
+"""Font size in a drawing: 13 px in the narrowest drawer."""
 
 
 def pill(text: str, kind: str = "") -> str:
@@ -39,7 +39,7 @@ def banner(text: str, kind: str, reasons: Iterable[str] = ()) -> str:
 
 
 def heading(text: str, aside: str = "") -> str:
-    """Return a line above a drawing or table, with a smaller text at its right end."""
+    """Return a heading for a drawing or table, with smaller text at its right end."""
     return f"<div class='heading'>{escape(text)}<span>{escape(aside)}</span></div>"
 
 
@@ -49,12 +49,12 @@ def count_text(n: int, what: str) -> str:
 
 
 def note(text: str) -> str:
-    """Return a small text, for sources and explanations."""
+    """Return text in small type, for sources and explanations."""
     return f"<div class='note'>{escape(text)}</div>"
 
 
 def svg(height: float, parts: Iterable[str], says: str) -> str:
-    """Return a drawing of width LINE_PX, scaled to the panel; says: its description as text."""
+    """Return a drawing of width LINE_PX, scaled to the panel; says: its text description."""
     return (
         f"<svg viewBox='0 0 {LINE_PX} {height:.0f}' role='img' aria-label='{escape(says)}'>"
         f"{''.join(parts)}</svg>"

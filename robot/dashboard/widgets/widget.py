@@ -1,7 +1,7 @@
 """Elements of the page's panels; browsers draw them with native controls.
 
-A change of an element goes to every browser that shows it. Input of a browser is checked by the
-element before it counts.
+A change of an element is sent to every browser that shows it. The element checks the input of a
+browser before it is applied.
 """
 
 from abc import ABC, abstractmethod
@@ -18,9 +18,9 @@ MOST_TEXT = 4000
 class WidgetPlace(NamedTuple):
     """Position of an element.
 
-    number: its own; parent: name of the panel or number of the section that holds it
-    panel: name of the panel that it is in, at whatever depth
-    owner: the client that alone sees it, "" for all
+    number: number of the element; parent: name of the panel or number of the section around it
+    panel: name of the panel around it, at any depth
+    owner: only client that sees it, "" for all
     """
 
     number: int
@@ -82,11 +82,11 @@ class Widget:
 
 
 class Html(Widget):
-    """HTML; the caller must escape names in it."""
+    """HTML element; the caller must escape names in it."""
 
     @property
     def content(self) -> str:
-        """HTML that is shown; it is sent only if it has changed."""
+        """Shown HTML; it is sent only if it has changed."""
         return str(self.props["content"])
 
     @content.setter
@@ -107,8 +107,8 @@ class Image(Widget):
 class Chart(Widget):
     """Chart of lines over an axis.
 
-    Its props are title, unit, x (n numbers) and lines: (name, style, n numbers) each, where style
-    names a colour of the page. A browser that cannot be looked at reads the last values.
+    Its props are title, unit, x (n numbers) and lines. Each line is (name, style, n numbers); the
+    style is the name of a colour of the page. Screen readers read the last values.
     """
 
     def draw(self, x: Sequence[float], lines: Mapping[str, Sequence[float]]) -> None:
@@ -163,7 +163,7 @@ class Field(Widget, ABC, Generic[T]):
         """Return the input of a browser as a value of this field.
 
         Raises:
-            ValueError: it is none.
+            ValueError: the input is not a valid value.
         """
 
     def receive_input(self, value: object, client: str) -> None:
@@ -185,7 +185,7 @@ class Checkbox(Field[bool]):
 
 
 class TextField(Field[str]):
-    """Line of text, sent ``on`` "enter", also when the focus has "left", or at each "key"."""
+    """Line of text, sent ``on`` "enter" (also if the focus has "left"), or at each "key"."""
 
     def check_value(self, value: object) -> str:
         """Return a text without control characters."""
@@ -197,7 +197,7 @@ class TextField(Field[str]):
 class Slider(Field[float]):
     """Slider between two ends, whose number can also be typed.
 
-    A number that is typed counts at Enter, when its field is left, or by the arrow keys.
+    A typed number is applied at Enter, when the field loses the focus, or by the arrow keys.
     """
 
     @property
@@ -230,7 +230,7 @@ class Choice(Field[str]):
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Options; a value that is not among new ones becomes the first."""
+        """Options; if new options do not contain the value, it becomes the first one."""
         return self._words("options")
 
     @options.setter
@@ -246,7 +246,7 @@ class Choice(Field[str]):
 
 
 class Buttons(Widget):
-    """Row of buttons; one of them may be marked as present."""
+    """Row of buttons; one of them may be marked as the present choice."""
 
     def __init__(
         self, page: WidgetPublisher, place: WidgetPlace, kind: str, props: dict[str, object]
@@ -265,7 +265,7 @@ class Buttons(Widget):
 
     @property
     def current(self) -> str:
-        """Button that is marked as present, "" for none."""
+        """Button that is marked as the present choice, "" for none."""
         return str(self.props["current"])
 
     @current.setter

@@ -1,8 +1,8 @@
 """Panels of the page: elements are added here and drawn by browser/widgets.js.
 
-Every browser receives the changes since its last message, only the newest of each element: a slow
-browser misses the values in between and delays no other. A browser that shows only some panels
-does not receive the others.
+Every browser receives the changes since its last message, but only the newest of each element: a
+slow browser misses intermediate values and does not delay other browsers. A browser that shows only
+some panels does not receive the others.
 """
 
 import json
@@ -29,7 +29,7 @@ from gazerig.robot.remote.socket_io import parse_json
 
 W = TypeVar("W", bound=Widget)
 Make = Callable[[WidgetPublisher, WidgetPlace, str, dict[str, object]], W]
-"""Constructor of a kind of element."""
+"""Constructor of one kind of element."""
 
 
 PANELS = ("headline", "camera", "replay", "watch", "steer", "tune", "health", "report")
@@ -44,10 +44,10 @@ class Container:
     """Container of elements: a panel of the page or a section of one.
 
     Args:
-        page: takes what is added.
+        page: page to which elements are added.
         parent: name of the panel, or number of the section.
         panel: name of the panel.
-        owner: the client that alone sees what is added, "" for all.
+        owner: only client that sees the added elements, "" for all.
     """
 
     def __init__(self, page: "Widgets", parent: str | int, panel: str, owner: str = "") -> None:
@@ -55,7 +55,7 @@ class Container:
         self._where = (parent, panel, owner)
 
     def for_client(self, client: str) -> "Container":
-        """Return the same container for elements that only one client sees."""
+        """Return this container for elements that only one client sees."""
         return Container(self.page, *self._where[:2], client)
 
     def clear(self) -> None:
@@ -74,7 +74,7 @@ class Container:
     def image(self, label: str, *, pick: bool = False, order: float = 0.0) -> Image:
         """Add an image, empty at first; label: its description for screen readers.
 
-        pick: a click asks the rig to look at what was clicked
+        pick: whether a click makes the rig look at the clicked point
         """
         props: dict[str, object] = {"label": label, "pick": pick, "order": order}
         return self.page.add(Image, "image", self._where, props)
@@ -93,9 +93,9 @@ class Container:
         Args:
             title: Text above the chart.
             lines: name and style of each; browser/panels.css has a colour for each style.
-            unit: of the values.
-            least: Smallest range of the axis.
-            order: its place among its neighbours.
+            unit: unit of the values.
+            least: smallest range of the axis.
+            order: its position among its neighbours.
         """
         props: dict[str, object] = {
             "title": title, "lines": [list(one) for one in lines], "unit": unit, "least": least,
@@ -106,7 +106,7 @@ class Container:
     def text(
         self, label: str, value: str = "", *, hint: str = "", on: str = "left", order: float = 0.0
     ) -> TextField:
-        """Add a line of text that is sent at Enter, also when the focus leaves, or at each key.
+        """Add a text field that is sent at Enter, when it loses the focus, or at each key.
 
         on: "enter", "left" or "key"
         """
@@ -172,7 +172,7 @@ class Section(Container):
         self.widget = widget
 
     def remove(self) -> None:
-        """Remove the section with all that is in it."""
+        """Remove the section with all its elements."""
         self.widget.remove()
 
 
@@ -184,7 +184,7 @@ class Notice(NamedTuple):
 
 
 class Outgoing(NamedTuple):
-    """Next messages to a client: one of text, and one of bytes for each image."""
+    """Next messages to a client: one text message, and one binary message for each image."""
 
     text: str
     images: tuple[bytes, ...]
@@ -193,13 +193,13 @@ class Outgoing(NamedTuple):
 class Client:
     """Tab of a browser that shows panels.
 
-    name: e.g. "panels-3", unique; browser: the name of its browser
+    name: unique name, e.g. "panels-3"; browser: name of its browser
     """
 
     def __init__(self, name: str, browser: str, wake: Callable[[], None]) -> None:
         self.name, self.browser = name, browser
         self._wake = wake
-        self.awake = False  # waiting data is announced, and not taken yet
+        self.awake = False  # waiting data has been announced but not yet taken
         # Number of an element -> its changed properties, None if it was removed.
         self.changes: dict[int, dict[str, object] | None] = {}
         self.images: set[int] = set()
@@ -228,7 +228,7 @@ class Widgets:
     # --- elements --------------------------------------------------------------------------
 
     def panel(self, name: str) -> Container:
-        """Return the panel of a name, one of PANELS."""
+        """Return the panel with a name, one of PANELS."""
         if name not in PANELS:
             raise ValueError(f"there is no panel {name}; there are {', '.join(PANELS)}")
         return Container(self, name, name)
@@ -236,7 +236,7 @@ class Widgets:
     def add(
         self, make: Make[W], kind: str, where: tuple[str | int, str, str], props: dict[str, object]
     ) -> W:
-        """Add an element; where: its parent, its panel, and the client that alone sees it."""
+        """Add an element; where: its parent, its panel, and the only client that sees it."""
         with self._lock:
             self._numbers += 1
             widget = make(self, WidgetPlace(self._numbers, *where), kind, props)
@@ -252,7 +252,7 @@ class Widgets:
             for client in self._viewers(widget):
                 if client.name != but:
                     waiting = client.changes.setdefault(widget.place.number, {})
-                    assert waiting is not None  # numbers are not used again
+                    assert waiting is not None  # numbers are not reused
                     waiting.update(props)
             self._wake()
 
@@ -421,7 +421,7 @@ class Widgets:
             case {"set": [int() as number, value]} if not isinstance(number, bool):
                 with self._lock:
                     widget = self._widgets.get(number)
-                # It may have been removed a moment ago.
+                # It may just have been removed.
                 if widget is None or widget.place.owner not in ("", client.name):
                     return
                 try:
