@@ -4,6 +4,7 @@ The rig's time is simulated and goes on slowly, so that a browser without a grap
 the time to draw it; each picture stands in the film for as long as it was true.
 """
 
+import re
 import sys
 import threading
 import time
@@ -82,8 +83,8 @@ class Film:
         self.pace_s = SLOW_S
 
     def keeps_up(self) -> bool:
-        """Return whether the page hears of the rig, and not that it is silent."""
-        return "is silent" not in self._browser.words()
+        """Return whether the page shows the rig as it is: it is not silent, and no picture is old."""
+        return not re.search(r"is silent|\d s old", self._browser.words())
 
     def press(self, name: str) -> None:
         """Press one of the buttons under the head."""
