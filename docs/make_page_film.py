@@ -83,7 +83,7 @@ class Film:
         self.pace_s = SLOW_S
 
     def keeps_up(self) -> bool:
-        """Return whether the page shows the rig as it is: it is not silent, and no picture is old."""
+        """Return whether the page shows the rig as it is: not silent, and without old pictures."""
         return not re.search(r"is silent|\d s old", self._browser.words())
 
     def press(self, name: str) -> None:
