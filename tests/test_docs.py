@@ -237,6 +237,7 @@ SAID = {
     *(
         "ok",
         "signed_rank",
+        "rank_sum",
         "cup: {held_by: anna, side: left}",
         "bus ok",
         "null",
