@@ -238,6 +238,8 @@ SAID = {
         "ok",
         "signed_rank",
         "rank_sum",
+        "friedman",
+        "chi_square",
         "cup: {held_by: anna, side: left}",
         "bus ok",
         "null",
