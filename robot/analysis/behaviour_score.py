@@ -1,17 +1,16 @@
 """The gaze's responses to a scene's events, and their latencies (Mitake et al. 1 and 4).
 
-Judged by what was chosen to be looked at, tick by tick; so the latency of the camera, of
-perception and of the choice are in it, the flight of the eyes (50 ms and more) is not.
-An event counts when it is over. World frame, metres, seconds.
+The score uses the chosen target of every tick. So latencies include those of the camera, of
+perception and of the choice, but not the duration of the saccade (50 ms and more).
+An event is scored when it is over. World frame, metres, seconds.
 
-The time of a hand that reaches in from outside the field of view begins when the hand comes
-nearer to straight ahead than half the camera's field. A
-head that is turned a little towards it may see it earlier, one turned away later, by
-about 0.1 s for every 8 degrees.
+For a hand that reaches in from outside the field of view, time starts when the angle between the
+hand and straight ahead falls below half the camera's field. A head that is turned a little towards
+the hand may see it earlier, one that is turned away later, by about 0.1 s for every 8 degrees.
 
-The score of an action planner that boxes counts guards in time, false guards and attacks into open
-guards, by ``Target.plan`` and the events of a scene: "punch", with the time at which the fist
-arrives, and "attack", while the opponent's guard is open.
+The score of an action planner that boxes counts timely guards, false guards and attacks into open
+guards. It uses ``Target.plan`` and the events of a scene: "punch", with the arrival time of the
+fist, and "attack", while the opponent's guard is open.
 """
 
 from collections import deque
@@ -26,14 +25,14 @@ from gazerig.robot.model.moved_opponent import MovableOpponent
 from gazerig.robot.model.scene_events import BoxingEvent, ExpectedResponse
 
 _MOST_TICKS = 2000
-"""Number of ticks kept to judge an event of a person's motion: 10 s at 200 Hz."""
+"""Number of ticks stored to score an event of a person's motion: 10 s at 200 Hz."""
 
 
 class _EventOutcome(NamedTuple):
     """Outcome of one event.
 
-    latency_s: "look": from its start to the first look, None without one;
-        "return": time spent elsewhere, None if the gaze was never drawn away
+    latency_s: "look": time from the event's start to the first look, None without one;
+        "return": time of the gaze elsewhere, None if it was never drawn away
     """
 
     seen: bool
@@ -43,7 +42,7 @@ class _EventOutcome(NamedTuple):
 
 
 class _EventObservation:
-    """One event while it lasts."""
+    """Observation of one event while it lasts."""
 
     def __init__(self) -> None:
         self._first_s: float | None = None
@@ -91,7 +90,7 @@ class BehaviourScore:
         self._round_of: dict[int, int] = {}
 
     def update(self, tick: Tick) -> None:
-        """Count one tick; the first one is the scene's beginning."""
+        """Count one tick; the first one is the start of the scene."""
         if self._first_s is None:
             self._first_s = self._last_s = tick.t_s
         dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
@@ -112,7 +111,7 @@ class BehaviourScore:
                 self._close_event(i)
 
     def _close_event(self, i: int) -> None:
-        """Write down how an event went."""
+        """Record the outcome of an event."""
         event = self._events[i]
         outcome = self._observations.pop(i).outcome(event.response)
         start_s = self._round_s * self._round_of[i]
@@ -120,7 +119,7 @@ class BehaviourScore:
             self._outcomes[event.name].append(outcome)
 
     def _judge_moved(self, dt_s: float, tick: Tick) -> None:
-        """Judge the events of a person's motion, which are known when they are over."""
+        """Score the events of a person's motion, which are known only when they are over."""
         if self._moved is None or not self._moved.spans_s:
             return
         start_s = self._start_s()
@@ -139,10 +138,10 @@ class BehaviourScore:
             self._outcomes.setdefault(event.name, []).append(watch.outcome(event.response))
 
     def figures(self) -> dict[str, dict[str, float | int | None]]:
-        """Return for each name: how many were seen, of how many, and how.
+        """Return for each name the number of events, the number seen, and statistics.
 
-        latency_s: median over the events seen (away: over those that drew the gaze off)
-        share: part of the events' time in which the expected target was looked at
+        latency_s: median over the events seen (away: over those that drew the gaze away)
+        share: fraction of the events' time in which the gaze was on the expected target
         """
         return {name: _outcome_figures(answers) for name, answers in self._outcomes.items()}
 
@@ -159,9 +158,9 @@ def _outcome_figures(outcomes: list[_EventOutcome]) -> dict[str, float | int | N
 
 
 _LATE_S = 0.3
-"""A guard that begins so soon after a punch is late, not false."""
+"""Time after a punch within which a new guard is late, not false."""
 _COUNTER_S = 0.6
-"""An attack that begins so soon after the end of a punch answers it."""
+"""Time after the end of a punch within which a new attack is a counter-attack."""
 
 
 class _Attack(NamedTuple):
@@ -170,11 +169,11 @@ class _Attack(NamedTuple):
 
 
 _Time = tuple[float, float, float]
-"""Start, end, and time by which an event must be answered."""
+"""Start and end of an event, and the latest time of an answer to it."""
 
 
 class PlannerScore:
-    """Scores a planner, tick by tick; the first tick is the beginning of a round."""
+    """Scores a planner, tick by tick; the first tick is the start of a round."""
 
     def __init__(
         self,
@@ -208,22 +207,22 @@ class PlannerScore:
     def figures(self) -> dict[str, float | int | None]:
         """Return the score; an empty dict if nothing was planned.
 
-        guards_in_time, punches: how many punches met a guard when the fist arrived, of how many
-        lead_ms: median time by which those guards began before that
-        false_guards_per_min: guards against no punch
-        attacks, open, counters: attacks begun, of those into an open guard, and after a punch
-        looked_at: attacks in which the place was looked at
+        guards_in_time, punches: number of punches that met a guard at arrival, and of all punches
+        lead_ms: median time between the start of those guards and the arrival of the fist
+        false_guards_per_min: guards without a punch
+        attacks, open, counters: attacks begun; those into an open guard; those after a punch
+        looked_at: attacks during which the gaze was on the attacked place
         """
         if not self._guards and not self._attacks:
             return {}
-        # Of all punches that are over: by how much a guard came before the fist.
+        # Lead of the guard over the fist, for all punches that are over.
         leads, punches = [], 0
         thrown, openings = self._event_times("punch"), self._event_times("attack")
         for _, end_s, due_s in thrown:
             if end_s > self._last_s:
                 continue
             punches += 1
-            # A tick before it is over is as good as its end.
+            # One tick before its end counts as its end.
             in_force = [at_s for at_s, end_s in self._guards if at_s <= due_s <= end_s + 0.05]
             if in_force:
                 leads.append(due_s - max(in_force))
@@ -242,7 +241,7 @@ class PlannerScore:
         }
 
     def _event_times(self, name: str) -> list[_Time]:
-        """Return the times of all events of a name: scripted ones, and those of a person."""
+        """Return the times of all events with a name: scripted ones, and those of a person."""
         found = []
         for number in range(int(self._last_s // self._round_s) + 1):
             start_s = self._round_s * number
@@ -267,6 +266,6 @@ def _is_during(at_s: float, times: Iterable[_Time], before_s: float, after_s: fl
 
 
 def _is_moved(moved: MovableOpponent | None, start_s: float, end_s: float) -> bool:
-    """Return whether a person moved the opponent during a scripted event, which then was not."""
+    """Return whether a person moved the opponent during a scripted event, and so replaced it."""
     spans = () if moved is None else moved.spans_s
     return any(start <= end_s and start_s <= end for start, end in spans)

@@ -1,8 +1,8 @@
-"""Openings of a rig's lids, and blinks in a trace of them, with their shape.
+"""Openings of a rig's lids, and the blinks in a trace of them.
 
-A blink shuts both lids by half or more and opens them again; lids that sink with the gaze
-stay down. Closing and opening last for as long as the lid is faster than a twentieth of that
-phase's peak, as blink kinematics are usually measured (VanderWerf et al. 2003).
+A blink closes both lids by half or more and opens them again; lids that follow the gaze down stay
+down. Closing and opening last while the lid is faster than a twentieth of the phase's peak speed,
+as blink kinematics are usually measured (VanderWerf et al. 2003).
 """
 
 from collections import deque
@@ -10,25 +10,25 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 _DEEP_SHARE, _BACK_SHARE = 0.5, 0.75
-"""Of the opening before: below the one it is a blink, above the other it is over."""
+"""Fractions of the opening before: a blink starts below the first and is over above the second."""
 
 _LONGEST_S = 2.0
 _BEFORE_S = 0.4
 _AFTER_S = 0.12
 _FOOT_SHARE = 0.05
 _OPEN_S = 0.5
-"""The opening before a blink is learned with this time constant."""
+"""Time constant with which the opening before a blink is learned."""
 
 _LEAST_OPEN = 0.15
-"""Lids that hang lower than this do not show a blink."""
+"""Lids with a smaller opening than this do not show a blink."""
 
 
 class BlinkEvent(NamedTuple):
     """One blink of both lids.
 
-    onset_s: the lids begin to shut; close_s, hold_s, open_s: lengths of its phases
-    depth: share of the opening that it took away, 1 is shut
-    close_peak_1_s, open_peak_1_s: fastest closing and opening, full travels of the lid a second
+    onset_s: start of the closing; close_s, hold_s, open_s: durations of its phases
+    depth: fraction of the opening by which the lids closed; 1 is shut
+    close_peak_1_s, open_peak_1_s: peak speeds of closing and opening, full lid travels per second
     """
 
     onset_s: float
@@ -41,7 +41,7 @@ class BlinkEvent(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """Return the whole length."""
+        """Return the total duration."""
         return self.close_s + self.hold_s + self.open_s
 
 
@@ -52,7 +52,7 @@ class BlinkFinder:
         self.clear()
 
     def clear(self) -> None:
-        """Forget the trace: there was a gap."""
+        """Clear the trace, after a gap."""
         self._trace: deque[tuple[float, float]] = deque()
         self._usual = 0.0
         self._shut_s: float | None = None
@@ -81,13 +81,13 @@ class BlinkFinder:
         return self._await_opening(t_s, opening, self._shut_s)
 
     def _await_opening(self, t_s: float, opening: float, shut_s: float) -> BlinkEvent | None:
-        """Wait for the lids to be open again, and for a little longer."""
+        """Wait until the lids are open again, and a little longer."""
         if self._back_s is None and opening >= _BACK_SHARE * self._usual:
             self._back_s = t_s
         if self._back_s is not None and t_s - self._back_s >= _AFTER_S:
             self._shut_s = self._back_s = None
             return _measure_blink(list(self._trace), self._usual)
-        if t_s - shut_s > _LONGEST_S:  # asleep, or looking down: that is the opening now
+        if t_s - shut_s > _LONGEST_S:  # asleep, or looking down: this is the new opening
             self._shut_s = self._back_s = None
             self._usual = opening
         return None
@@ -100,7 +100,7 @@ def _measure_blink(trace: list[tuple[float, float]], usual: float) -> BlinkEvent
     lowest = min(range(len(o)), key=o.__getitem__)
     speed = [
         (o[i + 1] - o[i - 1]) / (t[i + 1] - t[i - 1]) for i in range(1, len(o) - 1)
-    ]  # of row i + 1
+    ]  # speed of row i + 1
     if not 1 < lowest < len(o) - 2:
         return None
     down = min(range(lowest), key=speed.__getitem__)
@@ -121,7 +121,7 @@ def _measure_blink(trace: list[tuple[float, float]], usual: float) -> BlinkEvent
 
 
 def _phase_times_s(t: list[float], speed: list[float], peak: int) -> tuple[float, float]:
-    """Return when the speed rises above its foot before its peak, and falls below it after."""
+    """Return the times at which the speed crosses the threshold before and after its peak."""
     foot = _FOOT_SHARE * speed[peak]
     first = last = peak
     while first > 0 and speed[first] > foot:
@@ -148,9 +148,9 @@ LOWER = ("left_lower_lid", "right_lower_lid")
 def lid_openings(
     left: float, right: float, names: Sequence[str], pair: tuple[str, str]
 ) -> tuple[float, float] | None:
-    """Return the openings of two lids, None without any; a single lid counts for both.
+    """Return the openings of two lids, None without lids; a single lid counts for both.
 
-    pair: joints of the left and the right one; names: of the rig, all where empty
+    pair: joints of the left and the right lid; names: joints of the rig; empty: all joints
     """
     if not names:
         return left, right

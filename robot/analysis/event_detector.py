@@ -1,12 +1,12 @@
-"""Saccades, fixations and blinks, detected tick by tick as an eye tracker does.
+"""Saccades, fixations and blinks, detected tick by tick as by an eye tracker.
 
-All values are those of the servos: the mean of both lines of sight in space, and the opening of
-the upper lids. Without feedback they are estimated from the goals. The commanded saccade is kept
+All values are measured at the servos: the mean of both lines of sight in space, and the opening of
+the upper lids. Without feedback they are estimated from the goals. The commanded saccade is stored
 with the measured one, so that both can be compared.
 
-The speed is that of Engbert & Kliegl 2003, a central difference over five samples, taken relative
-to the slow motion of the last 50 ms, so that following a person who walks by is no saccade. 30
-deg/s beyond that is the usual threshold of velocity-based detection (I-VT).
+The speed is that of Engbert & Kliegl 2003, a central difference over five samples. It is relative
+to the slow motion of the last 50 ms, so that pursuit of a walking person is not a saccade. 30 deg/s
+above that is the usual threshold of velocity-based detection (I-VT).
 """
 
 from collections import Counter, deque
@@ -21,29 +21,30 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.types import GAZE_JOINTS
 
 THRESHOLD_DEG_S = 30.0
-"""Relative speed that makes a saccade; one servo step of both eyes in a tick is half of it."""
+"""Relative speed at which a saccade begins; one servo step of both eyes per tick is half of it."""
 
 LEAST_DEG = 0.5
-"""Smaller ones cannot be told from steps of the encoders."""
+"""Smaller saccades cannot be distinguished from encoder steps."""
 
 _FOOT_SHARE, _FOOT_DEG_S = 0.1, 10.0
-"""A saccade reaches as far as it is faster than this share of its peak, and than this."""
+"""A saccade lasts while its speed is above this fraction of its peak, and above this speed."""
 
 _TOP_SHARE = 0.9
-"""The peak's time is the middle of what is faster than this share: a capped peak is flat."""
+"""The time of the peak is the middle of the interval above this fraction: capped peaks are flat."""
 
 _SWING_SHARE, _AGAIN_SHARE = 0.35, 0.5
-"""A minimum below this share of the peak is the landing, even while a servo swings back (the
-glissade of Nystroem & Holmqvist 2010); what is then faster than the other is a saccade again."""
+"""A minimum below the first fraction of the peak is the landing, even while a servo swings back
+(the glissade of Nystroem & Holmqvist 2010). Later motion above the second fraction is a new
+saccade."""
 
 _LANDING_S = 0.15
 
 _SLOW_S = 0.05
 _FARTHEST_S = 0.022
-"""Neighbours farther away in time do not tell the speed of a saccade."""
+"""Samples farther apart in time do not give the speed of a saccade."""
 
 _NEAREST_S = 0.0035
-"""Samples that come faster are left out: their differences are but steps of the encoder."""
+"""Samples at shorter intervals are skipped: their differences are only encoder steps."""
 
 _GAP_S = 0.06
 _LONGEST_S = 0.4
@@ -53,7 +54,7 @@ _KEPT = 160
 class MeasuredSaccade(NamedTuple):
     """One saccade in a trace.
 
-    peak_share: share of the duration at which it was fastest
+    peak_share: time of the peak speed as a fraction of the duration
     mean_deg_s: amplitude over duration; from_world, to_world: unit directions
     """
 
@@ -79,7 +80,7 @@ class _DirectionSample(NamedTuple):
 class _SpeedSample(NamedTuple):
     """One sample with its speed.
 
-    velocity_1_s: of the unit vector, smoothed; relative_deg_s: what it is beyond the slow
+    velocity_1_s: smoothed velocity of the unit vector; relative_deg_s: speed relative to the slow
     motion; sharp_deg_s: speed over three samples only, for the peak
     """
 
@@ -169,9 +170,9 @@ class SaccadeFinder:
         return None
 
     def _await_landing(self, speed: _SpeedSample, before_deg_s: float) -> MeasuredSaccade | None:
-        """Wait for the landing: the speed is low, or has a minimum before the eye swings back."""
+        """Wait for the landing: a low speed, or a minimum before the eye swings back."""
         now = speed.relative_deg_s
-        # Relative to the peak until now: a saccade is slow at its beginning, too.
+        # Relative to the peak so far: a saccade is also slow at its beginning.
         swings = before_deg_s < _SWING_SHARE * self._peak_deg_s and now > before_deg_s
         self._peak_deg_s = max(self._peak_deg_s, now)
         if now < self._onset_speed_deg_s() or swings:
@@ -192,7 +193,7 @@ class SaccadeFinder:
         return max(_FOOT_SHARE * self._peak_deg_s, _FOOT_DEG_S)
 
     def _measure_saccade(self, end: int) -> MeasuredSaccade:
-        """Measure the saccade that was over with the last of the first ``end`` speeds."""
+        """Measure the saccade that ended at the last of the first ``end`` speeds."""
         foot, speeds = self._onset_speed_deg_s(), self._speeds
         first = end - 1
         while first > 0 and speeds[first - 1].t_s >= self._barrier_s:
@@ -220,26 +221,26 @@ class SaccadeFinder:
 
 
 def _crossing_time_s(below: _SpeedSample, above: _SpeedSample, level: float) -> float:
-    """Return when the speed passed a level between two samples."""
+    """Return the time when the speed crossed a level between two samples."""
     span = above.relative_deg_s - below.relative_deg_s
     share = (level - below.relative_deg_s) / span if span > 0.0 else 0.0
     return below.t_s + min(1.0, max(0.0, share)) * (above.t_s - below.t_s)
 
 
 NEAR_PART_M = 0.03
-"""A line of sight that passes a part within this distance is on it."""
+"""Largest distance at which a line of sight is on a part."""
 
 NEAR_FACE_M = 0.12
-"""One that passes the face's centre within this distance is on the face."""
+"""Largest distance from the face's centre at which a line of sight is on the face."""
 
 _LOOK_EVERY_S = 0.024
-"""How often the part is looked up while the eyes rest."""
+"""Interval at which the part is determined during a fixation."""
 
 SHORTEST_S = 0.04
-"""Less between two saccades is no fixation."""
+"""Shortest fixation between two saccades."""
 
 _SETTLING_S = 0.02
-"""After a saccade, before the part is looked up."""
+"""Delay after a saccade before the part is determined."""
 
 _LONGEST_FORESEEN_S = 0.3
 _COMMAND_BEFORE_S, _COMMAND_AFTER_S = 0.12, 0.03
@@ -247,7 +248,7 @@ _EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
 
 
 class CommandedSaccade(NamedTuple):
-    """A saccade as the models commanded it."""
+    """Saccade commanded by the models."""
 
     onset_s: float
     duration_s: float
@@ -258,7 +259,7 @@ class CommandedSaccade(NamedTuple):
 class SaccadeEvent(NamedTuple):
     """One saccade of the gaze in space.
 
-    peak_share: share of the duration at which it was fastest, .5 is symmetric
+    peak_share: time of the peak speed as a fraction of the duration; .5 is symmetric
     commanded: the commanded saccade, None if the eyes jumped without a command
     """
 
@@ -271,15 +272,15 @@ class SaccadeEvent(NamedTuple):
 
     @property
     def end_s(self) -> float:
-        """Return when it landed."""
+        """Return the time of the landing."""
         return self.onset_s + self.duration_s
 
 
 class FixationEvent(NamedTuple):
-    """Rest of the gaze between two saccades, at one place or with something that moves.
+    """Fixation of the gaze between two saccades, on one place or on a moving target.
 
-    part: the face part that the lines of sight passed nearest to, None off the parts
-    on_face: whether it was on a face at all; face: that face's id, -1 without one
+    part: the face part nearest to the lines of sight, None off the parts
+    on_face: whether it was on any face; face: id of that face, -1 without one
     target_kind, target_part: kind of the current target, and its face part
     """
 
@@ -293,7 +294,7 @@ class FixationEvent(NamedTuple):
 
     @property
     def end_s(self) -> float:
-        """Return when the next saccade began."""
+        """Return the start of the next saccade."""
         return self.start_s + self.duration_s
 
 
@@ -302,7 +303,7 @@ T = TypeVar("T")
 
 
 class EventDetector:
-    """Finds events in ticks as they arrive; an event is reported when it is over."""
+    """Finds events in ticks as they arrive; reports an event when it is over."""
 
     def __init__(self) -> None:
         self._saccades = SaccadeFinder()
@@ -357,14 +358,15 @@ class EventDetector:
             self._flight = None
 
     def _find_command(self, onset_s: float) -> CommandedSaccade | None:
-        """Find the command of a saccade that was measured a servo's lag later."""
+        """Find the command of a saccade, which is measured later by the lag of the servo."""
         known = list(self._commands)
         if self._flight is not None:
             known.append(self._flight.command)
         for command in reversed(known):
             if -_COMMAND_AFTER_S <= onset_s - command.onset_s <= _COMMAND_BEFORE_S:
                 if command in self._commands:
-                    self._commands.remove(command)  # an eye that swings back was not commanded to
+                    # An eye swings back without a command.
+                    self._commands.remove(command)
                 return command
         return None
 
@@ -386,7 +388,7 @@ class _CommandedFlight:
 
     @property
     def command(self) -> CommandedSaccade:
-        """Return it as far as it is known."""
+        """Return the commanded saccade as far as it is known."""
         return CommandedSaccade(
             self._start_s,
             self._last_s - self._start_s,
@@ -396,7 +398,7 @@ class _CommandedFlight:
 
 
 class _OpenFixation:
-    """The time between two saccades, and what was looked at in it."""
+    """Time between two saccades, and the fixated target."""
 
     def __init__(self, start_s: float | None) -> None:
         self._start_s = start_s
@@ -406,7 +408,7 @@ class _OpenFixation:
         self._kinds: Counter[tuple[str, str | None]] = Counter()
 
     def update(self, tick: Tick, direction: Vec3) -> None:
-        """Determine at intervals what the gaze is on."""
+        """Determine at intervals the part under the gaze."""
         t_s = tick.t_s
         if self._start_s is None:
             self._start_s = t_s
@@ -430,7 +432,7 @@ class _OpenFixation:
 
 
 def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, int]:
-    """Return the face part that the measured gaze passes, and the face's id, -1 off all faces.
+    """Return the face part at the measured gaze, and the id of the face, -1 off all faces.
 
     direction: unit vector of the gaze in the world
     """
@@ -449,7 +451,7 @@ def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, int]:
 
 
 def miss_distance_m(direction: Vec3, rel_m: Vec3) -> float:
-    """Return how far a line of sight passes from a place; both from the eye."""
+    """Return the distance between a line of sight and a place; both are relative to the eye."""
     if dot(direction, rel_m) <= 0.0:
         return norm(rel_m)
     return norm(cross(direction, rel_m))

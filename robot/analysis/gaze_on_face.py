@@ -1,4 +1,4 @@
-"""Where on the face the gaze goes, as measured: points in the face's own frame."""
+"""Measured gaze points on a face, in the face's own frame."""
 
 from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
@@ -6,17 +6,17 @@ from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.tick import Tick
 
 _PLANE_M = -0.028
-"""The plane between the nose tip and the eyes and mouth, along the face's own x axis."""
+"""Plane between the tip of the nose and the eyes and mouth, along the face's own x axis."""
 
 
 _ALONG = 0.05
-"""Cosine of a line of sight to the way a face looks: from 87 deg on it runs along the face."""
+"""Cosine between a line of sight and a face's direction: from 87 deg it is parallel to the face."""
 
 
 class GazeOnFace:
-    """Gathers gaze points on the plane of the face that is looked at.
+    """Collects gaze points on the plane of the target face.
 
-    points_face_m: (y, z) to the owner's left and up from the nose; seconds: time at each
+    points_face_m: (y, z) to the owner's left and up from the nose; seconds: duration at each
     """
 
     def __init__(self) -> None:

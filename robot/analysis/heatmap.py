@@ -1,11 +1,11 @@
-"""Where on a face a person has looked, as an image (Nakamoto & Tsuruno 4.3, figs 8 and 9).
+"""Heat map of the gaze on a face, as an image (Nakamoto & Tsuruno 4.3, figs 8 and 9).
 
-Gaze points are in the face's own frame, y to the owner's left and z up, in metres from the
-tip of the nose. Each is spread by a bell as wide as what is
-seen sharply from a metre away and weighted by its time; yellow marks the longest gaze.
+Gaze points are in the face's own frame, y to the owner's left and z up, in metres from the tip of
+the nose. Each point is weighted by its duration and spread by a Gaussian as wide as the area of
+sharp vision at a distance of one metre; yellow marks the longest gaze.
 
-The plain frontal face is drawn to measure, so that a gaze point is on the part it was meant for.
-Its canvas shows y to the owner's left rightwards and z upwards, as one sees a person who faces one.
+The plain frontal face is drawn to scale, so that a gaze point is on the intended part. On the
+canvas y, to the owner's left, points right and z points up, as an opposite viewer sees the face.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,13 +25,13 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 
 WIDTH_PX, HEIGHT_PX = 720, 860
 PX_PER_M = 3000.0
-# Place of the tip of the nose.
+# Position of the tip of the nose.
 _NOSE_PX = (WIDTH_PX / 2.0, 480.0)
 
 Image = NDArray[np.uint8]
 _PAPER, _SKIN, _SHADE = (243, 244, 245), (226, 230, 234), (205, 210, 216)
 _INK, _HAIR, _IRIS = (120, 124, 130), (150, 153, 158), (110, 114, 120)
-# Drawn this many times larger and scaled down, for smooth edges.
+# Factor by which it is drawn larger before it is scaled down, for smooth edges.
 _FINE = 3
 _Colour = tuple[int, int, int]
 
@@ -49,13 +49,13 @@ class _Pen:
         self.canvas: NDArray[np.uint8] = np.full(size, _PAPER, np.uint8)
 
     def fill_outline(self, yz_mm: Sequence[tuple[float, float]], fill: _Colour) -> None:
-        """Fill a closed, smooth outline through the points given."""
+        """Fill a closed, smooth outline through points."""
         cv2.fillPoly(self.canvas, [self._pixels(_spline(yz_mm, closed=True))], fill, cv2.LINE_AA)
 
     def draw_line(
         self, yz_mm: Sequence[tuple[float, float]], width_mm: float, ink: _Colour
     ) -> None:
-        """Draw a smooth line through the points given."""
+        """Draw a smooth line through points."""
         wide = max(1, round(width_mm * 1e-3 * PX_PER_M * _FINE))
         path = self._pixels(_spline(yz_mm, closed=False))
         cv2.polylines(self.canvas, [path], False, ink, wide, cv2.LINE_AA)
@@ -90,7 +90,7 @@ def draw_face() -> NDArray[np.uint8]:
 
 
 def _draw_head(pen: _Pen) -> None:
-    """Shoulders, neck, hair, ears, and the oval of the face."""
+    """Draw shoulders, neck, hair, ears, and the oval of the face."""
     pen.fill_outline(
         _close_with_mirror_image(
             [(0, -112), (34, -112), (58, -122), (100, -132), (124, -170), (0, -200)]
@@ -118,7 +118,7 @@ def _draw_head(pen: _Pen) -> None:
 
 
 def _draw_eye(pen: _Pen, side: float) -> None:
-    """An eye with its brow, at the pupil's measured place."""
+    """Draw an eye with its brow, at the measured position of the pupil."""
     _, y0, z0 = (1e3 * metres for metres in PARTS_FACE_M["LE"])
 
     def at(y: float, z: float) -> tuple[float, float]:
@@ -152,7 +152,7 @@ def _close_with_mirror_image(half: Sequence[tuple[float, float]]) -> list[tuple[
 
 
 def _spline(points: Sequence[tuple[float, float]], closed: bool) -> Floats:
-    """Run a Catmull-Rom curve through the points, (m, 2)."""
+    """Return a Catmull-Rom curve through points, (m, 2)."""
     p = np.asarray(points, dtype=float)
     first, last = (p[-1:], p[:2]) if closed else (p[:1], p[-1:])
     p = np.concatenate([first, p, last])
@@ -182,7 +182,7 @@ def add_legend(
     """Return the image with a panel to its right.
 
     most_s_cm2: value at the top of the colour scale
-    shares: of the time, per part code and "elsewhere"
+    shares: shares of the time, by part code and "elsewhere"
     """
     panel: Image = np.full((image.shape[0], _PANEL_PX, 3), _LEGEND_PAPER, np.uint8)
     _draw_scale(panel, most_s_cm2, total_s)
@@ -224,12 +224,12 @@ def _draw_text(
 
 # A gaze point counts for the nearest part within this distance.
 _NEAR_M = 0.03
-# Half a degree seen from a metre away.
+# Half a degree at a distance of one metre.
 _SPREAD_M = 0.0085
-# Below this share of the highest value nothing is painted; from the next on, most of it is.
+# Below the first fraction of the highest value nothing is painted; above the second, most of it.
 _FAINT, _PLAIN = 0.02, 0.45
 _COVER = 0.82
-_LARGEST = 100_000_000  # bytes of a photograph
+_LARGEST = 100_000_000  # size limit of a photograph, bytes
 
 
 def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, float]:
@@ -238,7 +238,7 @@ def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, fl
     points_face_m: (n, 2) y, z; seconds: (n,)
 
     Raises:
-        ValueError: there is no time at all, or shapes or numbers are not as they should be.
+        ValueError: the total time is zero, or shapes or numbers are not valid.
     """
     points, times = _check_points(points_face_m, seconds)
     centres = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
@@ -255,20 +255,20 @@ def write_heatmap(
     image: Path | None = None,
     force: bool = False,
 ) -> dict[str, float]:
-    """Write the heat map as a PNG over a drawn face or a face image; give the shares.
+    """Write the heat map as a PNG over a drawn face or a photograph; return the shares.
 
-    points_face_m: (n, 2) y, z; seconds: (n,) time on each
-    image: a photograph of one face from its front; force: replace a file that is there
+    points_face_m: (n, 2) y, z; seconds: (n,) duration at each
+    image: a frontal photograph of one face; force: replace an existing file
 
     Raises:
-        SetupError: no face in the image, or a file cannot be read or written.
-        ValueError: as of ``share_per_part``.
+        SetupError: the image has no face, or a file cannot be read or written.
+        ValueError: as in ``share_per_part``.
     """
     points, times = _check_points(points_face_m, seconds)
     shares = share_per_part(points, times)
     canvas = draw_face() if image is None else align_face(image)
     per_m2 = density_s_m2(points, times)
-    # Laid over the canvas: from nothing over purple and orange to yellow.
+    # Blended over the canvas: from transparent through purple and orange to yellow.
     top = float(per_m2.max())
     share = per_m2 / top if top > 0.0 else per_m2
     colours = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_PLASMA)
@@ -295,10 +295,10 @@ def density_s_m2(points_face_m: Floats, seconds: Floats) -> Floats:
 
 
 def align_face(photo: Path) -> Image:
-    """Bring the largest face of a photograph to the canvas, by its eyes and mouth.
+    """Align the largest face of a photograph with the canvas, by its eyes and mouth.
 
     Raises:
-        SetupError: it cannot be read, or no face is found in it.
+        SetupError: the photograph cannot be read, or no face is found in it.
     """
     try:
         data = np.frombuffer(read_limited(photo, _LARGEST), np.uint8)
@@ -308,14 +308,14 @@ def align_face(photo: Path) -> Image:
         ) from None
     try:
         image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    except cv2.error:  # larger than an image may be
+    except cv2.error:  # larger than the limit for images
         image = None
     if image is None:
         raise SetupError(f"{photo}: is no image that can be read; give a JPEG or PNG")
     faces = face_detector(FaceDetectorParams()).find(np.asarray(image, dtype=np.uint8))
     if not faces:
         raise SetupError(f"{photo}: no face found; give an image of one face from its front")
-    flat = [0, 1, 3, 4]  # without the nose, which is in front of the plane
+    flat = [0, 1, 3, 4]  # not the nose, which is in front of the plane
     there = faces[0].landmarks_px[flat]
     here = canvas_pixels(LANDMARKS_FACE_M[flat, 1:])
     ones = np.ones((len(flat), 1))
@@ -324,7 +324,7 @@ def align_face(photo: Path) -> Image:
     shown = cv2.warpAffine(
         image, affine, size, flags=cv2.INTER_AREA, borderMode=cv2.BORDER_REPLICATE
     )
-    # Pale and grey, so that the colours of the map are the only ones.
+    # Pale and grey, so that only the map has colours.
     grey = cv2.cvtColor(cv2.cvtColor(shown, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
     return np.asarray(cv2.addWeighted(grey, 0.8, grey, 0.0, 40.0), dtype=np.uint8)
 

@@ -1,7 +1,7 @@
-"""Published curves and tables of people, and measures with the limits between which people are.
+"""Published curves and tables of people, and measures with the range of people.
 
-The limits between which people are, are published means with their spread, not targets. If a model
-of this robot is built to differ, a note explains it; the verdict stays the same.
+The ranges are published means with their spread, not targets. If a model of this robot differs on
+purpose, a note explains it; the verdict stays the same.
 """
 
 from typing import NamedTuple
@@ -15,16 +15,16 @@ BAHILL_DEG_S, BALOH_DEG_S, ROUND_DEG = 551.0, 420.0, 14.0
 """Peak speed V (1 - exp(-A / 14 deg)): Bahill et al. 1975 and Baloh et al. 1975."""
 
 COLLEWIJN_DEG_S, COLLEWIJN_ROUND_DEG = 502.0, 11.0
-"""Where it saturates beyond 40 deg (Collewijn et al. 1988: 502 +- 32), and how soon."""
+"""Saturation beyond 40 deg (Collewijn et al. 1988: 502 +- 32), and its amplitude scale."""
 
 STAHL_FREE_DEG, STAHL_FREE_SD_DEG = 17.9, 16.0
 """Half of the range of 35.8 +- 31.9 deg that people cover with the eyes alone (Stahl 1999)."""
 
 STAHL_SLOPE, STAHL_SLOPE_SD = 0.77, 0.16
-"""Head movement for each degree beyond that range (Stahl 1999)."""
+"""Head movement per degree beyond that range (Stahl 1999)."""
 
 CONE_DEG = 5.2
-"""Diameter of the cone in which a gaze is taken for a direct one (Horstmann & Linke 2021)."""
+"""Diameter of the cone in which a gaze appears direct (Horstmann & Linke 2021)."""
 
 # Nakamoto & Tsuruno, eq 1 as printed: rows from, columns to, in the order of PARTS.
 _PRINTED = (
@@ -50,7 +50,7 @@ def transition_matrix() -> Floats:
 
 
 def visit_matrix(steps: Floats) -> Floats:
-    """Return the chain of visits of a chain of steps: without staying, (n, n)."""
+    """Return the Markov chain of visits for a chain of steps, without self-transitions, (n, n)."""
     away = steps * (1.0 - np.eye(len(steps)))
     total = away.sum(axis=1, keepdims=True)
     out: Floats = np.divide(away, total, out=np.zeros_like(away), where=total > 0.0)
@@ -66,27 +66,27 @@ def stationary_shares(steps: Floats) -> Floats:
 
 
 def time_share(steps: Floats, dwell_s: ArrayLike) -> Floats:
-    """Return the share of time in each state when a step in it lasts for ``dwell_s``, (n,)."""
+    """Return the share of time in each state if a step in it lasts ``dwell_s``, (n,)."""
     time = stationary_shares(steps) * np.asarray(dwell_s)
     out: Floats = time / time.sum()
     return out
 
 
 def mean_visit_s(steps: Floats, dwell_s: ArrayLike) -> Floats:
-    """Return the mean length of a visit, its refixations merged, (n,)."""
+    """Return the mean duration of a visit, with its refixations merged, (n,)."""
     out: Floats = np.asarray(dwell_s) / (1.0 - np.diag(steps))
     return out
 
 
 def lowest_peak_deg_s(amplitude_deg: ArrayLike) -> Floats:
-    """Return the lower edge of human peak speeds: Baloh's curve less 15 % between people."""
+    """Return the lower limit of human peak speeds: Baloh's curve minus 15 % for people's spread."""
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = 0.85 * BALOH_DEG_S * (1.0 - np.exp(-a / ROUND_DEG))
     return out
 
 
 def highest_peak_deg_s(amplitude_deg: ArrayLike) -> Floats:
-    """Return the upper edge: the higher of Bahill's and Collewijn's curves and 15 %."""
+    """Return the upper limit: the higher of Bahill's and Collewijn's curves plus 15 %."""
     a = np.asarray(amplitude_deg, dtype=float)
     bahill = BAHILL_DEG_S * (1.0 - np.exp(-a / ROUND_DEG))
     collewijn = COLLEWIJN_DEG_S * (1.0 - np.exp(-a / COLLEWIJN_ROUND_DEG))
@@ -95,16 +95,16 @@ def highest_peak_deg_s(amplitude_deg: ArrayLike) -> Floats:
 
 
 def shortest_duration_ms(amplitude_deg: ArrayLike) -> Floats:
-    """Return the lower edge of human durations, 21 ms + 2.2 ms a degree less a quarter."""
+    """Return the lower limit of human durations, 21 ms + 2.2 ms per degree, minus a quarter."""
     out: Floats = 0.75 * (21.0 + 2.2 * np.asarray(amplitude_deg, dtype=float))
     return out
 
 
 def longest_duration_ms(amplitude_deg: ArrayLike) -> Floats:
-    """Return the upper edge of human durations.
+    """Return the upper limit of human durations.
 
-    The higher of 25 ms + 2.4 ms a degree (Lee, Badler & Badler 2002) and a quarter, and the mean of
-    Baloh et al. 1975, 37 ms + 2.7 ms a degree.
+    This is the higher of 25 ms + 2.4 ms per degree (Lee, Badler & Badler 2002) plus a quarter, and
+    the mean of Baloh et al. 1975, 37 ms + 2.7 ms per degree.
     """
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = np.maximum(1.25 * (25.0 + 2.4 * a), 37.0 + 2.7 * a)
@@ -126,20 +126,20 @@ def mean_head_deg(eccentricity_deg: ArrayLike) -> Floats:
 
 
 def evoked_blink_probability(amplitude_deg: ArrayLike) -> Floats:
-    """Return the chance of a blink with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
+    """Return a blink's probability with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = 1.0 / (1.0 + np.exp(-0.217 * (a - 17.0)))
     return out
 
 
 class NormBand(NamedTuple):
-    """One measure and its pass band.
+    """One measure and its range of people.
 
-    key, group: its name in code, and its section
-    low, high: the band; least: fewest events that allow a verdict
-    source: who has measured it
-    mode: mode of conversation in which alone it applies, "" in all
-    notes: (style, words) pairs shown if the run has that style, e.g. "saccade min_jerk"
+    key, group: name in code, and section
+    low, high: the range; least: fewest events that allow a verdict
+    source: publication of the measurement
+    mode: only mode of conversation in which it applies, "" for all
+    notes: (style, text) pairs shown if the run has that style, e.g. "saccade min_jerk"
     """
 
     key: str

@@ -1,7 +1,7 @@
-"""Two heads that look at each other: how much, how long, who begins and who ends it.
+"""Mutual gaze of two heads: its share, its duration, and which head begins and ends it.
 
 A head looks at the other while its measured gaze passes through the oval of the other's face, seen
-from before. Shorter gaps and looks than ``BRIDGED_S`` count as none, as in the report's looks.
+from the front. Gaps and looks shorter than ``BRIDGED_S`` are ignored, as in the report.
 """
 
 from collections.abc import Sequence
@@ -20,17 +20,17 @@ from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 
 BRIDGED_S = 0.15
 HALF_WIDE_M, HALF_HIGH_M = 0.085, 0.125
-"""The oval of an adult's face about the nose; a head's grows with the distance of its eyes."""
+"""Oval of an adult's face around the nose; that of a head is proportional to its eye distance."""
 
 Mask = NDArray[np.bool_]
 
 
 class HeadPlacement(NamedTuple):
-    """Pose of one of the heads in their common world.
+    """Pose of one head in the common world.
 
     Attributes:
-        R: rotation of its neck base's frame.
-        p_m: place of its neck base.
+        R: rotation of the frame of its neck base.
+        p_m: position of its neck base.
     """
 
     R: Mat3
@@ -38,18 +38,18 @@ class HeadPlacement(NamedTuple):
 
     @classmethod
     def from_numbers(cls, numbers: Sequence[float]) -> "HeadPlacement":
-        """Return the place that ``as_numbers`` gave."""
+        """Return the placement that ``as_numbers`` returned as numbers."""
         a, b, c, d, e, f, g, h, i, j, k, m = numbers
         return cls(((d, e, f), (g, h, i), (j, k, m)), (a, b, c))
 
     @property
     def as_numbers(self) -> tuple[float, ...]:
-        """Return it as a recording holds it: the place, then the rows of the rotation."""
+        """Return the numbers stored in a recording: the position, then the rows of the rotation."""
         return (*self.p_m, *(number for row in self.R for number in row))
 
 
 class MutualLooks(NamedTuple):
-    """When each of two heads looked at the other: times (n,) in seconds, and whether (n,)."""
+    """Looks of two heads at each other: times (n,) in seconds, and whether each looked (n,)."""
 
     t_s: Floats
     first_looks: Mask
@@ -57,7 +57,7 @@ class MutualLooks(NamedTuple):
 
 
 class _LookingHead(NamedTuple):
-    """A head at an instant, in the common world; size: of its face, an adult's being 1."""
+    """Head at one time, in the common world; size: of its face, relative to an adult's."""
 
     eyes_m: Vec3
     gaze: Vec3
@@ -99,31 +99,32 @@ class MutualGazeTrace:
             self._rows.append((tick.t_s, *looks))
 
     def looks(self) -> MutualLooks:
-        """Return who looked when, short gaps and looks and all."""
+        """Return the looks of both heads, including short gaps and short looks."""
         t_s = np.array([row[0] for row in self._rows])
         first, second = (np.array([row[i] for row in self._rows], bool) for i in (1, 2))
         return MutualLooks(t_s, first, second)
 
     def figures(self) -> dict[str, object]:
-        """Return the statistics of ``mutual_gaze`` until now."""
+        """Return the statistics of ``mutual_gaze`` so far."""
         return mutual_gaze(*self.looks())
 
 
 def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
-    """Return how two who look at each other share their looks.
+    """Return statistics of the looks of two heads at each other.
 
     Args:
         t_s: (n,) times, seconds.
-        first: (n,) whether the first one looks at the second.
-        second: (n,) whether the second one looks at the first.
+        first: (n,) whether the first head looks at the second.
+        second: (n,) whether the second head looks at the first.
 
     Returns:
-        Shares of the time of each one's looks and of both at once; the share of both that looks
-        with the same lengths would have if neither minded the other (mean over the second's looks
-        shifted in time); lengths of mutual gazes (cut ones left out of mean and median); how many
-        of them the first one ended; and the time from a look to the other's answer. Argyle and
-        Ingham (1972) measured .6, .6 and .3 for two who talk, with mutual gazes of some 1.5 s;
-        people feel best looked at for 3.3 s at once (Binetti et al., 2016).
+        Shares of the time of each head's looks and of mutual gaze; the share of mutual gaze that
+        independent looks of the same durations would have (mean over shifts in time of the second
+        head's looks); durations of mutual gazes (mean and median without those cut off by the
+        start or the end); the number that the first head ended; and the time from a look to the
+        other's answer. Argyle and Ingham (1972) measured .6, .6 and .3 for two people who talk,
+        with mutual gazes of about 1.5 s; people prefer mutual gazes of 3.3 s (Binetti et al.,
+        2016).
     """
     if len(t_s) < 2:
         return {"seconds": 0.0}
@@ -162,7 +163,7 @@ def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
 
 
 def _looks_at(one: _LookingHead, other: _LookingHead) -> bool:
-    """Return whether a gaze passes through the oval of a face that it sees from before."""
+    """Return whether a gaze passes through the oval of a face seen from the front."""
     point = gaze_point_on_face(one.eyes_m, one.gaze, other.nose_m, other.R)
     if point is None:
         return False
@@ -172,13 +173,13 @@ def _looks_at(one: _LookingHead, other: _LookingHead) -> bool:
 
 
 def interval_edges(mask: Mask) -> tuple[list[int], list[int]]:
-    """Return the first index of each time it holds, and the one after its last."""
+    """Return the first index of each true interval, and the index after its last."""
     found = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
     return found[:, 0].tolist(), found[:, 1].tolist()
 
 
 def bridge_gaps(t_s: Floats, mask: Mask) -> Mask:
-    """Return looks without short gaps, and then without short looks."""
+    """Return looks with short gaps filled and then short looks removed."""
     out = mask.copy()
     for fill in (True, False):
         begins, ends = interval_edges(~out if fill else out)
@@ -190,7 +191,7 @@ def bridge_gaps(t_s: Floats, mask: Mask) -> Mask:
 
 
 def _chance_share(first: Mask, second: Mask, shifts: int = 50) -> float:
-    """Return the mean share of both when the second's looks are moved around in time."""
+    """Return the mean share of mutual gaze over circular shifts in time of the second's looks."""
     steps = np.linspace(0, len(first), shifts + 2)[1:-1].astype(int)
     return _round_figure(np.mean([np.mean(first & np.roll(second, step)) for step in steps]))
 

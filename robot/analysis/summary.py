@@ -1,4 +1,4 @@
-"""Figures of a run, gathered tick by tick and given as one JSON object at the end."""
+"""Figures of a run, collected tick by tick and returned as one JSON object at the end."""
 
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping
@@ -13,16 +13,16 @@ from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 
 _FIXATION_RAD_S = radians(40.0)
-"""Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""
+"""Largest speed of a fixation; 30 is usual, and a servo step in a 5 ms tick is already 18 deg/s."""
 
 _EVENTS_KEPT = 100
-"""The newest; a rig that runs for weeks must not fill the memory."""
+"""Number of newest values stored; a rig that runs for weeks must not fill the memory."""
 
 _TOGETHER = 16
-"""Ticks counted together: few enough for the rest of a slot, also on a slow machine."""
+"""Ticks counted together: few enough for the rest of a period, also on a slow machine."""
 
 _TickPart = tuple[float, GazeState, Target, str, tuple[str, ...]]
-"""What is counted of a tick: its time, pose, target, phase, and the guard's reasons."""
+"""Counted values of a tick: its time, pose, target, phase, and the guard's reasons."""
 
 
 class Summary:
@@ -33,7 +33,7 @@ class Summary:
         self._part_s: defaultdict[str, float] = defaultdict(float)
         self._limited: Counter[str] = Counter()
         self._events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
-        # Counted by thousandths of a degree: a list would grow for as long as the rig runs.
+        # Counts by thousandths of a degree: a list would grow while the rig runs.
         self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
         self._last: Tick | None = None
@@ -42,7 +42,7 @@ class Summary:
         self._gaze: Vec3 | None = None
 
     def update(self, tick: Tick) -> None:
-        """Add one tick; some are counted together, which costs a fraction of one at a time."""
+        """Add one tick; ticks are counted in batches, at a fraction of the cost of single ones."""
         if self._first_s is None:
             self._first_s = tick.t_s
         self._last = tick
@@ -55,7 +55,7 @@ class Summary:
             self._count_waiting_ticks()
 
     def _count_waiting_ticks(self) -> None:
-        """Count the ticks that wait."""
+        """Count the waiting ticks."""
         for t_s, pose, target, phase, reasons in self._waiting:
             dt_s = t_s - self._counted_s if self._counted_s is not None else 0.0
             self._counted_s = t_s
@@ -68,9 +68,10 @@ class Summary:
             before, self._gaze = self._gaze, unit(add(left, right))
             if before is None or dt_s <= 0.0 or phase == "saccade":
                 continue
-            # A fixation is judged by the speed of the gaze, as an eye tracker does.
+            # As in an eye tracker, the speed of the gaze defines a fixation.
             if angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s:
-                # Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
+                # Eyes that one linkage turns sideways stay parallel: the remaining error counts
+                # too.
                 point = add(
                     target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s))
                 )
@@ -96,19 +97,19 @@ class Summary:
                 "p95": _percentile_deg(self._errors_mdeg, 95.0),
             },
             "estimated": list(estimated_joints(last)) if last else [],
-            "reckoned": list(estimated_joints(last)) if last else [],  # the key until this version
+            "reckoned": list(estimated_joints(last)) if last else [],  # the key of earlier versions
             "limited": dict(sorted(self._limited.items())),
             "events": [{"at_s": round(at_s, 3), "what": what} for at_s, what in self._events],
         }
 
 
 def cyclopean_direction(tick: Tick) -> Vec3:
-    """Return the mean of both measured lines of sight: a unit vector in the world."""
+    """Return the unit mean of both measured lines of sight, in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
 
 
 def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
-    """Return a percentile of counted thousandths of a degree, None of nothing."""
+    """Return a percentile of counted thousandths of a degree, None without values."""
     if not counts_mdeg:
         return None
     values = sorted(counts_mdeg)
