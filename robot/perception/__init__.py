@@ -1,1 +1,1 @@
-"""From detections in camera frames to people and things localised in the world."""
+"""Localisation and tracking of people and things in the world, from detections in camera frames."""

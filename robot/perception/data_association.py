@@ -1,9 +1,9 @@
-"""Data association: the pairing of tracks and detections that is likeliest as a whole.
+"""Data association: the most likely joint assignment of detections to tracks.
 
-A pair is weighed by the distance from the track's expected position to the detection, in standard
-deviations of their difference. A handful of pairs is computed one by one, many in one expression of
-arrays. A greedy choice of the nearest pair would exchange the detections of two people who pass
-each other whenever one of them is nearer to both positions.
+The cost of a pair is the distance from the track's expected position to the detection, in standard
+deviations of their difference. A few pairs are computed one by one, many in one array expression.
+A greedy choice of the nearest pair would exchange the detections of two people who pass each other
+whenever one of them is nearer to both positions.
 """
 
 from collections.abc import Sequence
@@ -20,15 +20,15 @@ from gazerig.robot.model.track_params import TrackParams
 FORBIDDEN: Final = 1e6
 """Cost of an impossible pair; larger than the cost of all possible pairs."""
 NO_MARK = -1
-"""Mark of a detection that its detector did not number."""
+"""Mark of a detection without a number of its detector."""
 UNPAIRED: Final = 30.0
 """Cost of an unseen track and a detection of a new person; no possible pair costs more. Without
-this limit a new person would push the others on, each to the position of the next."""
+this limit a new person would shift the other tracks, each to the position of the next."""
 # Above this, costs approach that limit more and more slowly.
 _NEARLY_UNPAIRED = 25.0
 _SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
-# A motion that no filter expects (a lunge, a jump of the detector) happens in one frame of twenty.
-# The cost is minus twice the logarithm of that.
+# A motion that no filter predicts (a lunge, a jump of the detector) happens in one frame of twenty.
+# The cost is minus twice the logarithm of that probability.
 _SURPRISE = 6.0
 # A person out of sight is found again in one frame of ten.
 _BACK = 4.6
@@ -40,22 +40,23 @@ _BOB_M = 0.1
 _HIDDEN_M = 0.05
 # Two people at about the same distance may each hide the other.
 _NEARER = 1.1
-# Nothing is measured better than this.
+# Lower limit of measurement errors.
 _LEAST_SD_M = 1e-4
 # Cost of two detector numbers for one thing: 4 standard deviations.
 _OTHER_MARK = 16.0
-# Extent of a thing about its middle, in radii.
+# Extent of a thing around its centre, in radii.
 _OUTLINE = 1.5
-# Hellinger distance of two clothings at which the cost is 0, and the slopes of the cost below and
-# above it. At .105, one person at two times is as frequent as two people at one time. Measured on
-# people in a square (75 tracks; medians: .044 for one person, .13 for two people).
+# Hellinger distance of two clothes' colours at which the cost is 0, and the slopes of the cost
+# below and above it. At .105, one person at two times is as frequent as two people at one time.
+# Measured on people in a square (75 tracks; medians: .044 for one person, .13 for two people).
 _AS_LIKELY, _NEARER_COST, _FARTHER_COST = 0.105, 55.0, 14.0
 # The errors of successive frames are correlated (light, covers): each frame counts for this share
 # of an independent one.
 _CLOTHES = 0.6
 # Clothes of which this share is visible count as fully visible.
 _ENOUGH = 0.4
-# A person dressed this similarly may have moved on out of sight, and reappear elsewhere.
+# A person dressed at least this similarly may have moved while out of sight, and reappear
+# elsewhere.
 _ALIKE = -2.0
 # Largest difference of two ranges of one position, in standard deviations.
 _RANGE_SIGMA = 3.0
@@ -69,10 +70,10 @@ class TrackRow(NamedTuple):
 
     kind, mark: numbers of its kind and of the detector
     x, y, z, range_m: unit vector from the camera to its expected position, and the distance
-    across_m2, along_m2: variances of its position
+    across_m2, along_m2: variances of its position across and along the view
     radius_m: half its size
     size: factor of distances that come from the size of a face
-    moved_m: extra distance allowed because it was not seen
+    moved_m: extra distance allowed because it was unseen
     in_sight: whether it was seen recently
     gone_m: extra distance allowed if the clothes match
     fastest_m: largest motion along the view since it was seen
@@ -101,7 +102,7 @@ class TrackRow(NamedTuple):
 class DetectionRow(NamedTuple):
     """Detection in data association, as plain numbers.
 
-    kind, mark, x, y, z, range_m, radius_m: as of a track
+    kind, mark, x, y, z, range_m, radius_m: as in ``TrackRow``
     across_sd_m, along_sd_m: standard deviations of its position
     by_size: 1 if its distance comes from the size of a face, else 0
     """
@@ -126,16 +127,16 @@ def pair_costs(
 ) -> list[list[float]]:
     """Return the cost of each pair: minus twice the log likelihood.
 
-    A track long unseen could be anywhere; without the logarithm it would match everything best. A
-    detector that separates things in the image has already decided: a detection with another number
-    can match only within the track's own outline.
+    A track that was unseen for long could be anywhere; without the logarithm it would match every
+    detection best. If the detector numbers things in the image, its numbers take precedence: a
+    detection with another number can match only within the track's own outline.
 
     Args:
-        tracks: n of them.
-        detections: m of them.
+        tracks: n tracks.
+        detections: m detections.
         par: gates.
-        clothing: costs of the clothes of each pair, from ``clothing_costs``; None: no clothes
-            known.
+        clothing: costs of the clothes of each pair, from ``clothing_costs``; None: no known
+            clothes.
 
     Returns:
         n rows of m, FORBIDDEN for an impossible pair.
@@ -183,7 +184,7 @@ def _all_pairs(
     par: TrackParams,
     clothing: Sequence[Sequence[float]] | None = None,
 ) -> list[list[float]]:
-    """Return the costs of pairs, all at once."""
+    """Return the costs of all pairs, in array expressions."""
     t, d = np.array(tracks).T[:, :, None], np.array(detections).T
     far_m = d[5] * (1.0 + d[9] * (t[9] - 1.0))
     widest_m = par.gate_m * np.maximum(1.0, far_m)
@@ -195,7 +196,7 @@ def _all_pairs(
     wide_m = wide_m + t[12] * alike
     ratio = (t[5] / far_m) ** 2
     aside = t[5] * t[5] * ((t[2] - d[2]) ** 2 + (t[3] - d[3]) ** 2 + (t[4] - d[4]) ** 2)
-    deep_m = 2.0 * t[5] * (far_m - t[5]) / (far_m + t[5])  # the logarithm of their ratio, nearly
+    deep_m = 2.0 * t[5] * (far_m - t[5]) / (far_m + t[5])  # nearly the logarithm of their ratio
     deep = deep_m * deep_m
     across_sd, along_sd = np.maximum(d[6], _LEAST_SD_M), np.maximum(d[7], _LEAST_SD_M)
     across, along = ratio * across_sd * across_sd, ratio * along_sd * along_sd
@@ -231,11 +232,11 @@ def _all_pairs(
 def _hidden_tracks(t: Floats) -> NDArray[np.bool_]:
     """Return which tracks are expected behind or right next to a nearer one.
 
-    A person who is about to be hidden does not appear somewhere else suddenly: that is another
-    person, unless the detector gave both the same number.
+    A person who is about to be hidden does not suddenly appear elsewhere: a detection there is
+    another person, unless the detector gave both the same number.
 
     Args:
-        t: columns of the rows of tracks.
+        t: columns of the track rows.
     """
     apart = (t[2][:, None] - t[2]) ** 2 + (t[3][:, None] - t[3]) ** 2 + (t[4][:, None] - t[4]) ** 2
     covered = (t[8] + t[8][:, None]) / t[5]
@@ -336,7 +337,7 @@ def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> lis
     if not len(costs) or not len(costs[0]):
         return []
     finite = [[c if c < FORBIDDEN else unpaired for c in row] for row in costs]
-    if len(finite) == len(finite[0]) == 1:  # one person, most of the time
+    if len(finite) == len(finite[0]) == 1:  # usually one person
         pairs = [(0, 0)]
     elif len(finite) <= len(finite[0]):
         pairs = list(enumerate(_shortest_paths(finite)))
@@ -349,9 +350,9 @@ def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> lis
 def _shortest_paths(costs: list[list[float]]) -> list[int]:
     """Return the column of each row in the cheapest pairing; no fewer columns than rows.
 
-    Rows whose cheapest columns differ get them. Each other row is paired along the path of least
-    reduced cost to a free column, which moves the rows on that path to their next columns. Column 0
-    represents the row being paired.
+    Rows whose cheapest columns differ are paired with them. Each other row is paired along the path
+    of least reduced cost to a free column, which moves the rows on that path to their next columns.
+    Column 0 represents the row being paired.
 
     Source: Jonker and Volgenant, "A shortest augmenting path algorithm for dense and sparse
     linear assignment problems" (1987).

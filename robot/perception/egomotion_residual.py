@@ -1,9 +1,9 @@
 """Apparent speed of stationary things while the head turns: the residual of a wrong time or pose.
 
-A frame placed by the head's pose of another moment shifts everything by the head's speed times the
+A frame placed by the head's pose at another time shifts all things by the head's speed times the
 error in time. As the head's speed changes, the world seems to move with it: a fit of the observed
-shifts to the changes of the head's speed gives that error. Both figures are 0 for a camera whose
-times, mounting and lens agree with the rig.
+shifts to the changes of the head's speed yields that error. Both figures are 0 for a camera whose
+time stamps, mounting and lens agree with the rig.
 
 A thing counts as stationary only if it was still before a turn and is at the same position after
 it. So while the head is still only the newest frame counts, as the last one before a possible turn:
@@ -33,8 +33,8 @@ _FORGET = 0.99
 class ResidualFigures(NamedTuple):
     """Figures so far; None before a stationary thing was seen while the head turned.
 
-    speed_deg_s: median speed at which still things seemed to move
-    late_ms: how much older frames seem to be than their time stamps; below 0: younger
+    speed_deg_s: median apparent speed of stationary things
+    late_ms: apparent age of frames beyond their time stamps; below 0: they are newer
     samples: number of pairs of frames in the median
     """
 
@@ -67,7 +67,7 @@ class _ResidualFrame(NamedTuple):
 class _HeadTurn:
     """Apparent motion of one thing since the head was last still.
 
-    shifts: (seen shift, shift that the head's change of speed makes in a second, seconds
+    shifts: (observed shift, shift per second of delay due to the head's change of speed, seconds
     between the frames, whether the head was turning)
     """
 
@@ -77,7 +77,7 @@ class _HeadTurn:
 
 
 class EgomotionResidual:
-    """Gathers the figures frame by frame."""
+    """Collects the figures frame by frame."""
 
     def __init__(self) -> None:
         self._speeds: deque[float] = deque(maxlen=_SAMPLES)
@@ -99,15 +99,15 @@ class EgomotionResidual:
 
         Args:
             t_s: time of the capture.
-            turn_rad_s: returns the angular velocity of the camera then, along the world's axes.
+            turn_rad_s: returns the angular velocity of the camera at that time, in world axes.
             p_world_eye_m: position of the camera.
             seen: the things tracked in the frame.
-            at_most_rad_s: rough upper bound of the camera's speed of turning.
+            at_most_rad_s: rough upper bound of the camera's angular speed.
         """
         frame = _ResidualFrame(t_s, turn_rad_s, p_world_eye_m, seen)
         stands = at_most_rad_s < _STANDS_RAD_S
         if stands and self._stood:
-            self._waiting = frame  # the waiting frame neither begins nor ends a turn
+            self._waiting = frame  # the stored frame neither starts nor ends a turn
             return
         if self._waiting is not None:
             self._evaluate(self._waiting)
@@ -141,7 +141,7 @@ class EgomotionResidual:
         )
 
     def _use_turns(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
-        """Use the turns of things that are at their former positions, and begin new ones."""
+        """Use the turns of things that are at their former positions, and start new ones."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD

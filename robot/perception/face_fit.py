@@ -2,8 +2,8 @@
 
 Seven numbers are fitted: a rotation, a position and the length of the face. The width of the mouth
 over the distance of the eyes hardly depends on the turn of the face. It gives the strength of a
-smile, and so the positions of the mouth's corners; their height is free within wide bounds. On
-matrices this small NumPy and OpenCV spend most of their time on calls, and they round differently
+smile, and so the positions of the mouth's corners; their height is free within wide bounds. For
+matrices this small, NumPy and OpenCV spend most of their time on calls, and they round differently
 on other processors.
 
 Frame: of a camera that looks at the face with its eyes level; x right, y down, z forward. Points
@@ -20,21 +20,22 @@ Points = tuple[tuple[float, float], ...]
 Five = tuple[float, float, float, float, float]
 """Three components of a turn, the distance along the optical axis, and the length."""
 
-# Usual landmark error, as a part of the distance between the eyes.
+# Usual landmark error, as a fraction of the distance between the eyes.
 _NOISE_OF_EYES = 0.04
-# Spread of the belief that a face found is turned to the camera, pitch and yaw, and spread of
-# face lengths at a given distance between the eyes: as information, 1 / spread^2.
+# Prior: spread of pitch and yaw of a detected face about the direction to the camera, and spread of
+# face lengths at a given distance between the eyes; as information, 1 / spread^2.
 _PITCH_INFO, _YAW_INFO = radians(22.0) ** -2, radians(30.0) ** -2
 _LENGTH_INFO = 0.1**-2
 # A smile: spread of mouth widths over the usual one; and the motion of a corner up and back per
 # motion outward, from the dense mesh of a laughing and a calm face (7.6 mm out, 7.6 up, 6.6 back).
-# The narrowest and the widest mouths that are believed: parts of the usual width beyond it.
+# Limits of accepted mouth widths, as fractions of the usual width below and above it.
 _WIDTH_SPREAD, _UP_OF_OUT, _BACK_OF_OUT = 0.18, 1.0, 0.87
 _NARROWEST, _WIDEST = -0.3, 0.5
-# Spread of the remaining height of the mouth's corners, as a part of the distance of the eyes.
+# Spread of the remaining height of the mouth's corners, as a fraction of the eye distance.
 _MOUTH_HEIGHT_OF_EYES = 0.2
-# Each step is a part of the one before, so the remainder after the last is known: it may be a
-# thousandth (0.06 deg, 1 mm at 1 m). 2 steps are usual. With noise of a tenth of the face, one fit
+# Each step is a fraction of the previous one, so the remainder after the last is known; a
+# thousandth is accepted (0.06 deg, 1 mm at 1 m). 2 steps are usual. With noise of a tenth of the
+# face, one fit
 # in a hundred has not converged after 20.
 _REMAINS, _MOST_STEPS = 1e-3, 20
 _SMALL_TURN_RAD = 1e-4
@@ -42,7 +43,7 @@ _SMALL_TURN_RAD = 1e-4
 _OF_FIVE = 1.25
 
 # A face that looks straight into the camera: its left is the image's right, its up the image's
-# up. The tip of its nose, which is the origin, is left out.
+# up. The tip of its nose, the origin, is omitted.
 _LANDMARKS_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_FACE_M.tolist())
 _NOSE_OUT_M = -sum(x for x, _, _ in _LANDMARKS_M) / 4.0
 _FRONTAL_M = tuple((y, -z, -x) for i, (x, y, z) in enumerate(_LANDMARKS_M) if i != 2)
@@ -55,7 +56,7 @@ class FittedFace(NamedTuple):
 
     R: rotation from a face that looks straight into the camera
     p_m: tip of the nose
-    length: of the face, over the canonical one's
+    length: length of the face, relative to the canonical face
     """
 
     R: Mat3
@@ -66,9 +67,9 @@ class FittedFace(NamedTuple):
 class _Sums(NamedTuple):
     """Weighted sums over the points: the normal equations of one step.
 
-    n_x, n_y: of the weights in the rows of x and of y; to_x, to_y: of the coefficients there
-    products: of the coefficients with each other: the upper triangle, row by row
-    errors: of the coefficients with the errors; errors_x, errors_y: of the errors
+    n_x, n_y: sums of the weights in the rows of x and y; to_x, to_y: of the coefficients there
+    products: sums of products of the coefficients: the upper triangle, row by row
+    errors: sums of coefficients times errors; errors_x, errors_y: sums of the errors
     """
 
     n_x: float
@@ -82,7 +83,7 @@ class _Sums(NamedTuple):
 
 
 def fit_face(seen: Points, noise: float) -> FittedFace | None:
-    """Return the most probable face, None if the points determine none.
+    """Return the most probable face, None if the points do not determine one.
 
     Args:
         seen: right eye, left eye, nose, right and left mouth corner on the plane z = 1.
@@ -104,7 +105,7 @@ def fit_face(seen: Points, noise: float) -> FittedFace | None:
         0.0,
     )
     width = hypot(ex - cx, ey - cy) / eyes
-    # The believed part of its excess over the usual one; width: over the distance of the eyes.
+    # Accepted part of the excess over the usual width; width: relative to the eye distance.
     ratio = width / _USUAL_WIDTH
     unsure = 2.0 * (variance / (eyes * eyes)) * (1.0 / _USUAL_WIDTH**2 + ratio * ratio)
     believed = _WIDTH_SPREAD**2 / (_WIDTH_SPREAD**2 + unsure)
@@ -144,7 +145,7 @@ def fit_face(seen: Points, noise: float) -> FittedFace | None:
 
 
 def _smile_landmarks(wider: float) -> tuple[Vec3, ...]:
-    """Return eyes and mouth corners of a frontal face whose mouth is wider by a part of itself."""
+    """Return eyes and mouth corners of a frontal face whose mouth is wider by a fraction."""
     right_eye, left_eye, (_, y, z), _ = _FRONTAL_M
     out = wider * _HALF_MOUTH_M
     aside, y, z = _HALF_MOUTH_M + out, y - _UP_OF_OUT * out, z + _BACK_OF_OUT * out
@@ -152,7 +153,7 @@ def _smile_landmarks(wider: float) -> tuple[Vec3, ...]:
 
 
 def _mouth_width(frontal: tuple[Vec3, ...], R: Mat3, p_m: Vec3, length: float) -> float:
-    """Return the width of a mouth as seen, over the distance of the eyes as seen."""
+    """Return the observed width of a mouth relative to the observed distance of the eyes."""
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
     seen = []
     for x, y, z in frontal:
@@ -234,13 +235,13 @@ def _sums(
     Each point has a row of x, of weight k, and one of y, of weight h.
 
     Args:
-        nose: as seen.
-        others: eyes and corners of the mouth as seen.
-        frontal: the others, on the face.
+        nose: observed nose.
+        others: observed eyes and corners of the mouth.
+        frontal: the same points on the face.
         height_weight: weight of the rows of y of the mouth's corners.
         R: rotation of the face.
-        p_m: its position.
-        length: its length.
+        p_m: position of the face.
+        length: length of the face.
     """
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
     px, py, pz = p_m
@@ -308,7 +309,7 @@ def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | Non
     y0, y1, y2, y3, y4 = sums.to_y
     ex, ey, over_x, over_y = sums.errors_x, sums.errors_y, 1.0 / sums.n_x, 1.0 / sums.n_y
     pitch, yaw, long = variance * _PITCH_INFO, variance * _YAW_INFO, variance * _LENGTH_INFO
-    # Row by row: without x and y, with the prior, minus the rows solved already (LDL^T).
+    # Row by row: without x and y, with the prior, minus the rows already solved (LDL^T).
     fx, fy = x0 * over_x, y0 * over_y
     d0 = a00 + pitch - fx * x0 - fy * y0
     a01, a02 = a01 - fx * x1 - fy * y1, a02 - fx * x2 - fy * y2

@@ -5,12 +5,12 @@ Camera frame: optical, x right, y down, z forward. Metres; pixels have their cen
 whole numbers.
 
 Five points nearly in one plane determine position and roll well, and yaw and pitch poorly. Faces
-also differ, in length and most of all about the mouth: a smile widens it, raises its corners and
-draws them back, which a fixed face could explain only by a nod of ten degrees and more. The pose is
-therefore the most probable one. It combines reprojection errors weighted by usual landmark errors,
-a mouth of the observed width with corners at the positions of such a smile, priors on their height
-and on the face's length, and a weak prior that a detected face is turned towards the camera. The
-search starts from a face that looks into the camera, so it ends at the nearer of the two mirror
+also differ, in length and most of all at the mouth: a smile widens it, raises its corners and
+draws them back. A rigid face model could explain this only by a nod of ten degrees or more. The
+pose is therefore the most probable one. It combines reprojection errors weighted by usual landmark
+errors, a mouth of the observed width with corners at the positions of such a smile, priors on their
+height and on the face's length, and a weak prior that a detected face is turned towards the camera.
+The search starts from a face that looks into the camera, so it ends at the nearer of the two mirror
 poses of a flat set of points.
 """
 
@@ -39,7 +39,7 @@ class FacePose(NamedTuple):
 
     p_camera_m:    tip of the nose
     R_camera_face: face axes in the camera frame
-    length:        length of the face over the canonical one's
+    length:        length of the face relative to the canonical face
     turn_sd_rad:   standard deviation of its turn, the larger of yaw and pitch
     """
 
@@ -50,19 +50,19 @@ class FacePose(NamedTuple):
 
 
 def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | None:
-    """Return the pose of an adult face, or None if the points show no front of a face.
+    """Return the pose of an adult face, None if the points are not those of a face from its front.
 
     Args:
         landmarks_px: (5, 2) in the order of DetectedFace.
-        intrinsics: of the image.
+        intrinsics: intrinsics of the image.
     """
     array = np.asarray(landmarks_px, dtype=np.float64)
     points: list[list[float]] = array.tolist()
     if array.shape != (5, 2) or not _shows_front(points):
         return None
     rays = _rays(points, intrinsics)
-    # The camera turned to the face and rolled until the eyes are level: poses near "looks at me"
-    # are small rotations wherever the face appears.
+    # Axes of a camera turned to the face and rolled until the eyes are level: poses near "looks at
+    # the camera" are small rotations wherever the face appears.
     a, b, c, d, e = rays
     z = unit((a[0] + b[0] + c[0] + d[0] + e[0], a[1] + b[1] + c[1] + d[1] + e[1], 5.0))
     eyes = sub(b, a)
@@ -95,8 +95,8 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
 def _shows_front(points: list[list[float]]) -> bool:
     """Return whether eyes and mouth have the orientation of a face seen from its front.
 
-    The sign of a projected triangle's area shows exactly which side of its plane is visible; a
-    degenerate triangle shows neither.
+    The sign of the area of a projected triangle shows which side of its plane is visible; a
+    degenerate triangle shows neither side.
     """
     (ax, ay), (bx, by), (nx, ny), (cx, cy), (dx, dy) = points
     if not isfinite(ax + ay + bx + by + nx + ny + cx + cy + dx + dy):
@@ -106,7 +106,7 @@ def _shows_front(points: list[list[float]]) -> bool:
 
 
 def _rays(points: list[list[float]], lens: Intrinsics) -> list[Vec3]:
-    """Return the directions through pixels, with z = 1 and distortion undone."""
+    """Return the undistorted directions through pixels, with z = 1."""
     if lens.has_distortion:
         return [(x, y, z) for x, y, z in rays_through(points, lens).tolist()]
     fx, fy, cx, cy = lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px
@@ -114,7 +114,7 @@ def _rays(points: list[list[float]], lens: Intrinsics) -> list[Vec3]:
 
 
 def _project(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
-    """Return the points of rays on the plane z = 1 of the camera turned towards the face."""
+    """Return the intersections of rays with the plane z = 1 of the camera turned to the face."""
     (a, b, c), (d, e, f), (g, h, i) = R_face_camera
     found = []
     for x, y, _ in rays:  # z is 1

@@ -1,8 +1,8 @@
-"""Location of an image's contents in the camera's axes, by the image and the calibration alone.
+"""Localisation of an image's contents in the camera's axes, from image and calibration only.
 
-It runs next to the detector, in the camera's process. Across the line of view a position is exact
-to about a pixel. Along it, the distance is as good as the camera's depth if the camera measures one
-there, else as good as the spread of face sizes.
+It runs next to the detector, in the camera's process. Across the line of view a position is
+accurate to about a pixel. Along it, the accuracy is that of the camera's depth if the camera
+measures one there; otherwise it is limited by the spread of face sizes.
 """
 
 from collections.abc import Callable
@@ -37,54 +37,54 @@ from gazerig.robot.perception.mesh_reading import read_mesh
 Box = tuple[float, float, float, float]
 """x, y, width, height in pixels."""
 Reading = tuple[float | None, float, float]
-"""Distance along the optical axis (m), its spread (m), and the share of pixels with any."""
+"""Distance along the optical axis (m), its spread (m), and the share of pixels with a distance."""
 DepthAt = Callable[[NDArray[Any], Box], Reading]
-"""Function that reads the distance of a box of pixels from a depth image."""
+"""Reads the distance of a box of pixels from a depth image."""
 
 _FACE_RADIUS_M = 0.1
-# Length from the hips of a person to the top of the head in the detector's terms, its spread over
-# people and postures, and the error of the head's middle. Measured on three people in front of
+# Length from the hips of a person to the top of the head as the detector defines it, its spread
+# over people and postures, and the error of the head's centre. Measured on three people in front of
 # webcams, by the distance of their eyes: .76 to .87 m, and 2 cm.
 _TRUNK_M, _TRUNK_SPREAD, _HEAD_SD_M = 0.83, 0.15, 0.05
 # Length from the wrist of an adult to the root of the middle finger, its spread over people and
-# postures, and the error of its middle; radius of a hand.
+# postures, and the error of its centre; radius of a hand.
 _PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
-# A head beyond the image is placed inside it by this part of its width: over the visible body.
+# A head outside the image is placed inside it by this fraction of its width: over the visible body.
 _EDGE = 0.02
-# A face within this distance of the middle of a person's head, in trunk lengths, is theirs.
+# A face this near to the centre of a person's head, in trunk lengths, is that person's.
 _OWN_FACE = 0.25
 # A face printed on a shirt is rejected: its confidence is below this, and below another's divided
 # by this factor, and its middle is within these distances below and aside of the other's, in
 # heights of that one.
 _DOUBTFUL, _SURER, _ON_CHEST, _ASIDE = 0.9, 10.0, (1.0, 3.0), 1.0
-# Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
+# Error of a face's centre from five landmarks: fractions of a pixel and of the eye distance.
 _CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
-# Error of its size from frame to frame, in the same units. The eyes of a person are typically 6 %
-# nearer or farther apart than the mean (Gordon et al., ANSUR): this error is constant, and no
-# filter removes it.
+# Error of its size from frame to frame, in the same units. The eye distance of a person typically
+# differs from the mean by 6 % (Gordon et al., ANSUR): this error is constant, and no filter removes
+# it.
 _SIZE_PX, _SIZE_OF_EYES = 0.7, 0.03
 SIZE_SPREAD = 0.06
 # Depth of a face: rejected if too few of its pixels have one, or if they spread over more than a
-# face; its error is at least a part of itself.
+# face; its error is at least a fraction of the depth.
 _LEAST_SHARE, _MOST_SPREAD_M, _LEAST_SD = 0.3, 0.12, 0.01
-# Accepted sizes of a face, over an adult's.
+# Accepted sizes of a face, relative to an adult's.
 _SMALLEST, _LARGEST = 0.3, 3.0
-# The middle of a patch wanders within it; its flow has an error in proportion to itself and to the
-# search.
+# The centre of a patch wanders within it; the error of its flow is proportional to the flow and to
+# the search range.
 _MIDDLE_OF_RADIUS, _PLACED_M = 0.3, 0.002
 _FLOW_SHARE, _FLOW_RAD_S, _LOOM_SD_1_S = 0.1, 0.03, 0.5
-# Striding legs and people who part grow and shrink a patch that comes no nearer; a growth that no
-# measured distance confirms gets less weight.
+# Striding legs and people who part make a patch grow and shrink although it does not approach;
+# growth that no measured distance confirms gets less weight.
 _SHAPE_1_S = 0.3
-# A patch this many times as high as wide is a walking person; the head's middle is this part of the
-# height below its upper edge.
+# A patch this many times as high as wide is a walking person; the centre of the head is this
+# fraction of the height below its upper edge.
 _UPRIGHT, _HEAD_DOWN = 1.4, 1.0 / 14.0
 # Largest number of things of a frame that are passed on: the largest and fastest ones.
 _MOST_THINGS = 24
 # A patch is compact if its aspect ratio and the filled share of its box (of a disc's: .79) are
 # above these.
 _LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
-# A face has no measured velocity; these fields are a velocity's errors.
+# A face has no measured velocity; these fields are errors of a velocity.
 _NO_SPEED_SDS = (0.1, 0.5)
 
 
@@ -92,7 +92,7 @@ _NO_SPEED_SDS = (0.1, 0.5)
 class FrameLocator:
     """Locates faces and things in the camera's axes by one calibration; picklable.
 
-    lens: as measured; field_rad: horizontal field of view, used without a measured lens
+    lens: measured lens; field_rad: horizontal field of view, used without a measured lens
     depth_at: reads depth images; None: distances come from the size of faces
     """
 
@@ -105,12 +105,12 @@ class FrameLocator:
         return self.locate(found, self.intrinsics(found))
 
     def intrinsics(self, found: Detections) -> Intrinsics:
-        """Return the calibration of a frame: measured, the camera's own, or by its field."""
+        """Return the intrinsics of a frame: measured, the camera's, or from the field of view."""
         size_px = found.width_px, found.height_px
         return intrinsics_of_lens(self.lens, self.field_rad, *size_px, found.lens)
 
     def fault(self, found: Detections) -> str:
-        """Return why the measured lens is not used for a frame, as one line; "" if it is used."""
+        """Return why the measured lens is not used for a frame, in one line; "" if it is used."""
         if self.lens is None:
             return ""
         why = lens_fault(self.lens, found.width_px, found.height_px)
@@ -153,7 +153,7 @@ class FrameLocator:
     def _face(
         self, face: DetectedFace, found: Detections, lens: Intrinsics
     ) -> DetectionInCamera | None:
-        """Locate a face, None if its landmarks show no front of a face."""
+        """Locate a face, None if its landmarks are not those of a face from its front."""
         reading = read_mesh(face.mesh, lens) if face.mesh is not None else None
         pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
         if pose is None:
@@ -228,7 +228,7 @@ class FrameLocator:
     def _depth_about(
         self, found: Detections, at_px: tuple[float, float], half_px: float
     ) -> tuple[float, float] | None:
-        """Return the measured depth in a square, by its middle and half its side; see _depth."""
+        """Return the measured depth in a square with a centre and half side; see _depth."""
         (x, y), side = at_px, 2.0 * half_px
         return self._depth(found, (x - half_px, y - half_px, side, side))
 
@@ -244,9 +244,9 @@ class FrameLocator:
     def _depth_ratio(
         self, face: DetectedFace, pose: FacePose, found: Detections
     ) -> tuple[float, float] | None:
-        """Return the measured distance over that from the size, and its relative deviation.
+        """Return the ratio of measured distance to distance from size, and its relative deviation.
 
-        None if the camera's depth does not give the distance of this face.
+        Return None if the camera's depth does not give the distance of this face.
         """
         if found.depth_m is None:
             return None
@@ -256,7 +256,8 @@ class FrameLocator:
         if depth is None:
             return None
         z, spread = depth
-        # Between eyes and mouth the surface is behind the tip of the nose, the face's position.
+        # Between eyes and mouth the surface is behind the tip of the nose, which defines the
+        # position.
         behind = float((LANDMARKS_FACE_M @ np.array(pose.R_camera_face).T)[:, 2].mean())
         share = (z - behind) / pose.p_camera_m[2]
         if not _SMALLEST < share < _LARGEST:
@@ -271,7 +272,7 @@ def _point_at_depth(at_px: tuple[float, float], z_m: float, lens: Intrinsics) ->
 
 
 def _lower_face(face: DetectedFace) -> float:
-    """Return the size of a face's lower half over its eyes; see ``DetectionInCamera``."""
+    """Return the size of a face's lower half relative to its eyes; see ``DetectionInCamera``."""
     (ax, ay), (bx, by), (x, y), (cx, cy), (dx, dy) = face.landmarks_px.tolist()
     middle_x, middle_y = 0.5 * (ax + bx), 0.5 * (ay + by)
     eyes, mouth = hypot(bx - ax, by - ay), hypot(dx - cx, dy - cy)
@@ -303,8 +304,8 @@ def thing_in_camera(blob: MovingBlob, lens: Intrinsics | None = None) -> Detecti
     """Return a moving thing with the errors of its position, None if it has no position.
 
     Args:
-        blob: as detected.
-        lens: of the frame; None: its upper end stays unknown.
+        blob: the detected patch.
+        lens: lens of the frame; None: the upper end stays unknown.
     """
     far = norm(blob.p_camera_m)
     if not (isfinite(far) and isfinite(blob.radius_m)):
@@ -358,7 +359,7 @@ def _swept_m(blob: MovingBlob) -> float:
 
 
 def _is_compact(blob: MovingBlob) -> bool:
-    """Return whether a patch is about as wide as high and fills its box as a disc does."""
+    """Return whether a patch is about as wide as high and fills its box like a disc."""
     if blob.box_px is None:
         return False
     _, _, width, height = blob.box_px

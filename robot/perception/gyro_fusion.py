@@ -1,8 +1,8 @@
-"""Camera orientation from the joints and from the camera's own gyro, each used for its strength.
+"""Camera orientation from the joints and the camera's own gyro.
 
-The joints give the direction of the camera, but not a bump of the table, nor motion within play and
-between their readings. The gyro measures every turn, but drifts. A complementary filter takes quick
-turns from the gyro and, over about a second, follows the joints. Pure.
+The joints give the direction of the camera, but they measure neither a bump of the table nor motion
+within play and between readings. The gyro measures every rotation, but drifts. A complementary
+filter uses the gyro for fast rotations and follows the joints over about a second. Pure.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,20 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.perception.face_fit import rotation_by
 
 _SETTLE_S = 1.0
-"""In this time a difference between gyro and joints falls to a third."""
-# After a longer gap between frames the joints alone give the orientation.
+"""Time in which a difference between gyro and joints falls to a third."""
+# After a longer gap between frames only the joints give the orientation.
 _GAP_S = 0.5
-# A larger difference is no bump: the joints count, and if it recurs, the gyro is wrong.
+# A larger difference is not a bump: the joints are used, and if it recurs, the gyro is wrong.
 _MOST_RAD = radians(15.0)
 _MOST_TIMES, _WITHIN_S = 3, 30.0
 _WITHOUT_S = 60.0
 
 
 class GyroFusion:
-    """Corrects the orientation by the joints, frame by frame.
+    """Corrects the orientation from the joints, frame by frame.
 
     Args:
-        report: called with a line once the gyro is found wrong.
+        report: called with a line when the gyro is found to be wrong.
     """
 
     def __init__(self, report: Callable[[str], None]) -> None:
@@ -38,7 +38,7 @@ class GyroFusion:
         self._reported = False
 
     def reset(self) -> None:
-        """Restart from the joints, as the camera's mounting has changed."""
+        """Restart from the joints, after a change of the camera's mounting."""
         self._before = None
 
     def orientation(self, t_s: float, R_world_camera: Mat3, turn: CameraTurn | None) -> Mat3:
@@ -46,8 +46,8 @@ class GyroFusion:
 
         Args:
             t_s: time of the exposure.
-            R_world_camera: by the joints at that time.
-            turn: by the gyro; None without a gyro.
+            R_world_camera: orientation from the joints at that time.
+            turn: rotation from the gyro; None without a gyro.
         """
         if turn is None or t_s < self._without_until_s:
             self._before = None
@@ -61,7 +61,7 @@ class GyroFusion:
     def _advance(
         self, t_s: float, before: tuple[float, CameraTurn, Mat3], R_joints: Mat3, turn: CameraTurn
     ) -> Mat3:
-        """Return the last orientation, advanced by the gyro and pulled to the joints'."""
+        """Return the last orientation, advanced by the gyro and pulled towards the joints'."""
         before_s, before_turn, R_before = before
         step = compose(transpose(before_turn.R_start_camera), turn.R_start_camera)
         R = compose(R_before, step)
@@ -74,7 +74,7 @@ class GyroFusion:
     def _disagree(self, t_s: float) -> None:
         """Count disagreements of gyro and joints; after several, ignore the gyro for a while.
 
-        A base that is carried about causes them too, so the gyro is tried again.
+        A base that is being carried also causes them, so the gyro is tried again.
         """
         self._too_far_s = [s for s in self._too_far_s if t_s - s < _WITHIN_S] + [t_s]
         if len(self._too_far_s) < _MOST_TIMES:
@@ -90,7 +90,7 @@ class GyroFusion:
 
 
 def rotation_vector(R: Mat3) -> Vec3:
-    """Return the axis of a rotation times its angle, which is below pi."""
+    """Return the axis of a rotation times its angle, which must be below pi."""
     (a, b, c), (d, e, f), (g, h, i) = R
     angle = acos(min(1.0, max(-1.0, 0.5 * (a + e + i - 1.0))))
     share = 0.5 if angle < 1e-6 else 0.5 * angle / sin(angle) if sin(angle) > 1e-6 else 0.0

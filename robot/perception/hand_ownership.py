@@ -2,12 +2,14 @@
 
 A person who walks is detected twice, as a face and as a patch of optical flow. The patch would
 compete with the face, and would often win because it is larger. A patch therefore belongs to the
-person if it is on the head, or is below it and moves along with it. A waving arm moves differently
-and remains a body of its own (gazerig.robot.perception.hands), so that a wave attracts the gaze.
+person if it is on the head, or if it is below the head and moves with it. A waving arm moves
+differently and remains a separate body (gazerig.robot.perception.hands), so that a wave attracts
+the gaze.
 
-The robot's own head and neck in its camera's view are known by the kinematics, and ignored: a
-camera on the base sees the head turn, and one on the head may see parts of it. A patch in the
-direction of a part of the head is that part, unless its distance was measured and differs.
+The positions of the robot's own head and neck in the camera's view are known from the kinematics,
+and both are ignored: a camera on the base sees the head turn, and one on the head may see parts of
+it. A patch in the direction of a part of the head is that part, unless its measured distance
+differs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -34,7 +36,7 @@ def without_own_motion(
 ) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
     """Return the faces with the spin of their own motion, and the things that belong to no face.
 
-    before: tracked faces at their positions expected now
+    before: tracked faces at their positions predicted for now
     """
     spins = [0.0] * len(faces)
     known = known_faces(faces, before)
@@ -85,7 +87,7 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
 def _offset_from_face(
     thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3
 ) -> tuple[float, float] | None:
-    """Return the offset of a patch from a face, aside and above; None if its depth differs.
+    """Return the sideways and upward offset of a patch from a face; None if its depth differs.
 
     A patch whose distance is only assumed is placed at the face's distance.
     """
@@ -115,7 +117,7 @@ def _moves_along(
 OWN = "own"
 
 OwnParts = Callable[[Mat3, Vec3], Sequence[Capsule]]
-"""Function that returns the parts of the head in the world for its pose."""
+"""Returns the parts of the head in the world for a pose."""
 
 _MARGIN_M = 0.05
 
@@ -123,11 +125,11 @@ _MARGIN_M = 0.05
 def label_own_body(
     things: list[LocalisedDetection], parts: Sequence[Capsule], p_camera: Vec3
 ) -> list[LocalisedDetection]:
-    """Return the things, with the kind OWN for those that are the robot's own body.
+    """Return the things, with the kind OWN for parts of the robot's own body.
 
     Args:
         things: moving things of a frame.
-        parts: of the head, at its exposure. A part around the camera is not visible.
+        parts: parts of the head at the exposure. A part around the camera is not visible.
         p_camera: position of the camera.
     """
     seen = [part for part in parts if not part.contains(p_camera)]

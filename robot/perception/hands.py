@@ -1,20 +1,21 @@
-"""Recognition of hands: patches that move relative to a person, within reach, with evidence.
+"""Recognition of hands: patches that move relative to a person, within reach, and with evidence.
 
 A camera without a hand detector shows a moving arm as one patch of flow. The quarter of it that
 moves fastest is taken as the hand, at the distance of the person's face unless the distance was
-measured. A patch is a hand by evidence: it points to the person's shoulder and is fastest at the
-other end, it reaches in from the side in front of all people, it approaches the camera, or the palm
-detector found a palm there. Curtains, trunks and other people's sleeves remain moving things.
+measured. Any of these is evidence of a hand: the patch points to the person's shoulder and is
+fastest at the other end, it reaches in from the side in front of all people, it approaches the
+camera, or the palm detector found a palm there. Curtains, trunks and other people's sleeves remain
+moving things.
 
-A patch remains a hand while the detector keeps its number and it moves now and then; so a track
+A patch remains a hand while the detector keeps its number and it moves occasionally. So a track
 does not break when a hand turns or passes in front of the face. The remainder of an arm that was a
-hand is a hand, too. A hand at rest is kept for a while, although flow shows nothing that is still.
-A palm is kept from search to search, whether it moves or not.
+hand is also a hand. A hand at rest is kept for a while, although optical flow does not show still
+things. A palm is kept from one search to the next, whether it moves or not.
 
 A hand that approaches the camera, or reaches in from the side near it, is nearer than its person.
-Without measured depth the size gives the distance. A compact patch that is no arm and too large for
-a hand at the person's distance is placed so near that it has the size of a hand. An arm that enters
-at the side of the image, and not from the person's shoulder, is placed so near that it is as wide
+Without measured depth the size gives the distance. A compact patch that is not an arm and is too
+large for a hand at the person's distance is placed where it has the size of a hand. An arm that
+enters at the side of the image, and not from the person's shoulder, is placed where it is as wide
 as a hand.
 """
 
@@ -32,12 +33,12 @@ HAND = "hand"
 Known = tuple[Vec3, Vec3 | None]
 """Position of a face in the world, and its velocity, None if unknown."""
 
-# Range of hands about the face: aside, above, and below; legs and feet are lower.
+# Range of hands around the face: sideways, above, and below; legs and feet are lower.
 _REACH_M, _ABOVE_M, _BELOW_M = 0.85, 0.7, 0.8
 # Largest arm or hand (radius of a disc of the same area).
 _LARGEST_M = 0.24
-# Speed across the view relative to the person: to become a hand, to remain one, and to become one
-# in front of the head, which moves itself when it turns or nods.
+# Speed across the view relative to the person that is needed to become a hand, to remain one, and
+# to become one in front of the head, which itself moves when it turns or nods.
 _BEGINS_M_S, _STAYS_M_S, _BEFORE_HEAD_M_S = 0.4, 0.2, 1.5
 _HEAD_M = 0.25
 _SHOULDER_ASIDE_M, _SHOULDER_BELOW_M = 0.19, 0.17
@@ -46,28 +47,28 @@ _SAME_M = 0.3
 # The line of an arm passes the shoulder within this distance, and an arm is no smaller than this
 # (as _LARGEST_M). For rendered people who wave, point and box 98 % of the arms pass within .26 m.
 _ATTACHED_M, _SMALLEST_M = 0.27, 0.04
-# Its end is at least as fast as its whole, within rounding, and hardly nearer to the shoulder than
-# its middle.
+# Its end is at least as fast as the whole patch, within rounding, and hardly nearer to the shoulder
+# than its centre.
 _AS_FAST, _AS_FAR_M = 0.95, 0.1
-# Distance of a patch's end or, plus its radius, of its middle to its palm; time for which a palm
-# moves on with the patch's flow between two searches; confidence of a certain palm.
+# Distance of a patch's end or, plus its radius, of its centre to its palm; time for which a palm
+# follows the patch's flow between two searches; confidence of a certain palm.
 _AT_PALM_M, _PALM_S, _SURE = 0.1, 0.3, 0.7
-# A patch of a hand's size that certainly grows in the image at this rate approaches the camera: it
-# is a hand from the first frame on, as no other part of a person in view approaches so fast.
+# A patch of a hand's size that certainly grows in the image at this rate approaches the camera. It
+# is a hand from the first frame on, because no other visible part of a person approaches so fast.
 _COMES_1_S, _SURE_SD = 2.5, 2.0
 # Number of frames with such a motion that make a hand, and the longest rest between them.
 _FRAMES, _RESTS_S = 2, 0.4
-# A hand last seen slower than this is at rest, and is kept for this time; a motion within this
-# distance of it is the hand again.
+# A hand that was last slower than this is at rest, and is kept for this time; a motion within this
+# distance of it is attributed to the hand.
 _AT_REST_M_S, _HELD_S, _AGAIN_M = 0.4, 2.0, 0.3
 _HAND_RADIUS_M = 0.07
 # Size of a hand or fist in the flow if nothing else moves; the multiple of that size at the
-# person's distance, and the number of frames, that show that it is nearer: other people's hands are
-# not so much larger.
+# person's distance, and the number of frames, above which it is nearer: hands of other people are
+# not so large.
 _ALONE_M, _TOO_LARGE, _LARGE_FRAMES = 0.065, 1.6, 2
 # Width of a hand; least width of an arm that enters at the side, in such widths; number of frames
 # in which it is measured; and least distance of its line from the person's shoulder. If its fastest
-# part is this near to its middle, its direction is uncertain, and a smaller distance suffices.
+# part is this near to its centre, its direction is uncertain, and a smaller distance suffices.
 _WIDE_M, _TOO_WIDE, _WIDE_FRAMES, _ANOTHERS_M = 0.085, 1.4, 3, 0.165
 _SHORT_M, _ANOTHERS_SHORT_M = 0.1, 0.11
 # Gain per frame with which a change of this distance is adopted.
@@ -79,11 +80,11 @@ _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
 class _MovingPatch:
     """A patch that may be a hand.
 
-    at_s: last time of a hand's motion; p_face: face of its person; frames: number of frames with it
+    at_s: last time of a hand's motion; p_face: face of its person; frames: number of such frames
     hand: the hand at that time
     large_frames: successive frames in which it was too large for a hand at the person's distance
     wide_frames: number of frames in which it entered at the side and was too wide for that
-    distance_share: its distance over that of the person, by its size or that of the palm
+    distance_share: its distance relative to the person's, from its size or that of the palm
     palm_s: last time at which a palm was found there
     """
 
@@ -97,7 +98,7 @@ class _MovingPatch:
     palm_s: float = -inf
 
     def update_distance(self, thing: LocalisedDetection, arm: "_Arm") -> None:
-        """Update the distance by the size.
+        """Update the distance from the size.
 
         Args:
             thing: the patch.
@@ -150,14 +151,14 @@ class Hands:
     ) -> list[LocalisedDetection]:
         """Return the things; hands get the kind HAND and the position of the hand.
 
-        Hands at rest follow behind them.
+        Hands at rest are at the end of the list.
 
         Args:
             things: moving things of a frame.
-            faces: of the people in view.
+            faces: faces of the people in view.
             p_camera: position of the camera.
-            t_s: when.
-            palms: of the nearest person, None in a frame that was not searched for them.
+            t_s: time of the frame.
+            palms: palms of the nearest person, None in a frame that was not searched for them.
         """
         self._moving = {
             mark: one for mark, one in self._moving.items() if t_s - one.at_s <= _RESTS_S
@@ -170,7 +171,7 @@ class Hands:
             self._keep_palm(palm, found, p_camera, t_s)
         if not self._resting:
             return found
-        # Hands at rest that show no motion; the detector would recognise its own hands again.
+        # Only hands at rest without motion; the detector finds moving hands again itself.
         marks = {thing.mark for thing in found}
         moving = [thing for thing in found if thing.mark in self._moving]
         self._resting = {
@@ -183,7 +184,7 @@ class Hands:
 
     @property
     def has_resting(self) -> bool:
-        """Return whether there are hands at rest."""
+        """Return whether any hand is at rest."""
         return bool(self._resting)
 
     def _accept_palms(
@@ -236,7 +237,7 @@ class Hands:
         t_s: float,
         palms: list[LocalisedDetection],
     ) -> LocalisedDetection:
-        """Return a patch with its kind; its palm, if any, is removed from those given."""
+        """Return a patch with its kind; its palm, if any, is removed from the given palms."""
         if thing.kind != UNNAMED or thing.mark is None or not faces:
             return thing
         known = self._moving.get(thing.mark)
@@ -251,7 +252,7 @@ class Hands:
             if hypot(*_offset_from_face(arm.tip_m, p_face)) < _HEAD_M
             else _BEGINS_M_S
         )
-        # Relative to a walking person, their legs and parts of the trunk are no faster than that.
+        # Relative to a walking person, legs and parts of the trunk are not faster than this.
         comes = arm.ratio * thing.radius_m >= _ALONE_M and _approaches(thing, p_camera)
         palm = next((one for one in palms if _is_at(one, thing, p_camera)), None)
         if (
@@ -349,8 +350,8 @@ def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_ca
 class _Arm(NamedTuple):
     """A patch as the arm of a person.
 
-    face: of the person; tip_m, tip_m_s: position and velocity of its fastest part, at their
-        distance
+    face: face of the person; tip_m, tip_m_s: position and velocity of its fastest part, at the
+        person's distance
     ratio: length at that distance per length of the patch
     shoulder_m: distance of its line from the person's shoulder
     attached: it has an arm's size, points to the shoulder and is fastest at the other end
@@ -371,7 +372,7 @@ def _arm_of(
 ) -> _Arm | None:
     """Return a patch as an arm of its likely person, None without one.
 
-    last: face of the owner in the frame before, who remains the owner
+    last: face of the owner in the previous frame, who remains the owner
     """
     p_tip = thing.p_world_m if thing.fastest_m is None else thing.fastest_m
     v_tip = thing.v_world_m_s if thing.fastest_m_s is None else thing.fastest_m_s
@@ -388,7 +389,7 @@ def _arm_of(
         large = ratio * thing.radius_m >= _LARGEST_M
         if large or not -_BELOW_M < up < _ABOVE_M or hypot(aside, up) >= _REACH_M:
             continue
-        # The arm continues from the hand through the patch's middle to the shoulder.
+        # The arm continues from the hand through the patch's centre to the shoulder.
         middle = add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
         shoulder_m = _off_shoulder(sub(scale(middle, 2.0), tip), face[0])
         off_m = shoulder_m
@@ -412,7 +413,7 @@ def _arm_of(
 
 
 def _off_shoulder(p_m: Vec3, p_face: Vec3) -> float:
-    """Return the distance of a position from the person's shoulder on its side."""
+    """Return the distance between a position and the person's shoulder on its side."""
     aside, up = _offset_from_face(p_m, p_face)
     return hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
 
@@ -425,7 +426,7 @@ def _as_hand(
     Args:
         thing: the patch.
         arm: the patch at the person's distance.
-        nearer: its distance over the person's.
+        nearer: its distance relative to the person's.
         p_camera: position of the camera.
     """
     return replace(
@@ -443,7 +444,7 @@ def _as_hand(
 
 
 def _place_at_distance(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Vec3:
-    """Return the position of a thing at a distance, unless its own was measured."""
+    """Return the position of a thing at a distance, or at its own distance if that was measured."""
     if thing.depth_measured:
         return thing.p_world_m
     ratio = far_m / _horizontal_distance_m(thing.p_world_m, p_camera)

@@ -1,20 +1,20 @@
 """Kalman filter of one thing's position and velocity, in direction and log range.
 
-A camera measures positions across its view to millimetres, and along it often to a metre only. In
-x, y, z that is a long thin ellipsoid, and two of them in slightly different directions meet nearer
-to the camera than either of their middles: a linear filter would take every jump of the direction
-for an approach. Direction and logarithm of the range separate the two, and no estimate gets behind
-the camera (modified spherical coordinates: Aidala and Hammel, "Utilization of modified polar
+A camera measures positions to millimetres across its view, but often only to a metre along it. In
+x, y, z this error is a long thin ellipsoid. Two of them in slightly different directions intersect
+nearer to the camera than their centres: a linear filter would interpret every jump of the direction
+as an approach. Direction and logarithm of the range separate the two, and no estimate is behind the
+camera (modified spherical coordinates: Aidala and Hammel, "Utilization of modified polar
 coordinates for bearings-only tracking", 1983).
 
-Position and velocity are kept in the world, in metres and seconds; variances are kept across the
-view, the same for all directions there, and along it. They turn with the direction and grow with
-the range.
+Position and velocity are stored in the world, in metres and seconds. Variances are stored across
+the view, the same for all directions there, and along it. They rotate with the direction and grow
+with the range.
 
-A velocity changes at random: little most of the time, and abruptly when a person starts or stops.
-One noise for both is either nervous or late, so there are two, and an innovation too large for the
-quiet one raises the noise towards the lively one (Bar-Shalom, Li & Kirubarajan, "Estimation with
-Applications to Tracking and Navigation", 11.6).
+A velocity changes at random: usually little, and abruptly when a person starts or stops. One
+    process noise for both cases is either noisy or slow. So two are used, and an innovation too
+    large for the lower one raises the noise towards the higher one (Bar-Shalom, Li & Kirubarajan,
+    "Estimation with Applications to Tracking and Navigation", 11.6).
 """
 
 from math import atan2, cos, exp, log, sin, sqrt
@@ -31,9 +31,9 @@ _SURPRISING = 11.3
 _EXPECTED = 4.0
 # Usual duration of a change of speed.
 _CHANGES_FOR_S = 0.5
-# An unseen thing moves on, but less and less certainly: people stop.
+# Time constant with which an unseen thing slows down: people stop.
 _STOPS_WITHIN_S = 1.0
-# They also turn and hurry unseen: noise of the acceleration.
+# Noise of the acceleration while unseen: people also turn and hurry.
 _UNSEEN_M_S2 = 1.0
 NEAREST_M = 0.05
 """Least distance of a thing from the camera."""
@@ -58,9 +58,9 @@ class Variances(NamedTuple):
 
 
 class Offset(NamedTuple):
-    """Offset of a position from the expected one of a track, as seen from the camera.
+    """Offset of a position from the predicted one of a track, as seen from the camera.
 
-    across_m: from one line of view to the other, tangent to the sphere about the camera
+    across_m: from one line of view to the other, tangent to the sphere around the camera
     along_m: logarithm of the ratio of the ranges, times the range of the track
     ratio: range of the track over that of the position
     """
@@ -71,14 +71,14 @@ class Offset(NamedTuple):
 
 
 class TrackFilter:
-    """The filter of one track. Numbers given to it must be finite.
+    """Kalman filter of one track. All inputs must be finite.
 
     Args:
         p_m: first position.
         p_camera_m: position of the camera.
-        sds_m: its standard deviations across and along the view.
-        speed_sd_m_s: standard deviation of the velocity, which begins at 0.
-        noise: of the process.
+        sds_m: standard deviations of the position across and along the view.
+        speed_sd_m_s: standard deviation of the velocity, which is 0 at first.
+        noise: process noise.
 
     p_m, v_m_s: position and velocity
     view, range_m: unit vector from the camera to it, and its distance
@@ -109,7 +109,7 @@ class TrackFilter:
         self.along = Variances(sds_m[1] * sds_m[1], 0.0, var)
 
     def retune(self, noise: ProcessNoise) -> None:
-        """Use another process noise; position and velocity stay."""
+        """Use another process noise; position and velocity do not change."""
         self._noise = noise
 
     def predict(
@@ -121,7 +121,7 @@ class TrackFilter:
             dt_s: the time.
             seen: whether it was seen in the last frame.
             range_known: False if its range is only assumed: a thing that crosses the view then
-                stays at its range, as neither its line nor its speed is known.
+                keeps its range, because neither its path nor its speed is known.
             level: whether it keeps its height while unseen, as people do.
         """
         if dt_s <= 0.0:
@@ -143,7 +143,7 @@ class TrackFilter:
         self.along = _add_process_noise(_propagate(self.along, dt_s, kept), accel, dt_s)
 
     def look_from(self, p_camera_m: Vec3) -> None:
-        """Move the camera: part of the component along the view is now across it."""
+        """Move the camera, which mixes the components along and across the view."""
         if p_camera_m == self._camera:
             return
         before, self._camera = self.view, p_camera_m
@@ -156,7 +156,7 @@ class TrackFilter:
             self.along = _interpolate(b, a, turned)
 
     def offset(self, p_m: Vec3) -> Offset:
-        """Return the offset of a position from the expected one."""
+        """Return the offset of a position from the predicted one."""
         view, range_m = view_and_range(p_m, self._camera)
         ahead = dot(view, self.view)
         aside = sub(view, scale(self.view, ahead))
@@ -188,14 +188,14 @@ class TrackFilter:
     def _adapt(self, aside: float, deep: float, across: float, along: float) -> None:
         """Raise the noise until an innovation is plausible.
 
-        No higher than that: the full noise would take a small change of speed for a large one, and
-        the velocity would overshoot by as much as it had lagged behind.
+        The noise is not raised further: with the full noise a small change of speed would count as
+        a large one, and the velocity would overshoot by as much as it had lagged behind.
 
         Args:
-            aside: the innovation across the view, squared.
-            deep: the same along it.
-            across: variance of what was measured across the view.
-            along: the same along it.
+            aside: squared innovation across the view.
+            deep: squared innovation along the view.
+            across: variance of the measurement across the view.
+            along: variance of the measurement along the view.
         """
         # The change may have happened at any time since the last detection: after a long gap, an
         # offset says less about the present velocity.
@@ -216,8 +216,8 @@ class TrackFilter:
     ) -> None:
         """Update with a velocity that was measured at a position, and its standard deviations.
 
-        A camera measures an angle and a relative growth per second: at another range than the
-        measured one they are another speed.
+        A camera measures an angle and a relative growth per second: at a range other than the
+        measured one they correspond to another speed.
         """
         view, range_m = view_and_range(p_m, self._camera)
         at = self.range_m / range_m
@@ -250,9 +250,10 @@ class TrackFilter:
         self.view, self.range_m = view_and_range(p_m, self._camera)
 
     def _move(self, across_m: Vec3, along_m: float) -> None:
-        """Move it on the sphere about the camera and along its view; its velocity turns with it.
+        """Move it on the sphere around the camera and along the view; its velocity turns with it.
 
-        A velocity across the view stays an angle per second, and one along it a share of the range.
+        The velocity across the view is preserved as an angle per second, the velocity along it as a
+        fraction of the range per second.
         """
         here, range_m = self.view, self.range_m
         aside = norm(across_m)
@@ -286,20 +287,20 @@ def view_and_range(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
 
 
 def _propagate(C: Variances, dt_s: float, kept: float) -> Variances:
-    """Return a covariance after a time, with the share of the velocity that is kept."""
+    """Return a covariance after a time, given the fraction of the velocity that remains."""
     p, pv, v = C
     both = pv + dt_s * v
     return Variances(p + dt_s * (pv + both), kept * both, kept * kept * v)
 
 
 def _add_process_noise(C: Variances, accel_m_s2: float, dt_s: float) -> Variances:
-    """Return a covariance plus the effect of random acceleration in a time."""
+    """Return a covariance plus the effect of random acceleration over a time."""
     v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
     return Variances(C.p + v * dt_s * dt_s / 3.0, C.pv + v * dt_s / 2.0, C.v + v)
 
 
 def _interpolate(C: Variances, D: Variances, share: float) -> Variances:
-    """Return a covariance interpolated towards another by a share."""
+    """Return a covariance interpolated towards another by a fraction."""
     kept = 1.0 - share
     return Variances(kept * C.p + share * D.p, kept * C.pv + share * D.pv, kept * C.v + share * D.v)
 

@@ -1,10 +1,10 @@
 """Reading of a dense face mesh: pose, gaze of the eyes, lids and lips.
 
 The pose is the similarity that maps a rigid part of an average face (nose, forehead, temples,
-cheekbones; neither mouth nor jaw nor brows) onto the mesh. The network estimates the mesh's third
+cheekbones; not mouth, jaw or brows) onto the mesh. The network estimates the mesh's third
 coordinate in the scale of the other two, along the line of sight. The position follows from the
-points in the image. An eye looks from the centre of its ball, which is behind the middle between
-the corners of the lids, through the middle of the iris.
+points in the image. An eye's line of sight runs from the centre of the eyeball, which is behind the
+midpoint between the corners of the lids, through the centre of the iris.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up.
 """
@@ -25,8 +25,8 @@ from gazerig.robot.perception.face_pose import FacePose
 EYES_SHUT = 0.35
 """Eye opening below which eyes count as shut."""
 
-# Points of the mesh on an average face, mm: out of the face and up for those in its middle; out,
-# aside and up for pairs (right, left). Mean of the network's meshes of two people.
+# Points of the mesh on an average face, mm: out of the face and up for points on the midline; out,
+# sideways and up for pairs (right, left). Mean of the network's meshes of two people.
 _MIDDLE_MM = {
     168: (-20.9, 37.6), 6: (-16.7, 30.5), 197: (-11.9, 23.9), 195: (-6.6, 17.8), 5: (-1.1, 11.3),
     4: (1.1, 3.1), 1: (-1.1, -3.1), 2: (-16.8, -8.9), 10: (-24.1, 81.9), 151: (-21.1, 67.5),
@@ -51,19 +51,19 @@ _LIPS, _FOREHEAD, _CHIN, _HEIGHT_M = (13, 14), 10, 152, 0.152
 # Lids along the contour of an eye: middle of the upper and of the lower one.
 _UPPER_LID, _LOWER_LID, _CORNERS = 12, 4, (0, 8)
 
-# Distance of the eyeball's centre behind the middle between the corners; distance from it to the
-# iris; and weight of the corners' positions in the image, the rest from the pose.
+# Distance of the eyeball's centre behind the midpoint between the corners; distance from it to the
+# iris; and weight of the corners' positions in the image; the remaining weight is the pose's.
 _BALL_BEHIND_M, _IRIS_FROM_BALL_M, _SEEN_SHARE = 0.007, 0.0105, 0.75
-# Gap between the lids in the network's mesh, for shut eyes and for usually open ones.
+# Gap between the lids in the network's mesh, for shut eyes and for normally open ones.
 _LIDS_SHUT_M, _LIDS_OPEN_M = 0.0043, 0.0088
-# Usual error of a turn, and of a point in pixels, which grows with the turn's share of the face.
+# Usual error of a turn, and of a point in pixels, which grows with the turn's fraction of the face.
 _TURN_SD_RAD, _POINT_PX, _DEEP_M = radians(3.0), 0.7, 0.03
 _MOST_TURNED = 0.25
 _LONGEST = 1.35
 
 
 class MeshReading(NamedTuple):
-    """Contents of a mesh.
+    """Pose, gaze, lids and lips from a mesh.
 
     gaze_camera: unit vector of the eyes' gaze, camera frame; None if the irises are not visible or
         the eyes are shut
@@ -75,7 +75,7 @@ class MeshReading(NamedTuple):
 
 
 def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
-    """Return the contents of a mesh, None if its points show no front of a face."""
+    """Return the contents of a mesh, None if its points are not those of a face from its front."""
     points = mesh.points.astype(np.float64)
     if points.shape != (468, 3) or not np.isfinite(points).all():
         return None
@@ -90,7 +90,7 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
     p = _position(R, seen)
     if p is None or not -float(R[:, 0] @ p) > _MOST_TURNED * float(np.linalg.norm(p)):
         return None
-    px_m = float(p[2]) / focal_px  # of a pixel at the face
+    px_m = float(p[2]) / focal_px  # size of a pixel at the face
     tall = float(np.linalg.norm(points[_FOREHEAD] - points[_CHIN]))
     apart = float(np.linalg.norm(points[list(_EYES[0])].mean(0) - points[list(_EYES[1])].mean(0)))
     if not apart > 0.0:
@@ -110,9 +110,9 @@ def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
     """Return the rotation of a face from the rays of its points, about the ray of its middle.
 
     Args:
-        rays: (n, 3) through the points; z along the line of sight.
-        depth_px: (n,) their depths about the middle, in pixels at its distance.
-        focal_px: of the lens, which is as many pixels as that distance is long.
+        rays: rays (n, 3) through the points; z along the line of sight.
+        depth_px: depths (n,) relative to the centre, in pixels at its distance.
+        focal_px: focal length of the lens, which is also that distance in those pixels.
     """
     deep = 1.0 + depth_px / focal_px
     flat = rays[:, :2] / rays[:, 2:] * deep[:, np.newaxis]
@@ -143,7 +143,7 @@ def _position(R: Floats, seen: Floats) -> Floats | None:
 
 
 def _eye_opening(lids_px: NDArray[np.float32], apart: float) -> float:
-    """Return the opening of the eyes over the usual one, by the contours of the lids.
+    """Return the opening of the eyes relative to the usual one, from the contours of the lids.
 
     The points of the mesh itself hardly follow the lids.
     """

@@ -15,10 +15,10 @@ class MotionSource:
 
     Args:
         params: parameters of the detection.
-        lens: for frames without a lens of their own.
-        field_rad: horizontal field of view, likewise.
-        turns: rotation of a camera that turns with the head; None: it is not measured, and the
-            image alone shows whether the camera is still.
+        lens: lens for frames without their own lens.
+        field_rad: horizontal field of view for the same frames.
+        turns: rotation of a camera that turns with the head; None: it is not measured, and only the
+            image shows whether the camera is still.
     """
 
     def __init__(
@@ -28,7 +28,8 @@ class MotionSource:
         field_rad: float,
         turns: PoseBuffer | None,
     ) -> None:
-        # Imported here, with OpenCV: the control loop's process only has another process make one.
+        # Imported here, with OpenCV, because the control loop's process does not detect motion
+        # itself.
         from gazerig.drivers.vision.motion.detector import MotionDetector
 
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
@@ -37,14 +38,14 @@ class MotionSource:
         self._detector = MotionDetector(params)
 
     def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
-        """Use new parameters from the next frame on; tracks stay."""
+        """Use new parameters from the next frame on; tracks are kept."""
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._detector.retune(params)
         if not params.enabled:
             self._detector.forget()
 
     def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
-        """Find motion since the frame before; empty while not enabled."""
+        """Find motion since the previous frame; return nothing while it is not enabled."""
         if not self._enabled:
             return ()
         height, width = shot.image.shape[:2]
@@ -53,7 +54,7 @@ class MotionSource:
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
 
     def _rotation_since(self, shot: Shot) -> Floats | None:
-        """Return R_now_before by the camera's gyro, else by the joints; None if unknown."""
+        """Return R_now_before from the camera's gyro, else from the joints; None if unknown."""
         before, self._before_turn = self._before_turn, shot.turn
         before_s = self._detector.before_s
         if before_s is None:

@@ -1,8 +1,8 @@
-"""Perception: detections and the head's pose at their capture time give a percept in the world.
+"""Perception: a percept in the world, from detections and the head's pose at their capture.
 
-Faces and moving things are localised in the world by the camera's pose at the exposure, not by its
-present one. Motion of a person's own body is separated from that of other things
-(hand_ownership). A tracker gives all of them identities and velocities.
+Faces and moving things are localised in the world with the camera's pose at the exposure, not with
+its present pose. Motion of a person's own body is separated from that of other things
+(hand_ownership). A tracker assigns identities and velocities.
 """
 
 from collections.abc import Mapping
@@ -46,25 +46,25 @@ from gazerig.robot.perception.track import (
 )
 from gazerig.robot.perception.tracker import Tracker
 
-# The head's turn at a capture is taken over this time before and after it.
+# The head's rotation rate at a capture is computed over this time before and after it.
 _HALF_TURN_S = 0.015
 # A camera that turned farther than this between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
 
 
 class Perception:
-    """Makes one percept of each new frame.
+    """Creates one percept of each new frame.
 
     Args:
         mount: position and orientation of the camera.
-        horizontal_field_deg: its field of view.
+        horizontal_field_deg: field of view of the camera.
         tracker: tracks people and things.
         parts_face_m: measured positions of one person's face parts in the face frame, instead of
             the average ones (Nakamoto & Tsuruno 3.7).
-        lens: as calibrated, used for frames of the aspect ratio at which it was calibrated.
+        lens: calibrated lens, used for frames with the aspect ratio of the calibration.
         depth_at: reads depth images; without it, distances come from the size of faces.
-        gyro: places frames by the camera's own gyro as well; None: by the joints alone.
-        own_parts: positions of the robot's own head and neck; None: they are things like others.
+        gyro: also places frames with the camera's own gyro; None: only with the joints.
+        own_parts: positions of the robot's own head and neck; None: they count as other things.
     """
 
     def __init__(
@@ -125,8 +125,8 @@ class Perception:
             self._tracker.forget()
             self._tracks, self._hands = (), Hands()
             self._cuts += 1
-        # The camera's process has located them. A camera of another package need not do so, and a
-        # frame in transit during a change of the lens was located by the former lens.
+        # Normally the camera's process has located them. A camera of another package may not do so,
+        # and a frame in transit during a change of the lens was located with the former lens.
         intrinsics, located = self._locator.intrinsics(detections), detections.located
         if located is None or located.intrinsics != intrinsics:
             located = self._locator.locate(detections, intrinsics)
@@ -182,7 +182,7 @@ class Perception:
         A restarted camera process always counts as another scene.
 
         Args:
-            scene: number of the scene, counted from the images.
+            scene: number of the scene, from the images.
             axis: optical axis of the camera, in the world.
         """
         before, self._scene = self._scene, (scene, axis)
@@ -212,7 +212,7 @@ class Perception:
     def _face(self, track: Track) -> Face:
         """Return a tracked face with its eight parts."""
         R = track.R_world_face
-        assert R is not None  # faces that are seen are tracked with their pose
+        assert R is not None  # visible faces are tracked with their pose
         p = track.p_world_m
         across, along = track.filter.across.p, track.filter.along.p
         unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
@@ -228,7 +228,7 @@ class Perception:
             eyes = None if track.eyes is None else track.eyes.at(t_s)
         gaze = found.gaze_world if eyes is None else eyes.gaze_world
         off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
-        # A blink does not end a look.
+        # A blink does not end a look at the head.
         blinks = eyes is not None and eyes.opening < EYES_SHUT
         if track.seen_s == t_s and not blinks:
             track.looks_at_head = looks_at_head(
@@ -280,7 +280,7 @@ class Perception:
 
 
 def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) -> bool:
-    """Return whether a position is inside the image; people who left it are only remembered."""
+    """Return whether a position is inside the image; people outside it are only remembered."""
     if not p_camera_m[2] > 0.0:
         return False
     x, y = project([p_camera_m], lens)[0].tolist()
@@ -317,7 +317,7 @@ def covariance(view: Vec3, across: Variances, along: Variances) -> tuple[float, 
     Args:
         view: unit vector from the camera to the thing.
         across: variances of position, of position and velocity, and of velocity, across the view.
-        along: the same along it.
+        along: the same along the view.
     """
     x, y, z = view
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z

@@ -15,9 +15,9 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 NEAR_RAD = 0.12
 """A pixel within this angle (7 deg) of a person gets the person's distance."""
 USUAL_M = 1.5
-"""Assumed distance of an unknown thing: across a desk and a step more."""
+"""Assumed distance of an unknown thing: across a desk, plus one step."""
 
-_PATCH = 0.03  # side of the square whose depth is read, over the frame's width
+_PATCH = 0.03  # side of the square whose depth is read, as a fraction of the frame's width
 
 
 class PixelToWorld:
@@ -45,12 +45,12 @@ class PixelToWorld:
         """Return the point of the world at a pixel, in metres.
 
         Args:
-            pixel: (x, y) from the centre of the upper left one, x right, y down.
+            pixel: (x, y) relative to the centre of the upper left pixel, x right, y down.
             found: the newest frame, whose size and lens are used.
             percept: its percept, for the distance of a pixel next to a person.
-            distance_m: from the camera; None: the measured depth there, or that of a near person or
-                thing.
-            captured_s: exposure of the frame with the pixel; None: the newest frame.
+            distance_m: distance from the camera; None: the measured depth at the pixel, or that of
+                a nearby person or thing.
+            captured_s: exposure of the frame with the pixel; None: that of the newest frame.
         """
         newest = captured_s is None or captured_s == found.captured_s
         at_s = found.captured_s if captured_s is None else captured_s
@@ -70,10 +70,10 @@ class PixelToWorld:
 
 
 def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: Vec3) -> float:
-    """Return the distance of a pixel: that of the person or thing seen there.
+    """Return the distance of the person or thing at a pixel.
 
     Args:
-        percept: of the frame.
+        percept: percept of the frame.
         p_world_m: position of the camera.
         direction_world: unit vector through the pixel.
     """
@@ -91,7 +91,7 @@ def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: V
 
 
 def _depth_m(found: Detections, pixel: tuple[float, float]) -> float | None:
-    """Return the measured depth about a pixel of the camera frame, None without one."""
+    """Return the measured depth around a pixel of the camera frame, None without one."""
     if found.depth_m is None:
         return None
     height, width = found.depth_m.shape[:2]

@@ -14,21 +14,21 @@ from gazerig.robot.perception.kalman import TrackFilter
 from gazerig.robot.perception.returning_people import SeenPerson
 
 _EYES_HELD_S = 0.12
-"""Time for which the eyes' gaze holds if the next frames show a mesh, but not the irises."""
+"""Time for which a gaze stays valid if the next frames show a mesh, but not the irises."""
 _EYES_SD_RAD = radians(4.0)
 """Usual error of a gaze from images of both eyes."""
 _SMOOTHED = 0.6
 """Ratio of the deviation of a track's turn, smoothed over some frames, to that of one frame: a part
-of the landmark errors is the same in all of them."""
+of the landmark errors is the same in all frames."""
 _EDGE_OF_CONE, _EDGE_OF_SD = 0.2, 0.5
-"""Distance of inner and outer edge from the cone: share of the cone, and of the uncertainty."""
+"""Distance of inner and outer edge from the cone: fractions of the cone and of the uncertainty."""
 
 
 class EyeObservation(NamedTuple):
     """State of a person's eyes in the last frame that showed them.
 
     gaze_world: unit vector of their gaze, None if they were shut
-    opening: of the lids over the usual opening
+    opening: opening of the lids relative to the usual one
     at_s: capture time of that frame
     """
 
@@ -37,7 +37,7 @@ class EyeObservation(NamedTuple):
     at_s: float
 
     def at(self, t_s: float) -> Self | None:
-        """Return the state if it still holds at a time, else None."""
+        """Return the state if it is still valid at a time, else None."""
         return self if t_s - self.at_s <= _EYES_HELD_S else None
 
 
@@ -47,7 +47,7 @@ def angle_off_head_rad(R_world_face: Mat3, gaze_world: Vec3 | None, from_face_m:
     Args:
         R_world_face: face axes, x out of the face.
         gaze_world: direction of the gaze of the eyes, None if unknown.
-        from_face_m: from the face to the head, world.
+        from_face_m: vector from the face to the head, world.
     """
     ahead = R_world_face[0][0], R_world_face[1][0], R_world_face[2][0]
     return angle_between(ahead if gaze_world is None else gaze_world, from_face_m)
@@ -58,16 +58,16 @@ def looks_at_head(
 ) -> bool | None:
     """Return whether a person looks at the head, None if that is too uncertain.
 
-    A face that is turned to the head within the cone of the head's own eyes is taken to look at it.
-    Five landmarks give a turn to some degrees only. So the cone has an inner and an outer edge, and
-    between them the last result holds; the less certain the turn, the farther apart the edges.
+    A face that is turned to the head within a cone counts as looking at it. Five landmarks
+    determine a turn only to a few degrees. So the cone has an inner and an outer edge, and between
+    them the last result is kept; the less certain the turn, the farther apart the edges.
 
     Args:
         params: half angles of the cones.
         off_rad: angle between the person's gaze and the direction to the head.
         turn_sd_rad: standard deviation of the face's turn in one frame.
-        by_eyes: the angle is that of the eyes' gaze, not of the face.
-        before: result of the frame before.
+        by_eyes: whether the angle is that of the eyes' gaze instead of the face.
+        before: result of the previous frame.
     """
     cone = radians(params.eyes_at_head_deg if by_eyes else params.face_at_head_deg)
     sd = _EYES_SD_RAD if by_eyes else _SMOOTHED * turn_sd_rad
@@ -90,8 +90,8 @@ class Speech:
     stays open do not. A person speaks while the gap has recently crossed its own mean several
     times, each time by more than the usual error of the mesh.
 
-    mean_m: running mean of the gap, None before the first; above: the side of it that was last
-    crossed to; crossed_s: times of the last crossings; at_s: of the last gap
+    mean_m: running mean of the gap, None before the first; above: whether the last crossing was
+    upwards; crossed_s: times of the last crossings; at_s: time of the last gap
     """
 
     mean_m: float | None = None
@@ -112,7 +112,7 @@ class Speech:
         return replace(self, mean_m=mean_m, above=not self.above, crossed_s=crossed, at_s=t_s)
 
     def speaks(self, t_s: float) -> bool:
-        """Return whether it moves like the mouth of a speaking person."""
+        """Return whether the mouth moves like that of a speaking person."""
         return len(self.crossed_s) == _CROSSINGS and t_s - self.crossed_s[0] <= _WINDOW_S
 
 
@@ -121,7 +121,7 @@ NO_SPEECH = Speech()
 FACE = "face"
 """Kind of people, also while their face is not visible."""
 UNNAMED = "thing"
-"""Kind of a moving patch that is not recognised; a patch of another kind keeps it."""
+"""Kind of a moving patch that is not recognised; other kinds do not change."""
 # Gain with which the colours of clothes are learned, and gain if they do not match.
 _COLOURS_GAIN, _UNFIT_GAIN = 0.15, 0.005
 # Inner product of colours above which they are similar.
@@ -136,11 +136,11 @@ _SHAPE_SD = 0.1
 class KnownClothes:
     """Clothes of one person, as learned so far.
 
-    colours: their mean, as in ``Clothing``
-    frames: number of frames with clothes; a frame that shows a part counts as that part
-    confirmed: number of frames in which they fitted since the person was out of sight
-    lost_sight: whether the person was out of sight and the clothes are unconfirmed since
-    doubts: by the number of another person, how much better that person's clothes fit, as a cost
+    colours: mean colours, as in ``Clothing``
+    frames: number of frames with clothes; a frame that shows a part counts as a fraction
+    confirmed: number of frames in which they matched since the person was out of sight
+    lost_sight: whether the person was out of sight and the clothes are unconfirmed since then
+    doubts: number of another person -> cost by which that person's clothes match better
     """
 
     colours: Floats | None = None
@@ -155,7 +155,7 @@ class KnownClothes:
             self.confirmed, self.lost_sight = 0.0, True
 
     def learn(self, clothing: Clothing | None) -> None:
-        """Learn the clothes, the slower the less of them is visible."""
+        """Learn the clothes, more slowly if less of them is visible."""
         if clothing is None:
             return
         self.frames += clothing.share
@@ -175,25 +175,25 @@ class KnownClothes:
 class LocalisedDetection:
     """Detection of one thing in one frame, in the world.
 
-    R_world_face: axes of a face, None of anything else and of a person whose face is not seen
-    face_length: of a face, in lengths of the canonical one
-    depth_measured: whether the camera measured the distance; else a face's comes from its size and
-        a thing's is assumed
-    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
+    R_world_face: axes of a face, None for a thing and for a person without a visible face
+    face_length: of a face, length relative to the canonical face
+    depth_measured: whether the camera measured the distance; otherwise a face's is computed from
+        its size and a thing's is assumed
+    across_sd_m, along_sd_m: standard deviations of the position, across and along the view
     v_world_m_s: velocity measured in the image, None if only the position is known;
         across_sd_m_s, along_sd_m_s: its standard deviations
     size_depth: of a face, its distance at an adult's size over the measured distance; None without
         a measured distance
-    mark: the detector's own number of it, None without one
+    mark: number assigned by the detector, None without one
     turn_sd_rad: of a face, standard deviation of its turn
     gaze_world: of a face, direction of the gaze of the eyes, None if unknown
     fastest_m, fastest_m_s: of a moving thing, position and velocity of its fastest part
     signs: of a face, state of eyes and mouth, None if not found
     upper_m: of an upright moving thing, position of its upper end, the head of a person
     compact: of a moving thing, whether its patch is about as wide as high and full, like that of a
-        fist or a hand alone and unlike that of an arm
+        fist or a single hand and unlike that of an arm
     thickness_m: of a moving thing, diameter of the largest disc within its patch, at its distance;
-        from_side: the patch goes on beyond the left or right edge of the image
+        from_side: whether the patch continues beyond the left or right edge of the image
     clothing: of a person, colours of the clothes, None if not visible
     box_m, lower_face: of a face, as in ``DetectionInCamera``
     """
@@ -229,25 +229,25 @@ class LocalisedDetection:
 
 @dataclass(slots=True, eq=False)
 class Track:
-    """One thing through time.
+    """Track of one person or thing through time.
 
-    R_world_face: axes of a face; None of anything else, and while the person's face is not seen
-    seen_s, at_s: capture times of its last detection and of its place
+    R_world_face: axes of a face; None for a thing, and while the person's face is not visible
+    seen_s, at_s: capture times of its last detection and of its position
     frames: number of frames in which it was detected
     faced_s: of a person, capture time of the last detection of the face
-    face_size: of a face, its size over an adult's, learned if the camera measures depth
+    face_size: of a face, size relative to an adult's, learned if the camera measures depth
     depth_s: capture time of the last measured distance, None before the first
-    looks_at_head: of a face, whether the person looked at the head in its last frame; None if that
-        was too uncertain
+    looks_at_head: of a face, whether the person looked at the head in its last frame; None if
+        uncertain
     speech: of a face, recent motion of the mouth
-    eyes: of a face, last seen state of the eyes
-    clothes: of a person, as learned
-    returned_person: the person whose number a person's new track has got, None for a new number;
-        is_number_final: whether that is final, as the clothes are known
-    box_m, lower_face: as of a detection, usual values of the face
+    eyes: of a face, last observed state of the eyes
+    clothes: of a person, learned clothes
+    returned_person: the person whose number a new track has received, None for a new number;
+        is_number_final: whether the number is final because the clothes are known
+    box_m, lower_face: as in a detection, usual values of the face
     uncovered_frames: number of frames with them; lower_var: relative variance between frames
     covered_frames: number of frames with a covered lower half of the face
-    covered_s: capture time of the last of them; cover_share: factor of its distance since
+    covered_s: capture time of the last of them; cover_share: factor of the distance since then
     """
 
     id: int
@@ -289,7 +289,7 @@ class Track:
     def depth_from(self) -> str:
         """Return the source of its distance: "camera", "face size" or "assumed".
 
-        Without a visible face it is the size of the body.
+        Without a visible face, "face size" refers to the size of the body.
         """
         if self.detection.depth_measured:
             return "camera"
@@ -297,14 +297,14 @@ class Track:
 
     @property
     def is_person(self) -> bool:
-        """Return whether it is a person, with a visible face or without."""
+        """Return whether it is a person, with or without a visible face."""
         return self.detection.kind == FACE
 
 
 def place_in_world(
     found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3
 ) -> LocalisedDetection:
-    """Return a detection in the world, by the camera's pose at the exposure."""
+    """Return a detection in the world, from the camera's pose at the exposure."""
     R, v, gaze = found.R_camera_face, found.v_camera_m_s, found.gaze_camera
     fastest, faster, upper = found.fastest_m, found.fastest_m_s, found.upper_m
     return LocalisedDetection(

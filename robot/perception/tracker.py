@@ -1,13 +1,13 @@
 """Tracking: identities, positions and velocities of people and things, from frame to frame.
 
-World frame, metres. Every detection has its own uncertainty, which along the line of view may be
-many times that across it. All pairs of track and detection are weighed together by the distance in
-these terms (data_association), and a Kalman filter of direction and range (kalman) updates each
-track with its detection.
+World frame, metres. Every detection has its own uncertainty, which may be much larger along the
+line of view than across it. All pairs of track and detection are evaluated together by the distance
+relative to these uncertainties (data_association), and a Kalman filter of direction and range
+(kalman) updates each track with its detection.
 
-People who were confused while hidden get their numbers back by the colours of their clothes,
-learned over many frames. People count from 1; a person who comes back keeps the number
-(returning_people). Things have numbers of their own.
+If people are confused while hidden, the colours of their clothes, learned over many frames, restore
+their numbers. People are numbered from 1; a person who returns keeps the number (returning_people).
+Things are numbered separately.
 """
 
 from math import inf, sqrt
@@ -30,17 +30,17 @@ from gazerig.robot.perception.returning_people import SeenPerson, find_returned
 from gazerig.robot.perception.track import FACE, UNNAMED, KnownClothes, LocalisedDetection, Track
 
 # Number of frames with clothes after which they identify a person; number below which the person
-# may be a person who was here before.
+# may be one who returned.
 _CLOTHES_PROVED, _OWN = 3, 60
 # A person who is not seen for longer than this is lost.
 _LOST_S = 0.25
 # Number of frames that confirm a person's clothes; largest number that counts; cost above which
-# clothes do not fit.
+# clothes do not match.
 _CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
-# Cost below which clothes fit; advantage, summed over frames, at which two people exchange their
+# Cost below which clothes match; advantage, summed over frames, at which two people exchange their
 # numbers; largest advantage of one frame.
 _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
-# Share of a doubt that remains after a frame without evidence for it.
+# Fraction of a doubt that remains after a frame without evidence for it.
 _DOUBT_KEPT = 0.9
 
 
@@ -51,16 +51,16 @@ def resolve_identities(
     detections: list[LocalisedDetection],
     params: TrackParams,
 ) -> None:
-    """Give people who were confused while they were hidden the numbers of their clothes.
+    """Restore by their clothes the numbers of people who were confused while hidden.
 
-    A person who comes out from behind another shows the face first, and the clothes later.
+    A person who emerges from behind another shows the face first, and the clothes later.
 
     Args:
         tracks: all tracks; one that turns out to be a copy of another is removed.
         worn: cost of the clothes of each pair of track and detection.
         column: the detection of each track that has one.
-        detections: of the frame.
-        params: of tracking.
+        detections: detections of the frame.
+        params: parameters of tracking.
     """
     sure = True
     for i, j in column.items():
@@ -68,7 +68,7 @@ def resolve_identities(
         clothing, known = detections[j].clothing, track.clothes
         if clothing is None or not track.is_person:
             continue
-        new = max(own, 0.0) if known.frames < _OWN else own  # may be a person who was here before
+        new = max(own, 0.0) if known.frames < _OWN else own  # may be a person who returned
         if new < _FITS:
             known.confirmed = min(known.confirmed + clothing.share, _MOST_CONFIRMED)
         elif own > _MISFITS:
@@ -94,7 +94,7 @@ def resolve_identities(
 
 
 def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> None:
-    """Give the tracks in sight the numbers that fit all of them best; they exchange them."""
+    """Exchange the numbers of the tracks in sight so that they match all of them best."""
     people = [
         track
         for track in tracks
@@ -122,7 +122,7 @@ def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> No
             one.clothes = KnownClothes(colours, frames, lost_sight=one.clothes.lost_sight)
             one.returned_person, one.is_number_final = None, True
             if one.seen_s < one.at_s and frames < _OWN:
-                tracks.remove(one)  # no new person came: it was this one
+                tracks.remove(one)  # the supposed new person was this one
 
 
 def _reachable(one: Track, other: Track, params: TrackParams) -> bool:
@@ -135,14 +135,14 @@ def _reachable(one: Track, other: Track, params: TrackParams) -> bool:
 
 _FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
 _PROVED = 3
-# A person in fewer frames than this may be a false detection, whose number is given again. Number
-# of frames with clothes that settle the number. Largest number of people who left.
+# A person in fewer frames than this may be a false detection, whose number is reused. Number of
+# frames with clothes after which the number is final. Largest number of stored people who left.
 _KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
-# The lower half of a face is covered if it is below this part of its usual size, and by this number
-# of standard deviations of a frame.
+# The lower half of a face is covered if it is smaller than this fraction of its usual size, and by
+# this number of standard deviations of a frame.
 _COVERED, _COVERED_SDS = 0.8, 4.0
-# Number of bare frames needed before, and gain of learning the usual size. Largest factor of a
-# cover on the distance, and its gain of learning, at first higher.
+# Number of uncovered frames needed before, and gain of learning the usual size. Largest factor of a
+# cover on the distance, and its learning gain, which is higher at first.
 _BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 8, 0.03, 1.5, 0.03
 # Guessed points jump: a face counts as covered for this time after the last covered frame.
 _COVERED_S = 0.3
@@ -160,7 +160,7 @@ class Tracker:
         self.retune(params)
 
     def retune(self, params: TrackParams) -> None:
-        """Use other parameters from now on; all tracks stay."""
+        """Use other parameters from now on; all tracks are kept."""
         self._params = params
         lively = params.lively_accel_m_s2
         self._of_faces = ProcessNoise(params.quiet_accel_m_s2, lively)
@@ -169,7 +169,7 @@ class Tracker:
             track.filter.retune(self._of_faces if track.is_person else self._of_things)
 
     def forget(self) -> None:
-        """End all identities, as the scene has changed. Numbers are not used again."""
+        """End all identities, after a change of the scene. Numbers are not reused."""
         self._tracks, self._left = [], []
 
     @property
@@ -202,7 +202,7 @@ class Tracker:
         renamed = {
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
         }
-        # A thing recognised later as a hand is no newcomer: it keeps its number.
+        # A thing that is later recognised as a hand is not new: it keeps its number.
         ids = {t.detection.mark: t.id for t in self._tracks if _is_another_now(t, renamed)}
         for j, detection in enumerate(detections):
             if j not in taken:
@@ -242,7 +242,7 @@ class Tracker:
         return max(par.forget_ms / 1e3, par.remember_face_s if known else 0.0)
 
     def _is_remembered(self, track: Track) -> bool:
-        """Return whether a track is out of sight for a long time, so that it is assumed to stay."""
+        """Return whether a track has been out of sight for so long that it is assumed to stay."""
         return track.at_s - track.seen_s > self._params.forget_ms / 1e3
 
     def _costs(self, detections: list[LocalisedDetection], p_camera: Vec3) -> list[list[float]]:
@@ -316,7 +316,7 @@ class Tracker:
         return track
 
     def _number(self, track: Track) -> None:
-        """Give a person's new track the number of the person who has come back, or a free one."""
+        """Give a person's new track the number of the person who has returned, or a free one."""
         par, now_s = self._params, track.at_s
         if track.returned_person is not None:
             self._left.append(track.returned_person)
@@ -339,7 +339,7 @@ class Tracker:
         self._tracks = [one for one in self._tracks if one not in gone or one.id != back.id]
 
     def _new_number(self) -> int:
-        """Return the lowest number that no person has or had."""
+        """Return the lowest number that was never used for a person."""
         if self._free:
             number = min(self._free)
             self._free.remove(number)
@@ -348,7 +348,7 @@ class Tracker:
         return self._next_person - 1
 
     def _retire_track(self, track: Track) -> None:
-        """Remember a person who left; a false detection gives its number back."""
+        """Store a person who left; the number of a false detection becomes free."""
         if track.frames >= _KNOWN:
             self._left = [*self._left, _person(track)][-_MOST_LEFT:]
         elif track.returned_person is not None:
@@ -410,9 +410,9 @@ def _person(track: Track) -> SeenPerson:
 
 
 def _is_covered(track: Track, found: LocalisedDetection) -> bool:
-    """Return whether the lower half of a face is covered, as by a hand, so that its size misleads.
+    """Return whether the lower half of a face is covered, e.g. by a hand, which falsifies its size.
 
-    The network places hidden points nearer to the visible ones: the face seems to be farther away.
+    The network places hidden points nearer to the visible ones, so the face seems farther away.
     """
     if found.depth_measured or track.uncovered_frames < _BARE or not found.lower_face > 0.0:
         return False
@@ -424,9 +424,9 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
 
 
 def _covered_position(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:
-    """Return the position of a covered face: at its last distance, corrected for its motion since.
+    """Return the position of a covered face: its last distance, corrected for its motion since.
 
-    Half of the correction comes from its points and half from its box, whose error is opposite.
+    Half of the correction is from its points and half from its box, whose error is opposite.
     """
     measured = sub(place, p_camera)
     share = sqrt(track.box_m / found.box_m)
@@ -452,7 +452,7 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
 
 
 def _is_another_now(track: Track, renamed: set[int]) -> bool:
-    """Return whether the detector's number of a thing now belongs to a known thing."""
+    """Return whether the detector's number of a thing now belongs to another known thing."""
     return track.detection.kind == UNNAMED and track.detection.mark in renamed
 
 
@@ -481,7 +481,7 @@ def correct_distance(track: Track, detection: LocalisedDetection, p_camera: Vec3
 
 
 def blend(A: Mat3, B: Mat3, share: float) -> Mat3:
-    """Return the rotation at a share of the path from A to B (columns blended, orthonormalised)."""
+    """Return the rotation at a fraction of the path from A to B (columns blended, orthonormal)."""
     x = unit(_column(A, B, 0, share))
     z = _column(A, B, 2, share)
     y = unit(cross(z, x))
