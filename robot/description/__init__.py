@@ -1,1 +1,1 @@
-"""The rig as a body: links, joints, inertia and shapes, and the files that describe it."""
+"""Description of a rig's body: links, joints, inertia and shapes, and the files that contain it."""

@@ -1,8 +1,8 @@
-"""The description of a rig: a tree of links from the measures and joints of its YAML. Pure.
+"""The description of a rig: a tree of links from the dimensions and joints in its YAML. Pure.
 
-The neck turns yaw, pitch, roll about axes through one point, on a lower neck if the rig has one;
-the head carries eyes that pan and tilt about their centres, lids that turn about an axis through
-both eyes' centres, and whatever other joints the rig has. Angles are those of the rig's joints,
+The neck turns yaw, pitch, roll about axes through one point, on a lower neck if the rig has one.
+The head carries eyes that pan and tilt about their centres, lids that turn about an axis through
+both eyes' centres, and any other joints of the rig. Angles are those of the rig's joints,
 with their signs (robot/model/kinematics.py).
 """
 
@@ -41,14 +41,14 @@ from gazerig.robot.model.types import further_joints
 def joint_torques_nm(
     joints: Mapping[str, JointParams], couplings: Mapping[str, CouplingParams]
 ) -> dict[str, float]:
-    """Return the highest torque at every joint, standing still, at its servos' rated voltage.
+    """Return the stall torque at every joint, at the rated voltage of its servos.
 
-    Of a pair that two servos move together each joint gets what both do for it alone.
+    In a pair that two servos move together, each joint gets the torque of both servos on it alone.
     """
     own = {}
     for name, joint in joints.items():
         shaft_nm = joint.model_facts.stall_torque_nm * (joint.torque_limit or 1.0)
-        # Where the turns of the servo for one of the joint are the most.
+        # At the position with the highest ratio of servo to joint rotation.
         own[name] = shaft_nm * (
             joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
         )
@@ -72,11 +72,11 @@ _AXES |= {"pan": _AXES["yaw"], "tilt": UP}
 
 
 class RigShape(NamedTuple):
-    """Values of a rig's YAML that a description is made from.
+    """Values of a rig's YAML from which a description is built.
 
     lids: angles of the lid joints shut and open
     image_px: width and height of the camera's frames
-    meshes: of the user's own
+    meshes: meshes supplied by the user
     """
 
     name: str
@@ -95,7 +95,7 @@ def describe(rig: RigShape, *, looks: bool = True) -> Description:
 
     Args:
         rig: the rig.
-        looks: with what can be seen; without, the same mechanism is made in a moment.
+        looks: include visual shapes; without them, the same mechanism is built much faster.
     """
     if not looks:
         return _Builder(rig, looks=False).description().without_looks()
@@ -103,7 +103,7 @@ def describe(rig: RigShape, *, looks: bool = True) -> Description:
 
 
 def rig_mass_faults(rig: RigShape) -> Iterator[tuple[str, str]]:
-    """Find masses that no such head can have: key in the rig's file, and the fault."""
+    """Find masses that are impossible for such a head: key in the rig's file, and the fault."""
     built = describe(rig._replace(mass=MassParams()), looks=False)
     yield from mass_faults(rig.mass, _measures(rig.geometry), built)
 
@@ -189,7 +189,7 @@ class _Builder:
         chain += [(name, pivot) for name in NECK if name in joints]
         head_m = (self._eyes_m[0], 0.0, pivot + self._eyes_m[2])
         first = chain[0][1] if chain else pivot
-        # A column about a yaw axis turns with it; any other does not move.
+        # A column about a yaw axis turns with that axis; other columns do not move.
         turns = bool(chain) and chain[0][0].endswith("yaw")
         self._links.append(
             parts.base(BASE, self._measures, head_m, 0.0 if turns else first, bool(chain))
@@ -209,7 +209,7 @@ class _Builder:
         return parent
 
     def _build_head(self, neck: str, carried: list[Link]) -> Link:
-        """Return the head without what it carries."""
+        """Return the head without the links that it carries."""
         x, y, z = self._pivot_m
         ahead, _, above = self._eyes_m
         still = [
@@ -257,7 +257,7 @@ class _Builder:
         opens = 1.0 if wide > shut else -1.0
         up = opens if which == "upper" else -opens
         meet = self._lid_meeting_rad(side)
-        # Height of the edge above the eye's equator with the joint at 0.
+        # Elevation of the edge above the eye's equator with the joint at 0.
         edge = meet - up * shut
         opened = parts.awake_opening_rad(which == "upper", meet, abs(wide - shut))
         awake = shut + copysign(opened, wide - shut)
@@ -282,5 +282,5 @@ class _Builder:
 def link_name(joint: str) -> str:
     """Return the name of the link that a joint moves."""
     name = f"{joint}_link"
-    # A joint may be called base or camera.
+    # The name of a joint may be base or camera.
     return f"{name}_" if name in (BASE, CAMERA) else name

@@ -1,7 +1,7 @@
-"""Whether a rig's joints, each within its limits, bring parts of its model into each other. Pure.
+"""Collisions between parts of a rig's model within the limits of its joints. Pure.
 
-Bodies are compared by their collision shapes, lids by the elevations of their edges. Shoulders are
-those of the model, so that a finding is a hint and no fault of the rig.
+Bodies are compared by their collision shapes, lids by the elevations of their edges. The shoulders
+are those of the model, so a finding is a hint and not a fault of the rig.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,31 +17,31 @@ from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import CollisionShape, Description, Pose
 
 _STEPS, _HALVINGS = 7, 7
-"""Angles of a joint that are tried, its limits among them."""
+"""Number of tested angles of a joint, including its limits; number of bisections."""
 _DEEP_M = 0.003
-"""Parts may press into each other so far: skin and foam give."""
+"""Permitted overlap of parts: skin and foam are soft."""
 _LIDS_OVERLAP_DEG = 8.0
-"""Edges of lids may pass each other so far: they are soft, or slide over each other."""
+"""Permitted overlap of lid edges: they are soft, or slide over each other."""
 _POINTS = 160
 
 
 class Collision(NamedTuple):
-    """Two parts that meet within the limits of the joints, and what helps."""
+    """Two parts that collide within the limits of the joints, and the remedy."""
 
     angles_deg: Mapping[str, float]
     parts: tuple[str, str]
     cure: str
 
     def text(self) -> str:
-        """Return it as a line."""
+        """Return the collision as one line."""
         pose = ", ".join(f"{joint} {angle:.0f} deg" for joint, angle in self.angles_deg.items())
         return f"{pose}: {self.parts[0]} runs into {self.parts[1]}; {self.cure}"
 
 
 def collisions(rig: RigShape) -> tuple[Collision, ...]:
-    """Return the collisions of a rig: for every two parts the pose nearest to straight ahead.
+    """Return the collisions of a rig: for each pair of parts the pose nearest to straight ahead.
 
-    Every joint is tried alone, and every two joints of the necks together.
+    Each joint is tested alone, and each pair of neck joints together.
     """
     return (*_lid_collisions(rig), *_body_collisions(describe(rig, looks=False)))
 
@@ -51,7 +51,7 @@ def _lid_collisions(rig: RigShape) -> Iterator[Collision]:
         names = [f"{side}_{which}_lid" for which in ("upper", "lower")]
         if not all(name in rig.lids and name in rig.joints for name in names):
             continue
-        # Travel of each beyond the angle at which it is shut, in degrees.
+        # Travel of each lid beyond its shut angle, in degrees.
         ends, beyond = {}, {}
         for name in names:
             shut, wide = rig.lids[name]
@@ -110,7 +110,7 @@ def _first_collision(
 
 
 def _movable_pairs(description: Description) -> list[tuple[str, str]]:
-    """Return links whose bodies could meet: some joint moves one against the other."""
+    """Return pairs of links that could collide because a joint moves one relative to the other."""
     touching = {frozenset(pair) for pair in description.may_touch}
     solid = [link.name for link in description.links if _link_shapes(description, link.name)]
     return [
@@ -145,7 +145,7 @@ def _test_poses(description: Description) -> Iterator[dict[str, float]]:
 
 
 def _depth_m(description: Description, poses: Mapping[str, Pose], one: str, other: str) -> float:
-    """Return how deep two links' bodies are in each other, negative where they are apart."""
+    """Return the penetration depth of two links' bodies, negative if they are apart."""
     deepest = -np.inf
     for a in _link_shapes(description, one):
         for b in _link_shapes(description, other):
@@ -164,7 +164,7 @@ def _place_points(points: Floats, shape: CollisionShape, pose: Pose) -> Floats:
 
 @lru_cache(maxsize=64)
 def _surface_points(kind: str, half_m: tuple[float, float, float]) -> Floats:
-    """Return points all over the surface of a shape."""
+    """Return points distributed over the surface of a shape."""
     at = np.arange(_POINTS) + 0.5
     up, around = 1.0 - 2.0 * at / _POINTS, at * np.pi * (1.0 + np.sqrt(5.0))
     level = np.sqrt(1.0 - up * up)
@@ -180,7 +180,7 @@ def _surface_points(kind: str, half_m: tuple[float, float, float]) -> Floats:
 
 
 def _distances(shape: CollisionShape, pose: Pose, points: Floats) -> Floats:
-    """Return how far points (n, 3) of the world are outside a shape."""
+    """Return the distances of points (n, 3) of the world outside a shape."""
     in_link = (points - pose[1]) @ np.array(pose[0])
     local = (in_link - shape.p_m) @ np.array(shape.R)
     if shape.kind == "box":

@@ -1,4 +1,4 @@
-"""Lips and brows as shapes of their own on the front of a head, with clean edges."""
+"""Lips and brows as separate shapes on the front of a head, with sharp edges."""
 
 from math import pi
 from typing import NamedTuple
@@ -13,10 +13,10 @@ _COLUMNS, _ROWS = 31, 7
 
 
 class Mouth(NamedTuple):
-    """Measures of a mouth, in the unit of its head.
+    """Dimensions of a mouth, in the unit of its head.
 
-    z: height of its middle; half_width: of the line between the lips; smile: how much higher its
-    ends are for each unit aside, squared; upper, lower: heights of the lips
+    z: height of its centre; half_width: half the width of the line between the lips; smile: rise of
+    its ends per squared unit of sideways distance; upper, lower: heights of the lips
     """
 
     z: float
@@ -39,7 +39,7 @@ class Lips(NamedTuple):
 
 
 def lips(head: Solid, mouth: Mouth, colour: Colour, dark: Colour) -> Lips:
-    """Return the lips of a mouth, laid upon the front of a head."""
+    """Return the lips of a mouth on the front of a head."""
     share = np.linspace(-1.0, 1.0, _COLUMNS)
     y = mouth.half_width * share
     taper = np.maximum(1.0 - share * share, 0.0)
@@ -60,7 +60,7 @@ def _band(head: Solid, y: Floats, low: Floats, high: Floats, bulge: float) -> Me
     share = np.linspace(0.0, 1.0, _ROWS)[:, None]
     z = low + share * (high - low)
     points = head.front(np.tile(y, _ROWS), z.reshape(-1)).reshape(_ROWS, len(y), 3)
-    # Its edges are a little inside the skin, so that no gap shows.
+    # Its edges are a little inside the skin, so that no gap is visible.
     points[..., 0] += bulge * (np.sin(pi * share) ** 0.7 * 1.25 - 0.25) + 0.006
     return grid(points, closed=False)
 
@@ -68,15 +68,15 @@ def _band(head: Solid, y: Floats, low: Floats, high: Floats, bulge: float) -> Me
 def brow(
     head: Solid, y: Floats, z: Floats, thick: float, colour: Colour, around: int = 12
 ) -> Painted:
-    """Return a brow: a tapering bow on the front of a head.
+    """Return a brow: a tapering arc on the front of a head.
 
     Args:
-        head: the surface that carries it.
-        y: its places from the nose outwards (n,).
-        z: its heights (n,).
-        thick: half its greatest height.
-        colour: of the hair.
-        around: corners of its section.
+        head: surface of the head.
+        y: positions from the nose outwards (n,).
+        z: heights (n,).
+        thick: half the greatest thickness.
+        colour: colour of the hair.
+        around: number of corners of the cross-section.
     """
     share = np.linspace(0.0, 1.0, len(y))
     middle = head.front(y, z) + (0.012, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The files of a description: what ``gazerig describe`` writes, by their paths in its folder."""
+"""The files of a description that ``gazerig describe`` writes, by their paths in its folder."""
 
 import re
 from collections.abc import Collection
@@ -35,17 +35,17 @@ _SCENE = """<mujoco model="{name} on a table">
 
 
 def file_name(name: str) -> str:
-    """Return a rig's name as that of a file."""
+    """Return a rig's name as a file name."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "rig"
 
 
 def description_files(
     description: Description, formats: Collection[Format] = FORMATS
 ) -> dict[str, bytes]:
-    """Return the content of all files by their paths in the folder they are written to.
+    """Return the content of all files by their paths in the output folder.
 
     Args:
-        description: of the rig.
+        description: description of the rig.
         formats: mjcf: the rig as a MuJoCo model, and a scene with it on a table; urdf; glb.
     """
     name = file_name(description.name)
@@ -63,7 +63,7 @@ def description_files(
         found[f"{name}.urdf"] = text.encode()
         found |= {f"{MESHES}/{file}": data for file, data in assets.items()}
     if "glb" in formats:
-        from gazerig.robot.description.gltf import gltf  # takes .5 s of a processor
+        from gazerig.robot.description.gltf import gltf  # takes .5 s of CPU time
 
         found[f"{name}.glb"] = gltf(named)
     return found

@@ -1,8 +1,7 @@
 """A description as binary glTF: a tree of nodes with meshes, for browsers and modelling programs.
 
-A joint is a node of its own between a link and its parent: its rotation is by the joint's angle
-about the axis in its extras, and moves its children. y is up, as glTF wants it,
-under a root that turns z up.
+A joint is a separate node between a link and its parent. Its rotation by the joint's angle about
+the axis in its extras moves its children. y is up, as glTF requires, below a root that turns z up.
 """
 
 from math import atan, tan
@@ -32,11 +31,11 @@ _ROUGHNESS: dict[Finish, float] = {
 _Y_UP: Mat3 = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 _ROOT = "world"
 _VERTICES, _FACES = 34962, 34963
-"""What a part of glTF's buffer is for."""
+"""Use of a part of glTF's buffer."""
 
 
 def gltf(description: Description) -> bytes:
-    """Return a description as a binary glTF file, its lids open and all other joints at 0."""
+    """Return a description as a binary glTF file, with its lids open and all other joints at 0."""
     scene: Any = trimesh.Scene(base_frame=_ROOT)
     names = {_ROOT, *(link.name for link in description.links)}
     names |= {f"{look.name}_mesh" for link in description.links for look in link.visuals}
@@ -45,7 +44,7 @@ def gltf(description: Description) -> bytes:
         parent = link.parent or _ROOT
         R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
         if link.joint is not None:
-            node = link.joint.name  # may be called as a link is
+            node = link.joint.name  # may have the name of a link
             while node in names or node in joints:
                 node += "_"
             R = compose(R, turn_about(link.joint.axis, link.joint.awake_rad))
@@ -71,7 +70,7 @@ def gltf(description: Description) -> bytes:
         for node in tree["nodes"]:
             if node["name"] in joints:
                 node["extras"] = joints[node["name"]]
-        # The camera: glTF's looks along -z with y up, the optical frame along z with y down.
+        # A camera of glTF looks along -z with y up; the optical frame looks along z with y down.
         camera = description.camera
         share = camera.width_px / camera.height_px
         field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) / share)
@@ -81,7 +80,7 @@ def gltf(description: Description) -> bytes:
         tree["nodes"].append(view)
         (optical,) = (node for node in tree["nodes"] if node["name"] == camera.optical)
         optical.setdefault("children", []).append(len(tree["nodes"]) - 1)
-        # Which parts of the buffer are vertices and which are faces; trimesh leaves that open.
+        # Mark the parts of the buffer as vertices or faces, which trimesh does not do.
         views, accessors = tree["bufferViews"], tree["accessors"]
         for primitive in (one for mesh in tree["meshes"] for one in mesh["primitives"]):
             for accessor in primitive["attributes"].values():

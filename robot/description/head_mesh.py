@@ -48,18 +48,18 @@ _IRIS: Colour = (24, 122, 226)
 _IRIS_INNER: Colour = (150, 216, 250)
 LIMBUS_RAD, _PUPIL_RAD = radians(31.0), radians(12.5)
 _CORNEA = 0.05
-"""How far the cornea stands out of the eyeball, in its radii."""
+"""Height of the cornea above the eyeball, in radii of the eyeball."""
 _CAP_NORMAL, _CAP_LINE, _CAP_OUT = (-1.0, 0.0, 0.55), 0.70, 0.035
-"""The cap begins at this plane, and stands so far off the skin; in distances between the eyes."""
+"""Plane at which the cap begins, and its distance from the skin, in distances between the eyes."""
 
 _JAW_MIDDLE = (-0.42, -1.10)
-"""Ahead and height of a point within the jaw, from which its sides are fans."""
+"""Forward position and height of a point within the jaw from which its sides are triangle fans."""
 
 
 class HeadSkin(NamedTuple):
-    """The surface of the head in two pieces, of which a jaw moves the second.
+    """The surface of the head in two pieces; a jaw moves the second.
 
-    cheeks: walls that stay on both sides of the jaw, and face it
+    cheeks: fixed walls on both sides of the jaw that face it
     """
 
     head: Painted
@@ -93,9 +93,9 @@ def skin() -> HeadSkin:
 
 
 def _eye_rims() -> tuple[Painted, Painted]:
-    """Return the skin about the left and the right eye."""
+    """Return the skin around the left and the right eye."""
     points, normals = eye_rim()
-    # Lit as if it were a little flatter and higher: bags below the eyes look tired.
+    # Lit as if it were a little flatter and higher, because bags below the eyes look tired.
     normals = normals + np.linspace(1.0, 0.0, len(points))[:, None, None] * (0.3, 0.0, 0.25)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     mesh = grid(points, closed=True)
@@ -106,13 +106,13 @@ def _eye_rims() -> tuple[Painted, Painted]:
 
 
 def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted:
-    """Return the wall on one side of a jaw, which can be seen once it hangs below the head.
+    """Return the wall on one side of a jaw, which is visible while the jaw is below the head.
 
     Args:
-        jaw: its skin.
+        jaw: skin of the jaw.
         sign: 1: the left side.
-        deep: share of the distance from its edge to the jaw's middle.
-        within: colour of its inner end.
+        deep: depth as a fraction of the distance from the edge to the jaw's centre.
+        within: colour of the inner end.
     """
     rim = jaw.mesh.vertices[np.isclose(jaw.mesh.vertices[:, 1], sign * JAW_HALF)]
     middle = np.array((_JAW_MIDDLE[0], sign * JAW_HALF, _JAW_MIDDLE[1]))
@@ -154,9 +154,9 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
 
 @lru_cache(maxsize=1)
 def mouth() -> Painted:
-    """Return the dark within an open mouth, in distances between the eyes.
+    """Return the dark interior of an open mouth, in distances between the eyes.
 
-    A body that hides the neck, the inside of the skin, and the cheeks next to the jaw.
+    It is a body that hides the neck, the inside of the skin, and the cheeks next to the jaw.
     """
     ball = ellipsoid((0.52, 0.55, 0.62), 0.7)
     body = Mesh(ball.vertices + (-0.62, 0.0, -0.92), ball.faces)
@@ -167,7 +167,7 @@ def mouth() -> Painted:
 
 @lru_cache(maxsize=1)
 def brow() -> Painted:
-    """Return the left brow, in distances between the eyes: a tapering bow on the forehead."""
+    """Return the left brow, in distances between the eyes: a tapering arc on the forehead."""
     share = np.linspace(0.0, 1.0, 20)
     y = 0.20 + 0.68 * share
     z = 0.50 + 0.20 * np.sin(pi * (0.16 + 0.66 * share)) - 0.06 * share
@@ -177,7 +177,7 @@ def brow() -> Painted:
 @lru_cache(maxsize=1)
 def eye() -> Painted:
     """Return an eyeball of radius 1 that looks along x: white, iris, pupil under the cornea."""
-    # Close together at the edges of colours: the white, the limbus and the pupil.
+    # Rows are dense at the edges of colours: the white, the limbus and the pupil.
     angles = np.radians(
         (110, 80, 60, 46, 37, 33, 31.6, 30.6, 29.6, 28.4, 27, 24.5, 21.5, 18.5, 16, 14, 13, 12, 10, 5, 0)
     )  # fmt: skip
@@ -216,7 +216,7 @@ def _eye_colours(angles: Floats, columns: int) -> Floats:
 def eyelid(upper: bool) -> Painted:
     """Return a lid of radius 1: a slice of a sphere from its edge at +x up (or down) and back.
 
-    The edge is dark and has a lip, as lashes do.
+    The edge is dark and has a lip that resembles lashes.
     """
     side = 1.0 if upper else -1.0
     sweep = np.concatenate(((0.0, 0.0), np.radians((1.6, 3.2, 4.0)), np.linspace(0.09, 2.1, 11)))
@@ -239,7 +239,7 @@ def eyelid(upper: bool) -> Painted:
     colours = mix(colours, _LASH, np.broadcast_to(lash[:, None], points.shape[:2]))
     normals = smooth_normals(mesh)
     if not upper:
-        # Lit as if it faced up more, as the skin below it is.
+        # Lit as if it faced further up, like the skin below it.
         normals = normals + (0.3, 0.0, 0.5)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Painted(mesh, colours.reshape(-1, 3), normals)
@@ -259,7 +259,7 @@ def ear() -> Painted:
 
 @lru_cache(maxsize=1)
 def neck() -> Painted:
-    """Return a neck of length 1 along z and radius 1 of bellows."""
+    """Return a neck of bellows with length 1 along z and radius 1."""
     height = np.linspace(0.0, 1.0, 55)
     profile = [(1.0 + 0.05 * cos(18.0 * pi * h), h) for h in height]
     mesh = lathe(profile, around=28)
@@ -291,5 +291,5 @@ def bust() -> Painted:
 
 
 def _superellipse(value: float) -> float:
-    """Round a circle's sine or cosine outwards, so that an ellipse fills its box a little."""
+    """Push a circle's sine or cosine outwards, so that an ellipse becomes slightly box-shaped."""
     return float(np.sign(value) * abs(value) ** 0.82)

@@ -1,8 +1,8 @@
-"""The one shape of the head: a smooth solid whose measures follow from those of the rig.
+"""Shape of the head: a smooth solid whose dimensions follow from those of the rig.
 
-Everything scales with the distance between the eyes. Head frame: origin midway between the eyes,
-x ahead, y left, z up. In here the unit of length is the distance between the eyes, and left and
-right are alike; what leaves is in metres.
+All dimensions scale with the distance between the eyes. Head frame: origin midway between the eyes,
+x ahead, y left, z up. In this module the unit of length is the distance between the eyes, and left
+and right are symmetric; public results are in metres.
 """
 
 from functools import lru_cache
@@ -58,15 +58,15 @@ _RIM_OUT = np.array((0.0, 0.50, 0.49))
 _SMILE = 0.85
 _MOUTH_Z = -1.030
 JAW_HALF = 0.350
-"""Half the width of what a jaw moves, in distances between the eyes: about that of the lips."""
+"""Half the width of the moving jaw, in distances between the eyes: about that of the lips."""
 MOUTH = Mouth(_MOUTH_Z, 0.345, _SMILE, 0.088, 0.110)
-"""Where the lips lie, in distances between the eyes."""
+"""Position of the lips, in distances between the eyes."""
 _NOSE_TIP: Vec3 = (0.425, 0.0, -0.54)
 _HINGE: Vec3 = (-0.85, 0.0, -0.55)
 
 
 def heights_before_smile(y: Floats, z: Floats) -> Floats:
-    """Return heights as they were before a smile lifted the corners of the mouth."""
+    """Return the heights before the smile that lifted the corners of the mouth."""
     return np.asarray(z - _SMILE * y * y)
 
 
@@ -87,11 +87,11 @@ class HeadMeasures(NamedTuple):
 
     @property
     def height_m(self) -> float:
-        """Return how tall the head is from chin to top."""
+        """Return the height of the head from chin to top."""
         return (TOP - CHIN) * self.interocular_m
 
     def scaled(self, point: Vec3) -> Vec3:
-        """Return a point of this module's unit in metres."""
+        """Convert a point from this module's unit to metres."""
         x, y, z = point
         return x * self.interocular_m, y * self.interocular_m, z * self.interocular_m
 
@@ -107,7 +107,7 @@ class HeadMeasures(NamedTuple):
 
 
 def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> HeadMeasures:
-    """Return the measures of a head from its eyes' centres in any frame, and its pivot."""
+    """Return the dimensions of a head from the centres of its eyes in any frame, and its pivot."""
     plain = HeadMeasures()
     interocular_m = round(dist(left_m, right_m), 4) or plain.interocular_m
     if pivot_m is None:
@@ -118,7 +118,7 @@ def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> Hea
 
 
 def field(points: Floats) -> Floats:
-    """Return how far points (n, 3) are outside the head."""
+    """Return the distances of points (n, 3) outside the head."""
     folded = points * (1.0, 1.0, 1.0)
     folded[:, 1] = np.abs(folded[:, 1])
     solid = carve(_field_without_mouth(folded), _SOCKET(folded), 0.06)
@@ -129,7 +129,7 @@ def field(points: Floats) -> Floats:
 
 
 def _field_without_mouth(points: Floats) -> Floats:
-    """Return how far points (n, 3) of the left half are outside a head without eyes and lips."""
+    """Return the distances of points (n, 3) of the left half to a head without eyes and lips."""
     solid = _SOLIDS[0][0](points)
     for part, round_by in _SOLIDS[1:]:
         solid = union(solid, part(points), round_by)
@@ -142,18 +142,19 @@ HEAD = Solid(field, (-0.80, 0.0, -0.02), 2.6)
 
 @lru_cache(maxsize=1)
 def surface() -> Surface:
-    """Return the head's surface; it is worked out once."""
+    """Return the head's surface; it is computed once."""
     return HEAD.all_round(_ROWS, _COLUMNS, radians(-30.0), radians(30.0))
 
 
 def eye_rim() -> Surface:
-    """Return the left eye's surroundings: from the edge of the lids to the skin around it.
+    """Return the surroundings of the left eye: from the edge of the lids to the skin around it.
 
-    Rows from within outwards, columns around the eye, closed.
+    Rows from the inside outwards, closed columns around the eye.
     """
     around = np.linspace(2.0 * pi, 0.0, _RIM_COLUMNS, endpoint=False)
     aside, up = np.cos(around), np.sin(around)
-    # As far from the eye's axis as leaves lids and iris free: farther to the temple, nearer above.
+    # Far enough from the eye's axis to leave lids and iris free: farther at the temple, nearer
+    # above.
     off = np.radians(60.0 + 12.0 * np.clip(aside, 0.0, 1.0) ** 2 - 4.0 * np.clip(up, 0.0, 1.0) ** 2)
     out = np.stack((np.zeros_like(around), aside, up), axis=1)
     spherical = np.cos(off)[:, None] * (1.0, 0.0, 0.0) + np.sin(off)[:, None] * out
@@ -174,7 +175,7 @@ def eye_rim() -> Surface:
         + 3.0 * (1.0 - share) * share**2 * (skin - end / 3.0)
         + share**3 * skin
     )
-    # Skin that was cut into triangles stays below it.
+    # The triangulated skin stays below it.
     flat = points[1:].reshape(-1, 3)
     flat += np.maximum(0.0, _RIM_OFF - _field_without_mouth(flat))[:, None] * normals(
         _field_without_mouth, flat
@@ -190,7 +191,7 @@ def eye_rim() -> Surface:
 
 
 def _above_mouth(points: Floats) -> Floats:
-    """Return how far points (n, 3) are above the line between the lips, and on to the hinge."""
+    """Return heights of points (n, 3) above the line between the lips, extended to the hinge."""
     x, y, z = points.T
     z = heights_before_smile(np.minimum(np.abs(y), JAW_HALF), z)
     return np.asarray(z - _MOUTH_Z - 0.42 * np.maximum(0.0, -0.16 - x))
@@ -202,5 +203,5 @@ JAW_BOUNDS: tuple[Field, ...] = (
     lambda points: -2.56 - 0.6 * points[:, 0] - points[:, 2],  # top of the throat
     lambda points: -0.45 - points[:, 0],
 )
-"""A jaw moves what of the surface is below 0 in each of these. Its sides are planes across its
-axis: as it opens they slide along those that stay, so no gap appears beside the mouth."""
+"""A jaw moves the part of the surface where each of these is below 0. Its sides are planes across
+its axis: as it opens they slide along the fixed ones, so no gap appears next to the mouth."""

@@ -1,8 +1,8 @@
 """Links, joints, inertias and shapes of a rig's description. Values only.
 
-SI units. A link's frame is that of its joint: the joint turns it about an axis through its origin.
-World: origin at the neck base, x forward, y left, z up; all link frames are parallel to it while
-every joint is at 0, except those of the camera.
+SI units. A link's frame is that of its joint, which turns it about an axis through its origin.
+World: origin at the neck base, x forward, y left, z up. All link frames except those of the camera
+are parallel to it while every joint is at 0.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ ORIGIN: Vec3 = (0.0, 0.0, 0.0)
 Pose = tuple[Mat3, Vec3]
 """R_parent_child and p_parent_child_m."""
 Finish = Literal["skin", "plastic", "cloth", "eye", "dark"]
-"""What a surface is made of; each viewer shows it as well as it can."""
+"""Material of a surface; each viewer approximates it."""
 Layer = Literal["body", "lid"]
 ShapeKind = Literal["sphere", "ellipsoid", "capsule", "box"]
 
@@ -37,7 +37,7 @@ class CollisionShape(NamedTuple):
 
     half_m: half axes of an ellipsoid or a box; radius of a sphere first; a capsule's radius and
         half the length of its line, along its z axis
-    layer: lids touch lids only, bodies everything else
+    layer: lids collide only with lids, bodies with everything else
     """
 
     kind: ShapeKind
@@ -48,7 +48,7 @@ class CollisionShape(NamedTuple):
 
 
 class Visual(NamedTuple):
-    """A painted mesh of a link; the name is unique in the description."""
+    """Painted mesh of a link; the name is unique in the description."""
 
     name: str
     painted: Painted
@@ -58,21 +58,21 @@ class Visual(NamedTuple):
 
 
 class LinkageFollower(NamedTuple):
-    """A joint that a linkage moves with another one: its angle is ``ratio`` times the other's."""
+    """Joint that a linkage moves with another joint: its angle is ``ratio`` times the other's."""
 
     joint: str
     ratio: float = 1.0
 
 
 class ServoDrive(NamedTuple):
-    """A servo as it acts at its joint, all values per rad of the joint.
+    """Servo as it acts at its joint, all values per rad of the joint.
 
-    armature_kg_m2: inertia of its rotor behind the gear
+    armature_kg_m2: inertia of its rotor at the output of the gear
     friction_nm, damping_nm_s: dry and viscous friction of motor and gear
     kp_nm_rad, kv_nm_s: gains of its controller on the errors of position and speed
     force_nm: largest torque of its controller, at standstill
-    back_emf_nm_s: torque that the motor's induced voltage takes from it, per rad/s; none while it
-        is switched off
+    back_emf_nm_s: loss of torque due to the motor's induced voltage, per rad/s; none while it is
+        switched off
     smoothing_s: time constant with which its controller adopts the speed of a goal
     """
 
@@ -89,13 +89,13 @@ class ServoDrive(NamedTuple):
 class LinkJoint(NamedTuple):
     """The hinge between a link and its parent.
 
-    name: as in the rig, or its own if it follows another joint
+    name: name in the rig, or a separate one if it follows another joint
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
-    max_torque_nm: of the servo at the joint
+    max_torque_nm: largest torque of the servo at the joint
     awake_rad: its angle while the head is awake and looks straight ahead
     friction_nm: dry friction of its bearings, without that of a servo
-    spring_nm_rad, spring_rest_rad: stiffness of its spring, and the angle at which that is relaxed
-    drive: its servos; None if they are not part of the description, or unknown
+    spring_nm_rad, spring_rest_rad: stiffness of its spring, and the angle at which it is relaxed
+    drive: its servos; None if they are unknown or not part of the description
     """
 
     name: str
@@ -113,7 +113,7 @@ class LinkJoint(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A rigid part: its pose in its parent with the joint at 0, and what it consists of."""
+    """Rigid part: its pose in its parent with the joint at 0, its inertia and shapes."""
 
     name: str
     parent: str | None
@@ -126,7 +126,7 @@ class Link(NamedTuple):
 
 
 class CameraFrame(NamedTuple):
-    """The camera: its links and its field of view.
+    """Camera: its links and its field of view.
 
     link: x forward, y left, z up; optical: x right, y down, z forward (as in ROS)
     """
@@ -158,7 +158,7 @@ class Description(NamedTuple):
         """Return a link by its name.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: no link has that name.
         """
         for link in self.links:
             if link.name == name:
@@ -166,11 +166,11 @@ class Description(NamedTuple):
         raise KeyError(name)
 
     def without_looks(self) -> "Description":
-        """Return the same mechanism without anything to see."""
+        """Return the same mechanism without visual shapes."""
         return self._replace(links=tuple(link._replace(visuals=()) for link in self.links))
 
     def with_drives(self, drives: Mapping[str, ServoDrive]) -> "Description":
-        """Return the same with the servos at its joints, by the joints' names."""
+        """Return the description with the servos at its joints, by the joints' names."""
         links = []
         for link in self.links:
             if link.joint is not None and link.joint.name in drives:
@@ -182,8 +182,8 @@ class Description(NamedTuple):
         """Return the angle of every joint, those that follow others included.
 
         Args:
-            names: of joints of the rig.
-            position_rad: their angles; joints that are not named are at 0.
+            names: names of joints of the rig.
+            position_rad: their angles; the other joints are at 0.
         """
         known = dict(zip(names, position_rad, strict=True))
         found = {}
@@ -198,7 +198,7 @@ class Description(NamedTuple):
         """Return R_world_link and p_world_link_m of every link.
 
         Args:
-            angles_rad: of every joint, as ``angles`` returns them.
+            angles_rad: angles of all joints, as returned by ``angles``.
         """
         found: dict[str, Pose] = {}
         for link in self.links:

@@ -1,4 +1,4 @@
-"""Masses and inertias of the parts of a head, from their shapes and what they are made of.
+"""Masses and inertias of the parts of a head, from their shapes and materials.
 
 Lengths in metres, tensors about the centre of mass.
 """
@@ -12,23 +12,23 @@ from gazerig.robot.description.links import Inertia
 from gazerig.robot.model.mass_params import MassParams
 
 _PRINTED_KG_M3 = 1050.0
-"""Density of printed PLA or PETG with the usual share of air."""
+"""Density of printed PLA or PETG with the usual fraction of air."""
 SHELL_M, _GLOBE_M, _LID_M = 1.6e-3, 1.6e-3, 1.2e-3
 """Thickness of the skull's shell, of an eyeball and of a lid."""
 HEAD_KG, _REFERENCE_M = 0.6, 0.0619
-"""Mass of a whole head (skull, servos, eyes, lids) whose eyes are so far apart."""
+"""Mass of a whole head (skull, servos, eyes, lids) with this distance between the eyes."""
 SERVO_KG = 0.023
-"""Of an XC330 or an STS3215's smaller brothers."""
+"""Servo of the size of an XC330 or of models smaller than the STS3215."""
 _SERVO_HALF_M: Vec3 = (0.010, 0.013, 0.017)
 
 _CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
-"""Half axes of what fills a head (servos, frame, counterweight), in distances between the eyes."""
+"""Half axes of a head's contents (servos, frame, counterweight), in distances between the eyes."""
 _SKULL = (47.15, (-0.831, 0.0, 0.110), ((65.81, 0.0, 8.78), (0.0, 72.79, 0.0), (8.78, 0.0, 54.48)))
-"""Mass, centre and tensor of a head's shell with eyes 1 m apart, of the thickness above."""
+"""Mass, centre and tensor of a head's shell of that thickness, scaled to eyes 1 m apart."""
 
 
 def density_share(params: MassParams) -> float:
-    """Return the density of a rig's printed parts over the usual one."""
+    """Return the density of a rig's printed parts relative to the usual one."""
     return params.density_kg_m3 / _PRINTED_KG_M3
 
 
@@ -37,25 +37,25 @@ def head_mass_kg(interocular_m: float, printed: float) -> float:
 
     Args:
         interocular_m: distance between the eyes.
-        printed: density of its shell over the usual one.
+        printed: density of its shell relative to the usual one.
     """
     share = interocular_m / _REFERENCE_M
     return HEAD_KG * (0.5 + 0.5 * printed * share * share)
 
 
 def servo(times: float = 1.0) -> Inertia:
-    """Return a servo with its bracket, as a box in the middle of its link."""
+    """Return a servo with its bracket, as a box at the centre of its link."""
     mass = times * (SERVO_KG + 0.012)
     x, y, z = (half * half / 3.0 for half in _SERVO_HALF_M)
     return Inertia(mass, (0.0, 0.0, 0.0), diagonal(mass * (y + z), mass * (x + z), mass * (x + y)))
 
 
 def skull(interocular_m: float, printed: float = 1.0) -> Inertia:
-    """Return the shell of a head, whose thickness stays the same, from between the eyes.
+    """Return the shell of a head, of constant thickness, relative to the midpoint between the eyes.
 
     Args:
         interocular_m: distance between the eyes.
-        printed: density over the usual one.
+        printed: density relative to the usual one.
     """
     mass, com, tensor = _SKULL
     unit = interocular_m
@@ -85,7 +85,7 @@ def sheet(vertices: Floats, faces: np.ndarray, thickness_m: float = _LID_M) -> I
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     masses = areas * thickness_m * _PRINTED_KG_M3
-    # Three points at the middles of its edges have the moments of a triangle.
+    # Three points at the midpoints of its edges have the moments of a triangle.
     points = np.concatenate(((a + b) / 2, (b + c) / 2, (c + a) / 2))
     masses = np.tile(masses / 3.0, 3)
     mass = float(masses.sum())
@@ -98,14 +98,14 @@ def sheet(vertices: Floats, faces: np.ndarray, thickness_m: float = _LID_M) -> I
 def filled(
     shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, com_m: Vec3 | None = None
 ) -> Inertia:
-    """Return a shell with what fills it: an even ellipsoid of servos, frame and ballast.
+    """Return a shell with its contents: a homogeneous ellipsoid of servos, frame and ballast.
 
     Args:
         shell: the skull.
-        mass_kg: of both together.
-        unit_m: distance between the eyes, which scales the content.
-        middle_m: of the content.
-        com_m: centre of mass of both together, to which the content is moved; None: it stays.
+        mass_kg: total mass.
+        unit_m: distance between the eyes, which scales the contents.
+        middle_m: centre of the contents.
+        com_m: total centre of mass, which determines the contents' position; None: middle_m does.
     """
     rest = mass_kg - shell.mass_kg
     if rest <= 0.05 * mass_kg:  # a very large head has a thinner shell
@@ -121,13 +121,13 @@ def filled(
 
 
 def scale_mass(one: Inertia, mass_kg: float) -> Inertia:
-    """Return the same shape of another mass."""
+    """Return the same shape with another mass."""
     share = mass_kg / one.mass_kg
     return Inertia(mass_kg, one.com_m, matrix(np.array(one.tensor_kg_m2) * share))
 
 
 def join_inertias(parts: Iterable[Inertia]) -> Inertia:
-    """Return several bodies as one, all in the same frame."""
+    """Join several bodies in the same frame to one."""
     bodies = tuple(parts)
     mass = sum(body.mass_kg for body in bodies)
     com = sum((body.mass_kg * np.array(body.com_m) for body in bodies), np.zeros(3)) / mass
@@ -140,14 +140,14 @@ def join_inertias(parts: Iterable[Inertia]) -> Inertia:
 
 
 def in_parent_frame(one: Inertia, R: Mat3, p_m: Vec3) -> Inertia:
-    """Return a body as seen from a frame in which its own has this pose."""
+    """Return the inertia of a body in a parent frame, in which the body's frame has this pose."""
     turn = np.array(R)
     com = turn @ np.array(one.com_m) + p_m
     return Inertia(one.mass_kg, _vector(com), matrix(turn @ np.array(one.tensor_kg_m2) @ turn.T))
 
 
 def diagonal(x: float, y: float, z: float) -> Mat3:
-    """Return a tensor with these moments."""
+    """Return a diagonal tensor with these moments."""
     return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
 
 
@@ -161,6 +161,6 @@ def _vector(values: Floats) -> Vec3:
 
 
 def matrix(values: Floats) -> Mat3:
-    """Return a matrix of numpy as rows."""
+    """Return a NumPy matrix as rows."""
     a, b, c = np.asarray(values, float)
     return _vector(a), _vector(b), _vector(c)

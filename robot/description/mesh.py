@@ -1,8 +1,8 @@
-"""Shapes of the page's scene as triangles: everything is a profile turned about an axis.
+"""Triangle meshes of shapes in the page's scene: all are profiles rotated about an axis.
 
-Metres. A mesh is vertices (n, 3) and faces (m, 3), counter-clockwise seen from outside.
+Metres. A mesh has vertices (n, 3) and faces (m, 3), counter-clockwise seen from outside.
 
-Colours of vertices are 0..255 as on a screen: red, green, blue, and where given how opaque.
+Colours of vertices are 0..255 in sRGB: red, green, blue, and optionally opacity.
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,14 @@ _AROUND = 48
 
 
 class Mesh(NamedTuple):
-    """Triangles: vertices (n, 3) in metres, faces (m, 3) as rows of vertices."""
+    """Triangle mesh: vertices (n, 3) in metres, faces (m, 3) as indices of vertices."""
 
     vertices: Floats
     faces: NDArray[np.uint32]
 
 
 def lathe(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mesh:
-    """Turn a profile of (radius, height) about z; a repeated point makes a sharp edge."""
+    """Rotate a profile of (radius, height) about z; a repeated point makes a sharp edge."""
     angles = np.arange(around) * (2.0 * pi / around)
     radius, height = np.asarray(profile, float).T
     rings = np.stack(
@@ -47,7 +47,7 @@ def cap(radius_m: float, half_angle_rad: float, rings: int = 12, around: int = _
 
 
 def ellipsoid(half_axes_m: Vec3, bulge: float = 1.0, rings: int = 13) -> Mesh:
-    """Return an ellipsoid; a bulge below 1 fills it out towards a rounded box."""
+    """Return an ellipsoid; a bulge below 1 makes it more like a rounded box."""
     angles = np.linspace(-pi / 2, pi / 2, rings)
     ball = lathe([(cos(a), sin(a)) for a in angles], around=2 * rings)
     filled = np.sign(ball.vertices) * np.abs(ball.vertices) ** bulge
@@ -60,7 +60,7 @@ def disc(radius_m: float) -> Mesh:
 
 
 def lid(radius_m: float, sweep_rad: float) -> Mesh:
-    """Return a lid: the slice of a sphere swept about y, from its edge at +x upwards."""
+    """Return a lid: the slice of a sphere, swept about y, from its edge at +x upwards."""
     sweep = np.linspace(0.0, sweep_rad, 24)
     across = np.linspace(pi, 0.0, 32)
     points = np.stack(
@@ -88,7 +88,7 @@ def grid(points: Floats, *, closed: bool) -> Mesh:
 
 
 def smooth_normals(mesh: Mesh) -> Floats:
-    """Return unit vectors (n, 3) out of a surface at its vertices."""
+    """Return the outward unit normals (n, 3) of a surface at its vertices."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
     total = np.zeros_like(mesh.vertices)
@@ -98,7 +98,7 @@ def smooth_normals(mesh: Mesh) -> Floats:
 
 
 def quads(rows: int, columns: int, *, closed: bool) -> NDArray[np.uint32]:
-    """Join a grid of points, row after row, to triangles; ``closed`` joins its ends."""
+    """Triangulate a grid of points, row by row; ``closed`` joins its ends."""
     row, column = np.mgrid[0 : rows - 1, 0 : columns if closed else columns - 1]
     right = (column + 1) % columns
     a, b = row * columns + column, row * columns + right
@@ -111,7 +111,7 @@ Colour = tuple[int, int, int]
 
 
 class Painted(NamedTuple):
-    """A mesh with a colour a vertex (n, 3 or 4) in 0..255, and unit normals (n, 3) or None."""
+    """Mesh with a colour per vertex (n, 3 or 4) in 0..255, and unit normals (n, 3) or None."""
 
     mesh: Mesh
     colours: Floats
@@ -124,12 +124,12 @@ def paint(mesh: Mesh, colour: Colour) -> Painted:
 
 
 def uniform_colours(mesh: Mesh, colour: Colour) -> Floats:
-    """Return one colour for every vertex."""
+    """Return the same colour for every vertex."""
     return np.tile(np.array(colour, float), (len(mesh.vertices), 1))
 
 
 def mix(colours: Floats, colour: Colour, share: Floats) -> Floats:
-    """Blend colours (..., 3) towards one by a share (...), clipped to 0..1."""
+    """Blend colours (..., 3) towards one colour by fractions (...), clipped to 0..1."""
     part = np.clip(share, 0.0, 1.0)[..., None]
     return np.asarray(colours * (1.0 - part) + np.array(colour, float) * part)
 
@@ -141,25 +141,25 @@ def smooth_step(value: Floats, width: float) -> Floats:
 
 
 def spot_weight(points: Floats, at: Vec3, size: float) -> Floats:
-    """Return 1 at a place and less around it, for points (..., 3)."""
+    """Return weights of points (..., 3): 1 at a place and less around it."""
     away = ((points - np.array(at)) ** 2).sum(axis=-1)
     return np.asarray(np.exp(-away / (size * size)))
 
 
 def mirror_mesh(one: Painted) -> Painted:
-    """Return the same on the other side of y = 0."""
+    """Return the mesh mirrored at y = 0."""
     other = np.array((1.0, -1.0, 1.0))
     mesh = Mesh(one.mesh.vertices * other, one.mesh.faces[:, ::-1])
     return Painted(mesh, one.colours, None if one.normals is None else one.normals * other)
 
 
 def move_mesh(one: Painted, by: Vec3, scale: float = 1.0) -> Painted:
-    """Return the same, scaled about the origin and then moved."""
+    """Return the mesh scaled about the origin and then moved."""
     return one._replace(mesh=Mesh(one.mesh.vertices * scale + np.array(by), one.mesh.faces))
 
 
 def merge_meshes(parts: Sequence[Painted]) -> Painted:
-    """Return several as one; every part has normals."""
+    """Merge several meshes; every part must have normals."""
     first = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
     faces = [part.mesh.faces + start for part, start in zip(parts, first, strict=False)]
     mesh = Mesh(

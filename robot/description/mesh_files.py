@@ -1,6 +1,6 @@
-"""A painted mesh as files that every program reads: Wavefront OBJ, its material and a PNG.
+"""A painted mesh in common file formats: Wavefront OBJ, its material and a PNG.
 
-Numbers and angles are written as text files have them.
+Functions that format numbers and angles for text files are also here.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
 
 
 class _Content:
-    """A painted mesh as a key: it equals another one of the same numbers."""
+    """Painted mesh as a key of a cache: equal to another mesh with the same numbers."""
 
     def __init__(self, painted: Painted) -> None:
         self.painted = painted
@@ -48,21 +48,21 @@ class _Content:
 
 
 class _ObjText(NamedTuple):
-    """A mesh in its formats, but for its name: points and faces of the OBJ file, and the PNG."""
+    """Mesh in its file formats, without its name: points and faces of the OBJ file, and the PNG."""
 
     points: str
     faces: str
     image: bytes
 
 
-# A world is built once for its physics and once for its pictures, with one or more heads of a rig:
-# all parts of four rigs.
+# A world is built once for its physics and once for its images, with one or more heads of a rig:
+# cache all parts of four rigs.
 @lru_cache(maxsize=64)
 def _write_obj(content: _Content) -> _ObjText:
     mesh = add_texture(content.painted)
     points, point_of = _unique_rows(mesh.vertices, 6)
     normals, normal_of = _unique_rows(mesh.normals, 3)
-    # In this format an image begins at its left lower corner.
+    # In this format an image begins at its lower left corner.
     corners, corner_of = _unique_rows(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
     table = np.stack((point_of, corner_of, normal_of), axis=-1)[mesh.faces] + 1
     return _ObjText(
@@ -82,16 +82,16 @@ def plain_obj(name: str, mesh: Mesh) -> bytes:
 
 
 def png(image: np.ndarray) -> bytes:
-    """Return an image (rows, columns, 3 or 4), red first, as a PNG file."""
+    """Return an image (rows, columns, 3 or 4), RGB or RGBA, as a PNG file."""
     order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
     _, data = cv2.imencode(".png", cv2.cvtColor(image, order), [cv2.IMWRITE_PNG_COMPRESSION, 9])
     return bytes(data)
 
 
 def _unique_rows(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
-    """Return the different rows of rounded values, sorted, and which of them each row is."""
+    """Return the unique rows of rounded values, sorted, and the index of each row among them."""
     rounded = np.round(values, digits) + 0.0
-    # Column by column: a tenth of the time of np.unique, which compares whole rows.
+    # Column by column: takes a tenth of the time of np.unique, which compares whole rows.
     order = np.lexsort(rounded.T[::-1])
     ordered = rounded[order]
     first = np.ones(len(ordered), bool)
@@ -102,12 +102,12 @@ def _unique_rows(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
 
 
 def _rows(line: str, values: np.ndarray) -> str:
-    """Return a line for each row; all at once, which takes a third of the time of one by one."""
+    """Return a line for each row; formatting all together takes a third of the time."""
     return (line * len(values)) % tuple(values.ravel().tolist())
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Return numbers with spaces between, as exact as a float is, none longer than needed."""
+    """Return numbers separated by spaces, each the shortest text that is exact."""
     return " ".join(_number(float(value)) for value in values)
 
 
@@ -120,6 +120,6 @@ def roll_pitch_yaw(R: Mat3) -> tuple[float, float, float]:
     """Return the angles of a rotation about fixed x, y and z axes, in this order (as URDF)."""
     (a, b, c), (d, e, f), (g, _, _) = R
     yaw, pitch = atan2(d, a), atan2(-g, hypot(a, d))
-    # From what is left once yaw is undone, so that it holds where pitch is a right angle too.
+    # From the rotation without yaw, so that it is also valid if pitch is a right angle.
     s, k = sin(yaw), cos(yaw)
     return atan2(s * c - k * f, k * e - s * b), pitch, yaw

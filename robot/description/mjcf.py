@@ -1,7 +1,7 @@
-"""A description as MJCF, the format of MuJoCo: text, and the files that it names. Pure.
+"""A description as MJCF, the format of MuJoCo: text, and the files that it references. Pure.
 
-The text is a model of its own, and can be attached to a world (``spec.attach``). Its only body
-under the world is the rig's base. Lids collide with lids, other parts with everything but lids.
+The text is a complete model, and can be attached to a world (``spec.attach``). Its only body in the
+world is the rig's base. Lids collide with lids, other parts with everything but lids.
 """
 
 import xml.etree.ElementTree as ET
@@ -22,11 +22,11 @@ _MATERIALS = {
     "dark": {"specular": "0", "shininess": "0"},
 }
 _LOOKS_GROUP, _COLLISIONS_GROUP = "2", "3"
-"""Groups of geoms as MuJoCo's own models have them: the viewer hides the second at first."""
+"""Groups of geoms as in MuJoCo's own models: the viewer initially hides the second."""
 
 
 class Mjcf(NamedTuple):
-    """The text of a model, and the content of its files by name."""
+    """Text of a model, and the content of its files by name."""
 
     xml: str
     assets: dict[str, bytes]
@@ -43,11 +43,11 @@ def mjcf(
     """Return a description as MJCF.
 
     Args:
-        description: of the rig.
-        prefix: before the name of everything, so that two rigs fit in one world.
-        folder: of the meshes and textures, relative to the text.
-        looks: with what can be seen; without, it is the same mechanism without files.
-        awake: its lids are open at first, else all joints are at 0.
+        description: description of the rig.
+        prefix: prefix of all names, so that one world can contain two rigs.
+        folder: folder of the meshes and textures, relative to the text.
+        looks: include visual shapes; without them, the same mechanism needs no files.
+        awake: the lids are open at first; otherwise all joints are at 0.
     """
     if not looks:
         description = description.without_looks()
@@ -66,7 +66,7 @@ def mjcf(
         bodies[link.name] = body
         _fill(body, link, prefix, awake)
         if link.name == description.camera.optical:
-            # MuJoCo's camera looks along -z with y up, the optical frame along z, y down.
+            # MuJoCo's camera looks along -z with y up; the optical frame looks along z with y down.
             camera = description.camera
             share = camera.height_px / camera.width_px
             field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) * share)
@@ -93,12 +93,12 @@ def _add_assets(
         ET.SubElement(parent, "texture", name=name, type="2d", file=f"{name}.png")
         material = {"name": name, "texture": name} | _MATERIALS[visual.finish]
         ET.SubElement(parent, "material", material)
-        # A surface with holes has no volume; its mass is given with the body.
+        # A surface with holes has no volume; the body specifies its mass.
         ET.SubElement(parent, "mesh", name=name, file=f"{name}.obj", inertia="shell")
 
 
 def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
-    """Write what a body consists of, its joint first."""
+    """Write the contents of a body, its joint first."""
     at_rad, R = 0.0, link.R
     if awake and link.joint is not None and link.joint.awake_rad:
         at_rad = link.joint.awake_rad
@@ -163,7 +163,7 @@ def _add_shape(body: ET.Element, shape: CollisionShape) -> None:
 def _add_linkages(parent: ET.Element, description: Description, prefix: str) -> None:
     for joint in description.joints:
         if joint.follows is not None:
-            # As stiff as steps of 1 ms allow.
+            # The largest stiffness that is stable with steps of 1 ms.
             ET.SubElement(
                 parent, "joint", joint1=prefix + joint.name,
                 joint2=prefix + joint.follows.joint, solref="0.002 1",

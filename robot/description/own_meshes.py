@@ -1,6 +1,6 @@
-"""Meshes of the user's own in place of what the program makes for a link.
+"""Meshes of the user that replace the generated shape of a link.
 
-A file is STL, OBJ, PLY, OFF, GLB or glTF.
+Supported files are STL, OBJ, PLY, OFF, GLB and glTF.
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,9 +20,9 @@ from gazerig.robot.description.mesh_params import MeshParams
 
 @dataclass(frozen=True, eq=False)
 class OwnMesh:
-    """A user's mesh for a link: the rig's settings, and the content of the mesh file.
+    """User's mesh for a link: the rig's settings, and the content of the mesh file.
 
-    painted: in metres
+    painted: the mesh, in metres
     """
 
     link: str
@@ -31,9 +31,9 @@ class OwnMesh:
 
 
 def with_own_meshes(description: Description, meshes: Sequence[OwnMesh]) -> Description:
-    """Return a description in which some links look as the user's meshes.
+    """Return a description in which some links have the user's meshes as visual shapes.
 
-    Masses and collision shapes stay those of the rig's measures.
+    Masses and collision shapes still follow from the rig's dimensions.
     """
     own = {mesh.link: (_visual(mesh),) for mesh in meshes}
     return description._replace(
@@ -52,7 +52,7 @@ def _visual(mesh: OwnMesh) -> Visual:
 
 
 def unknown_links(description: Description, named: Iterable[str]) -> dict[str, str]:
-    """Return for each name that is no link's what is wrong with it."""
+    """Return a message for each name that is not the name of a link."""
     known = [link.name for link in description.links]
     found = {}
     for name in named:
@@ -67,18 +67,18 @@ FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
 _Y_UP = (".glb", ".gltf")
 _MOST_BYTES, _MOST_FACES = 100_000_000, 150_000
 _EDGE_RAD = radians(35.0)
-"""A corner whose faces turn farther from each other's mean is sharp; others are smooth."""
+"""Largest angle between a smooth corner's faces and their mean; other corners are sharp."""
 
 
 class MeshUnusable(ValueError):
-    """A file that cannot be shown; the message has the reason and a remedy."""
+    """Error: a mesh file cannot be used; the message has the reason and a remedy."""
 
 
 def read_mesh(params: MeshParams) -> Painted:
     """Return a mesh with its colours, in metres, z up.
 
     Raises:
-        MeshUnusable: there is no such file, or it holds no mesh.
+        MeshUnusable: the file does not exist, or it does not contain a mesh.
     """
     path = Path(params.file).expanduser()
     if path.suffix.lower() not in FORMATS:
@@ -98,7 +98,7 @@ def read_mesh(params: MeshParams) -> Painted:
     if not np.isfinite(mesh.vertices).all():
         raise MeshUnusable(f"{path}: points that are no numbers; export it again")
     y_up = path.suffix.lower() in _Y_UP
-    # Every corner of every triangle becomes a point of its own, as edges need it.
+    # Every corner of every triangle becomes a separate point, which sharp edges require.
     look: Any = mesh.visual
     if look.kind == "texture":
         look = look.to_color()
@@ -122,12 +122,12 @@ def read_mesh(params: MeshParams) -> Painted:
 
 
 def _load_mesh(path: Path) -> Any:
-    """Return all of a file as one mesh of trimesh."""
-    import trimesh  # takes a while to import, and few rigs need it
+    """Load all meshes of a file as one mesh of trimesh."""
+    import trimesh  # its import is slow, and few rigs need it
 
     try:
         scene: Any = trimesh.load_scene(path)
         return scene.to_mesh()
-    except Exception as error:  # the readers of many formats raise what they like
+    except Exception as error:  # the readers of many formats raise various exceptions
         reason = " ".join(str(error).split()) or type(error).__name__
         raise MeshUnusable(f"{path}: cannot be read ({reason[:120]}); export it again") from None

@@ -1,7 +1,7 @@
-"""The links of a head with their shapes, looks and masses, in metres.
+"""The links of a head with their collision shapes, visual shapes and masses, in metres.
 
-Everything scales with the distance between the eyes (robot/description/head_shape.py); a user's own
-mesh takes the place of a link's looks (robot/description/own_meshes.py).
+All dimensions scale with the distance between the eyes (robot/description/head_shape.py). A user's
+mesh replaces the visual shape of a link (robot/description/own_meshes.py).
 """
 
 from collections.abc import Sequence
@@ -25,21 +25,21 @@ from gazerig.robot.description.mesh import (
 )
 
 FLOOR_M = -0.09
-"""Height of the table the rig stands on, below the neck base."""
+"""Height of the table under the rig, relative to the neck base."""
 UPPER_LID, LOWER_LID = 1.085, 1.07
-"""Radii of the lids, in those of the eyeball."""
+"""Radii of the lids, in radii of the eyeball."""
 BUST, BELOW_CHIN, NECK_RADIUS = 1.45, 0.25, 0.42
 """Width of the shoulders, their distance from the chin, and the neck's radius, in distances
 between the eyes."""
 THROAT: Vec3 = (-0.72, 0.0, -0.90)
-"""Where a neck without joints ends, in distances between the eyes."""
+"""Upper end of a neck without joints, in distances between the eyes."""
 LEAST_M = 0.01
-"""No part is shorter."""
+"""Smallest length of a part."""
 _MIDDLE: Vec3 = (-0.85, 0.0, 0.10)
-"""Of the head's solid."""
+"""Centre of the head's solid."""
 
-# With these openings at rest (gaze/lids/lid_params.py) an eye looks awake with its lids' edges so
-# far above and below the middle of the pupil.
+# With these openings at rest (gaze/lids/lid_params.py) an eye looks awake if the edges of its lids
+# are this far above and below the centre of the pupil.
 _UPPER_REST, _LOWER_REST = 0.75, 0.8
 _UPPER_AWAKE_RAD, _LOWER_AWAKE_RAD = radians(24.0), radians(-26.0)
 _LOWEST_MEETING_RAD = radians(-26.0)
@@ -52,7 +52,7 @@ _JAW_BODIES: tuple[tuple[Vec3, Vec3], ...] = (
     ((-0.44, 0.0, -1.02), (0.60, 0.70, 0.50)),  # mouth and the cheeks next to it
     ((-0.06, 0.0, -1.42), (0.20, 0.30, 0.20)),  # chin
 )
-"""Ellipsoids (centre, half axes) that stand for the head in collisions."""
+"""Ellipsoids (centre, half axes) that represent the head in collisions."""
 _LID_EDGE = 0.022
 """Radius of the capsules along a lid's edge, in distances between the eyes."""
 _LID_PIECES = 5
@@ -67,8 +67,8 @@ _BROW_HINGE: Vec3 = (-0.22, 0.54, 0.62)
 def meeting_rad(upper_span_rad: float, lower_span_rad: float) -> float:
     """Return the elevation above an eye's equator at which its lids meet.
 
-    Its place lets both lids, as far open as they are at rest, leave the pupil free. A lower lid
-    that does not move is at the line where they meet.
+    It is chosen so that both lids leave the pupil free at their openings at rest. A lower lid that
+    does not move is at this elevation.
 
     Args:
         upper_span_rad: travel of the upper lid from shut to open.
@@ -80,12 +80,12 @@ def meeting_rad(upper_span_rad: float, lower_span_rad: float) -> float:
 
 
 def awake_opening_rad(upper: bool, meet_rad: float, span_rad: float) -> float:
-    """Return how far a lid is opened in an eye that looks awake, as far as it can be.
+    """Return the opening of a lid in an eye that looks awake, within the lid's travel.
 
     Args:
-        upper: the upper lid, else the lower one.
+        upper: whether it is the upper lid.
         meet_rad: elevation at which the lids meet.
-        span_rad: its travel.
+        span_rad: travel of the lid.
     """
     wanted = _UPPER_AWAKE_RAD - meet_rad if upper else meet_rad - _LOWER_AWAKE_RAD
     return min(span_rad, max(0.0, wanted))
@@ -95,11 +95,11 @@ def base(name: str, measures: HeadMeasures, head_m: Vec3, column_m: float, necke
     """Return the fixed parts: shoulders, and a neck that does not move.
 
     Args:
-        name: of the link.
-        measures: of the head.
+        name: name of the link.
+        measures: dimensions of the head.
         head_m: the point between the eyes with all joints at 0.
-        column_m: height at which a column on the shoulders ends that no joint turns; 0: none.
-        necked: the head is on a neck with joints.
+        column_m: height of the top of a fixed column on the shoulders; 0: no column.
+        necked: whether the head is on a neck with joints.
     """
     unit = measures.interocular_m
     throat = _sum(head_m, measures.scaled(THROAT))
@@ -123,12 +123,12 @@ def base(name: str, measures: HeadMeasures, head_m: Vec3, column_m: float, necke
     )
     inertia = Inertia(
         1.5, (x, y, top - 0.6 * tall), mass.diagonal(0.010, 0.006, 0.012)
-    )  # it stands still
+    )  # it does not move
     return Link(name, None, inertia=inertia, visuals=tuple(looks), collisions=shapes)
 
 
 def shoulders_m(measures: HeadMeasures, head_m: Vec3) -> float:
-    """Return the height of the shoulders' top: at the neck base, or a little below the chin."""
+    """Return the height of the shoulders' top: at the neck base or a little below the chin."""
     return min(0.0, head_m[2] + (CHIN - BELOW_CHIN) * measures.interocular_m)
 
 
@@ -144,13 +144,13 @@ def neck(
     """Return a link of the neck: a servo, and tubes down to the shoulders and up to the next axis.
 
     Args:
-        name: of the link.
-        parent: of the link.
-        p_m: in its parent.
-        joint: that turns it.
-        measures: of the head.
-        below_m: length of the tube below its origin.
-        above_m: length of the tube above it.
+        name: name of the link.
+        parent: parent of the link.
+        p_m: position in the parent.
+        joint: joint that turns it.
+        measures: dimensions of the head.
+        below_m: length of the tube below the origin.
+        above_m: length of the tube above the origin.
     """
     unit = measures.interocular_m
     looks, shapes = [], []
@@ -183,17 +183,17 @@ def head(
     still_lids: Sequence[tuple[str, float]],
     looks: bool,
 ) -> Link:
-    """Return the head without what its joints move.
+    """Return the head without the parts that its joints move.
 
     Args:
-        name: of the link.
-        parent: of the link.
-        p_m: in its parent.
-        measures: of the head.
-        inertia: of the head without its moved parts.
+        name: name of the link.
+        parent: parent of the link.
+        p_m: position in the parent.
+        measures: dimensions of the head.
+        inertia: inertia of the head without its moved parts.
         moved_parts: joints that move parts of it: jaw, brows, ears.
         still_lids: side and elevation of lower lids that no joint moves.
-        looks: with what can be seen of it, which takes a while to make.
+        looks: include visual shapes, whose creation is slow.
     """
     bodies = _BODIES + (() if "jaw" in moved_parts else _JAW_BODIES)
     shapes = tuple(_body(measures, *body) for body in bodies)
@@ -230,7 +230,7 @@ def eye_m(side: str, interocular_m: float) -> Vec3:
 
 
 def eye(name: str, parent: str, p_m: Vec3, measures: HeadMeasures) -> Link:
-    """Return an eyeball with iris and pupil that looks along its x axis."""
+    """Return an eyeball with iris and pupil, whose gaze is along its x axis."""
     ball = move_mesh(head_mesh.eye(), _ORIGIN, measures.eye_radius_m)
     look = Visual(name, ball, "eye")
     return Link(name, parent, p_m, inertia=mass.globe(measures.eye_radius_m), visuals=(look,))
@@ -266,10 +266,10 @@ def lid(
 
 
 def facial_joint_axis(name: str, measures: HeadMeasures) -> tuple[Vec3, Vec3]:
-    """Return where in the head a joint that gaze does not move turns, and its axis.
+    """Return position and axis of a joint in the head that gaze does not move.
 
     A jaw opens down about a hinge below the ears; brows turn up about an axis behind them; ears
-    turn forwards. Any other joint pitches up about the head's middle.
+    turn forwards. Any other joint pitches up about the centre of the head.
     """
     up, down = (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)
     side, _, part = name.rpartition("_")
@@ -354,7 +354,7 @@ def _ear(side: str, unit: float, by: Vec3) -> Visual:
     sign = 1.0 if side == "left" else -1.0
     x, y, z = _EAR
     place = _sum((x * unit, sign * y * unit, z * unit), by)
-    # About x: from facing up to facing aside.
+    # About x: from facing up to facing sideways.
     c, s = cos(-sign * _EAR_RAD), sin(-sign * _EAR_RAD)
     R: Mat3 = ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
     return Visual(
@@ -374,7 +374,7 @@ def _tube(unit: float, length_m: float) -> Painted:
 
 
 def _scale_axes(one: Painted, by: Vec3) -> Painted:
-    """Return the same, longer or shorter along each axis."""
+    """Scale a mesh along each axis."""
     mesh = Mesh(one.mesh.vertices * by, one.mesh.faces)
     if one.normals is None:
         return one._replace(mesh=mesh)

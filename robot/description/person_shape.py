@@ -1,8 +1,8 @@
-"""The one shape of a visitor: a head with hair and a face, shoulders, a hand; sculpted, no photo.
+"""Shape of a visitor: a head with hair and a face, shoulders, a hand; without photographs.
 
-Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up. In here
-the unit of length is the distance between the pupils; what leaves is in metres. Eyes, nose and
-mouth are at the places of the canonical face (robot/model/face_geometry.py).
+Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up. In this
+module the unit of length is the distance between the pupils; public results are in metres. Eyes,
+nose and mouth are at the positions of the canonical face (robot/model/face_geometry.py).
 """
 
 from functools import lru_cache
@@ -70,7 +70,7 @@ WORLD_LOOKS = (
         (210, 206, 198),
     ),
 )
-"""Looks of the people of a world: the same four, and more."""
+"""Looks of the people of a world: the same four, and further ones."""
 
 
 _EYE_RADIUS = 0.21
@@ -123,7 +123,7 @@ class HeadParts(NamedTuple):
 def head_parts(number: int, fineness: float = 1.0) -> HeadParts:
     """Return the head of a person; the same number looks the same.
 
-    fineness: 1 for a close look, less for fewer triangles
+    fineness: 1 for close views, less for fewer triangles
     """
     look = LOOKS[number % len(LOOKS)]
     solid = _head_solid(look, fineness)
@@ -151,11 +151,11 @@ def _head_solid(look: PersonLook, fineness: float) -> Painted:
 
 
 class HeadSegments(NamedTuple):
-    """A head in parts that move against each other, each in a frame of its own.
+    """Head in parts that move relative to each other, each in its own frame.
 
     head: skin, hair, brows, lower lids and upper lip, in the face frame
-    lips: the lower lip, about the middle of the mouth
-    eye, lid: an eyeball and an upper lid, about the eyeball's centre; both eyes are alike
+    lips: the lower lip, relative to the centre of the mouth
+    eye, lid: an eyeball and an upper lid, relative to the eyeball's centre; both eyes are equal
     """
 
     head: Painted
@@ -167,7 +167,7 @@ class HeadSegments(NamedTuple):
 EYE_FACE_M: Vec3 = tuple(PUPIL_DISTANCE_M * one for one in _EYE)  # type: ignore[assignment]
 """Centre of the left eyeball in the face frame."""
 MOUTH_FACE_M: Vec3 = (-0.34 * PUPIL_DISTANCE_M, 0.0, _MOUTH.z * PUPIL_DISTANCE_M)
-"""Middle of the mouth in the face frame."""
+"""Centre of the mouth in the face frame."""
 
 
 @lru_cache(maxsize=8)
@@ -181,13 +181,13 @@ def head_segments(look: PersonLook, fineness: float = 1.0) -> HeadSegments:
     inside = _MOUTH._replace(upper=0.03, lower=_MOUTH.lower + 0.045, half_width=0.30)
     open_mouth = move_mesh(lips(_HEAD, inside, dark, dark).lower, (-0.004, 0.0, 0.0))
     eye, glint, lid, still = _eye_parts(look, fineness, 20)
-    # The glint is flat on the eyeball, so that the lid goes over it.
+    # The glint is flat on the eyeball, so that the lid covers it.
     flat = move_mesh(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
     solid = _head_solid(look, fineness)
     features = [*still, *(mirror_mesh(part) for part in still), mouth.upper, mouth.line, open_mouth]
     back = tuple(-one / PUPIL_DISTANCE_M for one in MOUTH_FACE_M)
     size, here = PUPIL_DISTANCE_M, (0.0, 0.0, 0.0)
-    # The lower lip is in front of the open mouth, which it covers while it is up.
+    # The lower lip is in front of the open mouth and covers it while raised.
     lower = move_mesh(mouth.lower, (back[0] + 0.035, back[1], back[2]))
     return HeadSegments(
         merge_meshes([solid, move_mesh(merge_meshes(features), here, size)]),
@@ -216,7 +216,7 @@ def _complexion(points: Floats, look: PersonLook) -> Floats:
 
 
 class _EyeParts(NamedTuple):
-    """An eyeball's layers, its glint and its upper lid about its centre; lower lid and brow."""
+    """Layers of an eyeball, its glint and upper lid, about its centre; lower lid and brow."""
 
     eye: list[Painted]
     glint: Painted
@@ -271,7 +271,7 @@ def _shell(radius: float, edge_deg: float, end_deg: float) -> Mesh:
 
 @lru_cache(maxsize=4)
 def _skin(fineness: float) -> Surface:
-    """Return the surface of a head, alike for all people."""
+    """Return the surface of a head, the same for all people."""
     rows = round(84 * fineness)
     return _HEAD.all_round(rows, rows, radians(-4.0), radians(34.0))
 
@@ -283,7 +283,7 @@ def _crown(fineness: float, around: int) -> Surface:
 
 
 def _hair(look: PersonLook, fineness: float) -> list[Painted]:
-    """Return a cap of hair, and if it is long two strands next to the neck."""
+    """Return a cap of hair and, if the hair is long, two strands next to the neck."""
     around = round(56 * fineness)
     found = _crown(fineness, around)
     points = found.points.copy()
@@ -342,7 +342,7 @@ def hand(number: int) -> Painted:
 
 @lru_cache(maxsize=8)
 def open_right_hand(look: PersonLook, rows: int = 34) -> Painted:
-    """Return the open right hand of a look; fewer rows are fewer triangles."""
+    """Return the open right hand of a look; fewer rows give fewer triangles."""
     mitten = Solid(_mitten_field, (0.0, 0.0, -0.1), 2.2)
     found = mitten.all_round(rows, rows)
     points, normals = found.points.reshape(-1, 3), found.normals.reshape(-1, 3)

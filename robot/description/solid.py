@@ -1,7 +1,7 @@
-"""Smooth solids as signed distances, and the surface of one as a grid of points.
+"""Smooth solids as signed distance fields, and their surfaces as grids of points.
 
 A distance field is a function from points (n, 3) to distances (n,), negative inside. Lengths in any
-unit. A surface is found along rays from a centre: its outermost crossing in each direction.
+unit. A surface is found along rays from a centre, as the outermost crossing in each direction.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ Field = Callable[[Floats], Floats]
 _STEPS, _HALVINGS = 26, 9
 _GRADIENT_STEP = 0.012
 _AT_ONCE = 800
-"""So many points are asked of a field at once, where there are that many."""
+"""Largest number of points in one evaluation of a field."""
 
 
 def ellipsoid(middle: Vec3, half_axes: Vec3) -> Field:
-    """Return the field of an ellipsoid; away from its surface the distance is approximate."""
+    """Return the field of an ellipsoid; the distance is approximate away from its surface."""
     half = np.array(half_axes)
 
     def field(points: Floats) -> Floats:
@@ -54,13 +54,13 @@ def _lengths(vectors: Floats) -> Floats:
 
 
 def union(one: Floats, other: Floats, round_by: float) -> Floats:
-    """Return the distance to either, the seam rounded."""
+    """Return the union of two fields, with a rounded seam."""
     blend = np.maximum(round_by - np.abs(one - other), 0.0) / round_by
     return np.asarray(np.minimum(one, other) - 0.25 * round_by * blend * blend)
 
 
 def carve(solid: Floats, tool: Floats, round_by: float) -> Floats:
-    """Return the distance to a solid from which a tool was taken away, the edge rounded."""
+    """Return the field of a solid minus a tool, with a rounded edge."""
     return np.asarray(-union(-solid, tool, round_by))
 
 
@@ -77,12 +77,12 @@ def crossings(field: Field, centre: Vec3, directions: Floats, farthest: float) -
 def _bracket_crossings(
     field: Field, centre: Vec3, directions: Floats, farthest: float
 ) -> tuple[Floats, Floats]:
-    """Return distances from the centre (n,) between which each ray enters a solid from outside."""
+    """Return distances from the centre (n,) between which each ray crosses the surface."""
     at = np.linspace(farthest, 0.0, _STEPS)
     outside, inside = np.full(len(directions), farthest), np.zeros(len(directions))
     rays, step = np.arange(len(directions)), 1
     while len(rays) and step < _STEPS:
-        # Few rays go many steps at once: a field takes as long for one point as for hundreds.
+        # Few rays take many steps together: one point of a field takes as long as hundreds.
         steps = slice(step, step + max(1, _AT_ONCE // len(rays)))
         points = directions[rays, None] * at[steps, None] + centre
         within = field(points.reshape(-1, 3)).reshape(points.shape[:2]) < 0.0
@@ -94,21 +94,21 @@ def _bracket_crossings(
 
 
 def normals(field: Field, points: Floats) -> Floats:
-    """Return unit vectors (n, 3) out of a solid at points on its surface."""
+    """Return the outward unit normals (n, 3) of a solid at points on its surface."""
     steps = _GRADIENT_STEP * np.eye(3)
     slope = np.stack([field(points + step) - field(points - step) for step in steps], axis=1)
     return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9))
 
 
 class Surface(NamedTuple):
-    """A part of a solid's outside: points and unit normals, both (rows, columns, 3)."""
+    """Part of a solid's surface: points and unit normals, both (rows, columns, 3)."""
 
     points: Floats
     normals: Floats
 
 
 class Solid(NamedTuple):
-    """A body every ray from whose centre leaves once; what hides behind an edge is left out."""
+    """Solid with one surface point on each ray from its centre; parts behind edges are omitted."""
 
     field: Field
     centre: Vec3
@@ -117,7 +117,7 @@ class Solid(NamedTuple):
     def all_round(
         self, rows: int, columns: int, focus_rad: float = 0.0, spread_rad: float = 0.6
     ) -> Surface:
-        """Return the whole surface; rows from below to above, columns closed behind.
+        """Return the whole surface; rows from bottom to top, columns closed behind.
 
         See ``ray_grid`` for the arguments.
         """
@@ -126,13 +126,13 @@ class Solid(NamedTuple):
         return self._surface(points.reshape(rays.shape))
 
     def beyond(self, normal: Vec3, offset: float, rows: int, columns: int, out: float) -> Surface:
-        """Return the part of the surface with normal . point > offset; its edge is a clean line.
+        """Return the part of the surface with normal . point > offset; its edge is a smooth line.
 
         Args:
-            normal: of the plane that cuts the solid, any length.
-            offset: of the plane.
-            rows: from the edge to the middle.
-            columns: around.
+            normal: normal of the cutting plane, of any length.
+            offset: offset of the plane.
+            rows: number of rows from the edge to the centre.
+            columns: number of columns around.
             out: distance of the part from the surface.
         """
         ahead = np.array(normal) / np.linalg.norm(normal)
@@ -150,7 +150,7 @@ class Solid(NamedTuple):
         return Surface(found.points + out * found.normals, found.normals)
 
     def front(self, y: Floats, z: Floats) -> Floats:
-        """Return points (n, 3) on its front at given distances aside and heights."""
+        """Return points (n, 3) on its front at sideways positions and heights."""
         beside = np.stack((np.zeros(len(y)), y, z), axis=1)
         ahead = np.full(len(y), self.centre[0] + self.farthest)
         behind = np.full(len(y), self.centre[0])
@@ -173,14 +173,14 @@ class Solid(NamedTuple):
 
 
 def ray_grid(rows: int, columns: int, focus_rad: float, spread_rad: float) -> Floats:
-    """Return unit vectors (rows, columns, 3) in all directions, the densest ahead (+x).
+    """Return unit vectors (rows, columns, 3) in all directions, densest ahead (+x).
 
     Args:
-        rows: from below to above.
-        columns: around, from behind over the right (-y), ahead and the left; the last is not the
-            first again.
-        focus_rad: elevation around which the rows are twice as dense and more.
-        spread_rad: how far from it they are so.
+        rows: number of rows from bottom to top.
+        columns: number of columns around, from behind through the right (-y), ahead and the left;
+            the last one does not repeat the first.
+        focus_rad: elevation around which the rows are at least twice as dense.
+        spread_rad: half width of that range of elevations.
     """
     fine = np.linspace(-pi / 2, pi / 2, 2001)
     weight = 0.32 + np.exp(-(((fine - focus_rad) / spread_rad) ** 2))
@@ -202,18 +202,18 @@ def ray_grid(rows: int, columns: int, focus_rad: float, spread_rad: float) -> Fl
 def cut_mesh(one: Painted, outside: Floats) -> tuple[Painted, Painted]:
     """Return the part of a mesh where values at its vertices are below 0, and the rest.
 
-    Triangles that have both are divided at the line on which the value, linear between their
-    corners, is 0; both parts have the new points, with colour and normal in between.
+    Triangles with both signs are divided at the line on which the linearly interpolated value is 0;
+    both parts contain the new points, with interpolated colours and normals.
 
     Args:
-        one: with normals.
-        outside: (n,) a value a vertex.
+        one: mesh with normals.
+        outside: (n,) value at each vertex.
     """
     within = outside < 0.0
     faces = one.mesh.faces.astype(np.int64)
     count = within[faces].sum(axis=1)
     whole_in, whole_out = faces[count == 3], faces[count == 0]
-    # The corner that is alone on its side comes first; the order of the corners stays.
+    # The corner that is alone on its side comes first; the cyclic order of the corners is kept.
     mixed = faces[(count == 1) | (count == 2)]
     alone = np.where(within[mixed].sum(axis=1) == 1, True, False)
     first = np.argmax(within[mixed] == alone[:, None], axis=1)

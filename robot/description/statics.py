@@ -1,8 +1,8 @@
-"""Weight and springs at the joints of a rig: torques, shares of stall, the pose of rest. Pure.
+"""Weight and springs at the joints of a rig: torques, fractions of stall torque, rest pose. Pure.
 
-One model for emulated servos, examinations, parking and calibration; a world computes the same
-from the same masses. Torques are in Nm and act on a joint in the direction of its angle. Torques of
-joints that move together are shared by their two servos.
+Emulated servos, examinations, parking and calibration use this model; a world computes the same
+from the same masses. Torques are in Nm and act on a joint in the direction of its angle. The two
+servos of joints that move together share the torques.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -30,18 +30,18 @@ GRAVITY_M_S2 = 9.81
 NECK_JOINTS = (*LOWER_NECK, *NECK)
 """Joints that carry the head."""
 GEAR_FRICTION = 0.03
-"""Dry friction of a servo as a share of its stall torque, as in the emulated servos [A]."""
+"""Dry friction of a servo as a fraction of its stall torque, as in the emulated servos [A]."""
 STRONG_SHARE = 1.0 / 3.0
-"""Share of the stall torque above which a servo becomes hot while it holds."""
+"""Fraction of the stall torque above which a servo becomes hot while it holds."""
 STALL_RISE_C, AMBIENT_C = 150.0, 30.0
-"""Final warming of a stalled servo, and the air in a head, as in the emulated servos [A]."""
+"""Final warming of a stalled servo, and air temperature in a head, as in emulated servos [A]."""
 _CELLS = 64
 
 
 class Weight(NamedTuple):
-    """What a joint carries with all others at 0: its torque is nm * sin(angle - upright_rad).
+    """Weight on a joint with all others at 0: its torque is nm * sin(angle - upright_rad).
 
-    inertia_kg_m2: about the joint's axis
+    inertia_kg_m2: inertia about the joint's axis
     """
 
     nm: float
@@ -63,10 +63,10 @@ def rig_statics(
     """Return the torques that the servos of a rig hold at rest.
 
     Args:
-        description: of the rig, with its masses.
-        joints: of the rig.
-        couplings: of the rig.
-        of_neck: of the joints of the neck only, with all others at 0; this is computed quickly.
+        description: description of the rig, with its masses.
+        joints: joints of the rig.
+        couplings: couplings of the rig.
+        of_neck: only for the joints of the neck, with all others at 0, which is faster.
     """
     chosen = {name: one for name, one in joints.items() if not of_neck or name in NECK_JOINTS}
     pairs = tuple(one for one in coupled_pairs(couplings) if {one.first, one.second} <= {*chosen})
@@ -74,10 +74,10 @@ def rig_statics(
 
 
 class Statics:
-    """Torques that servos hold at rest; ``rig_statics`` makes it.
+    """Torques that servos hold at rest; created by ``rig_statics``.
 
     Attributes:
-        joints: that are looked at.
+        joints: the joints considered.
     """
 
     def __init__(
@@ -94,11 +94,11 @@ class Statics:
         }
 
     def retuned(self, joints: Mapping[str, JointParams]) -> "Statics":
-        """Return the same with other parameters of its joints."""
+        """Return the same statics with other joint parameters."""
         return Statics(self._nodes, {name: joints[name] for name in self.joints}, self._pairs)
 
     def load_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
-        """Return the torque of weight and spring at each joint; joints left out are at 0."""
+        """Return the torque of weight and spring at each joint; omitted joints are at 0."""
         weight = _weight_nm(self._nodes, angles_rad)
         return {
             name: weight.get(name, 0.0) + spring_nm(joint, angles_rad.get(name, 0.0))
@@ -106,16 +106,16 @@ class Statics:
         }
 
     def stall_shares(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
-        """Return the torque that each servo holds in a pose as a share of its stall torque.
+        """Return the torque that each servo holds in a pose as a fraction of its stall torque.
 
-        It is signed as the joint's angle; a limit of its drive (torque_limit) reduces the stall
+        Its sign follows the joint's angle; a limit of the drive (torque_limit) reduces the stall
         torque.
         """
         limits = {name: joint.torque_limit or 1.0 for name, joint in self.joints.items()}
         return {name: one / limits[name] for name, one in self.drive_shares(angles_rad).items()}
 
     def drive_shares(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
-        """Return the same as shares of the whole drive, at the rated voltage."""
+        """Return the torques as fractions of the full drive, at the rated voltage."""
         loads = self.load_nm(angles_rad)
         shafts = dict(loads)
         for first, second, coupling in self._pairs:
@@ -126,7 +126,7 @@ class Statics:
         return {name: torque / self._stall_nm[name] for name, torque in shafts.items()}
 
     def torque_nm(self, name: str, load: float) -> float:
-        """Return the torque at a joint of a servo's load, a share of its stall torque."""
+        """Return the joint torque for a servo's load, which is a fraction of its stall torque."""
         torque = load * self._stall_nm[name]
         return torque if self.joints[name].make_linkage().rising else -torque
 
@@ -135,10 +135,10 @@ class Statics:
         return GEAR_FRICTION * self._stall_nm[name] + self.joints[name].friction_nm
 
     def rest_pose(self, near_rad: Mapping[str, float]) -> dict[str, float]:
-        """Return the pose of the neck that needs no torque, as near as possible to a pose.
+        """Return the pose of the neck that needs no torque, as near as possible to a given pose.
 
-        A joint without such an angle within its range rests on its mechanical stop: its angle is
-        then that end of its range.
+        A joint without such an angle within its range rests on its mechanical stop, and its angle
+        is that end of its range.
         """
         pose = dict(near_rad)
         necks = [name for name in NECK_JOINTS if name in self.joints]
@@ -220,15 +220,15 @@ def _inertias(description: Description, joints: Collection[str]) -> dict[str, fl
 
 
 def _shaft_turns(joint: JointParams) -> float:
-    """Return the turns of a servo's shaft for one turn of its joint, where they are the most."""
+    """Return the highest number of shaft turns per turn of the joint."""
     return joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
 
 
 class _MovingBody(NamedTuple):
-    """Links that move as one, in the frame of the joint that turns them.
+    """Links that move together, in the frame of the joint that turns them.
 
-    joint, ratio, axis: the rig's joint, its turn for one of that joint, and its axis
-    parent: number of the node that carries it; the first has none
+    joint, ratio, axis: the rig's joint, rotation per rotation of that joint, and axis
+    parent: number of the node that carries it; the first one has no parent
     R_parent, p_parent_m: pose in the parent with the joint at 0
     mass_kg, moment_kg_m: mass, and mass times its centre
     """
@@ -244,7 +244,7 @@ class _MovingBody(NamedTuple):
 
 
 def _nodes(description: Description, moving: Collection[str]) -> tuple[_MovingBody, ...]:
-    """Return the links of a description as few bodies; joints that do not move are at 0."""
+    """Merge the links of a description into few bodies; joints that do not move are at 0."""
     nodes = [_MovingBody("", 0.0, ORIGIN, -1, IDENTITY, ORIGIN)]
     at: dict[str, tuple[int, Mat3, Vec3]] = {}
     for link in description.links:
@@ -294,5 +294,5 @@ def spring_nm(joint: JointParams, angle_rad: float) -> float:
 
 
 def holding_c(share: float) -> float:
-    """Return the final temperature of a servo that holds a share of its stall torque."""
+    """Return the final temperature of a servo that holds a fraction of its stall torque."""
     return AMBIENT_C + STALL_RISE_C * share * share

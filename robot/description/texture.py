@@ -1,9 +1,8 @@
-"""Colours of vertices as a texture, for viewers and engines that know no colours of vertices.
+"""Vertex colours as a texture, for viewers and engines that do not support vertex colours.
 
-A part that is a grid of points becomes a rectangle of the image with one texel a vertex, which is
-interpolated exactly as colours of vertices are; any other becomes a small square for every two
-triangles. Neighbours on a grid stay neighbours in the image, so smaller pictures of it (mipmaps)
-keep their colours.
+A part that is a grid of points becomes a rectangle of the image with one texel per vertex, which is
+interpolated exactly like vertex colours. Any other part becomes a small square for every two
+triangles. Neighbours on a grid remain neighbours in the image, so mipmaps keep their colours.
 """
 
 from collections.abc import Iterator
@@ -17,19 +16,19 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.description.mesh import Painted, quads, smooth_normals
 
 _PATCH = 4
-"""Texels along the side of the square that two triangles share."""
+"""Side of the square of two triangles, in texels."""
 _MARGIN = 2
-"""Texels around a part that repeat its edge, so that parts do not bleed into each other."""
+"""Width of the repeated edge around a part, in texels; it keeps parts from bleeding together."""
 
 
 class TexturedMesh(NamedTuple):
-    """Triangles with a texture.
+    """Triangle mesh with a texture.
 
     vertices: (n, 3)
-    normals: (n, 3) unit vectors out of the surface
-    uv: (n, 2) in 0..1 from the image's left upper corner, to the right and down
+    normals: (n, 3) outward unit normals
+    uv: (n, 2) in 0..1 from the image's upper left corner, to the right and down
     faces: (m, 3), counter-clockwise seen from outside
-    image: (rows, columns, 3 or 4) red, green, blue and where given how opaque
+    image: (rows, columns, 3 or 4) red, green, blue and optionally opacity
     """
 
     vertices: Floats
@@ -40,7 +39,7 @@ class TexturedMesh(NamedTuple):
 
 
 class _TexturePart(NamedTuple):
-    """A rectangle of texels, and the vertices in it; ``uv`` in texels."""
+    """Rectangle of texels, and the vertices in it; ``uv`` in texels."""
 
     vertices: Floats
     normals: Floats
@@ -50,7 +49,7 @@ class _TexturePart(NamedTuple):
 
 
 def add_texture(painted: Painted) -> TexturedMesh:
-    """Return a painted mesh with its colours as a texture; the triangles stay the same."""
+    """Return a painted mesh with its colours as a texture; the triangles do not change."""
     parts = [_texture_part(piece) for piece in _pieces(painted)]
     corners, size = _pack_rectangles([part.texels.shape[:2] for part in parts])
     image = np.zeros((*size, painted.colours.shape[1]))
@@ -63,7 +62,7 @@ def add_texture(painted: Painted) -> TexturedMesh:
         faces.append(part.faces + first)
         first += len(part.vertices)
     normals = np.concatenate([part.normals for part in parts])
-    # Of length one; up for those of points without a face of any size.
+    # Of length one; upwards for points without a face of non-zero size.
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return TexturedMesh(
         np.concatenate([part.vertices for part in parts]),
@@ -88,7 +87,7 @@ def _pieces(painted: Painted) -> Iterator[Painted]:
 
 
 def _texture_part(piece: Painted) -> _TexturePart:
-    """Return the texels of one part, in the simplest form that holds its colours."""
+    """Return the texels of one part, in the simplest form that contains its colours."""
     (vertices, faces), colours, normals = piece
     assert normals is not None
     if np.ptp(colours, axis=0).max() == 0.0:
@@ -115,7 +114,7 @@ def _grid_shape(faces: NDArray[np.uint32], vertices: int) -> tuple[int, int, boo
 def _grid_part(
     piece: Painted, rows: int, columns: int, closed: bool, *, backwards: bool
 ) -> _TexturePart:
-    """Return a part with a texel a vertex; a closed row ends with its first vertex again."""
+    """Return a part with one texel per vertex; a closed row repeats its first vertex at the end."""
 
     def laid_out(values: Floats) -> Floats:
         table = values.reshape(rows, columns, -1)
@@ -138,8 +137,8 @@ def _grid_part(
 def _part_in_patches(piece: Painted) -> _TexturePart:
     """Return a part with a square of texels for every two triangles, in the order of the faces.
 
-    A square holds one triangle above and one below the diagonal. Two triangles (a, b, c) and
-    (a, c, d) share it without a seam; any others, or a last one alone, each have one for itself.
+    A square contains one triangle above and one below the diagonal. Two triangles (a, b, c) and
+    (a, c, d) share a square without a seam; any other triangle has its own square.
     """
     (vertices, faces), colours, normals = piece
     assert normals is not None
@@ -150,7 +149,7 @@ def _part_in_patches(piece: Painted) -> _TexturePart:
     share = np.linspace(0.0, 1.0, _PATCH)
     right, below = share[None, :, None], share[:, None, None]
     a, b, c, d = (colours[corners[:, i]][:, None, None] for i in range(4))
-    # On either side of the diagonal from a to c the colours of that triangle.
+    # The colours on each side of the diagonal from a to c are those of its triangle.
     lower = a + right * (b - a) + below * (c - b)
     upper = a + below * (d - a) + right * (c - d)
     patches = np.where(right >= below, lower, upper)
@@ -174,7 +173,7 @@ def _part_in_patches(piece: Painted) -> _TexturePart:
 
 
 def _quadrangles(faces: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """Return corners (n, 4); if the last two are equal it is a triangle."""
+    """Return corners (n, 4); if the last two are equal, it is a triangle."""
     table, at = [], 0
     rows = faces.astype(int).tolist()
     while at < len(rows):
@@ -189,7 +188,7 @@ def _quadrangles(faces: NDArray[np.uint32]) -> NDArray[np.int64]:
 
 
 def _pack_rectangles(sizes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:
-    """Lay rectangles in rows, the tallest first; return their corners and the whole's size."""
+    """Arrange rectangles in rows, the tallest first; return their corners and the total size."""
     widest = max(columns for _, columns in sizes) + 2 * _MARGIN
     area = sum((rows + 2 * _MARGIN) * (columns + 2 * _MARGIN) for rows, columns in sizes)
     width = max(widest, ceil(sqrt(area)))

@@ -1,7 +1,8 @@
 """A description as URDF, which ROS, Foxglove and most simulators read: text and its meshes. Pure.
 
-Ellipsoids are a ball of radius 1 with a scale, capsules a cylinder with a ball at either end: URDF
-knows neither. Meshes are in the same folder, their paths are relative, no package is needed.
+URDF has no ellipsoids and capsules. An ellipsoid is a scaled sphere of radius 1, a capsule a
+cylinder with a sphere at each end. Meshes are in the same folder with relative paths, so no package
+is needed.
 """
 
 import xml.etree.ElementTree as ET
@@ -18,7 +19,7 @@ _BALL = "ball_of_radius_1.obj"
 
 
 class Urdf(NamedTuple):
-    """The text of a description, and the content of its files by name."""
+    """Text of a description, and the content of its files by name."""
 
     xml: str
     assets: dict[str, bytes]
@@ -28,9 +29,9 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
     """Return a description as URDF.
 
     Args:
-        description: of the rig.
-        folder: of the meshes, relative to the text.
-        looks: with what can be seen.
+        description: description of the rig.
+        folder: folder of the meshes, relative to the text.
+        looks: include visual shapes.
     """
     root = ET.Element("robot", name=description.name)
     # For MuJoCo, which otherwise drops visual shapes and looks for meshes in the text's folder.
@@ -77,7 +78,7 @@ def _place(element: ET.Element, p_m: Vec3, R: Mat3) -> None:
 
 
 def _pieces(shape: CollisionShape) -> Iterator[tuple[str, dict[str, str], Vec3]]:
-    """Yield elements of URDF that make up a shape: name, sizes and place."""
+    """Yield the elements of URDF that form a shape: name, sizes and position."""
     a, b, _ = shape.half_m
     if shape.kind == "box":
         yield "box", {"size": numbers(2.0 * half for half in shape.half_m)}, shape.p_m

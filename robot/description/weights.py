@@ -1,6 +1,6 @@
-"""Masses of a rig's links: those of its file, else from the shapes of the parts.
+"""Masses of a rig's links: from its file, else from the shapes of the parts.
 
-The one place that combines them. Lengths in metres, tensors about the centre of mass. A centre of
+Only this module combines them. Lengths in metres, tensors about the centre of mass. A centre of
 mass in the file is relative to the link's axis, that of the head to the pitch axis of the neck.
 """
 
@@ -17,20 +17,20 @@ from gazerig.robot.model.mass_params import MassParams, Moments
 
 HEAD = "head"
 _MIDDLE: Vec3 = (-0.85, 0.0, 0.10)
-"""Of the head's solid, in distances between the eyes: servos and frame are about it."""
+"""Centre of the head's solid, in distances between the eyes; servos and frame are around it."""
 _OUTSIDE = 0.05
-"""A centre of mass may be so far outside the head's surface, in distances between the eyes."""
+"""Largest distance of a centre of mass from the head's surface, in distances between the eyes."""
 _SIZE = 3.6
-"""No two points of a head are farther apart, in distances between the eyes."""
+"""Largest distance between two points of a head, in distances between the eyes."""
 
 
 def weighed(link: Link, params: MassParams, printed: bool) -> Link:
-    """Return a link other than the head with the mass of the rig's file.
+    """Return a link other than the head with the mass from the rig's file.
 
     Args:
-        link: with the mass of its shape.
-        params: of the rig.
-        printed: its shape is that of a printed part, whose density the file gives.
+        link: link with the mass of its shape.
+        params: mass parameters of the rig.
+        printed: whether it is a printed part, with the density in the file.
     """
     inertia, wanted = link.inertia, params.links.get(link.name)
     if inertia is not None and printed:
@@ -45,12 +45,13 @@ def weighed(link: Link, params: MassParams, printed: bool) -> Link:
 
 
 def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[Inertia]) -> Inertia:
-    """Return the inertia of the head without what it carries, in the head's frame.
+    """Return the inertia of the head without the links that it carries, in the head's frame.
 
     Args:
-        params: of the rig; its head is weighed with all that it carries.
-        measures: of the head.
-        carried: eyes, lids and all else, in the head's frame, without counterweights.
+        params: mass parameters of the rig; the mass of its head includes all carried links.
+        measures: dimensions of the head.
+        carried: eyes, lids and all other carried links, in the head's frame, without
+            counterweights.
     """
     rest = mass.join_inertias(carried)
     kg = _whole_kg(params, measures, rest.mass_kg) - rest.mass_kg
@@ -76,11 +77,11 @@ def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[I
 def mass_faults(
     params: MassParams, measures: HeadMeasures, built: Description
 ) -> Iterator[tuple[str, str]]:
-    """Find masses that no such head can have: key in its file, and the fault.
+    """Find masses that are impossible for such a head: key in its file, and the fault.
 
     Args:
-        params: of the rig.
-        measures: of the head.
+        params: mass parameters of the rig.
+        measures: dimensions of the head.
         built: description of the same rig with the masses of its shapes.
     """
     yield from _unknown(params, built)
@@ -146,7 +147,7 @@ def _whole_kg(params: MassParams, measures: HeadMeasures, rest_kg: float) -> flo
 
 
 def head_mass_kg(params: MassParams, interocular_m: float) -> float:
-    """Return the mass of the whole head: that of the rig's file, or of its shapes."""
+    """Return the mass of the whole head: from the rig's file, or from its shapes."""
     if params.head.mass_kg is not None:
         return params.head.mass_kg
     return mass.head_mass_kg(interocular_m, mass.density_share(params))
