@@ -27,7 +27,7 @@ from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
 composed = session.compose(RunOptions(mock=True, **{options!r}).check_and_complete())
 run = session.Session(composed, lambda: None, lambda line: None)
-with run.powered() as loop:
+with run.power_on() as loop:
     for _ in range(20):
         assert loop.step() is None
     names = set(sys.modules)

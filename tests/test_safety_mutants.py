@@ -165,7 +165,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (HEALTH, "hot - _COOLER_C if", "hot if", hot),
     (HEALTH, "(hot - celsius) / (hot - warm)", "1.0", hot),
     (HEALTH, '"hot" if self._hot[i] else', "", hot),
-    (GUARD, '_Hold(strain, again="slowly") if strain else None', "None", hot),
+    (GUARD, '_Hold(strain, restart="slowly") if strain else None', "None", hot),
     (GUARD, "top, soft = share * limit.speed_rad_s,", "top, soft = limit.speed_rad_s,", hot),
     (GUARD, "or self._health.share[i] < 1.0", "", hot),
     (GUARD, "not self._health.fine", "False", hot),
@@ -200,7 +200,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     # torque and faults
     (GUARD, "        if not powered:", "        if False:", torque_off),
     (GUARD, "or not all(joints.torque)", "", torque_off),
-    (GUARD, "position if isfinite(position) else None, again", "None, again", torque_off),
+    (GUARD, "position if isfinite(position) else None, restart", "None, restart", torque_off),
     (GUARD, "return (3, fault) if fault else (rank, reason)", "return (rank, reason)", limp),
     (GUARD, "or any(joints.fault)", "", limp),
     (GUARD, 'if "encoder" in fault:', "if False:", limp),
@@ -233,7 +233,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     ),
     (
         COLLISIONS,
-        "if not _side(pair[keeper], motion):\n            keeper",
+        "if not _present_side(pair[keeper], motion):\n            keeper",
         "if False:\n            keeper",
         collision_start,
     ),
@@ -253,7 +253,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (COLLISIONS, "                _put_wall(other, motion)", "                pass", collision_lag),
     (GUARD, "if i in self._collisions.exits:", "if False:", collision_start),
     (GUARD, "if i in self._collisions.still:", "if False:", collision_start),
-    (GUARD, "slowly=True,", "", collision_start),
+    (GUARD, "is_slow=True, ", "", collision_start),
     (
         COLLISIONS,
         "_, joint, exit_rad = min(paths)",

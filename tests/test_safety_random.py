@@ -307,7 +307,7 @@ def test_a_collision_that_leaves_no_pose_changes_nothing() -> None:
     watched = Watched(np.random.default_rng(0))
     before = watched.guard.limits
     all_of_it = CollisionParams("neck_pitch", -179.0, 179.0, "left_upper_lid", -179.0, 179.0)
-    with pytest.raises(ValueError, match="leaves no pose"):
+    with pytest.raises(ValueError, match="allows no pose"):
         watched.guard.retune(GuardParams(collisions=(all_of_it,)), limits(watched.dice))
     watched.wander(20)
     assert watched.guard.limits == before

@@ -17,7 +17,8 @@ from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.app.rig_limits import limits
 
 NAMES = ("desk", "feetech", "maker", "pca9685", "mixed")
-BEYOND_DEG = 0.5
+BEYOND_DEG = 0.8
+"""A balanced neck needs .5; a heavy one sags further until its compensation follows (3 deg/s)."""
 SPEED = 1.03
 """Of the limit: 2 % of the joint's own, 1 % of rounding to servo steps in 5 ms."""
 ACCEL = 1.1

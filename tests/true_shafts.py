@@ -20,6 +20,7 @@ from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.rig_description import sag_compensation
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.body import Body
@@ -238,8 +239,9 @@ class Bench:
         for name, angle in (where_rad or {}).items():
             self.turn(name, angle)
         self.body = Body(
-            rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s
-        )
+            rig_bus(rig, ports), rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s,
+            sag=sag_compensation(rig),
+        )  # fmt: skip
         self.guard = Guard(
             rig.guard,
             limits(rig.joints),

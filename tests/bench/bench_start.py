@@ -28,7 +28,7 @@ imported = time.process_time()
 composed = session.compose(RunOptions(mock=True, {options}).check_and_complete())
 made = time.process_time()
 run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
-with run.powered() as loop:
+with run.power_on() as loop:
     loop.step()
     ticked = time.process_time()
     for _ in range({ticks}):

@@ -34,7 +34,7 @@ PERIOD_S = 0.02
 
 
 class CalibrationStopped(DriverError):
-    """The user or the system requested the end: torque off. The message names which."""
+    """The user or the system requested the end: torque off. The message names the source."""
 
 
 class SmartServoAccess:
@@ -44,16 +44,16 @@ class SmartServoAccess:
     any more.
 
     Args:
-        name: the joint's.
-        joint: as configured.
-        port: opened.
-        clock: the host's.
-        stopped: called all the time; returns why to stop, None without a reason.
-        guardian: switches the torque off should this program die; it has one plan, that of this
-            servo, and the port calls its ``beat``. None: nothing does but the servo's watchdog.
+        name: name of the joint.
+        joint: configuration of the joint.
+        port: open port.
+        clock: clock of the host.
+        stopped: called regularly; returns why to stop, None without a reason.
+        guardian: switches the torque off if this program dies; it has one plan, for this servo, and
+            the port calls its ``beat``. None: only the servo's watchdog does so.
 
-    who: what messages call it, "neck_yaw (servo 7)"
-    alone: effect on it if this program dies while it moves, "" if its watchdog stops it
+    who: its name in messages, "neck_yaw (servo 7)"
+    alone: effect of the program's death during a motion, "" if its watchdog stops it
     """
 
     def __init__(
@@ -91,13 +91,13 @@ class SmartServoAccess:
         self._was: dict[str, int] = {}
 
     def check(self) -> None:
-        """Check that it is the right servo, sound, and in position mode.
+        """Check that it is the right servo, without faults, and in position mode.
 
         Raises:
             ServoMissing: it does not answer, is another model, or has other settings.
             ServoFault: it reports an error.
         """
-        # A servo may be set to answer questions alone; this takes no answer and ends that.
+        # A servo may be set to answer only queries; this write needs no answer and changes that.
         self._registers.write_all((self._id,), "status_return_level", self._family.answer_level)
         found = self._registers.identify(self._id)
         if found is None:
@@ -131,7 +131,7 @@ class SmartServoAccess:
             )
 
     def clear_offset(self) -> int:
-        """Set the offset of its position to 0, torque off; return what it was."""
+        """Set the offset of its position to 0, torque off; return the previous offset."""
         register = self._driving.offset
         was = self._value(register)
         if was:
@@ -141,10 +141,10 @@ class SmartServoAccess:
         return was
 
     def set_middle(self) -> int:
-        """Set the servo's present position as its middle, 2048; return the offset that it has now.
+        """Set the servo's present position as its middle, 2048; return the new offset.
 
         Raises:
-            SetupError: this kind cannot.
+            SetupError: this kind does not support it.
         """
         if self._kind.set_middle is None:
             raise SetupError(
@@ -155,10 +155,10 @@ class SmartServoAccess:
         return self._kind.set_middle(self._port, self._kind.family, self._id)
 
     def disable_torque(self) -> None:
-        """Switch the torque off, and see that it is; the guardian has nothing to watch then.
+        """Switch the torque off and verify it; then the guardian has nothing to watch.
 
         Raises:
-            ServoFault: it is not.
+            ServoFault: the torque is still on.
         """
         self._torque_off()
         self._unguard()
@@ -179,11 +179,11 @@ class SmartServoAccess:
     # --- motion with low drive
 
     def enable_torque(self, params: StopSearchParams) -> None:
-        """Switch the torque on at its position, weak and slow; goals may be anywhere in the turn.
+        """Switch the torque on at its position, weak and slow, for goals anywhere in the turn.
 
         Raises:
             ServoMissing: the position is not within one turn.
-            ServoFault: the torque does not come on, or the position jumped.
+            ServoFault: the torque is not on, or the position jumped.
             SetupError: the guardian does not start.
         """
         value, put, driving = self._value, self._put, self._driving
@@ -231,8 +231,8 @@ class SmartServoAccess:
         """Move it to its stop towards more (1) or fewer (-1) steps, and a little back.
 
         Raises:
-            ServoFault: it let go during the search, so it was not at a stop.
-            CalibrationStopped: a person or the system requested it.
+            ServoFault: its torque went off during the search, so it was not at a stop.
+            CalibrationStopped: a person or the system requested the end.
         """
         stop = find_end_stop(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
         if not self._value("torque_enable"):
@@ -243,7 +243,7 @@ class SmartServoAccess:
         return stop
 
     def go(self, params: StopSearchParams, goal_steps: int) -> bool:
-        """Move it slowly to a position; return whether it came there unhindered."""
+        """Move it slowly to a position; return whether it arrived unhindered."""
         return move_to_goal(goal_steps, params, self._exchange)
 
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:
@@ -255,7 +255,7 @@ class SmartServoAccess:
         if goal is not None:
             if self._guardian is not None and self._guardian.is_released(0):
                 raise ServoFault(
-                    f"{self.who}: the program stood still, so its guardian switched the torque "
+                    f"{self.who}: the program did not run, so its guardian switched the torque "
                     "off: start again"
                 )
             self._put("goal_position", goal)
@@ -264,7 +264,7 @@ class SmartServoAccess:
         return position, load, at_s
 
     def restore(self) -> None:
-        """Switch the torque off and put everything else back as it was found."""
+        """Switch the torque off and restore everything else."""
         self._torque_off()
         for name, value in self._was.items():
             if self._value(name) != value:
