@@ -244,7 +244,7 @@ def test_ask_lists_the_menus_and_chooses_from_them() -> None:
     assert f"conversation: {present} (in force), {', '.join(others)}" in lines
     try:
         done = gazerig("ctl", "ask", "conversation", others[0])
-        assert (done.returncode, done.stderr) == (0, f"conversation {others[0]}is active\n")
+        assert (done.returncode, done.stderr) == (0, f"conversation {others[0]} is active\n")
         (line,) = gazerig("ctl", "ask", "conversation").stdout.splitlines()
         assert line.startswith(f"conversation: {others[0]} (in force), ")
     finally:
@@ -404,4 +404,5 @@ def test_steer_leads_a_running_rig_and_lets_go() -> None:
 def test_steer_needs_a_terminal_or_a_gamepad() -> None:
     done = gazerig("ctl", "steer")
     assert done.returncode == 2 and "run this in one, or use --gamepad" in done.stderr
-    assert "one of them" in gazerig("ctl", "steer", "--keyboard", "--gamepad").stderr
+    done = gazerig("ctl", "steer", "--keyboard", "--gamepad")
+    assert done.returncode == 2 and "use only one of --keyboard and --gamepad" in done.stderr

@@ -157,7 +157,7 @@ def test_anchors_and_aliases(small):
 def test_a_tied_value_is_not_changed_unseen(small):
     text = "joints:\n  pan: {zero_step: &mid 2048}\n  tilt: {zero_step: *mid}\n"
     small.write_text(text)
-    with pytest.raises(ConfigError, match=r"joints\.tilt\.zero_step would change as well"):
+    with pytest.raises(ConfigError, match=r"joints\.tilt\.zero_step would also change"):
         save(small, {"joints.pan.zero_step": 1}, NOW, check, Head)
     assert small.read_text() == text and len(list(small.parent.iterdir())) == 1
 
@@ -196,7 +196,9 @@ def test_a_later_layer_that_has_the_last_word_is_named(small):
     def overridden(path):
         return check(path).__class__(name="other", joints=check(path).joints)
 
-    with pytest.raises(ConfigError, match="name stays other whatever this file says"):
+    with pytest.raises(
+        ConfigError, match="name stays other with any value in this file: a later layer sets it"
+    ):
         save(small, {"name": "mine"}, NOW, overridden, Head)
     assert small.read_text() == SMALL
 

@@ -81,7 +81,7 @@ def test_the_first_line_says_what_happens_and_how_it_ends() -> None:
     mock = RunOptions(mock=True).check_and_complete()
     assert start_text(mock) == (
         "desk: emulated servos; it looks at a simulated scene, visitor. "
-        "Ctrl-C parks the head and ends."
+        "Ctrl-C parks the head and ends the run."
     )
     assert "its servos; it looks at a webcam" in start_text(
         RunOptions(camera=0).check_and_complete()

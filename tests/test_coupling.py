@@ -151,7 +151,7 @@ def test_servos_get_the_limits_that_the_whole_range_needs(kind: str) -> None:
          "the servo of neck_pitch would be at -284 steps, outside its 0..4095"),
         (replace(KINDS["measured"], points=tuple(p for p in grid(RODS, 5) if p[0] > -30.0)),
          "its points do not extend that far"),
-        (replace(PARALLEL, first="nek_pitch"), "no joint 'nek_pitch'; there is"),
+        (replace(PARALLEL, first="nek_pitch"), "no joint 'nek_pitch'; available: left_eye_pan"),
     ],
 )  # fmt: skip
 def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(
@@ -168,7 +168,7 @@ def test_a_coupling_that_cannot_be_is_refused() -> None:
         replace(PARALLEL, rod_mm=200.0)
     with pytest.raises(ValueError, match="two angles or more of each joint"):
         CouplingParams("measured", "neck_pitch", "neck_roll")
-    with pytest.raises(ValueError, match="once; missing is -35, 25 deg"):
+    with pytest.raises(ValueError, match="once; missing: -35, 25 deg"):
         replace(KINDS["measured"], points=tuple(p for p in grid(RODS, 3) if p[:2] != (-35.0, 25.0)))
     back = [(f, s, abs(f), s) for f in (-10.0, 0.0, 10.0) for s in (-10.0, 10.0)]
     with pytest.raises(ValueError, match="reverse next to 0, -10 deg"):

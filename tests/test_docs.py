@@ -28,6 +28,7 @@ from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LOWER_NECK
 from gazerig.sim_mock.scenes import script
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
@@ -286,7 +287,7 @@ SAID = {
 def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper in (EMULATOR, PARAMETERS):
         return  # their tables are compared with the emulator and the declarations
-    words = {*keys(), *defined(), *SERVOS, *scene_names(), *all_examples(), *_modes()}
+    words = {*keys(), *defined(), *SERVOS, *scene_names(), *all_examples(), *_modes(), *LOWER_NECK}
     words |= {field.name for field in fields(script.WorldCameraParams)}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
         *DYNAMIXEL.registers,

@@ -183,9 +183,9 @@ def test_make_and_pip_have_what_the_papers_ask_for() -> None:
         for package in re.findall(r"pip install --no-deps ([^\s'`]+)", text):
             assert f":= {package}\n" in makefile, f"{paper.name}: {package}"
         for package in re.findall(r"pip install (?!--no-deps)(?:-\w+ )?'?([^\s'`]+)", text):
-            found = re.fullmatch(r"(?:\.|gazerig)\[([\w,]+)\]", package)
+            found = re.fullmatch(r"(?:\.|gazerig)(?:\[([\w,]+)\])?", package)
             assert found, f"{paper.name}: {package}"
-            for extra in found[1].split(","):
+            for extra in found[1].split(",") if found[1] else ():
                 assert f"\n{extra} = [" in extras, f"{paper.name}: {package}"
 
 

@@ -134,7 +134,9 @@ def test_make_run_has_a_scene_where_there_is_no_world(tmp_path: Path) -> None:
     program.parent.mkdir(parents=True)
     program.write_text('#!/bin/sh\necho "$@"\n')
     program.chmod(0o755)
-    (program.parent / "python").write_text("#!/bin/sh\necho --computer small\n")
+    (program.parent / "python").write_text(
+        '#!/bin/sh\ncase $2 in *.own_session) shift 2; exec "$@" ;; esac\necho --computer small\n'
+    )
     (program.parent / "python").chmod(0o755)
     (tmp_path / ".venv" / ".installed").touch()
     done = subprocess.run(

@@ -172,7 +172,7 @@ def test_the_command_fetches_lists_and_says_what_fails(
     assert [row["state"] for row in listed["models"]] == ["missing", "there", "there"]
     assert listed["folder"] == str(folder)
     monkeypatch.setattr(models, "MODEL_FILES", (plain(server),))
-    assert "is there" in invoked("models", "fetch").out
+    assert "plain.bin already exists" in invoked("models", "fetch").out
     assert "MIT" in invoked("models", "list").out
 
 

@@ -84,7 +84,7 @@ def test_joints_by_name_get_ids_in_their_order() -> None:
 def test_without_a_terminal_what_is_left_out_is_said() -> None:
     done = invoked("new", "a.yaml", "--joints", "eyes")
     assert done.code == 0, done.err
-    assert "board: none" in done.err and "--board takes dynamixel, feetech" in done.err
+    assert "board: none" in done.err and "choices for --board: dynamixel, feetech" in done.err
     assert "camera: webcam" in done.err and "joints:" not in done.err
     assert "gazerig run a.yaml --mock" in done.out and "calibrate" not in done.out
 

@@ -42,7 +42,7 @@ DOCTOR = CommandEntry(
 )
 CALIBRATE = CommandEntry(
     "gazerig.features.bringup.cli.calibrate.group",
-    "Calibrate joints (the default), camera or face, and write the result into the rig's YAML.",
+    "Calibrate joints (the default), camera, face or mass, and write the result into the rig's YAML.",
     "Bring-up",
     examples={
         "calibrate": (

@@ -401,7 +401,7 @@ def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> 
     """
     for name, angle in angles_deg.items():
         if name not in joints:
-            raise SetupError(f"no joint {name!r}; there is {', '.join(joints)}")
+            raise SetupError(f"no joint {name!r}; available: {', '.join(joints)}")
         if not isfinite(angle):
             raise SetupError(f"{name}: {angle} is not an angle in degrees")
 

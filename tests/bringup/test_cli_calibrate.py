@@ -313,7 +313,10 @@ NO_NOSE = "no such joint; there is left_eye_pan"
         ((), "copy it"),
         (("nose",), "nothing named 'nose' is shipped"),
         (("board", "b.pdf", "--square", "60"), "does not fit on a4"),
-        (("camera", "desk", "--mock", "--dry-run", "--ruler", "0"), "the print scale must be 0.2 to 5"),
+        (
+            ("camera", "desk", "--mock", "--dry-run", "--ruler", "0"),
+            "the print scale must be 0.2 to 5",
+        ),
     ],
 )
 def test_what_is_refused_is_said_with_and_without_the_word_joints(

@@ -22,13 +22,13 @@ class Servo(HobbyMarker):
     def __init__(self) -> None:
         self.reported: list[tuple[str, float]] = []
 
-    def by(self, us: float) -> None:
+    def move_by_us(self, us: float) -> None:
         self.reported.append(("by", us))
 
     def nudge(self, us: float) -> None:
         self.reported.append(("nudge", us))
 
-    def to(self, us: float) -> None:
+    def move_to_us(self, us: float) -> None:
         self.reported.append(("to", us))
 
     def live(self) -> str:

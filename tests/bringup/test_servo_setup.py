@@ -84,10 +84,10 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
     bench = Bench(ServoSpec(servo_id, MODELS[kind.name]), baud=baud, kind=kind)
     result = bench.assign()
     assert result.before == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
-    assert result.now == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
-    assert (f"id {servo_id} -> 7" in result.done) == (servo_id != 7)
-    assert (f"baud rate {baud} -> {BAUD} bit/s" in result.done) == (baud != BAUD)
-    assert len(result.done) == (servo_id != 7) + (baud != BAUD)
+    assert result.after == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
+    assert (f"id {servo_id} -> 7" in result.changes) == (servo_id != 7)
+    assert (f"baud rate {baud} -> {BAUD} bit/s" in result.changes) == (baud != BAUD)
+    assert len(result.changes) == (servo_id != 7) + (baud != BAUD)
     (servo,) = bench.chain.servos
     assert (servo.id, servo.torque) == (7, False)
     rate = bench.registers().read(7, "baud_rate")
@@ -108,7 +108,7 @@ def test_doing_it_again_changes_nothing(kind):
     bench = Bench(kind=kind)
     bench.assign()
     before = bench.kept(7)
-    assert bench.assign().done == ()
+    assert bench.assign().changes == ()
     assert bench.kept(7) == before
 
 
@@ -116,7 +116,7 @@ def test_doing_it_again_changes_nothing(kind):
 def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     bench = Bench(kind=kind)
     bench.hold()
-    assert bench.assign().done[0] == "torque 1 -> 0"
+    assert bench.assign().changes[0] == "torque 1 -> 0"
     assert not bench.chain[7].torque
 
 
@@ -293,7 +293,7 @@ def test_a_servo_that_answers_pings_alone():
     servo = bench.chain[1]
     servo.memory.set("status_return_level", 0)
     servo.status_level = 0
-    assert bench.assign().now.id == 7
+    assert bench.assign().after.id == 7
 
 
 class StubbornPort(InProcessPort):
@@ -358,7 +358,7 @@ def test_a_lost_confirmation_does_not_matter(address):
 
     bench = Bench()
     bench.port = Lossy(bench.chain)
-    assert bench.assign().now == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
+    assert bench.assign().after == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
 
 
 def test_a_lost_status_of_the_restart_does_not_matter():
