@@ -17,7 +17,7 @@ def test_e88_everybody_of_six_is_looked_at_again_and_again() -> None:
 
 @pytest.mark.usefixtures("ideal_servos")
 def test_e88_of_people_unlike_the_nearer_get_more_and_nobody_nothing() -> None:
-    figures = row.figures("six unlike", row.UNLIKE_M, seconds=32.0, seeds=1)
+    figures = row.figures("six unlike", row.UNLIKE_M, seconds=64.0, seeds=1)
     assert figures["six unlike: longest time without a look, s"] < 15.0
     assert figures["six unlike: correlation of share and salience"] > 0.7
 

@@ -9,6 +9,7 @@ the nose meanwhile (Collewijn et al. 1985; 1 to 2 deg, Riggs et al. 1987).
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import nan
 
 import numpy as np
 from human.measured_run import MeasuredRun, Runner
@@ -76,8 +77,8 @@ def _shapes(runs: Sequence[MeasuredRun], depths: np.ndarray) -> dict[str, float]
         "planned duration, SD, ms": 1e3 * float(np.std(lasting)),
         "depth of incomplete ones, SD": float(depths[depths < _FULL].std()),
         "left less right lid, mean size of the largest difference": float(np.mean(apart)),
-        "eyes down in a blink, median deg": float(np.median(down)),
-        "eyes towards the nose in a blink, median deg": float(np.median(nasal)),
+        "eyes down in a blink, median deg": float(np.median(down)) if down else nan,
+        "eyes towards the nose in a blink, median deg": float(np.median(nasal)) if nasal else nan,
         "planned duration, mean, ms": 1e3 * float(np.mean(lasting)),
     }
 
