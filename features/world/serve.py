@@ -8,10 +8,10 @@ from gazerig.features.world.gl_context import import_mujoco
 from gazerig.features.world.world_spec import WorldSpec, state_file
 
 if TYPE_CHECKING:
-    from gazerig.features.world.served_world import ServedWorld
+    from gazerig.sim_mock.pty.server import ServedSurroundings
 
 
-def serve(folder: Path, clock_s: Callable[[], float]) -> "ServedWorld":
+def serve(folder: Path, clock_s: Callable[[], float]) -> "ServedSurroundings":
     """Return the world of a server, as of ``SentSurroundings.make``.
 
     Raises:

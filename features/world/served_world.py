@@ -104,7 +104,7 @@ class ServedWorld:
         name = bus.rig_bus if bus.rig_bus is not None else bus.name or ""
         return self.world.device(bus.device, name, bus.seed, bus.rig)
 
-    def execute(self, text: str) -> str:
+    def obey(self, text: str) -> str:
         """Carry out a command of the world; return {"ok": ...} or {"error": ...} as JSON."""
         try:
             return json.dumps({"ok": COMMANDS.obey(self.world, text)})
