@@ -116,7 +116,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
     kinematics, _ = _gaze_parts(_load(rig))
     if strange := [name for name in joints_rad if name not in kinematics.names]:
         there = ", ".join(kinematics.names)
-        raise Refused(f"this rig has no joint {strange[0]!r}; there is {there}")
+        raise Refused(f"this rig has no joint {strange[0]!r}; available: {there}")
     angles = tuple([float(joints_rad.get(name, 0.0)) for name in kinematics.names])
     at_rest = (0.0,) * len(angles)
     pose = kinematics.forward(JointState(angles, at_rest, at_rest, ()))

@@ -97,7 +97,7 @@ def test_a_lead_ends_with_its_block_or_after_its_time(head: gazerig.SimulatedHea
         head.step(0.5)
         assert order.active
     head.step()
-    assert not order.active and head.state.led == ""
+    assert not order.active and head.state.controlled_by == ""
     timed = head.look_at(1.0, 1.0, 0.3, for_s=0.05)
     assert timed.wait() == "taken over" and timed.why == "its time is over"
 
@@ -128,11 +128,11 @@ def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedH
         (lambda head: head.express("happy", nan), "0..1"),
         (lambda head: head.express("smug"), "no expression 'smug'"),
         (lambda head: head.level("mouth", 2.0), "0..1"),
-        (lambda head: head.move_opponent(9.0, 0.0, 0.0), "fist is moved to"),
+        (lambda head: head.move_opponent(9.0, 0.0, 0.0), "fist must be moved to three numbers"),
         (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
         (lambda head: head.set({"gaze.head.comfort_deg": 1e9}), "is above 90"),
         (lambda head: head.get("gaze.hed"), "unknown key"),
-        (lambda head: head.save(), "comes with"),
+        (lambda head: head.save(), "is part of the program and is never changed"),
         (lambda head: next(head.states(0.0)), "above 0"),
     ],
 )

@@ -132,7 +132,7 @@ def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None
     assert lent.number() == 1 and not lent.camera.lent  # the networks are being loaded
     lent.browsers.found = found(7)
     assert lent.number() == 7 and lent.camera.lent and lent.placed == [True]
-    assert "60 deg wide" in lent.camera.events()[0]
+    assert "field of view is assumed to be 60 deg" in lent.camera.events()[0]
     lent.now_s += SILENT_S + 0.1
     assert lent.number() == 1 and lent.placed == [True, False]
     assert lent.camera.events() == ("the browser's camera has ended: the scene continues",)

@@ -77,7 +77,7 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
 
 
 def test_what_cannot_be_built(make):
-    with pytest.raises(ValueError, match=f"baud 1234: {make.model} knows [0-9]+, "):
+    with pytest.raises(ValueError, match=f"baud 1234: {make.model} supports [0-9]+, "):
         make(baud=1234)
     with pytest.raises(ValueError, match="load_nm"):
         make(ServoSpec(1, make.model, 0.0, physics=Physics(load_nm=1e9)))

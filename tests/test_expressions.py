@@ -187,7 +187,7 @@ def test_a_rig_with_a_face_keeps_all_rules() -> None:
     ("face", "blend_s", "said"),
     [
         ({"left_eye_pan": 5.0}, 0.5, "only gaze turns the eyes"),
-        ({"javv": 5.0}, 0.5, "no joint 'javv'; there is"),
+        ({"javv": 5.0}, 0.5, "no joint 'javv'; available: left_upper_lid"),
         ({"jaw": 26.0}, 0.5, "26 deg is outside the joint's range -2..25"),
         ({"left_upper_lid": -60.0}, 0.5, "more than the lid's whole range of 45 deg"),
         ({"neck_roll": 20.0}, 0.1, "375 deg/s, its limit is max_speed_deg_s 200; expression_blend_s"),

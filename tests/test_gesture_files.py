@@ -82,7 +82,7 @@ def test_the_command_imports_a_table_for_a_rig(tmp_path: Path) -> None:
     again = CliRunner().invoke(app, words)
     assert again.exit_code != 0 and "--force" in again.stderr
     wrong = CliRunner().invoke(app, [*words[:2], "Greet!", "--folder", str(tmp_path)])
-    assert wrong.exit_code != 0 and "small letters" in wrong.stderr
+    assert wrong.exit_code != 0 and "lower-case letters" in wrong.stderr
 
 
 def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> None:

@@ -66,7 +66,7 @@ def test_whoever_is_stopped_or_led_by_hand_does_not_gesture(rig: TickedRig) -> N
     assert reply is not None and not reply.refused, reply
     assert rig.made.robot.menus()["gesture"][0] == "none"  # the stop has ended the nod
     rig.command(Jog((("jaw", 0.1),), "me", True))
-    with pytest.raises(RequestRejected, match="held where they are"):
+    with pytest.raises(RequestRejected, match="held at their angles"):
         RobotClient.connect().play("nod")
 
 

@@ -298,7 +298,7 @@ def test_wrong_gyro_is_told_once_in_a_run_which_goes_on():
 
 def test_turn_that_is_no_rotation_ends_the_camera_of_a_program_alone():
     wrong = Detections(0.0, 1, WIDTH, HEIGHT, turn=CameraTurn(1, rows(np.full((3, 3), np.nan))))
-    assert "no rotation" in detections_fault(wrong)
+    assert "not a rotation" in detections_fault(wrong)
     assert detections_fault(replace(wrong, turn=CameraTurn(1, rows(np.eye(3))))) == ""
 
 

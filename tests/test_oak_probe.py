@@ -59,7 +59,7 @@ def test_camera_in_use_is_named(tmp_path):
 
 
 def test_wrong_name_lists_what_there_is(tmp_path):
-    with pytest.raises(CameraError, match="no OAK camera 'CC' .there is: AA, BB."):
+    with pytest.raises(CameraError, match="no OAK camera 'CC' .found: AA, BB."):
         find_oak(sdk([info("AA")], [info("BB")]), "CC", tmp_path)
 
 
@@ -224,7 +224,10 @@ def test_usb_3_is_no_matter_and_the_dots_are_lit():
 @pytest.mark.parametrize(
     ("error", "cure"),
     [
-        ("Failed to connect to device, error message: X_LINK_DEVICE_ALREADY_IN_USE", "end that"),
+        (
+            "Failed to connect to device, error message: X_LINK_DEVICE_ALREADY_IN_USE",
+            "close that program",
+        ),
         (
             "Failed to find device after booting, error message: X_LINK_DEVICE_NOT_FOUND",
             "not a hub",

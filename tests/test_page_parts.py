@@ -885,7 +885,7 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(server: viser.ViserServe
         view.show(News((healthy(1.1 + 0.1 * k),), None, ended=False))
     last = replace(of_six(healthy(4.0)), target_name="the last", stopped="a test")
     view.show(News((last,), None, ended=False))
-    known = {"stopped": "a test", "silent": False, "no_feedback_note": 6}
+    known = {"stopped": "a test", "silent": False, "without_feedback": 6}
     assert button.reported.items() >= known.items()
     panel = view._panel
     widgets.join("a browser", lambda: None)
@@ -949,7 +949,7 @@ def test_a_recording_without_pictures_says_so(server: viser.ViserServer) -> None
 def test_bus_faults_are_told_in_plain_words() -> None:
     errors = {"timeout": 74, "rearmed": 1, "late computer": 0, "pulse": 2}
     said = health_text(BusHealth(0, 0, errors))
-    assert said == "bus: pulse 2 times, torque on again 1 time, no answer 74 times"
+    assert said == "bus: pulse 2 times, torque switched on again 1 time, no answer 74 times"
     assert health_text(BusHealth(0, 0, {})) == "bus ok"
 
 

@@ -117,4 +117,4 @@ def test_a_bus_that_cannot_be_ends_the_others(capfd):
                 "neck": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=12),
             }
         )
-    assert "baud 12: xl330-m288 knows" in capfd.readouterr().err
+    assert "baud 12: xl330-m288 supports" in capfd.readouterr().err

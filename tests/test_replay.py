@@ -97,7 +97,7 @@ def test_saccades_blinks_and_orders_can_be_stepped_to(
     kinds = [mark.kind for mark in frames.marks]
     assert kinds.count("saccade") == last.saccades > 10
     assert kinds.count("blink") == last.blinks > 0
-    (asked,) = [mark for mark in frames.marks if mark.words.startswith("asked: ask")]
+    (asked,) = [mark for mark in frames.marks if mark.words.startswith("requested: ask")]
     assert asked.at_s == pytest.approx(2.0, abs=0.011) and asked.kind == "event"
 
 

@@ -80,7 +80,7 @@ def test_same_picture_may_be_asked_for_again_but_none_before(film):
 
 @pytest.mark.parametrize("film_s", [-0.1, -5.0])
 def test_film_time_starts_at_zero(film, film_s):
-    with pytest.raises(ValueError, match="frame -?[0-9]+ wanted"):
+    with pytest.raises(ValueError, match="frame -?[0-9]+ requested"):
         film.frame_at(film_s)
 
 

@@ -84,10 +84,10 @@ def opened(device, capture: Capture) -> Webcam:
 
 
 def test_absent_camera_is_named_with_what_there_is(tmp_path, device):
-    with pytest.raises(CameraError, match=r"no camera at .*video7 \(there is: .*video0\)"):
+    with pytest.raises(CameraError, match=r"no camera at .*video7 \(found: .*video0\)"):
         Webcam(tmp_path / "video7").open()
     device.unlink()
-    with pytest.raises(CameraError, match="there is: none"):
+    with pytest.raises(CameraError, match="found: none"):
         Webcam(tmp_path / "video7").open()
 
 
