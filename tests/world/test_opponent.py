@@ -154,7 +154,9 @@ def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(early_s: float) 
     "p_m", [(nan, 0.0, 0.0), (0.7, 0.0), (0.1, 0.0, 0.0), (0.7, 0.7, 0.0), ("a", 0.0, 0.0), None]
 )
 def test_a_bad_point_gets_one_clear_error(p_m: object) -> None:
-    with pytest.raises(ValueError, match=r"^the opponent.s fist must be .* 0\.36\.\.1\.2, "):
+    with pytest.raises(
+        ValueError, match=r"^the opponent's fist must be moved to .* 0\.36\.\.1\.2, "
+    ):
         from_json({"do": "opponent", "p_world_m": p_m})
     assert from_json(as_json(MoveOpponent(READY))) == MoveOpponent(READY)
 
