@@ -2,9 +2,9 @@
 
 Interface: the commands ``scan``, ``setup``, ``doctor``, ``calibrate``, ``jog``, ``home``,
 ``look-at``, ``monitor``, ``reboot`` and ``record-gesture`` (commands.py); ``servo_families.KINDS``
-and ``doctor.families.CHECKS`` have what differs between servo families.
+and ``doctor.families.CHECKS`` contain the differences between servo families.
 
-In this folder: what commands do with servos: search, settings, slow motion, telemetry, recording
-by hand; doctor/: faults and their remedies; calibration/: joints, linkages, camera, face; cli/:
-the commands.
+This folder has the operations of the commands: search, settings, slow motion, telemetry, recording
+by hand. Subfolders: doctor/ for faults and their remedies; calibration/ for joints, linkages,
+camera and face; cli/ for the commands.
 """

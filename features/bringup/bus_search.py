@@ -1,19 +1,19 @@
 """Search for servos and boards of any kind on a port; nothing is changed and nothing moves.
 
-Why the order is as it is, and what is sent at all:
+Reasons for the order and for what is sent:
 
 - To a Maestro every byte from 80 on is a command, and FF moves a servo (FF, channel,
   target). Packets of smart servos begin with FF. So a port of Pololu's is searched for a
   Maestro only, and every other port is searched for one first. Queries to a Maestro
-  contain no FF, so no servo can take them for the head of a packet. After an answer of a
+  contain no FF, so no servo can mistake them for the header of a packet. After an answer of a
   Maestro nothing else is sent.
-- Dynamixel servos heed FF FF FD 00, STS servos FF FF, an id and a length of 2 or more. To
-  an STS a Dynamixel packet is one with the id 253 and the length 0, which is none; to a
-  Dynamixel an STS packet has no 00 behind FD, or no FD. Even servos that took one for the
-  other would be pinged or read only: nothing else is ever sent here.
+- Dynamixel servos accept FF FF FD 00, STS servos FF FF, an id and a length of 2 or more. To
+  an STS a Dynamixel packet has the id 253 and the length 0, which is invalid; to a Dynamixel an
+  STS packet has no 00 behind FD, or no FD. Even a servo that accepted the other packets would
+  only be pinged or read: nothing else is ever sent here.
 
-A board that receives the line but cannot answer (one wire, a rate that is not searched) is
-not detected: with such a board on the line, name the kind of servo.
+A board that receives data but cannot answer (one wire, a rate that is not searched) is not
+detected: with such a board on the line, specify the kind of servo.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ from gazerig.drivers.servo_bus.discovery import FoundServo, scan
 from gazerig.features.bringup.servo_kinds import KINDS
 
 BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
-"""Rates of a Maestro's serial pins, the usual ones first; on USB any works."""
+"""Baud rates of a Maestro's serial pins, the usual ones first; on USB any rate works."""
 
 ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 """Order of the search by kind; see above."""
@@ -44,10 +44,10 @@ RATES: Mapping[BusKind, Sequence[int]] = {
 class SearchRound:
     """Result of the search for one kind at one baud rate.
 
-    is_supported: the adaptor can run at it; unknown_bytes: bytes that made no sense
+    is_supported: whether the adaptor supports the rate; unknown_bytes: bytes that are not valid
     shared_ids: ids that two servos seem to have
     protocol_1_ids: ids that answer to the old protocol
-    board: a Maestro; channels: how many it has, None if unknown
+    board: a Maestro; channels: number of its channels, None if unknown
     """
 
     kind: BusKind
@@ -72,7 +72,7 @@ def plan_search(
     """Return the kinds and rates to search, in order.
 
     usb: vendor and product id of the port, "" if it has none
-    kinds, rates: those to search; None: all rates
+    kinds, rates: kinds and rates to search; None: all rates
     """
     if usb.startswith(POLOLU):
         return (("maestro", BOARD_RATES[0]),) if "maestro" in kinds else ()
@@ -80,7 +80,7 @@ def plan_search(
     for kind in ORDER:
         if kind in kinds:
             some = [rate for rate in RATES[kind] if rates is None or rate in rates]
-            # Whether a board is there must be known whatever the rates are.
+            # Search for a board at any rates: its presence must be known.
             some = some or [BOARD_RATES[0]] if kind == "maestro" else some
             rows += [(kind, rate) for rate in some]
     return tuple(rows)
@@ -93,16 +93,17 @@ def search_bus(
     thorough: bool = False,
     to_the_end: bool = False,
 ) -> Iterator[SearchRound]:
-    """Search with one kind of bus after the other; end after the first kind that replied.
+    """Search for one kind after the other; end after the first kind that replies.
 
     asked: result of ``plan_search``
-    thorough: wait long for Dynamixel servos, ask each STS id even if no servo answers a
+    thorough: wait longer for Dynamixel servos, and ping each STS id even if no servo answers a
         broadcast ping
-    to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does
+    to_the_end: continue after servos of a kind, as a line can have two kinds; a board ends it
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
+
     """
     met: BusKind | None = None
     for kind, baud in asked:
@@ -120,7 +121,7 @@ def search_bus(
                 one.protocol_1_ids,
             )
         elif port.setBaudRate(baud):
-            # The first six channels are there on every board; others might be an error to it.
+            # Every board has the first six channels; others might cause an error.
             board = probe(port, replace(MaestroParams(), baud=baud))
             looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
         else:
@@ -135,10 +136,10 @@ def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServ
 
 
 def parse_kinds(text: str) -> tuple[BusKind, ...]:
-    """Read the name of a kind, or "all".
+    """Parse the name of a kind, or "all".
 
     Raises:
-        ValueError: there is no such kind.
+        ValueError: the kind does not exist.
     """
     for kind in ORDER:
         if text == kind:

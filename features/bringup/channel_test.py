@@ -1,7 +1,7 @@
 """Slow motion of one channel of a board, so that a person sees which servo moves.
 
-A first pulse cannot be slowed down: a servo without pulses goes there at once, at its own
-speed. From then on it moves slowly. The pulses end with the walk, whatever happens.
+A first pulse cannot be slowed down: a servo without pulses moves there immediately, at its own
+speed. After that it moves slowly. The pulses end with the walk in all cases.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -29,11 +29,11 @@ LOOK_S = 0.02
 FINE_STEPS = 2
 LATE_S = 1.0
 MOST_TRIES = 10
-"""A busy computer may keep answers waiting, and there is no hurry here."""
+"""Long, because answers are late on a busy computer, and time does not matter here."""
 
 
 class ChannelPosition(NamedTuple):
-    """A commanded place of a channel, and the board's pulse at the end, in steps."""
+    """Commanded position of a channel, and the board's pulse at the end, in steps."""
 
     commanded: int
     reported: int
@@ -46,14 +46,14 @@ def walk_channel(
     sleep_until: Callable[[float], None],
     speed_steps_s: float = SLOW_STEPS_S,
 ) -> tuple[ChannelPosition, ...]:
-    """Move a channel to places, the first at once, the others slowly; then stop the pulses.
+    """Move a channel to positions, the first immediately, the others slowly; then stop the pulses.
 
     Args:
-        board: its port is open.
-        setup: the servo; places outside its limits are not gone to.
-        places: quarter microseconds.
+        board: board with an open port.
+        setup: the servo; positions outside its limits are skipped.
+        places: positions in quarter microseconds.
         sleep_until: waits until a time of the port's clock.
-        speed_steps_s: speed between the places.
+        speed_steps_s: speed between the positions.
 
     Raises:
         ServoMissing: the board does not answer, or the channel is no servo's.
@@ -77,7 +77,7 @@ def walk_channel(
                 start = _wait_for_channel(board, channel, sleep_until)
             gone.append(ChannelPosition(asked, start))
             until_s = now_s() + SETTLE_S
-            # The board may have a timeout, so it is read meanwhile.
+            # The board may have a timeout, so it is read in the meantime.
             while not nth and now_s() < until_s:
                 _wait_for_channel(board, channel, sleep_until)
     return tuple(gone)
@@ -118,7 +118,7 @@ def start_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
 
 
 def _wait_for_channel(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
-    """Wait a moment and return the pulse; move it on if the board does not do so itself."""
+    """Wait a moment and return the pulse; advance it if the board does not do so itself."""
     sleep_until(board.line.port.now_s() + LOOK_S)
     channel.advance(board.line.port.now_s())
     board.advance_pulses([channel])

@@ -1,4 +1,4 @@
-"""The entries of bring-up in the list of commands; light, as every command imports them."""
+"""The entries of bring-up in the list of commands; light, because every command imports them."""
 
 from gazerig.robot.cli.command_list import CommandEntry
 

@@ -1,4 +1,4 @@
-"""A head moved by hand, without torque: its joints read at even times."""
+"""Recording of a head moved by hand, without torque: its joints are read at regular times."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -17,15 +17,15 @@ from gazerig.robot.model.joint import JointParams
 RATE_HZ = 50.0
 LONGEST_S = 60.0
 _LEAST_SHARE = 0.5
-"""Share of readings with an answer that a recorded joint must exceed."""
+"""Fraction of answered readings that a recorded joint must exceed."""
 
 
 class HandRecording(NamedTuple):
     """A recording by hand.
 
-    series: times in seconds from the beginning, and angles in degrees, by joint
-    left_out: joints whose servos were silent too often
-    ended_by: why it ended
+    series: times in seconds from the start, and angles in degrees, by joint
+    left_out: joints whose servos failed to answer too often
+    ended_by: reason of the end
     """
 
     series: Mapping[str, tuple[Floats, Floats]]
@@ -36,10 +36,10 @@ class HandRecording(NamedTuple):
 def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
     """Switch the torque of all servos of a line off, and verify it.
 
-    All are tried, whatever one of them does.
+    All servos are tried, even after a failure.
 
     Raises:
-        ServoFault: one does not let go, or does not answer.
+        ServoFault: the torque of a servo stays on, or it does not answer.
     """
     holding = []
     for name, joint in joints.items():
@@ -65,13 +65,13 @@ def record_hand_motion(
 
     Args:
         sample: reads every servo once.
-        clock: that of the ports.
+        clock: clock of the ports.
         stopped: returns why to end, None before.
         seconds: longest time.
 
     Raises:
-        SetupError: a torque came on: another program moves the head.
-        DriverError: a port is gone, or no servo answered.
+        SetupError: a torque was switched on: another program moves the head.
+        DriverError: a port has disappeared, or no servo answered.
     """
     start_s, rows = clock.now_s(), list[TelemetrySample]()
     ended_by, slot = None, 0

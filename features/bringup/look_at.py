@@ -1,4 +1,4 @@
-"""Looking at a point: eyes and head by the oculomotor model, through the guard, no camera."""
+"""Gaze at a point: eyes and head by the oculomotor model, through the guard, without a camera."""
 
 from collections.abc import Mapping
 from math import degrees, isfinite
@@ -17,19 +17,19 @@ from gazerig.robot.model.types import JointAngles, JointState
 AT_END_DEG = 1.0
 
 TOGETHER = "eyes_pan"
-"""The joint that turns both eyes to the sides by one linkage."""
+"""Joint that turns both eyes sideways by one linkage."""
 
 
 class GazeResult(NamedTuple):
     """Measured gaze error of both eyes at the end. Degrees, metres.
 
     left_error, right_error: angle between each eye's line of sight and the point
-    error: the larger of both; if one linkage turns both eyes to the sides, that of their
-        mean line of sight, from midway between them
-    vergence: angle between the lines of sight; desired_vergence: what the point needs
-    converges: each eye has a yaw joint of its own, so vergence is possible
-    head: (yaw, pitch, roll); distance_m: from midway between the eyes
-    moved: what the guard sent of the last desired pose, joint by joint
+    error: the larger of both; if one linkage turns both eyes sideways, the error of their mean
+        line of sight, from midway between them
+    vergence: angle between the lines of sight; desired_vergence: angle required by the point
+    converges: whether each eye has its own yaw joint, so that vergence is possible
+    head: (yaw, pitch, roll); distance_m: distance from midway between the eyes
+    moved: result of the last desired pose after the guard, by joint
     """
 
     left_error: float
@@ -55,8 +55,8 @@ def look_at(
     p_world_m: x forward, y left, z up from the neck base
 
     Raises:
-        SetupError: it is no point, or one in the head itself.
-        DriverError: the bus is gone.
+        SetupError: the coordinates are not a point, or the point is in the head itself.
+        DriverError: the bus has disappeared.
     """
     refuse_not_finite(p_world_m)
     fresh = True
@@ -105,7 +105,7 @@ def look_at(
 
 
 def gaze_result_text(looked: GazeResult) -> tuple[str, ...]:
-    """Return gaze error and vergence as text, as far as the mechanism has them."""
+    """Return gaze error and, if the mechanism has it, vergence as text."""
     eyes = [part for part in looked.moved.joints if part.joint.endswith(("_pan", "_tilt"))]
     known = " (estimated, not measured)" if any(part.estimated for part in eyes) else ""
     away = f"of a point {looked.distance_m:.2f} m away{known}"
@@ -126,9 +126,9 @@ def gaze_result_text(looked: GazeResult) -> tuple[str, ...]:
 def joints_at_limits(
     joints: Mapping[str, JointParams], narrower_deg: Mapping[str, float], moved: MoveResult
 ) -> tuple[str, ...]:
-    """Name the joints that could turn no farther towards the point.
+    """Return the names of the joints that could not turn farther towards the point.
 
-    narrower_deg: by the end of a joint's name, how far a style of gaze lets it go to each side
+    narrower_deg: suffix of a joint's name -> limit of a gaze style to each side
     """
     found = []
     for part in moved.joints:
@@ -144,7 +144,7 @@ def refuse_not_finite(p_world_m: Vec3) -> None:
     """Refuse coordinates that are not numbers.
 
     Raises:
-        SetupError: a coordinate is no number.
+        SetupError: a coordinate is not a number.
     """
     if not all(map(isfinite, p_world_m)):
         raise SetupError(f"{p_world_m} is no point: three numbers in metres, e.g. 1.0 0.2 0.3")

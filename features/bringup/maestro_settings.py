@@ -1,8 +1,8 @@
-"""Settings of a Maestro for Pololu's program, as no serial command can set them. Pure.
+"""Settings of a Maestro for Pololu's program, because no serial command can set them. Pure.
 
-On an error - one damaged byte is one - a board moves every channel as its setting requires.
-Off stops the pulses, until the servos are held again where they are.
-Ignore would go on, but also when the program dies; Go to moves all servos home.
+After an error, such as one damaged byte, a board moves every channel according to its setting. Off
+stops the pulses, until the servos are held again at their positions. Ignore would continue, but
+also after the program dies; Go to moves all servos home.
 
 Source: Pololu Maestro User's Guide (0J40), sections 4.b (channel settings; Min and Max are
 kept in multiples of 16 us) and 4.e (serial settings).
@@ -23,10 +23,10 @@ FACTORY_US = (992, 2000)
 
 UNIT_US = 16
 MANTISSA, MOST_DOUBLED = 31, 7
-"""A board keeps a speed as up to 31, doubled up to seven times."""
+"""A board stores a speed as a number up to 31, doubled up to seven times."""
 
 TIMEOUT_S = 0.5
-"""Long compared with a tick, short compared with the time in which a hand gets between lids."""
+"""Long compared with a tick, short compared with the time in which a hand can get between lids."""
 
 
 def range_us(setup: ServoConfig) -> tuple[int, int]:
@@ -44,10 +44,10 @@ def wide_range(setup: ServoConfig) -> tuple[int, int] | None:
 
 
 def start_limits(setup: ServoConfig) -> tuple[int, int]:
-    """Return Speed and Acceleration of a channel, which the board keeps to from its start on.
+    """Return Speed and Acceleration of a channel, which the board applies from its start on.
 
-    In the board's units (0.25 us in 10 ms; that in 80 ms), 0 for unlimited. A board keeps five
-    bits of a speed and how often they are doubled: what it shows is what it keeps.
+    In the board's units (0.25 us in 10 ms; that in 80 ms), 0 for unlimited. A board stores five
+    bits of a speed and the number of doublings; it shows the stored value.
     """
     speed, doubled = speed_units(setup.max_speed_steps_s), 0
     while speed >> doubled > MANTISSA:
@@ -60,7 +60,7 @@ def start_limits(setup: ServoConfig) -> tuple[int, int]:
 def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> Iterator[str]:
     """Return the settings to make in Pololu's Maestro Control Center, line by line.
 
-    usb: the board's own USB port is used; else its serial pins
+    usb: whether the board's own USB port is used instead of its serial pins
     """
     yield "nothing of this can be set over the serial line; in Pololu's Maestro Control Center:"
     crc = "on" if params.crc else "off"
@@ -83,9 +83,9 @@ def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool
 
 
 def settings_file(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> str:
-    """Return the same as a settings file of Pololu's programs.
+    """Return the settings as a file of Pololu's programs.
 
-    Channels of no joint are servos without pulses, as from the factory.
+    Channels without a joint are servos without pulses, as in the factory settings.
     """
     root = Element("UscSettings", version="1")
     for name, value in (

@@ -1,7 +1,7 @@
-"""Slow motion of a rig, joint by joint or all at once, for bring-up and for own programs.
+"""Slow motion of a rig, joint by joint or together, for bring-up and for users' programs.
 
-No camera, no attention. Every goal goes through the guard, and the caller gets back
-what was really applied:
+It uses neither camera nor attention. Every goal passes the guard, and the caller receives the
+applied result:
 
     control = ManualControl(body, guard, RealClock())
     control.start()
@@ -13,7 +13,7 @@ what was really applied:
 
 Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
 stay at their last goal, or lose their torque if a guardian watches them
-(gazerig.robot.guardian, after .4 s), and the next call goes on from there.
+(gazerig.robot.guardian, after .4 s), and the next call continues from there.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -43,10 +43,10 @@ _STILL_DEG_S = 2.0
 class JointMove(NamedTuple):
     """Result of a movement for one joint, in degrees.
 
-    desired, commanded: the goal, and what the guard sent of it in the end
-    measured: present angle; error: measured less desired
-    reasons: why commanded or measured differ, as the guard names it; empty when all is well
-    estimated: its servo has no sensor, so measured is the goal moved by its known speed
+    desired, commanded: the goal, and the final command of the guard
+    measured: present angle; error: measured minus desired
+    reasons: the guard's reasons for differences; empty without differences
+    estimated: whether its servo has no sensor, so that measured follows from the goal and its speed
     """
 
     joint: str
@@ -71,7 +71,7 @@ class JointMove(NamedTuple):
 
 
 class Step(NamedTuple):
-    """One exchange: desired, commanded and measured joints."""
+    """One exchange with the servos: desired, commanded and measured joints."""
 
     t_s: float
     desired_rad: JointAngles
@@ -97,11 +97,11 @@ class MoveResult(NamedTuple):
 
     @property
     def arrived(self) -> bool:
-        """Return whether every moving joint came near its goal."""
+        """Return whether every moving joint reached its goal."""
         return self.end_reason == "arrived"
 
     def __str__(self) -> str:
-        """Write how it ended, with the reasons joint by joint."""
+        """Write the result, with the reasons by joint."""
         reasons = [f"{part.joint}: {', '.join(part.reasons)}" for part in self.remarkable_joints()]
         return f"{self.end_reason} ({'; '.join(reasons)})" if reasons else self.end_reason
 
@@ -115,7 +115,7 @@ class MoveResult(NamedTuple):
 
 
 class GuardReasons:
-    """Reasons of the guard by joint, in the order of coming, each once."""
+    """Reasons of the guard by joint, in order of occurrence, each once."""
 
     def __init__(self) -> None:
         self._by_joint: dict[str, dict[str, None]] = {}
@@ -128,7 +128,7 @@ class GuardReasons:
                 self._by_joint.setdefault(joint, {})[reason] = None
 
     def joint_reasons(self, joint: str) -> tuple[str, ...]:
-        """Return the reasons of one joint, with those of all."""
+        """Return the reasons of one joint, including those of all joints."""
         return (*self._by_joint.get(joint, {}), *self._by_joint.get("all", {}))
 
 
@@ -175,17 +175,17 @@ def rest_result(
 
 
 def _deg(angle: float) -> str:
-    """Write an angle, and zero without a sign."""
+    """Format an angle, with zero without a sign."""
     return f"{round(angle, 1) + 0.0:.1f}"
 
 
 _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
-"""Peaks of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
+"""Peaks of a fifth-order polynomial from rest to rest, in distance/time and distance/time^2."""
 
 
 @dataclass(frozen=True)
 class JogParams:
-    """Speed of a slow move, and when a goal counts as reached."""
+    """Speed of a slow move, and criteria for a reached goal."""
 
     # fmt: off
     speed_deg_s: Annotated[float, Bounds(0.5, 200), "top speed on the way; the guard's gentle speed holds as well"] = 20.0
@@ -200,7 +200,7 @@ DesiredPose = Callable[[JointState, float, float], JointAngles]
 """Returns the desired pose for measured joints, the time, and the time since the last step."""
 
 Done = Callable[[Step], str | None]
-"""Returns how it ended, None while it continues."""
+"""Returns the reason of the end, None while the motion continues."""
 
 
 def no_reason() -> str | None:
@@ -209,15 +209,15 @@ def no_reason() -> str | None:
 
 
 class ManualControl:
-    """A rig whose goals come from a person.
+    """Control of a rig by the goals of a person.
 
     Args:
         body: the joints of one rig.
-        guard: the same rig's.
-        clock: the host's, or a simulated one with the emulated bus.
-        params: how slowly.
+        guard: guard of the same rig.
+        clock: clock of the host, or a simulated one with the emulated bus.
+        params: speed of the motion.
         stopped: called at every step; returns why to stop, None without a reason.
-        watch: gets every step.
+        watch: receives every step.
     """
 
     def __init__(
@@ -300,7 +300,7 @@ class ManualControl:
         return self.follow(on_the_way, there, longest_s, desired, gently=True)
 
     def hold(self, seconds: float) -> MoveResult:
-        """Hold the present goals for this long.
+        """Hold the present goals for a time.
 
         Raises:
             DriverError: the bus is gone.
@@ -313,7 +313,7 @@ class ManualControl:
     def park(
         self, angles_deg: Mapping[str, float], stopped: Callable[[], str | None] = no_reason
     ) -> MoveResult:
-        """Move to a pose despite earlier requests to stop; joints left out go to 0.
+        """Move to a pose despite earlier requests to stop; omitted joints move to 0.
 
         stopped: called at every step; returns why to stop, None without a reason
 
@@ -334,11 +334,11 @@ class ManualControl:
         ends_on: JointAngles | None = None,
         gently: bool = False,
     ) -> MoveResult:
-        """Send desired poses through the guard until ``done`` returns how it ended.
+        """Send desired poses through the guard until ``done`` returns the reason of the end.
 
-        longest_s: after that it has ended "not there in time"
-        ends_on: the pose that the result is judged by; None: the last one
-        gently: the guard moves slowly throughout, not only at the start
+        longest_s: time after which the motion ends with "not there in time"
+        ends_on: pose with which the result is compared; None: the last one
+        gently: whether the guard moves slowly throughout, not only at the start
 
         Raises:
             DriverError: the bus is gone.
@@ -381,7 +381,7 @@ class ManualControl:
 
 
 def park_slowly(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
-    """Park slowly unless the user requests the end again; return the result as text."""
+    """Park slowly unless the user repeats the request to end; return the result as text."""
     moved = control.park(park_deg, lambda: "interrupted" if again() else None)
     return "parked" if moved.arrived else f"not parked ({moved})"
 
@@ -397,7 +397,7 @@ def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> 
     """Refuse unknown joints, and angles that are not numbers.
 
     Raises:
-        SetupError: with what there is.
+        SetupError: the message lists the available joints.
     """
     for name, angle in angles_deg.items():
         if name not in joints:

@@ -1,6 +1,6 @@
-"""The kinds of smart servos, one value a kind: the only module of bring-up that names makes.
+"""The kinds of smart servos, one value per kind. Only this module of bring-up names makes.
 
-Boards of hobby servos, whose channels do not answer, are not among them.
+Boards of hobby servos, whose channels do not answer, are not included.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ Tell = Callable[[str], None]
 
 
 class Setting(NamedTuple):
-    """A register that must have a value for calibration; ``mask`` chooses its bits."""
+    """Register that must have a value for calibration; ``mask`` selects its bits."""
 
     register: str
     value: int
@@ -34,14 +34,14 @@ class Setting(NamedTuple):
 
 
 class CalibrationRegisters(NamedTuple):
-    """Gentle motion of one servo of a kind.
+    """Registers for the calibration and gentle motion of one servo of a kind.
 
-    settings: without which its steps do not mean what they should
-    offset: register that shifts its position; offset_usable: it keeps to that
-    full_drive: a register, and the register of its largest value, which it gets back
+    settings: settings without which its steps have another meaning
+    offset: register that shifts its position; offset_usable: whether the servo applies it
+    full_drive: a register, and the register of its largest value, which is restored
     gentle_drive: returns the register values for a share of full drive and a speed in steps/s;
         reads registers by name
-    load: present current as a share of the stall current, of a model by its name
+    load: present current as a fraction of the stall current, by the name of the model
     """
 
     settings: tuple[Setting, ...]
@@ -53,14 +53,14 @@ class CalibrationRegisters(NamedTuple):
 
 
 class ServoKind(NamedTuple):
-    """One kind of smart servo; ports are open at the baud rate that is given or was found.
+    """Kind of smart servo; ports are open at the given or detected baud rate.
 
-    title: as people call it
-    family: what the engine must know of it
-    no_reply: what to check if no servo answers
-    notes: what must be known of all of them
-    calibration: None if this program does not move a servo of the kind alone
-    set_middle: makes the present position the middle, None if the kind cannot
+    title: common name
+    family: properties for the engine
+    no_reply: checks if no servo answers
+    notes: notes about all servos of the kind
+    calibration: None if this program does not move a single servo of the kind
+    set_middle: sets the present position as the middle, None if the kind does not support it
     """
 
     name: BusKind
@@ -73,7 +73,7 @@ class ServoKind(NamedTuple):
 
 
 GENTLE_ACCELERATION = 10
-"""1000 steps/s2: a search begins within a tenth of a second."""
+"""1000 steps/s2, so that a search is at full speed within a tenth of a second."""
 
 
 def _gentle_dynamixel(
@@ -110,7 +110,7 @@ DYNAMIXEL = ServoKind(
         offset_usable=False,
         full_drive=("goal_pwm", "pwm_limit"),
         gentle_drive=_gentle_dynamixel,
-        # Present Current, or Present Load on a model with that register.
+        # Present Current, or Present Load for a model with that register.
         load=lambda model, current: current * dynamixel.MODELS[model].load_unit,
     ),
 )
@@ -162,7 +162,7 @@ def servo_kind(model: str) -> ServoKind:
     """Return the kind of a servo by its model.
 
     Raises:
-        SetupError: it is no smart servo.
+        SetupError: the model is not a smart servo.
     """
     kind = _KIND_OF.get(SERVOS[model].family)
     if kind is None:

@@ -1,4 +1,4 @@
-"""Restart of one servo, which clears a latched error of a Dynamixel as a power cycle does."""
+"""Restart of one servo, which clears a latched error of a Dynamixel like a power cycle."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -17,9 +17,9 @@ PAUSE_S = 0.1
 class ServoSnapshot(NamedTuple):
     """Status of a servo.
 
-    errors: by name; torque: None if it could not be read
-    position: in steps, None likewise
-    latching: errors stay until a restart; else they go with their cause
+    errors: errors by name; torque: None if it could not be read
+    position: position in steps, None if it could not be read
+    latching: whether errors stay until a restart; otherwise they end with their cause
     """
 
     errors: tuple[str, ...]
@@ -29,7 +29,7 @@ class ServoSnapshot(NamedTuple):
     latching: bool = True
 
     def __str__(self) -> str:
-        """Return it as a line."""
+        """Return the status as one line."""
         word, none = ("latched", "nothing latched") if self.latching else ("reports", "no errors")
         errors = f"{word}: {' and '.join(self.errors)}" if self.errors else none
         torque = {None: "torque unknown", False: "torque off", True: "torque on"}[self.torque]
@@ -38,7 +38,7 @@ class ServoSnapshot(NamedTuple):
 
 
 class RebootResult(NamedTuple):
-    """A servo before and after its restart, and how long it was away."""
+    """Servo before and after its restart, and the duration of its absence."""
 
     before: ServoSnapshot
     after: ServoSnapshot

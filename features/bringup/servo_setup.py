@@ -1,11 +1,12 @@
-"""Finding the one servo that is connected, and giving it its id and baud rate.
+"""Search for the only connected servo, and assignment of its id and baud rate.
 
-Only one servo may be connected: two with one id look like one, and an id given to
-both would make it worse.
+Only one servo may be connected: two servos with the same id appear as one, and both would receive
+the new id.
 
-Id and baud rate act at once, after the status of their own write. If the memory has a lock
-they are written with it open, or they would hold until the next power-off only; it is closed
-under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory table STS3215.
+Id and baud rate take effect immediately, after the status packet of their own write. If the memory
+has a lock, they are written with it open; otherwise they would be lost at the next power-off. It is
+closed under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory table
+    STS3215.
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,7 @@ from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 
 
 class SetupResult(NamedTuple):
-    """Result for one servo: as it was found, as it is now, and what was written."""
+    """Result for one servo: its state before and now, and the written values."""
 
     before: FoundServo
     after: FoundServo
@@ -36,15 +37,15 @@ class SetupResult(NamedTuple):
 
 
 def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
-    """List all baud rates, those that a servo is likely to have first."""
+    """List all baud rates, the most likely ones first."""
     return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.scan_rates)))
 
 
 def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> FoundServo:
-    """Find the one servo that is connected, at any id and baud rate; all rates are searched.
+    """Find the only connected servo, at any id and baud rate; all rates are searched.
 
     Raises:
-        ServoMissing: none answers, or more than one.
+        ServoMissing: no servo or more than one answers.
         PortError: the port cannot be opened.
         BusLost: it has gone away.
     """
@@ -81,7 +82,7 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
     """Refuse a servo of another model than the joint's.
 
     Raises:
-        ServoMissing: it is another.
+        ServoMissing: the model is another one.
     """
     if found.number != kind.family.models[setup.model].number:
         raise ServoMissing(
@@ -93,15 +94,15 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
 def assign_servo(
     port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
 ) -> SetupResult:
-    """Give the servo found the id of a joint and the bus's baud rate, and verify them.
+    """Assign the id of a joint and the bus's baud rate to the servo, and verify them.
 
-    Its torque goes off. The message of every failure names id and rate of the servo now.
+    Its torque is switched off. The message of every failure has the present id and rate.
 
     Raises:
-        ValueError: there is no such id or baud rate.
-        ServoMissing: of another model, or is not found again.
+        ValueError: the id or baud rate does not exist.
+        ServoMissing: the servo has another model, or does not answer afterwards.
         ServoFault: it refuses.
-        PortError: the adaptor cannot run at a rate.
+        PortError: the adaptor does not support a rate.
         BusLost: the port is gone.
     """
     refuse_model(found, kind, setup, port.port_name)
@@ -135,7 +136,7 @@ class _Assignment:
             tell(f"id {self._id} -> {servo_id}")
             self._unlock()
             written = registers.write(self._id, "id", servo_id)
-            # The confirmation may come from either id, or be lost.
+            # The confirmation may arrive from either id, or be lost.
             if not written and ping(self._port, kind.family, servo_id, self._baud, 2) is None:
                 raise self._refusal(f"take the id {servo_id}")
             self._done.append(f"id {self._id} -> {servo_id}")
@@ -144,7 +145,7 @@ class _Assignment:
         if self._baud != baud or registers.read(self._id, "baud_rate") != rate:
             tell(f"baud rate {self._baud} -> {baud}")
             self._unlock()
-            # A mere silence may be a lost confirmation.
+            # Silence may only be a lost confirmation.
             if not registers.write(self._id, "baud_rate", rate) and registers.refusal:
                 raise self._refusal(f"take {baud} bit/s")
             self._done.append(f"baud rate {self._baud} -> {baud} bit/s")

@@ -1,8 +1,8 @@
 """Telemetry of servos: registers and pulses are read, nothing is written.
 
-A bus watchdog is fed by it, as by every packet. Of a Maestro only pulse widths are read and never
-its errors: reading them clears them, and the program that moves the servos would miss them.
-A bus that is opened for moving sets its servos up, which is a write; a monitor only reads.
+Reading restarts a bus watchdog, like every packet. Only pulse widths of a Maestro are read and
+never its errors: reading clears them, and the program that moves the servos would miss them.
+Opening a bus for motion sets its servos up, which is a write; a monitor only reads.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,17 +31,17 @@ LIVE = (
     "present_input_voltage",
     "present_temperature",
 )
-"""Registers that are read from every smart servo; those of errors and load have other names."""
+"""Registers that are read from every smart servo; errors and load have other names."""
 
 
 class Telemetry(NamedTuple):
     """Present values of one servo; None for values that its kind does not have.
 
-    goal_deg, position_deg, velocity_deg_s: at the joint; the steps are the servo's own
-    load: share of the stall torque, signed, -1..1
-    errors: of the hardware, by name
-    measured: False if the position is estimated: that of the pulse
-    pulse_us: pulse width that a hobby servo gets, 0 for no pulses
+    goal_deg, position_deg, velocity_deg_s: at the joint; steps are those of the servo
+    load: fraction of the stall torque, signed, -1..1
+    errors: errors of the hardware, by name
+    measured: False if the position is estimated from the pulse
+    pulse_us: pulse width of a hobby servo, 0 for no pulses
     """
 
     goal_deg: float | None
@@ -71,7 +71,7 @@ class TelemetryReader(Protocol):
 
 
 class SmartServoTelemetry:
-    """Reads smart servos; one try is enough, the next reading comes soon.
+    """Reads smart servos without retries, because the next reading follows soon.
 
     Args:
         port: open at the servos' baud rate.
@@ -109,10 +109,10 @@ def telemetry_of(kind: ServoKind, joint: JointParams, values: Mapping[str, int])
 
 
 class MaestroTelemetry:
-    """Reads the channels of a Maestro: which pulse each gives, and nothing else.
+    """Reads only the pulses of the channels of a Maestro.
 
-    A board that has not detected its baud rate yet waits for the first byte of the Pololu
-    form; so after a silence the query is sent in that form, too.
+    A board that has not detected its baud rate yet waits for the first byte of the Pololu protocol,
+    so after a missing answer the query is also sent in that protocol.
     """
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
@@ -131,7 +131,7 @@ class MaestroTelemetry:
 
 
 class Pca9685Telemetry:
-    """Reads the channels of PCA9685 boards: which pulse each gives, and nothing else."""
+    """Reads only the pulses of the channels of PCA9685 boards."""
 
     def __init__(self, port: BusPort, params: Pca9685Params) -> None:
         self._board = Pca9685Board(port, params)
@@ -143,7 +143,7 @@ class Pca9685Telemetry:
 
 
 def pulse_telemetry(joint: JointParams, pulse_steps: int) -> Telemetry:
-    """Return the telemetry of a joint's pulse; 0 is no pulse, so nothing holds the servo."""
+    """Return the telemetry of a joint's pulse; 0 is no pulse: the servo does not hold."""
     if 0 < pulse_steps <= MOST_INPUT:
         return Telemetry(*_UNTOLD, False, ("its channel is an input",), False, None)
     at = degrees(joint.angle_rad(pulse_steps)) if pulse_steps else None
@@ -160,8 +160,8 @@ _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
 class TelemetrySample(NamedTuple):
     """One reading of all servos.
 
-    at_s, took_s: when it was done and how long it took
-    servos: by joint; None if the servo did not answer
+    at_s, took_s: time and duration of the reading
+    servos: telemetry by joint; None if the servo did not answer
     request_count, unanswered: queries since the start, and those without an answer
     """
 
@@ -176,9 +176,9 @@ class Monitor:
     """Reads the servos of a rig, one after the other.
 
     Args:
-        readers: of the servos of each bus, by the name of the bus.
-        joints: in the order of the samples.
-        now_s: the ports' clock.
+        readers: readers of the servos of each bus, by the name of the bus.
+        joints: joints in the order of the samples.
+        now_s: clock of the ports.
         pairs: joints that two servos move together.
     """
 
@@ -217,7 +217,7 @@ def joint_telemetry(
 ) -> tuple[Telemetry | None, Telemetry | None]:
     """Return the telemetry of two coupled servos with the angles of their joints.
 
-    Without either of them both joints' angles are unknown.
+    If either is missing, the angles of both joints are unknown.
     """
     goals = _joint_deg(pair, one and one.goal_deg, other and other.goal_deg)
     at = _joint_deg(pair, one and one.position_deg, other and other.position_deg)
@@ -252,7 +252,7 @@ def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:
             if values[key] is not None:
                 values[key] = round(values[key], digits)
         if seen.measured:
-            del values["pulse_us"]  # smart servos know no such thing
+            del values["pulse_us"]  # smart servos have no pulses
     return {
         "t_s": round(sample.at_s - start_s, 3),
         "took_ms": round(1e3 * sample.took_s, 1),

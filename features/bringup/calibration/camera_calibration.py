@@ -1,7 +1,7 @@
-"""Views of the board to the lens: focal lengths, centre, distortion, and how sure they are.
+"""Lens calibration from views of the board: focal lengths, centre, distortion, and uncertainties.
 
-Pure. Zhang's method and its refinement are OpenCV's (manual, cv2.calibrateCameraExtended);
-what is ours is the refusal of views and results that are not worth writing down.
+Pure. Zhang's method and its refinement are OpenCV's (manual, cv2.calibrateCameraExtended). This
+module adds the refusal of unsuitable views and results.
 """
 
 from collections.abc import Sequence
@@ -23,18 +23,18 @@ from gazerig.robot.model.intrinsics import project, rays
 
 Floats = NDArray[np.float64]
 
-# Limits in pixels are for images of this width and grow with it.
+# Limits in pixels are for images of this width and scale with the width.
 _WIDTH_PX = 640
 # The third radial coefficient is kept if it is this many times its spread.
 _PROVEN = 4.0
-# No view is an outlier that is as good as this.
+# A view with an error up to this is never an outlier.
 _GOOD_PX = 0.25
-# No more than one view in five is dropped; more that do not fit are the majority's fault.
+# At most one view in five is dropped; if more do not fit, the others are at fault.
 _MOST_DROPPED = 0.2
 
 
 class CameraCalibrationRefused(SetupError):
-    """The frames do not make a calibration; the message has the reason and the remedy."""
+    """Error: the frames are not sufficient for a calibration; the message has reason and remedy."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class LensCalibrationParams:
 class LensCalibration:
     """A measured lens.
 
-    width_px, height_px: size of the frames it was measured on
-    rms_px: root mean square reprojection error of all corners; view_rms_px: of each view kept
-    kept, dropped: numbers of the views given, from 0
+    width_px, height_px: size of the frames of the measurement
+    rms_px: root mean square reprojection error of all corners; view_rms_px: of each kept view
+    kept, dropped: numbers of the input views, from 0
     focal_std_px, centre_std_px: standard deviations of fx, fy and of cx, cy
     """
 
@@ -80,12 +80,12 @@ class LensCalibration:
         return degrees(atan2(right, 1.0) - atan2(left, 1.0))
 
     def params(self) -> LensParams:
-        """Return the lens as the rig's file holds it."""
+        """Return the lens in the format of the rig's file."""
         return lens_params(self.intrinsics, self.width_px, self.height_px)
 
 
 def lens_params(lens: Intrinsics, width_px: int, height_px: int) -> LensParams:
-    """Return a lens as the rig's file holds it."""
+    """Return a lens in the format of the rig's file."""
     fx, fy, cx, cy = (round(px, 2) for px in (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px))
     k1, k2, p1, p2, k3 = (round(k, 6) + 0.0 for k in lens.distortion)
     return LensParams(width_px, height_px, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
@@ -109,11 +109,11 @@ def calibrate_lens(
 ) -> LensCalibration:
     """Find the lens that explains all views.
 
-    guess: a lens that is about right, by which views are compared
+    guess: an approximate lens, for the comparison of views
 
     Raises:
-        CameraCalibrationRefused: too few views or too much alike (names the missing ones), or
-            the result is not good or not sure enough.
+        CameraCalibrationRefused: the views are too few or too similar (names the missing ones), or
+            the result is not good or not certain enough.
     """
     par = params if params is not None else LensCalibrationParams()
     usable = _usable(views, guess, width_px, height_px, par.views)
@@ -124,7 +124,7 @@ def calibrate_lens(
             break
         del kept[worst]
         fit = _fit(views, kept, width_px, height_px)
-    # The views without the outliers must still show all of the lens.
+    # The views without the outliers must still cover the lens.
     _usable([views[k] for k in kept], guess, width_px, height_px, par.views)
     _judge(fit, width_px, height_px, par)
     fx, fy, cx, cy = fit.std[:4].tolist()
@@ -144,7 +144,7 @@ def calibrate_lens(
 def _usable(
     views: Sequence[DetectedBoard], guess: Intrinsics, width: int, height: int, params: ViewParams
 ) -> list[int]:
-    """Return the numbers of the views that show something new, or refuse if they are too few."""
+    """Return the numbers of the views that add information; refuse if they are too few."""
     collector = ViewCollector(guess, width, height, params)
     usable = [k for k, seen in enumerate(views) if not collector.offer(seen)]
     if not collector.coverage.enough:
@@ -189,7 +189,7 @@ def _run_opencv(views: Sequence[DetectedBoard], width: int, height: int, flags: 
 def outlier(view_rms_px: Floats, ratio: float, good_px: float) -> int | None:
     """Return the view with the largest error if that is much larger than the median.
 
-    ratio: of both; good_px: no view with a smaller error is an outlier
+    ratio: limit of error over median; good_px: a view with a smaller error is not an outlier
     """
     worst = int(np.argmax(view_rms_px))
     usual = float(np.median(view_rms_px))
@@ -219,7 +219,7 @@ def _judge(fit: _Fit, width: int, height: int, params: LensCalibrationParams) ->
 
 
 def _folds(lens: Intrinsics, width: int, height: int) -> bool:
-    """Return whether a pixel near the image's edge is reached from two directions or none."""
+    """Return whether a pixel near the image's edge has two directions or none."""
     x, y = np.linspace(0.0, width - 1.0, 9), np.linspace(0.0, height - 1.0, 9)
     pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     back = project(rays(pixels, lens), lens)

@@ -1,7 +1,7 @@
-"""Calibration of a camera, step by step: frames in, the next instruction and the result out.
+"""Calibration of a camera, step by step, from frames to the next instruction and the result.
 
-Nothing is printed and nothing waits on its own: who runs the steps shows them, brings the
-frames and moves the head.
+Nothing here prints or waits: the caller of the steps shows them, supplies the frames and moves the
+head.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,9 +27,9 @@ from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, DetectedBoard
 
 Look = Callable[[], Shot | None]
-"""Returns the newest frame at once, None before the first."""
+"""Returns the newest frame immediately, None before the first."""
 
-# Shares of the neck's range (yaw, pitch, roll): pairs of axes mixed, symmetric.
+# Fractions of the neck's range (yaw, pitch, roll): combinations of two axes, symmetric.
 _PATTERN = (
     (0.0, 0.0, 0.0), (0.5, 0.5, 1.0), (1.0, 0.0, 0.0), (1.0, 0.0, -1.0), (0.9, 0.8, 0.0),
     (0.0, 1.0, 0.0), (-0.5, 0.5, -1.0), (-0.9, 0.8, 0.0), (-1.0, 0.0, 0.0), (-1.0, 0.0, 1.0),
@@ -55,8 +55,8 @@ class NeckStepParams:
 class LensStep(NamedTuple):
     """Contribution of one frame.
 
-    number: of the frame; corners: how many were seen; kept: it counts as a view
-    why: it was not kept; coverage: what is there and what to do next
+    number: number of the frame; corners: number of detected corners; kept: whether it is a view
+    why: reason why it was not kept; coverage: coverage so far and the next instruction
     """
 
     number: int
@@ -67,7 +67,7 @@ class LensStep(NamedTuple):
 
 
 class LensSteps:
-    """Collects frames of a board that the user holds until they cover all of the lens."""
+    """Collects frames of a board in the user's hands until they cover the whole lens."""
 
     def __init__(
         self, board: CharucoBoard, view_rad: float, params: LensCalibrationParams | None = None
@@ -81,7 +81,7 @@ class LensSteps:
         """Detect the board in a frame and keep the view if it is new.
 
         Raises:
-            CameraError: the frames have changed their size.
+            CameraError: the size of the frames has changed.
         """
         height, width = shot.image.shape[:2]
         if self._collector is None:
@@ -99,7 +99,7 @@ class LensSteps:
         return LensStep(shot.number, corners, not why, why, self._collector.coverage)
 
     def try_result(self) -> tuple[LensCalibration | None, str]:
-        """Return the lens, or None and why more views are needed.
+        """Return the lens, or None and the reason why more views are needed.
 
         Raises:
             CameraCalibrationRefused: more views will not help.
@@ -116,7 +116,7 @@ class LensSteps:
         """Return the lens.
 
         Raises:
-            CameraCalibrationRefused: the views do not show it.
+            CameraCalibrationRefused: the views do not determine it.
         """
         views: Sequence[DetectedBoard] = (
             self._collector.views if self._collector is not None else ()
@@ -130,15 +130,15 @@ class Neck(Protocol):
     """Moves the head."""
 
     def turn(self, head_rad: Angles3) -> None:
-        """Move gently to a yaw, pitch and roll; return when the head is there.
+        """Move gently to a yaw, pitch and roll; return when the head has arrived.
 
         Raises:
-            DriverError: it cannot.
+            DriverError: the movement is not possible.
         """
         ...
 
     def rest(self, seconds: float) -> None:
-        """Hold still for this long, and keep the servos' watchdog from expiring."""
+        """Hold still for a time, and keep the servos' watchdog from expiring."""
         ...
 
     def angles(self) -> Angles3:
@@ -149,8 +149,8 @@ class Neck(Protocol):
 class NeckStep(NamedTuple):
     """Contribution of one neck angle.
 
-    number, step_count: which of how many angles; asked_rad: yaw, pitch, roll requested
-    corners: how many were seen in every frame; view: what counts, or None and why not
+    number, step_count: number of the angle, and of all; asked_rad: requested yaw, pitch, roll
+    corners: number of corners detected in every frame; view: the view, or None and why not
     """
 
     number: int
@@ -170,14 +170,14 @@ def neck_angles(
 ) -> tuple[Angles3, ...]:
     """Plan angles at which a board straight ahead stays in the image.
 
-    ranges_rad: lowest and highest yaw, pitch and roll that the neck may have
+    ranges_rad: lowest and highest permitted yaw, pitch and roll of the neck
     """
     par = params if params is not None else NeckStepParams()
     half = (degrees(atan(0.5 * width_px / lens.fx_px)), degrees(atan(0.5 * height_px / lens.fy_px)))
     far_deg = (min(par.yaw_deg, 0.55 * half[0]), min(par.pitch_deg, 0.5 * half[1]), par.roll_deg)
 
     def within(axis: int, share: float) -> float:
-        # A tenth of the range is left out: no view is taken at the neck's ends.
+        # A tenth of the range is not used: no view is taken at its ends.
         low, high = (0.9 * end for end in ranges_rad[axis])
         return min(max(share * radians(far_deg[axis]), low), high)
 
@@ -223,7 +223,7 @@ def _average_view(
         before = neck.angles()
         neck.rest(0.04)
         shot = look()
-        # A frame from before the head came to rest shows the board from elsewhere.
+        # A frame from before the head came to rest shows the board from another position.
         if shot is None or shot.captured_s <= last_s:
             continue
         last_s = shot.captured_s

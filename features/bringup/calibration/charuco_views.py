@@ -1,11 +1,11 @@
 """Views of the ChArUco board: its pose, and the views that a lens calibration needs. Pure.
 
-A lens shows its focal length only on a tilted board, its centre and distortion only near
-the edges of the image: many similar views fit well and show little.
+Only a tilted board determines the focal length of a lens, and only views near the edges of the
+image its centre and distortion. Many similar views fit well but determine little.
 
 Frames as in gazerig.robot.model.charuco_board and gazerig.robot.model.intrinsics. A flat
-board seen from far has two poses that explain it nearly as well, mirrored about the line of sight;
-both are given.
+board seen from far has two poses that explain it nearly equally well, mirrored about the line of
+sight; both are returned.
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ def board_poses(seen: DetectedBoard, lens: Intrinsics) -> tuple[BoardPose, ...]:
         _, turns, places, _ = cv2.solvePnPGeneric(
             points, corners, matrix, bends, flags=cv2.SOLVEPNP_IPPE
         )
-    except cv2.error:  # corners that no plane could show
+    except cv2.error:  # corners that are impossible for a plane
         return ()
     found = []
     for start_turn, start_place in zip(turns, places, strict=True):
@@ -64,7 +64,7 @@ def board_poses(seen: DetectedBoard, lens: Intrinsics) -> tuple[BoardPose, ...]:
 
 @dataclass(frozen=True)
 class ViewParams:
-    """Number of views, and differences between them."""
+    """Required number of views, and differences between them."""
 
     # fmt: off
     least_views: Annotated[int, Bounds(4, 200), "fewer are refused"] = 12
@@ -80,7 +80,7 @@ class ViewParams:
 class BoardView(NamedTuple):
     """Position and tilt of the board in one view.
 
-    left, right, top, bottom: of its corners in the image, 0..1
+    left, right, top, bottom: limits of its corners in the image, 0..1
     tilt_right_deg: right edge nearer; tilt_down_deg: bottom edge nearer
     """
 
@@ -92,7 +92,7 @@ class BoardView(NamedTuple):
     tilt_down_deg: float
 
     def differs(self, other: "BoardView", params: ViewParams) -> bool:
-        """Return whether it shows something that the other does not."""
+        """Return whether it is sufficiently different from another view."""
         moved = max(abs(a - b) for a, b in zip(self[:4], other[:4], strict=True))
         tilted = hypot(
             self.tilt_right_deg - other.tilt_right_deg, self.tilt_down_deg - other.tilt_down_deg
@@ -101,9 +101,9 @@ class BoardView(NamedTuple):
 
 
 class Coverage(NamedTuple):
-    """Coverage of the views kept, and what a person should do next.
+    """Coverage of the kept views, and the next instructions for a person.
 
-    views: number kept; missing: one instruction each, empty when all is there
+    views: number of kept views; missing: instructions, empty when the views are sufficient
     """
 
     views: int
@@ -111,7 +111,7 @@ class Coverage(NamedTuple):
 
     @property
     def enough(self) -> bool:
-        """Return whether a calibration can be made of them."""
+        """Return whether the views are sufficient for a calibration."""
         return not self.missing
 
 
@@ -120,7 +120,7 @@ def board_view(
 ) -> BoardView | None:
     """Return position and tilt of the board, None if its pose cannot be found.
 
-    guess: a lens that is about right; the field of view of the data sheet will do
+    guess: an approximate lens; the field of view of the data sheet is sufficient
     """
     poses = board_poses(seen, guess)
     if not poses:
@@ -132,7 +132,7 @@ def board_view(
 
 
 def coverage(views: Sequence[BoardView], params: ViewParams) -> Coverage:
-    """Return what is missing."""
+    """Return the coverage of views, and what is missing."""
     edge, tilt = params.edge_share, params.least_tilt_deg
     goals = {
         "bring the board to the left edge of the image": any(v.left <= edge for v in views),
@@ -155,7 +155,7 @@ def coverage(views: Sequence[BoardView], params: ViewParams) -> Coverage:
 
 
 class ViewCollector:
-    """Keeps the views that show something new."""
+    """Keeps the views that add information."""
 
     def __init__(
         self, guess: Intrinsics, width_px: int, height_px: int, params: ViewParams | None = None
@@ -167,7 +167,7 @@ class ViewCollector:
 
     @property
     def coverage(self) -> Coverage:
-        """Return what the kept views cover and what is missing."""
+        """Return the coverage of the kept views, and what is missing."""
         return coverage(self._held, self.params)
 
     def offer(self, seen: DetectedBoard | None) -> str:
@@ -190,24 +190,24 @@ class ViewCollector:
 
 
 PAPERS_MM: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "letter": (279.4, 215.9)}
-"""Width and height of the paper laid crosswise."""
+"""Width and height of the paper in landscape format."""
 
 RULER_MM = 100
 """Length of the ruler on the page."""
 
-# A whole number of pixels a millimetre keeps squares and marker modules exact.
+# A whole number of pixels per millimetre keeps squares and marker modules exact.
 _PX_PER_MM = 12
 _DPI = _PX_PER_MM * 25.4
-# No printer reaches the edge; the strip below the board holds ruler and text.
+# No printer reaches the edge; the strip below the board contains ruler and text.
 _EDGE_MM, _STRIP_MM = 5.0, 13.0
 _BLACK = 0
 
 
 def board_page(board: CharucoBoard, paper: str) -> ImageArray:
-    """Draw the page: (h, w) grey, 12 px a millimetre.
+    """Draw the page: (h, w) grey, 12 px per millimetre.
 
     Raises:
-        SetupError: no such paper, or the board is too large for it.
+        SetupError: the paper is unknown, or the board is too large for it.
     """
     if paper not in PAPERS_MM:
         raise SetupError(f"paper {paper!r}: unknown; there is {', '.join(PAPERS_MM)}")
@@ -226,7 +226,7 @@ def board_page(board: CharucoBoard, paper: str) -> ImageArray:
     top = round((_EDGE_MM + (room_mm[1] - board_mm[1]) / 2) * _PX_PER_MM)
     sheet[top : top + drawn.shape[0], left : left + drawn.shape[1]] = drawn
     below = round((high_mm - _EDGE_MM - _STRIP_MM + 3.0) * _PX_PER_MM)
-    # A line of 100 mm with a mark every 10 mm; its length is that between outer edges.
+    # A line of 100 mm with a mark every 10 mm; the length is between the outer edges.
     mm = _PX_PER_MM
     sheet[below : below + 3, left : left + RULER_MM * mm] = _BLACK
     for at_mm in range(0, RULER_MM + 1, 10):
@@ -246,18 +246,18 @@ def board_page(board: CharucoBoard, paper: str) -> ImageArray:
 
 
 def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) -> None:
-    """Write the page as PDF or PNG, by the name's ending; either prints in true size.
+    """Write the page as PDF or PNG, by the file's suffix; both print in true size.
 
     Raises:
-        SetupError: see ``page``, or the ending is another one.
-            Or it already exists and not forced, or cannot be written.
+        SetupError: see ``board_page``; or the suffix is another one, the file already exists and
+            ``force`` is not set, or it cannot be written.
     """
     if out.suffix.lower() not in (".pdf", ".png"):
         raise SetupError(f"{out}: a page is written as .pdf or .png; choose such a name")
     image = Image.fromarray(board_page(board, paper))
     with output_file(out, force) as file:
         if out.suffix.lower() == ".pdf":
-            # Two grey values compressed without loss: a JPEG inside would blur the corners.
+            # Lossless compression of two grey values: a JPEG inside would blur the corners.
             image = image.convert("1", dither=Image.Dither.NONE)
             image.save(file, format="PDF", resolution=_DPI)
         else:

@@ -1,9 +1,9 @@
 """Slow search for the stop of a joint. Pure.
 
-The goal runs ahead of the joint by a few degrees at most, so the servo pushes no harder
-than its position gain makes of that; if the joint does not move although it is pushed, its
-stop is reached and the goal goes back at once. A stop and a finger look the same:
-both are treated alike, gently and for half a second at the longest.
+The goal is ahead of the joint by a few degrees at most, so the servo's position gain limits its
+force. If the joint does not move although it is pushed, it is at its stop, and the goal moves back
+immediately. A stop and a finger cannot be distinguished: both are pushed gently and for at most
+half a second.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from gazerig.params import Bounds
 STEPS_PER_DEG = STEPS_PER_TURN / 360.0
 
 NEAR_DEG = 1.0
-"""Distance from its goal of a servo with factory gains under a light load."""
+"""Distance of a servo with factory gains and a light load from its goal."""
 
 BACK_OFF_EXCHANGES = 25
 """Half a second at 50 Hz, for the motion back from a stop."""
@@ -41,8 +41,8 @@ class StopSearchParams:
 class EndStop(NamedTuple):
     """Result of a search, in unwrapped steps.
 
-    kind: "stop", pushed and did not move; "limit", the end of what the servo allows
-    pushed_s: time for which it stood still under the goal
+    kind: "stop": pushed and did not move; "limit": end of the range that the servo permits
+    pushed_s: time for which it was pushed without motion
     """
 
     position_steps: int
@@ -51,13 +51,13 @@ class EndStop(NamedTuple):
 
 
 class StopSearch:
-    """One search in one direction; ask ``step`` for the goal until ``found`` is not None.
+    """One search in one direction; call ``step`` for the next goal until ``found`` is not None.
 
     Args:
-        params: how gently.
+        params: speed and force.
         direction: 1 towards more steps, -1 towards fewer.
-        low: the least goal that the servo allows, in steps.
-        high: the greatest one.
+        low: the smallest goal that the servo permits, in steps.
+        high: the largest goal.
     """
 
     def __init__(self, params: StopSearchParams, direction: int, low: int, high: int) -> None:
@@ -69,9 +69,9 @@ class StopSearch:
         self.found: EndStop | None = None
 
     def step(self, position_steps: int, load: float, t_s: float) -> int:
-        """Add a measurement, return the goal; after the end the goal that backs off.
+        """Add a measurement and return the goal; after the end, a goal away from the stop.
 
-        load: present current as a share of the stall current, 0 if unknown
+        load: present current as a fraction of the stall current, 0 if unknown
         """
         par, way = self._params, self._way
         if self._goal is None:
@@ -101,7 +101,7 @@ class StopSearch:
 
 
 Exchange = Callable[[int | None], tuple[int, float, float]]
-"""Sends a goal (None: none) and returns position in steps, load share and time in seconds."""
+"""Sends a goal (None: no goal) and returns position in steps, load and time in seconds."""
 
 
 def find_end_stop(
@@ -118,7 +118,7 @@ def find_end_stop(
 
 
 def move_to_goal(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
-    """Move a joint slowly to a position; return whether it came there unhindered."""
+    """Move a joint slowly to a position; return whether it arrived unhindered."""
     position, _, _ = exchange(None)
     way = 1 if goal_steps > position else -1
     look = StopSearch(params, way, min(goal_steps, position), max(goal_steps, position))

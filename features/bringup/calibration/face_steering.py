@@ -1,17 +1,17 @@
-"""Places of a person's own face parts, to which the person steers the gaze by keys.
+"""Positions of a person's face parts, to which the person steers the gaze by keys.
 
-People judge well where another person looks (Nakamoto & Tsuruno 3.7), so a person whose face
-differs from an adult's average steers the gaze to each part of it and confirms each. Only the
-direction of a gaze can be judged: a part moves in the face's plane, to its owner's left and up,
-and its distance out of the face stays as it was.
+People judge the direction of another person's gaze well (Nakamoto & Tsuruno 3.7). So a person whose
+face differs from an adult's average steers the gaze to each part of it and confirms each. Only the
+direction of a gaze can be judged: a part moves in the face's plane, to its owner's left and up, and
+its distance out of the face does not change.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up;
-millimetres. The offsets live in that frame, so they hold wherever the face goes and
-however it turns. Up to ``FaceSteering`` it is pure: keys and poses in, values out.
+millimetres. The offsets are in that frame, so they are valid for every pose of the face. All code
+before ``FaceSteering`` is pure: from keys and poses to values.
 
-``FaceSteering`` chooses the target instead of attention: one part of the nearest face, placed again
-with the face's full pose at every tick, so the person may move while judging. After it come the
-oculomotor model of an gaze without refixations and scatter, guard and servos.
+``FaceSteering`` chooses the target instead of attention: one part of the nearest face, located with
+the face's full pose at every tick, so the person may move while judging. It is followed by the
+oculomotor model, without refixations and scatter, the guard and the servos.
 """
 
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ from gazerig.robot.model.kinematics import gaze_error
 Key = Literal["left", "right", "up", "down", "larger", "smaller", "enter", "skip", "back", "end"]
 
 ORDER = ("N", "LE", "RE", "M", "DN", "UP", "FL", "FR")
-"""The parts in the order of the calibration, from the middle outwards."""
+"""The parts in the order of the calibration, from the centre outwards."""
 
 PART_NAMES_TEXT = {
     "N": "the tip of your nose",
@@ -45,7 +45,7 @@ PART_NAMES_TEXT = {
 
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0)
 FARTHEST_MM = 150.0
-"""No part of a face is farther from the tip of its nose, sideways or upright."""
+"""Largest distance of a face part from the tip of the nose, sideways or vertically."""
 
 # A person who faces the robot sees the gaze go to their own left, which is the face's +y.
 _WAYS: Mapping[str, tuple[float, float]] = {
@@ -60,11 +60,11 @@ _WAYS: Mapping[str, tuple[float, float]] = {
 class FaceCalibration:
     """Progress of a calibration.
 
-    starts_mm, places_mm: each part's first and present place in the face frame
+    starts_mm, places_mm: initial and present position of each part in the face frame
     part_number: number of the part in ORDER, len(ORDER) after the last
     adjusted_parts: parts that the gaze seemed to look at
     step: number of the present step in STEPS_MM
-    is_ended: no part is due any more
+    is_ended: whether all parts are done
     """
 
     starts_mm: tuple[Vec3, ...]
@@ -76,29 +76,29 @@ class FaceCalibration:
 
     @property
     def part(self) -> str | None:
-        """Return the part that is due, None at the end."""
+        """Return the current part, None at the end."""
         return None if self.is_ended or self.part_number >= len(ORDER) else ORDER[self.part_number]
 
     @property
     def step_mm(self) -> float:
-        """Return how far one key moves the gaze."""
+        """Return the distance by which one key moves the gaze."""
         return STEPS_MM[self.step]
 
     def place_mm(self, part: str) -> Vec3:
-        """Return the present place of a part, in the face frame."""
+        """Return the present position of a part, in the face frame."""
         return self.places_mm[ORDER.index(part)]
 
     def moved_mm(self, part: str) -> tuple[float, float]:
-        """Return how far a part has been moved to its owner's left and up."""
+        """Return the distances by which a part has been moved to its owner's left and up."""
         _, y0, z0 = self.starts_mm[ORDER.index(part)]
         _, y, z = self.place_mm(part)
         return y - y0, z - z0
 
 
 def initial_calibration(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
-    """Return the start: a rig's own places, or those of an adult's face for parts without one.
+    """Return the start: the positions in a rig, or those of an adult's face for other parts.
 
-    own_mm: part -> place in the face frame, as under ``face_parts_mm`` of a rig file
+    own_mm: part -> position in the face frame, as under ``face_parts_mm`` of a rig file
     """
     starts = [
         own_mm[part] if part in own_mm else _round_to_tenths((x * 1e3, y * 1e3, z * 1e3))
@@ -108,7 +108,7 @@ def initial_calibration(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
 
 
 def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
-    """Return the state after a key; after the end, keys do nothing."""
+    """Return the state after a key; after the end, keys have no effect."""
     part = state.part
     if part is None:
         return state
@@ -136,19 +136,19 @@ def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
 
 
 def point_world_m(place_mm: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Return the point in the world of a place in the face frame."""
+    """Convert a position in the face frame to a point in the world."""
     x, y, z = place_mm
     return add(p_world_face_m, rotate(R_world_face, (x / 1e3, y / 1e3, z / 1e3)))
 
 
 def place_in_face_mm(p_world_m: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Return the place in the face frame of a point in the world."""
+    """Convert a point in the world to a position in the face frame."""
     x, y, z = rotate_back(R_world_face, sub(p_world_m, p_world_face_m))
     return x * 1e3, y * 1e3, z * 1e3
 
 
 def changed_places(state: FaceCalibration) -> dict[str, Vec3]:
-    """Return the chosen places as dotted keys of a rig file and values, to 0.1 mm."""
+    """Return the chosen positions as dotted keys of a rig file and values, to 0.1 mm."""
     return {
         f"face_parts_mm.{part}": _round_to_tenths(state.place_mm(part))
         for part in ORDER
@@ -162,7 +162,7 @@ def _round_to_tenths(place_mm: Vec3) -> Vec3:
 
 
 def _step_within_range(value: float, by: float) -> float:
-    # A place stored farther out stays, but moves only inwards.
+    # A position stored farther out is kept, but can only be moved inwards.
     far = max(FARTHEST_MM, abs(value))
     return max(-far, min(far, value + by))
 
@@ -185,30 +185,30 @@ AIMED_DEG = 1.0
 """Largest gaze error at which the eyes look at the part."""
 
 STALE_S = 0.4
-"""No face is seen in an image older than this."""
+"""Largest age of an image with a face."""
 
 WAIT_S = 1.5
 """Time for which an Enter waits for moving eyes."""
 
 _LOST_S = 5.0
 _STILL: Vec3 = (0.0, 0.0, 0.0)
-# The head turns to the face as far as it can, which leaves the eyes their whole range.
+# The head turns to the face as far as possible, so that the eyes have their whole range.
 _PULL = 1.0
 
 
 class FaceSteering:
-    """A gazerig.robot.control.loop.Chooser whose choices come from keys.
+    """Chooser (gazerig.robot.control.loop) that keys control.
 
     state: progress of the calibration
-    face: the face that is looked at, None while none is seen
+    face: the target face, None while no face is seen
     error_deg: angle of the worse eye from the part, as measured, or of the mean line of sight
         of eyes that share one linkage for yaw; inf while unknown
 
     Args:
-        state: where to start.
-        top_down: the behaviours, of which none is active.
-        rest_world_m: where to look while no face is seen.
-        converges: each eye has a yaw joint of its own.
+        state: initial state.
+        top_down: the behaviours, none of which is active.
+        rest_world_m: point to look at while no face is seen.
+        converges: whether each eye has its own yaw joint.
     """
 
     def __init__(
@@ -233,11 +233,11 @@ class FaceSteering:
 
     @property
     def is_aimed(self) -> bool:
-        """Return whether both eyes are on the part and no key is waiting."""
+        """Return whether both eyes are on the part and no key waits."""
         return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Return the part that is due as target, or where to wait while no face is seen."""
+        """Return the current part as target, or the rest point while no face is seen."""
         followed, self.face = self.face.id if self.face is not None else None, None
         if percept is not None and percept.faces and percept.age_s(t_s) <= STALE_S:
             # The present face while it is seen, else the nearest.
@@ -250,7 +250,7 @@ class FaceSteering:
             )
         face, part = self.face, self.state.part
         if face is None or percept is None or part is None:
-            # At the last face, and after a while straight ahead.
+            # At the last face first, and straight ahead after a while.
             lost = t_s - self._seen_s > _LOST_S
             p = self._rest if lost else self._lost_at
             self._count(("rest", lost))
@@ -268,9 +268,9 @@ class FaceSteering:
         )  # fmt: skip
 
     def press(self, key: Key, t_s: float) -> str | None:
-        """Apply a key; return why that is impossible.
+        """Apply a key; return the reason if that is impossible.
 
-        An Enter counts as soon as the eyes are on the part, see ``update``.
+        An Enter takes effect as soon as the eyes are on the part, see ``update``.
         """
         if key != "end" and self.face is None:
             return "no face is seen: keys wait until one is"
@@ -283,7 +283,7 @@ class FaceSteering:
         return None
 
     def update(self, tick: Tick) -> str | None:
-        """Measure the gaze; return why a waiting Enter was dropped."""
+        """Measure the gaze; return the reason if a waiting Enter was dropped."""
         self.error_deg = self._gaze_error_deg(tick)
         if tick.target.kind != "part" or tick.gaze.phase == "saccade":
             self.error_deg = inf
@@ -303,10 +303,10 @@ class FaceSteering:
         return None
 
     def _gaze_error_deg(self, tick: Tick) -> float:
-        """Return the angle of the gaze from the part, as far as the eyes can meet it."""
+        """Return the angle between the gaze and the part, as far as the eyes can reach it."""
         return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
 
     def _count(self, identity: object) -> None:
-        """Count a shift whenever another point is looked at."""
+        """Count a shift whenever the target point changes."""
         self._shift += identity != self._identity
         self._identity = identity

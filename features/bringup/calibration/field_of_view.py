@@ -1,8 +1,9 @@
-"""The field of view of a camera by a face at a known distance, without a board.
+"""Field of view of a camera from a face at a known distance, without a board.
 
-The size of a face in the image depends on its distance and the focal length. Its distance by an
-assumed field of view, over its true distance, gives the true field. People's faces differ in size
-by 8 %, so no number of frames makes this surer than that; the printed board gives 0.2 %.
+The size of a face in the image depends on its distance and the focal length. The ratio between the
+distance for an assumed field of view and the true distance gives the true field. People's faces
+differ in size by 8 %, which limits the accuracy for any number of frames; the printed board gives
+0.2 %.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from gazerig.gaze.angles import norm
 from gazerig.robot.perception.face_pose import face_pose
 
 SIZE_SPREAD = 0.08
-"""Standard deviation of the size of faces, as a share."""
+"""Relative standard deviation of the size of faces."""
 LEAST_FRAMES = 60
 _ROUNDS = 4  # perspective changes with the focal length, a little
 _MOST_MOVED = 0.15
@@ -26,10 +27,10 @@ _LEAST_DEG, _MOST_DEG = 20.0, 140.0
 
 
 class FaceFieldOfView(NamedTuple):
-    """A field of view as found.
+    """Estimated field of view.
 
-    horizontal_deg: the best value; low_deg, high_deg: those of a face 8 % larger and smaller
-    frames: with a face that was used; moved: how much its size varied, as part of it
+    horizontal_deg: the best value; low_deg, high_deg: values for a face 8 % larger and smaller
+    frames: number of frames with a used face; moved: relative variation of its size
     """
 
     horizontal_deg: float
@@ -42,16 +43,16 @@ class FaceFieldOfView(NamedTuple):
 def estimate_field(
     landmarks_px: Sequence[Pixels], width_px: int, height_px: int, distance_m: float
 ) -> FaceFieldOfView:
-    """Return the field of view by a face that is seen at a known distance.
+    """Return the field of view from a face at a known distance.
 
     Args:
-        landmarks_px: (5, 2) of the face in each frame, in the order of ``DetectedFace``.
-        width_px: of the frames.
-        height_px: the same.
-        distance_m: from the lens to the tip of the nose.
+        landmarks_px: (5, 2) landmarks of the face in each frame, in the order of ``DetectedFace``.
+        width_px: width of the frames.
+        height_px: height of the frames.
+        distance_m: distance from the lens to the tip of the nose.
 
     Raises:
-        CameraCalibrationRefused: too few frames, it moved, or no lens has such a field.
+        CameraCalibrationRefused: too few frames, the face moved, or no lens has such a field.
     """
     field_rad = radians(ASSUMED_FIELD_DEG)
     for _ in range(_ROUNDS):

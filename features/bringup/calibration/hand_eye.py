@@ -1,17 +1,18 @@
-"""Place of the camera on the head, from one fixed board seen at several neck angles. Pure.
+"""Pose of the camera on the head, from one fixed board seen at several neck angles. Pure.
 
-Hand-eye calibration, AX = XB: the joints measure how the head moves, the camera sees how
-the board seems to move, and only one place of the camera on the head makes both agree. OpenCV's
-closed forms (manual, cv2.calibrateHandEye) start the search; they trust every single pose of the
-board, whose tilt is poorly seen, so the result is the pose of camera and board that reprojects
-all corners of all frames best. Corners far off count less (Huber). Joint sensors are not exact
-(steps of 0.088 deg, play of the gears), and a head that is 0.1 deg off shifts a board 0.7 m away
-by more than all errors of its corners; so each view has a small turn of the head as well, held
-near zero by the usual joint error. Nor is the lens known exactly: 1 % of its focal length is 7 mm
-of the camera's place, but a head that turns by known angles measures the lens too, so focal length
-and centre may move as far as a calibration is usually off. The standard deviations come from
-leaving out one view at a time (jackknife), and from how the place follows the lens.
-Frames as in gazerig.robot.model.frames; the board's as in gazerig.robot.model.charuco_board.
+Hand-eye calibration, AX = XB: the joints measure the motion of the head, the camera measures the
+apparent motion of the board, and only one pose of the camera on the head makes both agree. OpenCV's
+closed forms (manual, cv2.calibrateHandEye) are the start of the search. They rely on each single
+pose of the board, whose tilt is measured inaccurately. So the result is the pose of camera and
+board that reprojects all corners of all frames best. Outlying corners have less weight (Huber).
+Joint sensors are not exact (steps of 0.088 deg, play of the gears), and an error of 0.1 deg of the
+head shifts a board at 0.7 m by more than all errors of its corners. So each view also has a small
+rotation of the head as an unknown, with the usual joint error as prior. The lens is not known
+exactly either: 1 % of its focal length is 7 mm of the camera's position. But a head that turns by
+known angles also measures the lens, so focal length and centre may change within the usual error of
+a calibration. The standard deviations follow from omitting one view at a time (jackknife), and from
+the dependence of the pose on the lens. Frames as in gazerig.robot.model.frames; the board's as in
+gazerig.robot.model.charuco_board.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,20 +41,20 @@ Floats = NDArray[np.float64]
 # Steps for slopes by differences: radians, metres.
 _SMALL = 1e-6
 _MOST_STEPS = 60
-# The bound of Huber follows the errors of the round before.
+# The bound of Huber follows the errors of the previous round.
 _ROUNDS = 4
 # A last step of 1 um, or 0.00006 deg.
 _SETTLED = 1e-6
-# Numbers that all views share: camera, board, and focal length and centre of the lens.
+# Unknowns that all views share: camera, board, and focal length and centre of the lens.
 _SHARED = 15
 # Usual error of a corner; only its ratio to the joints' error matters.
 _CORNER_PX = 0.3
-# Huber's bound over the spread of the errors: 95 % as good as plain squares on normal noise.
+# Huber's bound relative to the spread of the errors: 95 % efficiency for normal noise.
 _HUBER = 1.345
 
 
 class Pose(NamedTuple):
-    """A frame in its parent: rotation (3, 3) and place (3,) in metres."""
+    """Pose of a frame in its parent: rotation (3, 3) and position (3,) in metres."""
 
     R: Floats
     p: Floats
@@ -63,17 +64,17 @@ class Pose(NamedTuple):
         return Pose(self.R @ child.R, self.R @ child.p + self.p)
 
     def displace(self, step: Floats) -> "Pose":
-        """Turn it about its own axes and shift it along its parent's."""
+        """Rotate it about its own axes and shift it along its parent's."""
         return Pose(self.R @ np.asarray(cv2.Rodrigues(step[:3])[0]), self.p + step[3:])
 
 
 class Estimate(NamedTuple):
     """Unknowns of the fit.
 
-    camera: in the head; board: in the world
-    lens_off: (3,) share by which the focal length is longer, pixels by which the centre is
-        farther right and lower, than calibrated
-    turns_rad: (views, 3) turn of each head beyond the measured joint angles
+    camera: pose in the head; board: pose in the world
+    lens_off: (3,) deviation from the calibrated lens: relative increase of the focal length, and
+        shift of the centre to the right and down in pixels
+    turns_rad: (views, 3) rotation of the head in each view beyond the measured joint angles
     """
 
     camera: Pose
@@ -103,12 +104,12 @@ class Estimate(NamedTuple):
 
 
 class Observations(NamedTuple):
-    """All corners of all views: n corners.
+    """Observations of all corners in all views: n corners.
 
     R_world_head: (n, 3, 3); p_world_head_m, corners_board_m: (n, 3); corners_px: (n, 2)
-    view: (n,) number of the view each belongs to; views: how many
-    lens_error: (3,) how far focal length (as a share) and centre (pixels) are usually off
-    joint_error_rad: how far joints are usually off
+    view: (n,) number of each corner's view; views: number of views
+    lens_error: (3,) usual errors of focal length (relative) and centre (pixels)
+    joint_error_rad: usual error of joints
     """
 
     R_world_head: Floats
@@ -143,16 +144,16 @@ class Observations(NamedTuple):
         )
 
     def errors(self, estimate: Estimate) -> Floats:
-        """Return by how much each corner is seen off: (2 n,) pixels, nan behind the camera."""
+        """Return the reprojection error of each corner: (2 n,) pixels, nan behind the camera."""
         world = self.corners_board_m @ estimate.board.R.T + estimate.board.p
         head = np.einsum("nji,nj->ni", self.R_world_head, world - self.p_world_head_m)
-        # The turns are so small that their squares do not count.
+        # The rotations are so small that their squares are negligible.
         head -= np.cross(estimate.turns_rad[self.view], head)
         shown = project((head - estimate.camera.p) @ estimate.camera.R, estimate.lens(self.lens))
         return np.asarray((shown - self.corners_px).ravel(), dtype=np.float64)
 
     def slopes(self, estimate: Estimate) -> tuple[Floats, Floats]:
-        """Return the slopes of errors by shared numbers (2 n, 15) and head turns (2 n, 3)."""
+        """Return the derivatives of errors by shared unknowns (2 n, 15) and rotations (2 n, 3)."""
         columns = []
         for k in range(_SHARED + 3):
             step = np.zeros(_SHARED + 3 * self.views)
@@ -162,12 +163,12 @@ class Observations(NamedTuple):
         return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
 
     def residuals(self, estimate: Estimate) -> Floats:
-        """Return the errors over a corner's usual one, then lens and turns over theirs."""
+        """Return errors of corners, lens and rotations, each relative to its usual error."""
         off = np.concatenate((estimate.lens_off, estimate.turns_rad.ravel())) / self._usual_errors()
         return np.concatenate((self.errors(estimate) / _CORNER_PX, off))
 
     def jacobian(self, estimate: Estimate) -> Floats:
-        """Return the slopes of ``residuals``: (2 n + 3 + 3 views, 15 + 3 views)."""
+        """Return the Jacobian of ``residuals``: (2 n + 3 + 3 views, 15 + 3 views)."""
         shared, own = self.slopes(estimate)
         rows, columns = len(shared), _SHARED + 3 * self.views
         slopes = np.zeros((rows + columns - 12, columns))
@@ -187,10 +188,10 @@ class Observations(NamedTuple):
 class Fit:
     """Result of the fit.
 
-    cost: what it made small
+    cost: minimised cost
     rms_px, view_rms_px: reprojection errors with the measured joint angles
-    corner_px: what is left of them when each head may be turned a little
-    joint_error_deg: root mean square of those turns, a joint
+    corner_px: remaining error with the estimated rotations of the head
+    joint_error_deg: root mean square of those rotations, per joint
     """
 
     observations: Observations
@@ -202,7 +203,7 @@ class Fit:
     joint_error_deg: float
 
     def spread(self) -> Floats:
-        """Return standard deviations (6,) of the camera's turn (rad) and place (m)."""
+        """Return standard deviations (6,) of the camera's rotation (rad) and position (m)."""
         observations, errors = self.observations, self.observations.errors(self.estimate)
         shared, own = observations.slopes(self.estimate)
         weight = np.minimum(1.0, _bound(errors) / np.maximum(np.abs(errors), 1e-12))
@@ -217,7 +218,7 @@ class Fit:
             inner[k] = a.T @ (a * w) - across @ np.linalg.solve(free, across.T)
             pull[k] = a.T @ (errors[mine] * weight[mine])
         try:
-            # Without view k the best place is this far from the best with all of them.
+            # Distance of the best pose without view k from the best pose with all views.
             whole = inner.sum(axis=0)
             whole[12:, 12:] += np.diag(1.0 / observations.lens_error**2)
             off = np.linalg.solve(whole - inner, pull[:, :, None])[:, :6, 0]
@@ -232,7 +233,7 @@ class Fit:
 
 
 def first_estimate(observations: Observations, camera: Pose, board: Pose) -> Estimate:
-    """Return an estimate with the lens as calibrated and the measured joint angles."""
+    """Return an estimate with the calibrated lens and the measured joint angles."""
     return Estimate(camera, board, np.zeros(3), np.zeros((observations.views, 3)))
 
 
@@ -273,7 +274,7 @@ def refine(observations: Observations, estimate: Estimate) -> Fit:
 
 
 def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
-    """Return Huber's loss of the corners' squares, and two derivatives, as scipy takes them."""
+    """Return Huber's loss of the corners' squares and two derivatives, in SciPy's format."""
 
     def loss(squares: Floats) -> Floats:
         rho = np.stack((squares, np.ones_like(squares), np.zeros_like(squares)))
@@ -286,7 +287,7 @@ def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
 
 
 def _bound(errors: Floats) -> float:
-    """Return the size beyond which errors count less, in pixels."""
+    """Return the size above which errors have less weight, in pixels."""
     return max(_HUBER * 1.4826 * float(np.median(np.abs(errors))), 1e-3)
 
 
@@ -297,13 +298,13 @@ _METHODS = (
     cv2.CALIB_HAND_EYE_HORAUD,
 )
 _MOST_DROPPED = 0.2
-# Limits in pixels are for images of this width and grow with it.
+# Limits in pixels are for images of this width and scale with it.
 _WIDTH_PX = 640
-# A search that ends worse than this is tried from the other starts too.
+# A search that ends with a larger error is repeated from the other starts.
 _DOUBTFUL_PX = 1.0
-# No view is an outlier that is as good as this.
+# A view with an error up to this is never an outlier.
 _GOOD_PX = 0.5
-# No joint is trusted beyond a quarter of a servo step.
+# Smallest assumed joint error: a quarter of a servo step.
 _BEST_JOINT_DEG = 0.02
 
 
@@ -328,7 +329,7 @@ class HandEyeParams:
 
 
 class NeckView(NamedTuple):
-    """The head's pose while a frame was taken, and the board in it."""
+    """View of the board: the head's pose at the time of a frame, and the board in the frame."""
 
     R_world_head: Mat3
     p_world_head_m: Vec3
@@ -337,20 +338,20 @@ class NeckView(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class HandEye:
-    """A camera found on the head.
+    """Result of the hand-eye calibration.
 
-    R_head_camera, p_head_camera_m: its pose in the head
-    R_world_board, p_world_board_m: pose of the board, by the same fit
-    lens: as given, with focal length and centre touched up by the same fit; it belongs to
-        this place of the camera
-    rms_px: root mean square reprojection error, joints taken at their word; view_rms_px: of
-        each view kept
-    corner_px: what is left of it when every neck joint may be off a little
-    joint_error_deg: root mean square of how far they would have to be off
-    kept, dropped: numbers of the views given, from 0
-    position_std_mm: standard deviation of each coordinate, from how views and lens bear on it
-    angle_std_deg: standard deviation about the camera's x, y and z axis, found likewise;
-        what the rig's geometry is off is in neither
+    R_head_camera, p_head_camera_m: pose of the camera in the head
+    R_world_board, p_world_board_m: pose of the board, from the same fit
+    lens: the input lens, with focal length and centre corrected by the same fit; it belongs to
+        this pose of the camera
+    rms_px: root mean square reprojection error with the measured joint angles; view_rms_px: of
+        each kept view
+    corner_px: remaining error if every neck joint may have a small error
+    joint_error_deg: root mean square of those joint errors
+    kept, dropped: numbers of the input views, from 0
+    position_std_mm: standard deviation of each coordinate, from the influence of views and lens
+    angle_std_deg: standard deviation about the camera's x, y and z axis, computed likewise;
+        neither includes errors of the rig's geometry
     """
 
     R_head_camera: Mat3
@@ -368,7 +369,7 @@ class HandEye:
     angle_std_deg: Vec3
 
     def camera_params(self, params: CameraParams) -> CameraParams:
-        """Return the camera at the place found, rounded to 0.1 mm and 0.01 deg."""
+        """Return the camera at the calibrated pose, rounded to 0.1 mm and 0.01 deg."""
         found = camera_at_pose(params, self.R_head_camera, self.p_head_camera_m)
         x, y, z = (round(mm, 1) for mm in found.position_mm)
         return replace(
@@ -384,13 +385,13 @@ class HandEye:
 def camera_on_head(
     views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: HandEyeParams | None = None
 ) -> HandEye:
-    """Find the place of the camera on the head.
+    """Find the pose of the camera on the head.
 
-    width_px: of the frames; limits in pixels grow with it
+    width_px: width of the frames; limits in pixels scale with it
 
     Raises:
-        CameraCalibrationRefused: too few views, turns about one axis only, or the result is
-            not good or not sure enough.
+        CameraCalibrationRefused: too few views, rotations about one axis only, or the result is
+            not good or not certain enough.
     """
     par = params if params is not None else HandEyeParams()
     if len(views) < par.least_views:
@@ -427,10 +428,10 @@ def camera_on_head(
 
 
 def turns_deg(R_world_head: Sequence[Mat3]) -> tuple[float, float]:
-    """Return the root mean square turn between any two poses about the main axis and the second.
+    """Return the root mean square rotations between poses about the main axis and the second.
 
-    If the second is 0, the head turned about one axis only, and the place of the camera
-    along it is unknown.
+    If the second is 0, the head turned about one axis only, and the position of the camera along
+    that axis is unknown.
     """
     R = np.array(R_world_head)
     turns = [
@@ -498,13 +499,13 @@ def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: Han
     if not best.corner_px < _DOUBTFUL_PX:
         others = [refine(observations, other) for _, other in starts[1:]]
         best = min((best, *others), key=lambda fit: fit.cost)
-    # Joints that proved better than usual are trusted more.
+    # Joints that are more accurate than usual get more weight.
     proven = min(max(best.joint_error_deg, _BEST_JOINT_DEG), params.joint_error_deg)
     return refine(observations._replace(joint_error_rad=radians(proven)), best.estimate)
 
 
 def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pose]]:
-    """Return places of camera and board by OpenCV's closed forms, those that are any."""
+    """Return the valid poses of camera and board from OpenCV's closed forms."""
     posed = [(view, poses[0]) for view in views if (poses := board_poses(view.seen, lens))]
     if len(posed) < 3:
         return []
@@ -522,7 +523,7 @@ def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pos
         camera = Pose(np.asarray(R, dtype=np.float64), np.ravel(p).astype(np.float64))
         if np.isfinite(camera.R).all() and np.isfinite(camera.p).all():
             hung = [h.then(camera).then(b) for h, b in zip(heads, boards, strict=True)]
-            # The board in the middle of all: median place, mean rotation.
+            # Average of the board's poses: median position, mean rotation.
             u, _, vt = np.linalg.svd(np.sum([pose.R for pose in hung], axis=0))
             mean = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
             found.append((camera, Pose(mean, np.median([pose.p for pose in hung], axis=0))))

@@ -1,7 +1,7 @@
 """Access to one hobby servo on a board, moved slowly by a person who watches it.
 
-It has no position sensor: its position is the pulse that it gets, as far as nothing holds it back.
-The board knows no watchdog: a guardian stops its pulses when this program is killed.
+The servo has no position sensor: its position is that of its pulse unless something blocks it. The
+board has no watchdog: a guardian stops the pulses if this program is killed.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ SPEED_US_S = 200.0
 
 NEAR_STEPS = 4
 TIMEOUT_S = 1.0
-"""A goal that is not reached this long after the planned time is given up."""
+"""Time after the planned arrival at which an unreached goal is given up."""
 
 SILENT_S = 2.0
 
@@ -34,14 +34,14 @@ class HobbyServoAccess:
     """The servo of one joint.
 
     Args:
-        name: the joint's.
-        joint: as configured.
-        port: of the board; opened by ``open``.
-        params: how to speak with the board.
-        clock: the host's.
-        stopped: called all the time; returns why to stop, None without a reason.
-        pulses_us: it is never sent outside.
-        guardian: has one plan, that of this servo; None: nothing stops its pulses.
+        name: name of the joint.
+        joint: configuration of the joint.
+        port: port of the board; opened by ``open``.
+        params: protocol of the board.
+        clock: clock of the host.
+        stopped: called regularly; returns why to stop, None without a reason.
+        pulses_us: range of permitted pulses.
+        guardian: has one plan, for this servo; None: nothing else stops its pulses.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class HobbyServoAccess:
 
     @property
     def pulse_us(self) -> float:
-        """Return the pulse that it gets now."""
+        """Return the present pulse."""
         return self._pulse / US_STEPS
 
     def open(self) -> float | None:
@@ -93,28 +93,28 @@ class HobbyServoAccess:
         return self._pulse / US_STEPS if self._on else None
 
     def begin(self, place_us: float) -> float:
-        """Hold the joint at its present pulse, or start with this one; return the pulse in us.
+        """Hold the joint at its present pulse, or start with a given one; return the pulse in us.
 
-        A servo without pulses goes there at once, at its own speed.
+        A servo without pulses moves there immediately, at its own speed.
 
         Raises:
-            ServoMissing: the channel does not take it.
+            ServoMissing: the channel does not accept it.
         """
         self._bus.retune([self._setup._replace(rest_steps=self._within(place_us))])
         (self._goal,) = self._bus.enable_torque()
         return self.place_us
 
     def aim(self, place_us: float) -> float:
-        """Move slowly to a pulse; return that pulse, limited to what is allowed."""
+        """Move slowly to a pulse; return that pulse, limited to the permitted range."""
         self._goal = self._within(place_us)
         return self.place_us
 
     def look(self) -> bool:
-        """Wait a moment and move it on; return whether it is at its goal.
+        """Wait a moment and continue the motion; return whether it is at its goal.
 
         Raises:
             BusLost: the board does not answer any more.
-            CalibrationStopped: a person or the system requested it.
+            CalibrationStopped: a person or the system requested the end.
         """
         why = self._stopped()
         if why is not None:
@@ -125,7 +125,7 @@ class HobbyServoAccess:
         return abs(at - self._goal) <= NEAR_STEPS
 
     def arrive(self) -> float:
-        """Move it to its goal; return the pulse in us at the end.
+        """Move the servo to its goal; return the pulse in us at the end.
 
         Raises:
             BusLost, CalibrationStopped: see ``look``.
@@ -147,7 +147,7 @@ class HobbyServoAccess:
         """Stop its pulses and close the port; safe to call at any time.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port has disappeared.
         """
         try:
             self._bus.disable_torque()
@@ -166,7 +166,7 @@ class HobbyServoAccess:
             if not feedback.missing:
                 self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
                 if feedback.rearmed[0]:
-                    # It keeps the pulse of the board, whatever the reason.
+                    # Keep the pulse of the board, for any reason.
                     sent_us, self._goal = self.place_us, self._pulse
                     remedy = (
                         ": if it never comes farther, widen the range of its channel in "

@@ -1,9 +1,9 @@
-"""Zero, sign and range of a joint out of servo positions: samples in, calibration out. Pure.
+"""Zero, sign and range of a joint, computed from servo positions. Pure.
 
-A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
-only the place within the turn, so a joint whose travel holds the seam would wake up a whole
-turn off: such a joint cannot be used and must be built in again.
-Steps as in gazerig.drivers.bus.servo_models, angles in degrees at the joint.
+A servo counts 4096 steps per turn; the transition from 4095 to 0 is its seam. After a restart it
+knows only the position within the turn, so a joint whose travel contains the seam could be wrong by
+a whole turn. Such a joint cannot be used, and its servo must be mounted again. Steps as in
+gazerig.drivers.bus.servo_models, angles in degrees at the joint.
 """
 
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
 
 SMALLEST_RANGE_DEG = 5.0
-"""A joint that moved less than this was not turned."""
+"""Least motion of a joint that counts as turned."""
 
 LONGEST_GAP_S = 0.3
 MAX_UNSEEN_JUMP_STEPS = STEPS_PER_TURN // 8
-"""A joint that turned farther in a longer gap may have turned in the other direction."""
+"""Longest gap and largest motion between two samples with a certain direction."""
 
 ENDS = {
     "eye_pan": ("LEFT", "RIGHT"),
@@ -40,7 +40,7 @@ ENDS = {
 
 
 class CalibrationRefused(SetupError):
-    """The samples do not make a calibration; the message has the reason and the remedy."""
+    """Error: the samples are not sufficient for a calibration; with reason and remedy."""
 
 
 class Marks(NamedTuple):
@@ -56,7 +56,7 @@ class Marks(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """Calibrated values of one joint for the rig file; fields as in ``model.joint.JointParams``."""
+    """Calibrated values of one joint for the rig file; the fields are those of JointParams."""
 
     zero_step: int
     sign: int
@@ -65,9 +65,9 @@ class Calibration(NamedTuple):
 
 
 class LinkageFit(NamedTuple):
-    """Calibrated values of a joint behind a push rod; fields as in JointParams.
+    """Calibrated values of a joint with a push rod; the fields are those of JointParams.
 
-    transmission_points: each (joint angle in degrees, servo position in steps or us), angles rising
+    transmission_points: (joint angle in degrees, servo position in steps or us), rising angles
     """
 
     transmission_points: tuple[tuple[float, float], ...]
@@ -82,8 +82,8 @@ Value = int | float | tuple[tuple[float, float], ...]
 class PositionUnwrapper:
     """Follows a position register over the seam.
 
-    Some firmware goes on counting past 4095, some starts again at 0: a change is taken as
-    the shorter turn, so both give the same.
+    Some firmware continues to count above 4095, some restarts at 0. A change is interpreted as the
+    shorter turn, so both give the same result.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class PositionUnwrapper:
         """Add one sample; return the unwrapped position.
 
         Raises:
-            CalibrationRefused: it moved too far between two samples to know its direction.
+            CalibrationRefused: it moved too far between two samples to determine its direction.
         """
         if self._at is None:
             self._at = position_steps % STEPS_PER_TURN
@@ -125,12 +125,12 @@ def end_names(joint_name: str) -> tuple[str, str]:
 
 
 def zero_name(joint_name: str) -> str:
-    """Return what people call the position of a joint at 0 deg."""
+    """Return the common name of the position of a joint at 0 deg."""
     return "straight ahead" if joint_name in GAZE_JOINTS else "at rest"
 
 
 def is_lid(joint_name: str) -> bool:
-    """Return whether a joint moves a lid: its ends matter, and it has no straight ahead."""
+    """Return whether a joint moves a lid, which has two ends but no "straight ahead"."""
     return joint_name in LIDS
 
 
@@ -150,10 +150,10 @@ def joint_calibration(
 ) -> Calibration:
     """Return zero, sign and range of a joint, ``margin_deg`` short of each end.
 
-    joint: as it is configured now; its gear ratio is taken as right
+    joint: present configuration; its gear ratio is assumed to be correct
 
     Raises:
-        CalibrationRefused: too small a range, zero not inside it, or the seam within it.
+        CalibrationRefused: the range is too small, excludes zero or contains the seam.
     """
     steps_per_deg = joint.ratio * STEPS_PER_TURN / 360.0
     low, high = sorted((marks.positive_end, marks.negative_end))
@@ -211,9 +211,9 @@ def round_inwards(angle_deg: float) -> float:
 
 
 def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable: bool) -> None:
-    """Refuse a travel that leaves the turn 0..4095 in which a restarted servo counts.
+    """Refuse a travel outside the turn 0..4095, in which a restarted servo counts.
 
-    settable: any position of the servo can be set as its middle, lastingly
+    settable: whether any position of the servo can be set permanently as its middle
     """
     if low // STEPS_PER_TURN == high // STEPS_PER_TURN:
         return
@@ -242,10 +242,10 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable:
 
 
 def with_calibration(joint: JointParams, made: Calibration) -> JointParams:
-    """Return the joint as calibrated.
+    """Return the joint with its calibration.
 
     Raises:
-        ValueError: the joint's own rules refuse it.
+        ValueError: the rules of the joint refuse it.
     """
     return replace(joint, **made._asdict())
 
@@ -255,8 +255,8 @@ def rig_changes(
 ) -> dict[str, Value]:
     """Return dotted keys of the rig file and their new values, only those that differ.
 
-    Values that depend on the old range follow: a lid's shut and open angle go to its ends,
-    a parking angle outside the new range to its nearer end.
+    Values that depend on the old range also change: a lid's shut and open angles are set to its
+    ends, a parking angle outside the new range to the nearer end.
     """
     wanted: dict[str, Value] = {
         f"joints.{name}.{key}": value
@@ -265,7 +265,7 @@ def rig_changes(
     }
     places = f"joints.{name}.transmission_points"
     if isinstance(made, LinkageFit) and places in wanted:
-        # Whole numbers as such: 1500 us is no more exact as 1500.0.
+        # Write whole numbers as integers: 1500 us is not more exact as 1500.0.
         wanted[places] = tuple(
             (int(angle) if angle == int(angle) else angle, int(at) if at == int(at) else at)
             for angle, at in made.transmission_points

@@ -1,6 +1,6 @@
 """Calibration of one joint, step by step: a hand or gentle motion turns it, a person judges.
 
-Nothing is printed or written here: questions go to ``Operator``, the result is a value.
+Nothing is printed or written here: ``Operator`` asks the questions, and the result is a value.
 """
 
 from collections.abc import Callable
@@ -28,11 +28,11 @@ class Operator(Protocol):
     """A person who answers; ``live`` is called more than 20 times a second meanwhile."""
 
     def tell(self, line: str) -> None:
-        """Show what is going on."""
+        """Show the present activity."""
         ...
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        """Return when they have done it; ``live`` returns the line to show meanwhile.
+        """Return when the person is done; ``live`` returns the line to show meanwhile.
 
         Raises:
             CalibrationStopped: the user requested the end.
@@ -40,12 +40,12 @@ class Operator(Protocol):
         ...
 
     def agrees(self, question: str, live: Callable[[], str]) -> bool:
-        """Return their yes or no, as ``wait``."""
+        """Return the person's yes or no; see ``wait``."""
         ...
 
 
 class PositionTracker:
-    """A joint's position followed over the seam, with a line that shows it."""
+    """Tracker of a joint's position over the seam, with a line that shows it."""
 
     def __init__(self, single: SmartServoAccess) -> None:
         self._single = single
@@ -53,7 +53,7 @@ class PositionTracker:
         self._first: int | None = None
 
     def live(self) -> str:
-        """Add a sample; return it as text."""
+        """Add a sample; return the position as text."""
         steps, first = self.steps(), self._first
         first = steps if first is None else first
         self._first = first
@@ -72,7 +72,7 @@ def calibrate_by_hand(single: SmartServoAccess, person: Operator, margin_deg: fl
     """Let the user turn the joint, with torque off, to its ends and straight ahead.
 
     Raises:
-        CalibrationRefused: the marks make no calibration.
+        CalibrationRefused: the marks are not sufficient for a calibration.
         DriverError: the servo does not answer any more.
         CalibrationStopped: the person ended it.
     """
@@ -102,11 +102,11 @@ def calibrate_by_motion(
     params: StopSearchParams,
     zero_by: ZeroReference,
 ) -> Calibration:
-    """Drive the joint slowly and weakly to both stops; the zero is in the middle, or a person's.
+    """Drive the joint slowly and weakly to both stops; set the zero in the middle or by hand.
 
     Raises:
-        CalibrationRefused: the stops make no calibration.
-        DriverError: the servo is not fit for it, or does not answer any more.
+        CalibrationRefused: the stops are not sufficient for a calibration.
+        DriverError: the servo is not suitable, or does not answer any more.
         CalibrationStopped: the person ended it.
     """
     try:

@@ -1,6 +1,6 @@
-"""A joint behind a push rod: a person marks places and reads angles; linkage and range result.
+"""Calibration of a joint with a push rod: linkage and range from marked positions and read angles.
 
-A hobby servo is moved by steps of its pulse width, as no sensor measures its position; a servo
+A hobby servo is moved by steps of its pulse width, because no sensor measures its position; a servo
 that reports its position is turned by hand. Nothing is printed or written here.
 
 Positions are in the unit of the servo's model (steps, or us of pulse width), angles in
@@ -32,7 +32,7 @@ Place = tuple[float, float]
 
 
 def angle_now(joint: JointParams, position: float) -> float:
-    """Return the angle of a position as the rig file has it, to a tenth of a degree."""
+    """Return the angle of a position according to the rig file, to a tenth of a degree."""
     return round(degrees(joint.angle_rad(position * joint.model_facts.unit_steps)), 1) + 0.0
 
 
@@ -42,7 +42,7 @@ def spread_between(one: float, other: float, count: int) -> list[float]:
 
 
 def likely_angle(joint: JointParams, position: float, one: Place, other: Place) -> float:
-    """Return what angle a position between two marked ones will be: the old curve, bent to fit."""
+    """Return the likely angle of a position between two marks: the old curve, adjusted to them."""
     (low, at_low), (high, at_high) = one, other
     was_low, was_high = angle_now(joint, at_low), angle_now(joint, at_high)
     if was_low == was_high:
@@ -58,13 +58,13 @@ def fit_linkage(
     """Return linkage and range of a joint; a lid's range ends at its marked positions.
 
     Args:
-        name: the joint's.
+        name: name of the joint.
         marked: angles in degrees and positions, in any order.
-        joint: as configured.
-        margin_deg: kept from the ends of any other joint.
+        joint: configuration of the joint.
+        margin_deg: distance from the ends, except for lids.
 
     Raises:
-        CalibrationRefused: they make no linkage, or no range with 0 inside.
+        CalibrationRefused: the marks do not give a linkage, or a range that includes 0.
     """
     linkage = tuple(sorted((round(angle, 1) + 0.0, position) for angle, position in marked))
     kept = 0.0 if is_lid(name) else margin_deg
@@ -100,11 +100,11 @@ SHUT_WHERE = {
 
 
 LEAD_US = 50.0
-"""A quarter of a second at its slow speed: the time until it stops after a key is released."""
+"""Travel in a quarter of a second at its slow speed, until it stops after the release of a key."""
 
 
 class Jogger(Operator, Protocol):
-    """A person who moves a servo by small steps, and reads angles off."""
+    """Person who moves a servo by small steps, and reads angles."""
 
     def steer(self, question: str, servo: "HobbyMarker") -> None:
         """Return when the servo has the desired position.
@@ -115,18 +115,18 @@ class Jogger(Operator, Protocol):
         ...
 
     def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return their number, or the proposed one if they agree to it."""
+        """Return the person's number, or the proposed one if the person accepts it."""
         ...
 
 
 class Marker(Protocol):
-    """Brings a joint to places, and measures them in the unit of its servo's model."""
+    """Moves a joint to positions, and measures them in the unit of its servo's model."""
 
     name: str
     joint: JointParams
 
     def begin(self) -> None:
-        """Begin: hold it at its position, or switch its torque off."""
+        """Hold the joint at its position, or switch its torque off."""
         ...
 
     def mark(self, where: str) -> float:
@@ -134,11 +134,11 @@ class Marker(Protocol):
         ...
 
     def move_to(self, place: float) -> float:
-        """Bring it to about that place; return the place reached."""
+        """Move the joint to about a position; return the reached position."""
         ...
 
     def leave(self, place: float) -> None:
-        """Bring it to a place and leave it there, if it has a motor."""
+        """Move the joint to a position and leave it there, if it has a motor."""
         ...
 
     def live(self) -> str:
@@ -147,7 +147,7 @@ class Marker(Protocol):
 
 
 class HobbyMarker:
-    """Moves a hobby servo as a person steers it; implements Marker."""
+    """Moves a hobby servo under a person's control; implements Marker."""
 
     def __init__(self, hobby: HobbyServoAccess, person: Jogger) -> None:
         self.name, self.joint = hobby.name, hobby.joint
@@ -179,11 +179,11 @@ class HobbyMarker:
         return self._arrive()
 
     def move_by_us(self, us: float) -> None:
-        """Move the joint by this much."""
+        """Move the joint by a pulse width."""
         self._hobby.aim(self._hobby.place_us + us)
 
     def nudge(self, us: float) -> None:
-        """Move the joint by this much, at most ``LEAD_US`` ahead of its pulse."""
+        """Move the joint by a pulse width, at most ``LEAD_US`` ahead of its pulse."""
         at_us = self._hobby.pulse_us
         self._hobby.aim(min(max(self._hobby.place_us + us, at_us - LEAD_US), at_us + LEAD_US))
 
@@ -192,12 +192,12 @@ class HobbyMarker:
         self._hobby.aim(us)
 
     def move_to(self, place: float) -> float:
-        """Move it slowly to a pulse width in us; return the width reached."""
+        """Move the joint slowly to a pulse width in us; return the reached width."""
         self._hobby.aim(place)
         return self._arrive()
 
     def leave(self, place: float) -> None:
-        """Move it slowly to a place at which friction shall hold it."""
+        """Move the joint slowly to a position at which friction must hold it."""
         self.move_to(place)
 
     def _arrive(self) -> float:
@@ -206,7 +206,7 @@ class HobbyMarker:
         return at_us
 
     def live(self) -> str:
-        """Move it on; return pulse width and angle as text."""
+        """Continue the motion; return pulse width and angle as text."""
         self._hobby.look()
         self._tell_events()
         at_us = self._hobby.place_us
@@ -236,24 +236,24 @@ class HandMarker:
         return float(self._watched.steps())
 
     def move_to(self, place: float) -> float:
-        """Let the user turn the joint to about a position in steps; return the position reached."""
+        """Let the user turn the joint to about a position in steps; return the reached position."""
         return self.mark(f"until it reads about step {place:.0f}")
 
     def leave(self, place: float) -> None:
         """Do nothing: its torque is off."""
 
     def live(self) -> str:
-        """Return the position in words."""
+        """Return the position as text."""
         return self._watched.live()
 
 
 def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: int) -> LinkageFit:
-    """Mark the places of a joint and ask for their angles.
+    """Mark the positions of a joint and ask for their angles.
 
-    more: places between each two that are marked; margin_deg: kept from the ends, but for lids
+    more: number of positions between two marks; margin_deg: distance from the ends, not for lids
 
     Raises:
-        CalibrationRefused: they make no linkage.
+        CalibrationRefused: the marks do not give a linkage.
         DriverError: the servo does not answer any more.
         CalibrationStopped: the person ended it.
     """
@@ -277,7 +277,7 @@ def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: 
             likely = likely_angle(placer.joint, at, one, other)
             all_places.append((_angle(placer, person, at, likely), at))
     made = fit_linkage(placer.name, all_places, placer.joint, margin_deg)
-    # A lid stays shut, so that the other one can be brought to meet it.
+    # A lid stays shut, so that the other lid can be moved to meet it.
     placer.leave(marked[0][1] if is_lid(placer.name) else dict(marked)[0.0])
     return made
 

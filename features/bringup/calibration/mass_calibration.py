@@ -1,8 +1,8 @@
 """Mass and balance of a head from the loads of its neck's servos, moved slowly up and down.
 
-At a slow and steady pace a servo carries the weight and overcomes its friction, which changes its
-sign with the direction; a fit over both directions separates them. Joints through one point give
-the mass times its distance, in three directions; only a lower neck gives the mass, too.
+At a low constant speed a servo carries the weight and overcomes its friction, whose sign changes
+with the direction; a fit over both directions separates them. Joints through one point give the
+mass times its distance, in three directions; only a lower neck also gives the mass.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ SWEPT = ("lower_neck_pitch", "neck_pitch", "neck_roll")
 WIDEST_DEG, END_DEG = 30.0, 2.0
 """Largest sweep to either side, and distance from the ends of the range."""
 _STEADY_RAD_S = radians(2.0)
-"""Slower samples are left out: friction there has any value."""
+"""Slower samples are omitted, because their friction may have any value."""
 _EVERY, _FEWEST = 4, 20
 """Steps per sample, and samples of each joint in each direction."""
 
@@ -39,12 +39,12 @@ class LoadSample(NamedTuple):
 
 
 class HeadBalance(NamedTuple):
-    """What the loads give.
+    """Balance of a head, estimated from loads.
 
     moment_kg_m: mass of the head times its centre from the pitch axis, with counterweights
-    mass_kg: None where it cannot be found
-    friction_nm: by joint
-    rest_nm: root mean square of what the fit leaves
+    mass_kg: mass of the head, None if it cannot be determined
+    friction_nm: friction by joint
+    rest_nm: root mean square residual of the fit
     """
 
     moment_kg_m: Vec3
@@ -54,7 +54,7 @@ class HeadBalance(NamedTuple):
 
 
 class LoadRecorder:
-    """Collects loads while the joints of a neck move; it watches every step."""
+    """Collects loads while the joints of a neck move; observes every step."""
 
     def __init__(self, statics: Statics) -> None:
         self.samples: list[LoadSample] = []
@@ -63,7 +63,7 @@ class LoadRecorder:
         self._steps = 0
 
     def watch(self, step: Step) -> None:
-        """Keep the load of the joint that moves now."""
+        """Store the load of the joint that moves now."""
         names, joints = step.guard_result.joints, step.joints
         if not self.joint or not joints.load:
             return
@@ -115,12 +115,12 @@ def fit_balance(
     """Return the balance that fits the loads best.
 
     Args:
-        samples: of sweeps in both directions.
-        statics: of the neck, which gives what is known: springs.
-        description: of the rig.
+        samples: samples of sweeps in both directions.
+        statics: statics of the neck, with its known springs.
+        description: description of the rig.
 
     Raises:
-        CalibrationRefused: there are too few samples, or a joint moved one way only.
+        CalibrationRefused: too few samples, or a joint moved in one direction only.
     """
     swept = tuple(name for name in SWEPT if any(one.joint == name for one in samples))
     for name in swept or ("neck_pitch",):
@@ -137,7 +137,7 @@ def fit_balance(
         basis = _torques_of_moment(description, one.joint, one.pose_rad)
         friction = [one.direction * (one.joint == name) for name in swept]
         rows.append([*basis[: 4 if has_mass else 3], *friction])
-        # The servo holds what weight and spring do, and overcomes the friction.
+        # The servo holds weight and spring, and overcomes the friction.
         spring = spring_nm(statics.joints[one.joint], one.pose_rad[one.joint])
         torques.append(one.torque_nm + spring)
     matrix, wanted = np.array(rows), np.array(torques)

@@ -1,8 +1,9 @@
-"""Access to one smart servo for calibration: the others of its line stay as they are.
+"""Access to one smart servo for calibration: other servos on its line are not changed.
 
-A bus watchdog, if it has one, is armed while the torque is on, so a servo without a program stops.
-If its memory has a lock, its limits are opened with the lock shut: the servo obeys and its EEPROM
-keeps the old ones, so switching it off and on restores them after a killed program.
+A bus watchdog, if it has one, is armed while the torque is on, so that a servo without a program
+stops. If its memory has a lock, its limits are extended with the lock closed: the servo applies the
+new limits while its EEPROM keeps the old ones, so a power cycle restores them after a killed
+program.
 """
 
 from collections.abc import Callable
@@ -24,7 +25,7 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
 WATCHDOG_S = 0.3
-"""Three readings that were lost in a row must not let it trip."""
+"""Time of the watchdog: three consecutive lost readings must not trip it."""
 
 LIMITS = ("min_position_limit", "max_position_limit")
 

@@ -1,1 +1,1 @@
-"""The commands of bring-up, their options, ports and questions."""
+"""Commands of bring-up, with their options, ports and questions."""

@@ -1,4 +1,4 @@
-"""Keys of a terminal, words of a script or buttons of the page, which steer a calibration."""
+"""Keys of a terminal, words of a script or buttons of the page that control a calibration."""
 
 from abc import ABC, abstractmethod
 from contextlib import AbstractContextManager
@@ -32,17 +32,17 @@ _WORDS: dict[str, Key] = {
 
 
 def split_words(text: str) -> tuple[list[Key], str]:
-    """Return the keys in what a terminal has sent, and the rest that a sequence begins with."""
+    """Return the keys in a terminal's input, and an incomplete sequence at its end."""
     typed, rest = split_keys(text)
     named = ((one if len(one) > 1 else _PLAIN.get(one.lower())) for one in typed)
     return [cast(Key, key) for key in named if key is not None], rest
 
 
 def key_and_count(line: str) -> tuple[Key, int]:
-    """Read "left 3", "enter" or an empty line, which is Enter.
+    """Parse "left 3", "enter" or an empty line, which is Enter.
 
     Raises:
-        SetupError: it is no key; with what there is.
+        SetupError: it is not a key; the message lists the keys.
     """
     word, _, number = line.strip().lower().partition(" ")
     number = number.strip() or "1"
@@ -55,7 +55,7 @@ def key_and_count(line: str) -> tuple[Key, int]:
 
 
 class Keys(AbstractContextManager["Keys"], ABC):
-    """Where keys come from, one by one, for as long as the block lasts."""
+    """Source of single keys within the block."""
 
     def __exit__(self, *raised: object) -> None:
         """End."""
@@ -73,7 +73,7 @@ class TerminalKeys(TerminalInput, Keys):
         self._rest = ""
 
     def next(self, ready: bool) -> Key | None:
-        """Return the next key, None if none has been pressed; ``ready`` does not matter."""
+        """Return the next key, None if none has been pressed; ``ready`` is ignored."""
         if not self._ready:
             text = self.text()
             if text is None:
@@ -83,7 +83,7 @@ class TerminalKeys(TerminalInput, Keys):
 
 
 class LineKeys(Keys):
-    """Keys from lines of a file or a pipe, each after the eyes have finished the one before."""
+    """Keys from lines of a file or a pipe, each after the eyes have finished the previous one."""
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
@@ -93,7 +93,7 @@ class LineKeys(Keys):
         """Return the next key if the eyes are ready for it.
 
         Raises:
-            SetupError: a line is no key, or there are no more.
+            SetupError: a line is not a key, or no lines remain.
         """
         if self._ready:
             return self._ready.pop(0)
@@ -113,26 +113,26 @@ class LineKeys(Keys):
 
 
 class PageKeys(Keys):
-    """Keys pressed as buttons of the page, side by side with those of another source."""
+    """Keys pressed as buttons of the page, in addition to those of another source."""
 
     def __init__(self, others: Keys) -> None:
         self._others = others
         self._pressed: Queue[Key] = Queue(_MOST_WAITING)
 
     def __enter__(self) -> Self:
-        """Begin with the other source."""
+        """Enter the other source."""
         self._others.__enter__()
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """End with the other source."""
+        """Exit the other source."""
         self._others.__exit__(*raised)
 
     def press(self, word: str) -> str | None:
-        """Handle a button, for any thread; return the reason if it is refused.
+        """Handle a button, from any thread; return the reason if it is refused.
 
         Raises:
-            ValueError: there is no such button.
+            ValueError: the button does not exist.
         """
         found = next((key for key in BUTTONS if key == word), None)
         if found is None:
@@ -144,7 +144,7 @@ class PageKeys(Keys):
         return None
 
     def next(self, ready: bool) -> Key | None:
-        """Return the next key of either, those of the page first."""
+        """Return the next key of either source, those of the page first."""
         try:
             return self._pressed.get_nowait()
         except Empty:

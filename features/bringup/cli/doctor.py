@@ -101,7 +101,7 @@ def doctor(
 
 
 def examine_detector(params: FaceDetectorParams) -> Diagnostic:
-    """Return what finds faces and people, and what brings what is missing."""
+    """Return the detectors of faces and people, and the installation of missing ones."""
     text, cure = detector_status(params)
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
 
@@ -144,7 +144,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[
 
 
 def _print_line(line: str) -> None:
-    """Print a line of the doctor's; all lines go to one stream, so that their order stays."""
+    """Print a line; all lines are written to one stream, which keeps their order."""
     level, space, rest = complete_suggestions(line).partition(" ")
     out = console()
     if level in STYLES:
@@ -181,7 +181,7 @@ def _apply_fixes(
 
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:
-    """Print findings, the worst first, the same one at several servos once."""
+    """Print findings, the worst first; equal findings of several servos are printed once."""
     for level, where, what, cure in group_findings(findings):
         tell(f"{level} {where}: {what}")
         if cure:

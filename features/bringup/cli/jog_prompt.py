@@ -24,7 +24,7 @@ LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it i
 class TerminalJogger(TerminalPerson):
     """Asks on the terminal; implements Jogger.
 
-    Keys of a terminal act as they are pressed, lines of a file or a pipe one by one.
+    Keys of a terminal take effect when pressed; lines of a file or a pipe are read one by one.
     """
 
     def steer(self, question: str, servo: HobbyMarker) -> None:
@@ -63,7 +63,7 @@ class TerminalJogger(TerminalPerson):
                     step = max(step - 1, 0)
 
     def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return the typed number, Enter is the proposed one; see Jogger."""
+        """Return the typed number; Enter selects the proposed one; see Jogger."""
         asked = f"{question} [{proposed:g}]"
         say(asked)
         while True:

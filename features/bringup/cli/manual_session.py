@@ -1,4 +1,4 @@
-"""A rig that holds its pose while a command moves it; whatever happens, it ends torque off."""
+"""A rig that holds its pose while a command moves it; in all cases it ends with the torque off."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
@@ -36,17 +36,17 @@ def holding_rig(
     """Switch torque on at the present pose; at the end of the block park, torque off, close.
 
     Args:
-        rig: to move.
-        paths: of the serial ports, by the name of the bus.
-        params: how slowly it moves.
+        rig: the rig to move.
+        paths: paths of the serial ports, by the name of the bus.
+        params: speed of the motion.
         stopped: returns why to end a motion, None without a reason.
         interrupts: requests to end this program.
-        park: False leaves the joints where they are.
-        watch: is shown every step.
+        park: whether to park the joints at the end.
+        watch: receives every step.
 
     Raises:
-        SetupError: port or servos are not as configured.
-        typer.Exit: all went well but the torque-off, which not all servos confirm.
+        SetupError: port or servos do not match the configuration.
+        typer.Exit: not all servos confirmed the torque-off after a successful block.
     """
     body = Body(
         guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=coupled_pairs(rig.couplings)

@@ -67,7 +67,7 @@ def monitor(
     leaving = contextlib.suppress(KeyboardInterrupt)
     with clear_errors(rig, port, mock), record_signals() as stopped, leaving:
         stopped.tolerated_requests = (
-            0  # nothing to park: what waits for a stopped terminal ends at once
+            0  # nothing to park: a write that waits for a stopped terminal ends immediately
         )
         found, clock = load_rig(rig), RealClock()
         refuse_packages(found, "monitor")
@@ -96,7 +96,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig], TelemetryReader]] = {
 
 @contextlib.contextmanager
 def _readers(rig: Rig, wire: RigPorts) -> Iterator[dict[str, TelemetryReader]]:
-    """Open every bus for reading alone."""
+    """Open every bus for reading only."""
     with contextlib.ExitStack() as ports:
         readers = {}
         for name in bus_names(rig):
@@ -117,7 +117,7 @@ def _samples(
     seconds: float | None,
     stopped: Callable[[], str | None],
 ) -> Iterator[TelemetrySample]:
-    """Yield samples at absolute slots until the time is over or a signal comes; at least one."""
+    """Yield samples at absolute times until the time is over or a signal arrives; at least one."""
     start_s = clock.now_s()
     end_s = inf if seconds is None else start_s + seconds
     slot = 0
@@ -134,7 +134,7 @@ def _samples(
 
 
 def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
-    """Lay a sample out as a table."""
+    """Format a sample as a table."""
     hobby = any(not joint.model_facts.measures_position for joint in joints.values())
     share = sample.unanswered / sample.request_count
     caption = (
@@ -149,11 +149,11 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
     )
     table.add_column("joint", no_wrap=True)
     table.add_column("id", justify="right", no_wrap=True)
-    # The place of a hobby servo is its pulse width in us.
+    # The position of a hobby servo is its pulse width in us.
     units = dict.fromkeys(
         "step" if joint.model_facts.measures_position else "us" for joint in joints.values()
     )
-    goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
+    goal = "goal deg" if len(units) == 1 else "goal"  # short, because a terminal has 80 columns
     for name in (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("torque", no_wrap=True)
@@ -187,5 +187,5 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
 
 
 def _number(value: float | None, digits: int) -> str:
-    """Write a number, zero without a sign, and "-" for None."""
+    """Format a number, zero without a sign, and None as "-"."""
     return _UNTOLD if value is None else f"{round(value, digits) + 0.0:.{digits}f}"

@@ -119,8 +119,8 @@ def look_at_command(
     with clear_errors(rig, port, mock):
         refuse_not_finite((x, y, z))
         loaded = load_rig(rig)
-        # Imports vision as well, so only this command does, and before the torque is on: in
-        # that time the servos' watchdog would trip.
+        # This import also loads vision, so only this command does it, and before the torque is on:
+        # otherwise the servos' watchdog would trip in the meantime.
         from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 
         kinematics, oculomotor = kinematics_and_oculomotor(loaded, seed)
@@ -160,15 +160,15 @@ def _manual_control(
     hold: bool,
     park: bool,
 ) -> Iterator[ManualControl]:
-    """Return a rig that holds its pose; whatever happens, it ends with the torque off.
+    """Return a rig that holds its pose; in all cases it ends with the torque off.
 
-    name: the rig as the user named it, for the commands that messages suggest
+    name: name of the rig on the command line, for the commands that messages suggest
     """
     without_feedback = [
         name for name in rig.names if not rig.joints[name].model_facts.measures_position
     ]
     if without_feedback and not mock:
-        with clear_errors(name, port):  # before Ctrl-C is only noted
+        with clear_errors(name, port):  # before Ctrl-C is only recorded
             confirm_safe(
                 f"{', '.join(without_feedback)}: hobby servos without pulses go to their parking "
                 "place at once, at their own full speed",
@@ -226,7 +226,7 @@ def _hold(control: ManualControl, seconds: float, hold: bool) -> None:
 
 
 def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
-    """Print what was applied, for the joints commanded and those that were limited or failed."""
+    """Print the result for the commanded joints and those that were limited or failed."""
     _print_events(moved.events)
     for applied in moved.joints:
         if applied.joint in asked or applied.reasons:
@@ -235,7 +235,7 @@ def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
 
 
 def _print_events(events: Iterable[str]) -> None:
-    """Print what was done to which servo."""
+    """Print the events by servo."""
     for line in group_events(events):
         say(line)
 

@@ -52,12 +52,12 @@ def unopened_port(path: str, on_traffic: Callable[[], None] | None = None) -> It
 
 
 def console() -> Console:
-    """Return the place for results; long lines are the terminal's business."""
+    """Return the console for results; the terminal wraps long lines."""
     return Console(soft_wrap=True, highlight=False)
 
 
 def progress(line: str) -> None:
-    """Show what is being done, on a terminal only."""
+    """Show the present activity, on a terminal only."""
     if sys.stderr.isatty():
         status(line)
 
@@ -80,17 +80,17 @@ PortOption = Annotated[
 
 
 class RigPorts(NamedTuple):
-    """Serial ports by the names of their buses, and what is emulated behind them, if it is."""
+    """Serial ports by the names of their buses, and the emulated devices, if any."""
 
     paths: Mapping[str, str]
     buses: PtyBuses | None
 
 
 def refuse_packages(rig: Rig, command: str) -> None:
-    """Refuse a command that speaks to servos of our kinds alone.
+    """Refuse a command that supports only the built-in kinds of servos.
 
     Raises:
-        SetupError: a bus of the rig is another package's.
+        SetupError: a bus of the rig belongs to another package.
     """
     for name in bus_names(rig):
         kind = rig.bus_named(name).kind
@@ -105,11 +105,11 @@ def rig_ports(
 ) -> Iterator[RigPorts]:
     """Return the ports to open; emulated buses end with the block.
 
-    devices: what is emulated on some buses instead of the rig's servos
+    devices: devices emulated on some buses instead of the rig's servos
 
     Raises:
-        SetupError: the options exclude each other, or name no bus of the rig.
-        PortError: a port's owner would take servo packets for commands.
+        SetupError: the options are contradictory, or name an unknown bus.
+        PortError: the device on a port would interpret servo packets as commands.
     """
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
@@ -132,7 +132,7 @@ def bus_label(rig: Rig, name: str) -> str:
 
 
 def setups_on(rig: Rig, name: str) -> tuple[ServoConfig, ...]:
-    """Return what a bus must know of its servos, in the order of the joints."""
+    """Return the setups of the servos on a bus, in the order of the joints."""
     every = dict(zip(rig.names, servo_configs(rig), strict=True))
     return tuple(every[joint] for joint in joints_on(rig, name))
 
@@ -143,10 +143,10 @@ def open_port(
 ) -> Iterator[BusPort]:
     """Open the port of the bus of this name at its speed; nothing is sent.
 
-    guardian: is shown a sign of life with all that is sent
+    guardian: receives a heartbeat with every transmission
 
     Raises:
-        PortError: it is absent, busy, not permitted, or has no such speed.
+        PortError: it is absent, busy, not permitted, or does not support the speed.
     """
     baud = rig.bus_named(bus).baud
     with unopened_port(ports.paths[bus], guardian.beat if guardian is not None else None) as port:
@@ -159,13 +159,13 @@ def confirm_safe(why: str, remedy: str, question: str, yes: bool) -> None:
     """Warn of a movement, and ask for a confirmation.
 
     Args:
-        why: what will move.
-        remedy: what the user must do first.
-        question: for a yes or no.
-        yes: the answer is known.
+        why: the planned motion.
+        remedy: required preparation by the user.
+        question: question with the answers yes or no.
+        yes: whether the answer is already yes.
 
     Raises:
-        SetupError: no user is there to ask.
+        SetupError: no user can answer.
         typer.Abort: the answer was no.
     """
     if not yes and not sys.stdin.isatty():

@@ -1,4 +1,4 @@
-"""Questions on the terminal, answered by a person, a pipe or a file, while something is watched."""
+"""Questions on the terminal, answered by a person, a pipe or a file, while a joint is watched."""
 
 import os
 import select
@@ -12,7 +12,7 @@ from gazerig.features.bringup.calibration.smart_servo_access import CalibrationS
 from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03
-"""Period at which a joint is read while the user thinks: more than 20 times a second."""
+"""Period at which a joint is read during a question: more than 20 times a second."""
 
 HAND_STEPS = 100
 """Steps by which an emulated hand turns a joint between two readings."""
@@ -20,18 +20,18 @@ HAND_STEPS = 100
 YES, NO = ("y", "yes"), ("n", "no")
 
 
-_LARGEST = 1_000_000  # bytes of a file of answers
+_LARGEST = 1_000_000  # largest size of a file of answers, bytes
 
 
 class Lines:
-    """Lines of a file, or of standard input as they come; is_scripted: of a file."""
+    """Lines of a file, or of standard input as they arrive; is_scripted: whether from a file."""
 
     def __init__(self, answers: Path | None) -> None:
-        """Read the answers of a file at once; None: standard input.
+        """Read all answers of a file; None: use standard input.
 
         Raises:
             OSError: the file cannot be read.
-            SetupError: it is no text.
+            SetupError: it is not text.
         """
         self.is_scripted, self._rest = answers is not None, b""
         self._ready: list[str] = []
@@ -42,10 +42,10 @@ class Lines:
                 raise SetupError(f"{answers}: is no UTF-8 text; write one answer a line") from None
 
     def next(self, wait_s: float) -> str | None:
-        """Return the next line, None if none came in time.
+        """Return the next line, None if none arrived in time.
 
         Raises:
-            EOFError: there are no more.
+            EOFError: no lines remain.
         """
         if self._ready:
             return self._ready.pop(0).strip()
@@ -55,7 +55,7 @@ class Lines:
             return None
         try:
             data = os.read(sys.stdin.fileno(), 4096)
-        except OSError:  # a terminal that is gone
+        except OSError:  # the terminal has disappeared
             data = b""
         if not data:
             raise EOFError
@@ -68,9 +68,9 @@ class TerminalPerson:
     """Asks on the terminal; implements Operator.
 
     Args:
-        lines: where answers come from.
+        lines: source of the answers.
         stopped: returns why to end, None without a reason.
-        yes: every question for a yes or no has the answer yes.
+        yes: answer every yes-or-no question with yes.
     """
 
     def __init__(self, lines: Lines, stopped: Callable[[], str | None], yes: bool) -> None:
@@ -114,7 +114,7 @@ class TerminalPerson:
         return line
 
     def _look(self, live: Callable[[], str], more: str = "") -> None:
-        """Watch the joint once, and show it."""
+        """Read the joint once, and show it."""
         why = self._stopped()
         if why is not None:
             raise CalibrationStopped(why)

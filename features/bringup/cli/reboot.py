@@ -72,10 +72,10 @@ def reboot(
 
 
 def _servo(rig: Rig, text: str) -> tuple[str, int]:
-    """Read the name of a joint, or a servo id; return its bus and id.
+    """Parse the name of a joint, or a servo id; return its bus and id.
 
     Raises:
-        SetupError: it is neither, or there are several buses with such ids.
+        SetupError: it is neither, or several buses have such ids.
     """
     if text in rig.joints:
         return rig.joints[text].bus, rig.joints[text].id
@@ -96,7 +96,7 @@ def _servo(rig: Rig, text: str) -> tuple[str, int]:
 
 
 def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, yes: bool) -> bool:
-    """Restart one servo; return whether it complains again."""
+    """Restart one servo; return whether it still reports errors."""
     names = [joint for joint in joints_on(rig, bus) if rig.joints[joint].id == servo_id]
     name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
     baud = rig.bus_named(bus).baud
@@ -115,7 +115,7 @@ def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, y
 
 
 def _maestro(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
-    """Do what comes nearest to a restart of a Maestro: clear its errors, send it home."""
+    """Replace the restart of a Maestro: clear its errors and send it home."""
     label = bus_label(rig, bus)
     say(
         f"{label}: a Maestro has no restart over its serial line (its power switch is one); its "
@@ -130,10 +130,10 @@ def _maestro(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
 
 
 def _pca9685(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
-    """Do what comes nearest to a restart of a PCA9685: stop the pulses of the rig's channels.
+    """Replace the restart of a PCA9685: stop the pulses of the rig's channels.
 
     Raises:
-        ServoFault: some do not stop.
+        ServoFault: some pulses do not stop.
     """
     ids = tuple(rig.joints[joint].id for joint in joints_on(rig, bus))
     params = rig.bus_named(bus).pca9685

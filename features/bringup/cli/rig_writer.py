@@ -25,10 +25,10 @@ AllYesOption = Annotated[bool, typer.Option("--yes", help="Answer yes to every q
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:
-    """Refuse before a calibration if its result could not be written.
+    """Refuse a calibration whose result could not be written.
 
     Raises:
-        gazerig.config.load.ConfigError, SetupError: why, and what to do.
+        gazerig.config.load.ConfigError, SetupError: with the reason and the remedy.
     """
     if out is None:
         save_rig(rig, {}, datetime.now())
@@ -44,10 +44,10 @@ def write_values(
     """Write values after a yes, and print the path of the old file.
 
     Args:
-        rig: as it was named.
-        values: by the dotted keys of the rig file.
+        rig: name of the rig on the command line.
+        values: values by the dotted keys of the rig file.
         out: a copy of a shipped rig to write instead, None for the rig itself.
-        person: answers.
+        person: answers the question.
     """
     if not values:
         say("everything is as the rig file says: nothing to write")
@@ -77,7 +77,7 @@ def show_and_write(
 ) -> None:
     """Show old and new values side by side; write them after a yes, but not with ``dry_run``.
 
-    loaded: with the old values; the others as in ``write_values``
+    loaded: rig with the old values; see ``write_values`` for the others
     """
     table = Table(caption=f"what was found, against {rig}")
     for name in ("key", "old", "new"):
@@ -94,7 +94,7 @@ def show_and_write(
 
 
 def _text(value: Any) -> str:
-    """Write a value; the places of a linkage one below the other."""
+    """Format a value; the positions of a linkage are on separate lines."""
     if not isinstance(value, tuple):
         return f"{value}"
     if any(isinstance(one, tuple) for one in value):

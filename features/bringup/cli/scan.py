@@ -1,4 +1,4 @@
-"""The command ``gazerig scan``: which ports there are, and who answers on one."""
+"""The command ``gazerig scan``: lists the ports, and the servos that answer on one."""
 
 import contextlib
 import json
@@ -117,9 +117,9 @@ def _paths(
 
 
 def _boards(path: str, as_json: bool) -> bool:
-    """Search one I2C bus and show what was found; return whether any board answered.
+    """Search one I2C bus and show the results; return whether any board answered.
 
-    A serial port is searched only if the user named it: to a Maestro such bytes are commands.
+    A serial port is searched only if the user named it: for a Maestro such bytes are commands.
     """
     with bench.unopened_port(path) as line:
         found = [f"{address:#x}" for address in probe(line, Pca9685Params())]
@@ -140,10 +140,10 @@ def _boards(path: str, as_json: bool) -> bool:
 
 
 def parse_bauds(text: str) -> tuple[int, ...] | None:
-    """Read --bauds; None for all.
+    """Parse --bauds; None for all.
 
     Raises:
-        SetupError: it holds what no servo can be set to.
+        SetupError: it contains a rate that no servo supports.
     """
     if text == "all":
         return None
@@ -156,7 +156,7 @@ def parse_bauds(text: str) -> tuple[int, ...] | None:
 
 
 def _only_port(ports: Sequence[SerialPort]) -> str:
-    """Return the one port on USB; asking strange devices needs a person's word."""
+    """Return the only port on USB; queries to unknown devices need a person's consent."""
     usb = [port for port in ports if port.usb]
     if len(usb) == 2 and usb[0].usb == usb[1].usb and usb[0].usb.startswith(POLOLU):
         # Both ports of one Maestro: its Command Port is the first.
@@ -179,7 +179,7 @@ def _search_port(
     named: str | None,
     as_json: bool,
 ) -> bool:
-    """Search one port and show what was found; return whether a servo answered."""
+    """Search one port and show the results; return whether a servo answered."""
     usb = bench.usb_id(path)
     asked = plan_search(usb, kinds, rates)
     if not asked and usb.startswith(POLOLU):
@@ -193,7 +193,8 @@ def _search_port(
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
         if not thorough and not any(one.has_answer for one in rounds):
-            # Ids that are far apart answer after a long silence; some not a ping to all.
+            # Ids that are far apart answer after a long silence; some do not answer a broadcast
+            # ping.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
             rounds = [*boards, *_search(line, usb, servos, True, named == "all")]
@@ -269,7 +270,7 @@ def scan_remarks(
 ) -> Iterator[str]:
     """Return remarks on a scan beyond its tables of servos and boards.
 
-    requested: kinds to search, unless one before them answered
+    requested: kinds to search unless an earlier one answered
     """
     found = found_servos(rounds)
     boards = sum(1 for one in rounds if one.board is not None)
@@ -298,7 +299,7 @@ def scan_remarks(
 
 
 def _unusual_lines(one: SearchRound, heard: Container[int]) -> Iterator[str]:
-    """Return what was unusual at one baud rate."""
+    """Return the unusual results at one baud rate."""
     twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
     for servo_id in sorted({*one.shared_ids, *twice}):
         yield (

@@ -97,9 +97,9 @@ def _set_up_chain(task: SetupTask) -> list[str]:
 
 
 def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
-    """Set one joint's servo up, again and again until it is done or skipped."""
+    """Set one joint's servo up; repeat until it is done or skipped."""
     kind = servo_kind(one.model)
-    # As it comes from the factory.
+    # Factory settings.
     spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
     fresh = {task.bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
     question = "   Enter: it is connected; s: skip this one; Ctrl-C: end "

@@ -1,10 +1,10 @@
-"""Setting up boards of hobby servos: settings, the clock of a PCA9685, then channel by channel.
+"""Setup of boards of hobby servos: settings, the clock of a PCA9685, then channel by channel.
 
-Nothing of a Maestro can be set over its serial line, and no channel's range can be read: ranges
-are tested with the servo supply off, when nothing moves. A PCA9685 keeps nothing without power:
-the program sets it up at every start; its oscillator has 25 MHz by the data sheet, and boards of
-23 to 27 MHz are reported, which changes every pulse by the same share. A person reports which
-servo is connected to which channel: each is moved a little.
+The serial line cannot set anything in a Maestro, and cannot read the range of a channel: ranges are
+tested with the servo supply off, when nothing moves. A PCA9685 loses its settings without power, so
+the program sets it up at every start. Its oscillator has 25 MHz by the data sheet, but boards of 23
+to 27 MHz are reported, which scales every pulse equally. Each servo is moved a little, so that a
+person can confirm its channel.
 """
 
 import os
@@ -55,7 +55,7 @@ QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0
 
 PULSE_STEPS = 1500 * US_STEPS
 LOW_HZ, HIGH_HZ = 22e6, 28e6
-"""No board has been seen outside; also the bounds of oscillator_hz."""
+"""Range of the known boards; also the bounds of oscillator_hz."""
 
 _MEASURED = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(hz|us)\s*", re.IGNORECASE)
 
@@ -64,9 +64,9 @@ Explain = Callable[[ServoConfig, ChannelPosition], str]
 
 
 class SetupTask(NamedTuple):
-    """Setting up the servos of one bus, as requested on the command line.
+    """Setup of the servos of one bus, as requested on the command line.
 
-    rig_name: the rig as the user named it; setups: of the chosen servos
+    rig_name: name of the rig on the command line; setups: setups of the chosen servos
     settings: file for the settings of a Maestro
     """
 
@@ -88,12 +88,12 @@ class SetupTask(NamedTuple):
 
     @property
     def config(self) -> BusConfig:
-        """Return the bus as the rig describes it."""
+        """Return the configuration of the bus."""
         return self.rig.bus_named(self.bus)
 
 
 def press_enter(question: str) -> str:
-    """Wait for Enter; return what was typed before it."""
+    """Wait for Enter; return the text typed before it."""
     answer = typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
     return str(answer)
 
@@ -121,7 +121,7 @@ def _try_channels(board: Board, task: SetupTask, explain: Explain) -> list[str]:
 def _walk_channel(
     board: Board, setup: ServoConfig, places: Sequence[int], *speed_steps_s: float
 ) -> tuple[ChannelPosition, ...]:
-    """Move a channel over places; a request to end is obeyed with pulses off.
+    """Move a channel to positions; after a request to end, the pulses are off.
 
     Raises:
         KeyboardInterrupt: the user requested the end.
@@ -200,7 +200,7 @@ def set_up_maestro(task: SetupTask) -> list[str]:
         bench.unopened_port(wired.paths[task.bus]) as line,
     ):
         path, usb = line.port_name, bench.usb_id(line.port_name)
-        # Its own USB port, and not one of an adaptor at its serial pins.
+        # The board's own USB port, not that of an adaptor at its serial pins.
         on_usb = usb.startswith(POLOLU)
         if not usb:
             on_usb = not os.path.realpath(path).startswith(("/dev/ttyS", "/dev/ttyAMA"))
@@ -356,11 +356,11 @@ def oscillator_hz(clock: PulseClock, typed: str) -> float:
     """Return the frequency of an oscillator, whole kilohertz.
 
     Args:
-        clock: the assumed clock while the pulses of 1500 us were measured.
-        typed: "50.9 Hz" or "1473 us", as the meter shows.
+        clock: the assumed clock during the measurement of the 1500 us pulses.
+        typed: "50.9 Hz" or "1473 us", from the meter.
 
     Raises:
-        ValueError: the text has another form, or no PCA9685 could have such a clock.
+        ValueError: the text has another form, or the clock is impossible for a PCA9685.
     """
     found = _MEASURED.fullmatch(typed)
     if found is None:

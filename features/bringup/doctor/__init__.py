@@ -1,1 +1,1 @@
-"""Faults of a rig, each with its remedy."""
+"""Diagnosis of a rig: faults, each with its remedy."""

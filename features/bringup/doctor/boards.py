@@ -28,7 +28,7 @@ from gazerig.features.bringup.maestro_settings import FACTORY_US, wide_range
 WHERE = "the board"
 
 SCRIPT = "script"
-"""In place of a register: the board's own script runs (1) or not (0)."""
+"""Pseudo-register: whether the board's own script runs (1) or not (0)."""
 
 TIMEOUT = "serial timeout"
 _BAD_SCRIPT = "its script is at fault: delete it in Pololu's program"
@@ -93,12 +93,12 @@ ADVICE = {
 
 
 class BoardRules(NamedTuple):
-    """Differences between makes.
+    """Rules that differ between makes.
 
-    highest_input: a channel that reports at most this pulse is an input; 0: none can be
+    highest_input: a channel with at most this pulse is an input; 0: the board has no inputs
     left_on_remedy, outside_range_remedy: remedies for pulses inside and outside a joint's range
         that no program sends; {name} is the joint
-    note: what no board of the make reports
+    note: properties that no board of the make reports
     """
 
     highest_input: int
@@ -142,12 +142,12 @@ def examine_channels(
     """Return all findings about a board that answers.
 
     Args:
-        rules: of its make.
+        rules: rules of its make.
         setups: the servos of the rig.
-        pulses: by channel, quarter microseconds, 0 for none, None without an answer; channels
-            that were not read are missing.
+        pulses: pulses by channel, quarter microseconds, 0 for none, None without an answer;
+            channels that were not read are missing.
         channels: number of its channels.
-        own: other findings of the make.
+        own: other findings, specific to the make.
         well: description of a healthy board.
     """
     findings = list(own)
@@ -182,10 +182,10 @@ def examine_channels(
 def examine_maestro(
     port: BusPort, params: MaestroParams, setups: Sequence[ServoConfig], usb: str
 ) -> list[Diagnostic]:
-    """Read and check everything that a board reports; nothing moves.
+    """Read and check all values that a board reports; nothing moves.
 
     Args:
-        port: opened here.
+        port: port, which is opened here.
         params: protocol of the board according to the rig.
         setups: the servos of the rig.
         usb: vendor and product id of its port, "" unless on USB.
@@ -215,7 +215,7 @@ def examine_maestro(
     if size is not None and size != params.channels:
         own.append(ADVICE["size"].at(WHERE, size=size, params=params))
     for error in found.errors:
-        # With a timeout set, every pause between two programs is one.
+        # If a timeout is set, every pause between two programs causes it.
         advice = ADVICE["timeout" if error == TIMEOUT else "error"]
         cure = CURES.get(error, "look it up in Pololu's guide")
         own.append(advice.at(WHERE, error=error, cure=cure))
@@ -245,9 +245,9 @@ def _read_pulses(
 ) -> dict[int, int | None]:
     """Read the pulses of a rig's channels.
 
-    If a board is queried for a channel that it does not have, that is an error to it, and it
-    sends all channels home. So channels that cannot be there are not read; nor, while any channel
-    gives pulses and the size of the board is not known, those beyond the six of every board.
+    A query for a channel that the board does not have is an error, and the board then sends all
+    channels home. So impossible channels are not read. While any channel gives pulses and the size
+    of the board is not known, channels beyond the six of every board are not read either.
     """
     pulses: dict[int, int | None] = {}
     sure = MICRO if any(found.pulses) and not sized else channels
@@ -258,19 +258,19 @@ def _read_pulses(
         heard = None if silent or channel >= channels else line.read_pulses((channel,))
         pulses[channel] = None if heard is None else heard[0]
     if None in pulses.values():
-        # The unknown channel is an error in its register now, and no fault.
+        # The unknown channel has now set an error in its register, which is not a fault.
         line.wait_for_answer()
     return pulses
 
 
 def _board_params(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
-    """Return the protocol of a board that was found; the rig file may differ."""
+    """Return the protocol of a detected board; the rig file may differ."""
     form = params.protocol if params.protocol in found.command_forms else found.command_forms[0]
     return replace(params, protocol=form, crc=found.expects_crc)
 
 
 def stop_script(port: BusPort, params: MaestroParams) -> str:
-    """Stop the board's script; return "" or why it was not done. Nothing moves.
+    """Stop the board's script; return "" or the reason of a failure. Nothing moves.
 
     Raises:
         PortError: the port cannot be opened.
@@ -290,7 +290,7 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
 def examine_pca9685(
     port: BusPort, params: Pca9685Params, setups: Sequence[ServoConfig]
 ) -> list[Diagnostic]:
-    """Read and check everything that the boards of one bus report; nothing moves.
+    """Read and check all values that the boards of one bus report; nothing moves.
 
     Raises:
         PortError: the port cannot be opened.

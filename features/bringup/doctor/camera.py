@@ -32,10 +32,10 @@ def examine_camera(
     """Watch the frames of a camera; return the problems, each with its remedy.
 
     Args:
-        source: gives the frames as they come.
+        source: source of the frames.
         camera: orientation and lens.
         faces: parameters of the face detector.
-        now_s: the host's clock.
+        now_s: clock of the host.
         look_s: duration, by the times of the frames.
     """
     turned = UprightSource(source, FrameOrientation(camera.rotation, camera.mirrored))

@@ -1,4 +1,4 @@
-"""Findings of an examination as values: how bad, what, where, the remedy; and their texts."""
+"""Findings of an examination as values (level, fact, place, remedy), and their texts."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -11,16 +11,16 @@ Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
 BOARD = -1
-"""In place of a servo id: the board to which the servos are connected."""
+"""Used instead of a servo id: the board to which the servos are connected."""
 
 _JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
 class Fix(NamedTuple):
-    """One register write that repairs something and moves nothing.
+    """Write to one register that repairs a fault and moves nothing.
 
     servo_id: ``BOARD`` for the board itself, whose "registers" are its settings
-    was: the value found, None if it could not be read
+    was: the previous value, None if it could not be read
     """
 
     servo_id: int
@@ -38,9 +38,9 @@ class Fix(NamedTuple):
 class Diagnostic:
     """One finding.
 
-    level: ok, note (worth knowing), warn (works, but not well), error (does not work)
-    what: the fact; where: port, joint or file; remedy: what to do, "" if nothing is needed
-    fixes: what ``--fix`` may write
+    level: ok, note (useful to know), warn (works, but not well), error (does not work)
+    what: the fact; where: port, joint or file; remedy: remedy, "" if none is needed
+    fixes: writes that ``--fix`` may apply
     """
 
     level: Level
@@ -55,14 +55,14 @@ class Diagnostic:
 
 
 class Advice(NamedTuple):
-    """A row of a table of findings; the texts have fields as of ``str.format``."""
+    """Row of a table of findings; the texts have fields for ``str.format``."""
 
     level: Level
     what: str
     remedy: str = ""
 
     def at(self, where: str, *fixes: Fix, **facts: object) -> Diagnostic:
-        """Return the finding at a place.
+        """Return the finding for a place.
 
         facts: values of the fields of the texts
         """
@@ -85,7 +85,7 @@ def group_findings(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str
 
 
 def join_places(places: Sequence[str]) -> str:
-    """Name several places; joints first, then their servos: "a, b, c (servos 1-3)"."""
+    """Join the names of several places; joints first, then servos: "a, b, c (servos 1-3)"."""
     found = [match for place in places if (match := _JOINT.fullmatch(place))]
     nouns = {match[2] for match in found}
     if len(places) == 1 or len(found) < len(places) or len(nouns) > 1:
@@ -95,7 +95,7 @@ def join_places(places: Sequence[str]) -> str:
 
 
 def finding_json(finding: Diagnostic, bus: str) -> dict[str, object]:
-    """Return a finding as JSON can hold it; bus: the name of its bus, "" for the main one."""
+    """Return a finding as JSON values; bus: the name of its bus, "" for the main one."""
     return {
         "bus": bus,
         "level": finding.level,
@@ -107,7 +107,7 @@ def finding_json(finding: Diagnostic, bus: str) -> dict[str, object]:
 
 
 def summarize(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
-    """Count findings by level, and offer what --fix may do."""
+    """Count findings by level, and list the fixes that --fix may apply."""
     counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
     text = ", ".join(f"{count} {level}" for level, count in counts if count)
     fixable = sum(bool(finding.fixes) for finding in findings)

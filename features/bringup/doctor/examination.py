@@ -1,7 +1,7 @@
 """Examination of a whole bus of a rig: its servos, their baud rates and their faults.
 
-Reads only; ``apply_fixes`` writes what the findings offer, to servos whose torque is off, and
-moves nothing.
+The examination only reads; ``apply_fixes`` writes the fixes of the findings, to servos whose torque
+is off, and moves nothing.
 """
 
 from collections import Counter
@@ -60,8 +60,8 @@ ADVICE = {
 class Presence(NamedTuple):
     """Servos that answered at the rig's baud rate, by id, and missing ones.
 
-    unexpected: answered, but are not in the YAML; elsewhere: answered at other baud rates
-    corrupt: how many of six answers came in pieces, by id, where any did
+    unexpected: servos that answered but are not in the YAML; elsewhere: at other baud rates
+    corrupt: number of incomplete answers out of six, by id, if any
     """
 
     present: dict[int, FoundServo]
@@ -91,7 +91,7 @@ def examine_ports(
 
     A failure of the examination is one of the findings.
 
-    examine: asks what is behind it
+    examine: queries the devices on the port
     """
     device = port.port_name
     findings = examine_port(port_facts(device, host))
@@ -99,10 +99,10 @@ def examine_ports(
         return findings
     try:
         behind = examine()
-        # While it is open: the program asks the adaptor itself for low latency then.
+        # While it is open: the program itself sets the adaptor to low latency then.
         return [*findings, *examine_latency(device, host), *behind]
     except DriverError as error:
-        # The message names port and cure.
+        # The message has the port and the remedy.
         return [Diagnostic("error", str(error).removeprefix(device).lstrip(": "), device)]
     finally:
         port.closePort()
@@ -111,7 +111,7 @@ def examine_ports(
 def examine_bus(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
 ) -> list[Diagnostic]:
-    """Examine every servo of a bus, and any other on it; torque is left as it is.
+    """Examine every servo of a bus, including unexpected ones; torque is not changed.
 
     Raises:
         PortError: the port cannot be opened.
@@ -197,9 +197,9 @@ def fix_latency(device: str, host: Host) -> list[AppliedFix]:
 def apply_fixes(
     write: Callable[[Fix], str], findings: Iterable[Diagnostic]
 ) -> Iterator[AppliedFix]:
-    """Write what the findings offer, one after the other.
+    """Write the fixes of the findings, one after the other.
 
-    write: writes one if that is safe; returns "" or why it was not done
+    write: writes one fix if that is safe; returns "" or the reason why it did not
 
     Raises:
         BusLost: the port is gone.
@@ -216,10 +216,10 @@ def apply_fixes(
 
 
 def examine_guardian(plan: ReleasePlan) -> Diagnostic:
-    """Start a guardian, let it end again, and return what it would do; nothing is sent.
+    """Start a guardian, end it again, and return its planned actions; nothing is sent.
 
     Args:
-        plan: what it would release.
+        plan: servos that it would release.
     """
     guardian = Guardian((plan,))
     try:
@@ -234,7 +234,7 @@ def examine_guardian(plan: ReleasePlan) -> Diagnostic:
     )
 
 
-# --- Faults of a serial port, by what the operating system reports. It is not opened
+# --- Faults of a serial port, as the operating system reports them. It is not opened
 # Source of the latency timer: ROBOTIS e-Manual, U2D2 (FTDI adaptors wait 16 ms by default).
 
 
@@ -269,9 +269,9 @@ PORT_ADVICE = {
 
 
 class PortFacts(NamedTuple):
-    """Report of the operating system on one port.
+    """Properties of one port, from the operating system.
 
-    holders: other programs that hold it; other_ports: the ports there are
+    holders: other programs that use it; other_ports: the existing ports
     """
 
     device: str
@@ -281,7 +281,7 @@ class PortFacts(NamedTuple):
 
 
 def port_facts(device: str, host: Host) -> PortFacts:
-    """Return what the operating system knows of a port."""
+    """Return the operating system's properties of a port."""
     return PortFacts(device, access(device), port_users(device, host), serial_ports(host))
 
 
@@ -308,7 +308,7 @@ def examine_port(facts: PortFacts) -> list[Diagnostic]:
 
 
 def name_ports(ports: Sequence[SerialPort]) -> str:
-    """List ports for people."""
+    """Format a list of ports for people."""
     named = [f"{port.by_id or port.device} ({port.description})" for port in ports]
     return ", ".join(named) or "none"
 

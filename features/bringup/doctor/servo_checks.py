@@ -29,10 +29,10 @@ DELAY_UNIT_US = 1e6 * dynamixel.RETURN_DELAY_UNIT_S
 class WantedSetting(NamedTuple):
     """A register that should have one value.
 
-    text: describes a value
-    remedy: any other than ``FIX`` offers no fix; {setup.name} is the joint
-    mask: chooses its bits
-    least, most: other values within them are as good
+    text: description of a value
+    remedy: any text other than ``FIX`` offers no fix; {setup.name} is the joint
+    mask: selects its bits
+    least, most: values between them are also correct
     """
 
     register: str
@@ -45,7 +45,7 @@ class WantedSetting(NamedTuple):
     most: int | None = None
 
     def accepts(self, value: int) -> bool:
-        """Return whether a register with this value is as it should be."""
+        """Return whether the value of a register is correct."""
         if self.least is None and self.most is None:
             return value & self.mask == self.value
         above = self.least is None or value >= self.least
@@ -53,11 +53,11 @@ class WantedSetting(NamedTuple):
 
 
 class Protection(NamedTuple):
-    """The register by which a servo protects motor and gears.
+    """Register by which a servo protects motor and gears.
 
-    errors: those that must switch it off, by the bits of the register
-    text: with {errors} and {value}
-    by_hand: what to do, by the model; None: missing bits may be set
+    errors: errors that must switch it off, by the bits of the register
+    text: text with {errors} and {value}
+    by_hand: remedy by the user, by model; None: missing bits may be set
     """
 
     register: str
@@ -68,17 +68,17 @@ class Protection(NamedTuple):
 
 @dataclass(frozen=True)
 class ServoChecks:
-    """Properties of a kind of servo that the rules depend on.
+    """Properties of a kind of servo that the rules need.
 
-    maker_program: the maker's, for settings that this program cannot write
-    maker_manual: the maker's
-    registers: those that rules read
-    ping_only: Status Return Level 0 means that only pings are answered
+    maker_program: program of the maker, for settings that this program cannot write
+    maker_manual: manual of the maker
+    registers: registers that the rules read
+    ping_only: whether Status Return Level 0 means that only pings are answered
     out_of_voltage: effect of a supply outside the limits
-    error_remedies: by the error; {setup.id} is the servo's id; "" for an error that is found by
-        its measured value alone
-    unlimited_at_zero: both position limits 0 mean no limits
-    firmware_notes: of a model; each with the firmware below which it applies; the first counts
+    error_remedies: remedies by error; {setup.id} is the servo's id; "" for an error that only its
+        measured value shows
+    unlimited_at_zero: whether both position limits 0 mean no limits
+    firmware_notes: notes by model, each with the firmware below which it applies; the first is used
     """
 
     kind: ServoKind

@@ -1,4 +1,4 @@
-"""Rules for one servo: its registers as read, compared with the rig's YAML. Nothing is written.
+"""Rules for one servo that compare its registers with the rig's YAML. Nothing is written.
 
 A latched fault stays until a restart. Other error bits last as long as their cause, except
 overload and overcurrent, which last until a goal that moves away from the obstacle, or a restart.
@@ -21,11 +21,11 @@ from gazerig.features.bringup.servo_kinds import ServoKind
 MOST_NAMED = 6
 TRIPPED = 255
 WARM_C = 10
-"""A servo this near to its limit is called warm."""
+"""Distance from the temperature limit at which a servo is called warm."""
 WEAK = 0.9
-"""Below this share of the rated voltage a servo has little speed and torque left."""
+"""Fraction of the rated voltage below which a servo has little speed and torque."""
 MEANT = 0.875
-"""From this share of a rated voltage on a supply is meant for servos of that voltage."""
+"""Fraction of a rated voltage above which a supply is intended for servos of that voltage."""
 
 VOLTAGE = "input voltage"
 """Every family's name of an unfit voltage, in bit 0."""
@@ -71,15 +71,15 @@ ADVICE = {
         "{model.rated_v:g} V it turns {limit:.0f}", "lower max_speed_deg_s in the YAML"),
 }
 # fmt: on
-"""Findings that a function decides on; those of one condition are in ``RULES``."""
+"""Findings that need a function; those with one condition are in ``RULES``."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServoState:
-    """One servo as found.
+    """State of one servo.
 
-    values: registers by name, None without a good answer
-    corrupt: how many of six answers came in pieces
+    values: registers by name, None without a valid answer
+    corrupt: number of incomplete answers out of six
     """
 
     checks: ServoChecks
@@ -90,14 +90,14 @@ class ServoState:
 
     @property
     def model(self) -> Model:
-        """Return the model that it should be."""
+        """Return the expected model."""
         return self.checks.kind.family.models[self.setup.model]
 
     def finding(self, advice: Advice, *fixes: tuple[str, int], **facts: object) -> Diagnostic:
         """Return a finding about this servo.
 
         fixes: registers and their correct values
-        facts: of the advice, in addition to ``setup``, ``found``, ``checks``, ``model`` and the
+        facts: values for the advice besides ``setup``, ``found``, ``checks``, ``model`` and the
             registers
         """
         made = (Fix(self.setup.id, name, value, self.values.get(name)) for name, value in fixes)
@@ -111,10 +111,10 @@ Rule = Callable[[ServoState], Iterator[Diagnostic]]
 
 @dataclass(frozen=True)
 class RegisterRule:
-    """A rule of one condition: a ``Rule``.
+    """``Rule`` with one condition.
 
-    registers: those that it needs; it does not apply if any is missing or was not read
-    applies: given the servo and their values
+    registers: required registers; the rule does not apply if any is missing or was not read
+    applies: the condition, called with the servo and their values
     """
 
     registers: tuple[str, ...]
@@ -132,7 +132,7 @@ class RegisterRule:
 def examine_servo(
     port: BusPort, kind: ServoKind, setup: ServoConfig, found: FoundServo, corrupt: int
 ) -> list[Diagnostic]:
-    """Read one servo and examine it; its torque stays as it is.
+    """Read one servo and examine it; its torque is not changed.
 
     Raises:
         BusLost: the port is gone.
@@ -156,7 +156,7 @@ def read_state(
 def apply_rules(state: ServoState) -> list[Diagnostic]:
     """Return all faults of one servo; a healthy one has one finding that describes it.
 
-    A servo of another model, or with an id that another one has, is not examined further.
+    A servo of another model, or with the id of another servo, is not examined further.
     """
     family, values = state.checks.kind.family, state.values
     findings = []
@@ -210,7 +210,7 @@ def _voltage(state: ServoState) -> Iterator[Diagnostic]:
 
 
 def _too_high(state: ServoState, volts: int) -> str:
-    """Return the remedy if a model has versions for other voltages that look alike to the bus."""
+    """Return the remedy for a model whose versions for other voltages look the same on the bus."""
     model, raised = state.model, "set Max Voltage (14) to {} with " + state.checks.maker_program
     for other in state.checks.kind.family.models.values():
         if other.number != model.number:
@@ -232,7 +232,7 @@ def _too_high(state: ServoState, volts: int) -> str:
 def _firmware(state: ServoState) -> Iterator[Diagnostic]:
     firmware, wanted = state.found.firmware, state.setup.firmware_min
     notes = ((wanted, ADVICE["firmware"]), *state.checks.firmware_notes(state.setup.model))
-    # The first one counts.
+    # The first one is used.
     yield from [state.finding(advice) for below, advice in notes if firmware < below][:1]
 
 
@@ -280,7 +280,7 @@ def _protection(state: ServoState) -> Iterator[Diagnostic]:
 
 
 def _voltage_latch(state: ServoState) -> Iterator[Diagnostic]:
-    """Note that a moment of an unfit voltage is enough if it switches the torque off."""
+    """Note that a short voltage fault is sufficient to switch the torque off."""
     family, register = state.checks.kind.family, state.checks.protection.register
     value = state.values[register]
     if value is None or not family.faults_latch or family.name_errors(value & 1) != (VOLTAGE,):
@@ -293,14 +293,14 @@ def _voltage_latch(state: ServoState) -> Iterator[Diagnostic]:
 
 
 def _overload(state: ServoState) -> Iterator[Diagnostic]:
-    """Check that share and time of an overload protection both let it act."""
+    """Check that load limit and time of an overload protection both permit it to act."""
     share, after = state.values.get("overload_torque"), state.values.get("protection_time")
     if share is not None and after is not None and (share >= 100 or not after):
         yield state.finding(ADVICE["overload"], share=share, seconds=after / 100.0)
 
 
 def _speed(state: ServoState) -> Iterator[Diagnostic]:
-    """Compare the YAML's speed with the servo's own limit, or what its motor can do."""
+    """Compare the YAML's speed with the servo's own limit, or with the speed of its motor."""
     family, wanted_steps_s = state.checks.kind.family, state.setup.max_speed_steps_s
     unit_deg_s = family.velocity_unit_steps_s * 360.0 / family.steps_per_turn
     asked = int(wanted_steps_s / family.velocity_unit_steps_s)
@@ -354,7 +354,7 @@ RULES: tuple[Rule, ...] = (
 
 
 def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
-    """Write a fix if the torque is off, so that it stays; return "" or why it was not done.
+    """Write a fix if the torque is off, so that it persists; return "" or the reason of a failure.
 
     Raises:
         BusLost: the port is gone.
@@ -362,7 +362,7 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
     registers, servo_id = Registers(port, kind.family), fix.servo_id
     torque = registers.read(servo_id, "torque_enable")
     if not torque and registers.read(servo_id, "status_return_level") != kind.family.answer_level:
-        # A servo that answers only questions or pings confirms nothing of what follows.
+        # A servo that answers only queries or pings does not confirm the following writes.
         registers.write_all((servo_id,), "status_return_level", kind.family.answer_level)
         torque = registers.read(servo_id, "torque_enable")
     if torque:

@@ -1,4 +1,4 @@
-"""The commands that calibrate a camera: the board to print, then lens and place on the head."""
+"""The commands that calibrate a camera: the printed board, then lens and pose on the head."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -94,7 +94,7 @@ ColumnsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from le
 RowsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from top to bottom.")]
 SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a square.")]
 _BOARD = BoardParams()
-# Frames with a face, some seconds of them, and how long none may be seen.
+# Number of frames with a face (some seconds), and longest time without one.
 _FACE_FRAMES, _NO_FACE_S = 120, 30.0
 
 
@@ -238,9 +238,9 @@ def _measure_field(
 
 
 def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
-    """Return a camera found on the head as dotted keys of a rig file and values.
+    """Return a calibrated camera on the head as dotted keys of a rig file and values.
 
-    With it goes the lens that belongs to this place, at the size it was measured on.
+    They include the lens that belongs to this pose, at the image size of its measurement.
     """
     params, lens = found.camera_params(camera), found.lens
     place = ("position_mm", "yaw_deg", "pitch_deg", "roll_deg")
@@ -260,9 +260,9 @@ class _Job(NamedTuple):
 
 
 class _KnownLens(NamedTuple):
-    """The lens as far as it is known.
+    """The lens, as far as known.
 
-    camera: with it; changes: for the rig's file; good: what may be assumed of it
+    camera: camera with the lens; changes: values for the rig's file; good: its assumed quality
     """
 
     camera: CameraParams
@@ -280,7 +280,7 @@ class _CameraView(NamedTuple):
 
 
 class _NullDetector:
-    """Stands where faces are looked for: a board has none."""
+    """Detector for a board, which has no faces."""
 
     def find(self, _: ImageArray) -> tuple[DetectedFace, ...]:
         """Find nothing."""
@@ -322,7 +322,7 @@ def _refuse_contradictions(
     mock: bool,
     face_at: float | None,
 ) -> None:
-    """Refuse options that exclude each other."""
+    """Refuse contradictory options."""
     if face_at is not None and (
         oak or oak_calibration is not None or mock or what is not CalibrationTarget.all
     ):
@@ -341,7 +341,7 @@ def _refuse_contradictions(
 def _find_lens(
     job: _Job, eye: _CameraView, source: FrameSource, what: CalibrationTarget
 ) -> _KnownLens:
-    """Return the lens as the rig has it, as an OAK camera has it in memory, or measure it."""
+    """Return the lens of the rig or from the memory of an OAK camera, or measure it."""
     if what is CalibrationTarget.mount:
         return _KnownLens(job.rig.camera, {}, HandEyeParams())
     if isinstance(source, OakSource):
@@ -396,7 +396,7 @@ def _read_oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = Non
 def _measure_mount(
     job: _Job, eye: _CameraView, neck: Neck, camera: CameraParams, good: HandEyeParams
 ) -> HandEye:
-    """View the hanging board from several neck angles."""
+    """Observe the hanging board from several neck angles."""
     if camera.lens is None:
         raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
     shot = _first_frame(job, eye)
@@ -447,7 +447,7 @@ def _first_frame(job: _Job, eye: _CameraView) -> Shot:
 
 
 def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:
-    """Return the board in its printed size."""
+    """Return the board with its printed size."""
     marker_mm = square_mm * _BOARD.marker_mm / _BOARD.square_mm
     try:
         return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)
@@ -463,7 +463,7 @@ _SETTLE_S = 0.4
 
 
 class JoggedNeck:
-    """A ``calibration.camera_procedure.Neck`` that goes through the guard, as jogging does."""
+    """``calibration.camera_procedure.Neck`` that moves through the guard, like jogging."""
 
     def __init__(
         self, control: ManualControl, mock: BoardScene | None, stopped: StopReason
@@ -472,7 +472,7 @@ class JoggedNeck:
         self._angles: Angles3 = (0.0, 0.0, 0.0)
 
     def turn(self, head_rad: Angles3) -> None:
-        """Move gently; if the guard holds it back, the measured angles count."""
+        """Move gently; if the guard limits the motion, the measured angles are used."""
         raise_if_stopped(self._stopped)
         there = self._control.body.names
         axes = zip(NECK, head_rad, strict=True)
@@ -502,12 +502,12 @@ class JoggedNeck:
 def moving_neck(
     rig: Rig, mock: BoardScene | None, port: str | None, stopped: StopReason, yes: bool
 ) -> Iterator[JoggedNeck]:
-    """Return a neck that moves gently; whatever happens, it ends with the torque off.
+    """Return a neck that moves gently; in all cases it ends with the torque off.
 
-    mock: the simulated board, for which the servos are emulated too
+    mock: the simulated board, for which the servos are also emulated
 
     Raises:
-        SetupError: port or servos are not as configured, or the answer was no.
+        SetupError: port or servos do not match the configuration, or the answer was no.
     """
     if any(name not in rig.joints for name in NECK[:2]):
         raise CameraCalibrationRefused(
@@ -536,7 +536,7 @@ def raise_if_stopped(stopped: StopReason) -> None:
     """Refuse to continue if there is a reason to stop.
 
     Raises:
-        CameraCalibrationRefused: with the reason.
+        CameraCalibrationRefused: the message has the reason.
     """
     why = stopped()
     if why is not None:

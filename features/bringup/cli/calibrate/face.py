@@ -1,4 +1,4 @@
-"""The command calibrate face: places of one person's eyes, mouth and other parts."""
+"""The command calibrate face: positions of a person's eyes, mouth and other parts."""
 
 import os
 import sys
@@ -54,10 +54,10 @@ from gazerig.robot.remote.live_server import StopOnlyServer
 
 STILL_SCENE = "sits-still"
 
-# A script cannot come nearer or turn to the robot, so it does not wait for ever.
+# A script cannot move nearer or turn to the robot, so the waiting time is limited.
 _SCRIPT_WAITS_S = 20.0
 _SHOW_S = 0.1
-# A detector that blinks is not worth a word.
+# Short gaps of a detector are not reported.
 _UNSEEN_S = 1.0
 
 
@@ -99,9 +99,9 @@ def calibrate_face(
         options = RunOptions(
             rig=rig,
             mock=mock,
-            # No user watches a script on an emulated rig: simulated time will do.
+            # No user watches a script on an emulated rig, so simulated time is sufficient.
             fast=mock and answers is not None and camera is None and not oak,
-            seconds=0.0,  # that much a film in simulated time asks for; keys end it
+            seconds=0.0,  # enough for a film in simulated time; keys end it
             scene=STILL_SCENE if mock and nothing else scene,
             video=video,
             camera=camera,
@@ -124,9 +124,9 @@ def calibrate_face(
 
 
 def exact_gaze(rig: Rig) -> Rig:
-    """Return a rig whose gaze rests on the part itself.
+    """Return a rig whose gaze stays exactly on the part.
 
-    Refixations look up to 1.1 deg past it, as much as ``AIMED_DEG``.
+    Refixations deviate by up to 1.1 deg, which is as much as ``AIMED_DEG``.
     """
     exact = replace(
         rig.gaze.oculomotor,
@@ -147,7 +147,7 @@ def _calibrate(
     begin = initial_calibration(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
     made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
-    # Input from a pipe is a script, too: no user can end it.
+    # Input from a pipe is also a script: no user can end it.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
     steer = SteeringButtons(BUTTONS, keys.press, lambda: status_text(steering))
@@ -188,7 +188,7 @@ def _calibrate(
 
 
 class _CalibrationSession:
-    """Keys in, words out on the terminal and the page, between the ticks."""
+    """Session between the ticks: reads keys, and prints text on the terminal and the page."""
 
     def __init__(
         self,
@@ -229,7 +229,7 @@ class _CalibrationSession:
         return None
 
     def update(self, tick: Tick) -> None:
-        """Update from a tick, and print what a person should know."""
+        """Update from a tick, and print instructions for the person."""
         self._observers.update(tick)
         self._door.update(tick)
         self._tell(self._steering.update(tick))

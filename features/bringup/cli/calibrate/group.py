@@ -14,10 +14,10 @@ _HELP = ("--help", "-h")
 
 
 class DefaultCommandGroup(TyperGroup):
-    """Passes arguments that name none of its commands to the default command.
+    """Group that passes arguments without the name of a command to the default command.
 
-    So ``gazerig calibrate my_rig.yaml`` stays what it was before there was anything else to
-    calibrate. A rig file that is called like a command is named ``./face``.
+    So ``gazerig calibrate my_rig.yaml`` calibrates joints. For a rig file with the name of a
+    command, write ``./face``.
     """
 
     default = "joints"

@@ -1,4 +1,4 @@
-"""The command calibrate joints: zero, sign and range of each joint, by what its servo can do."""
+"""The command calibrate joints: zero, sign and range of each joint, as its servo permits."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
@@ -79,10 +79,10 @@ class ZeroReference(StrEnum):
 
 
 class CalibrationOptions(NamedTuple):
-    """Options of a calibration, as on the command line.
+    """Options of a calibration on the command line.
 
-    pulses_us: hobby servos are never sent outside
-    extra_marks: places of a linkage between each two that are marked
+    pulses_us: permitted range of the pulses of hobby servos
+    extra_marks: number of positions of a linkage between two marks
     """
 
     actuation: ActuationMode
@@ -125,15 +125,15 @@ def measure(
             except (CalibrationRefused, ServoMissing, ServoFault) as error:
                 refused.append(name)
                 say(f"refused: {error}")
-    # In the order of the rig, whatever the buses are called.
+    # In the order of the rig, independent of the names of the buses.
     return {name: found[name] for name in names if name in found}, tuple(refused)
 
 
 def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -> None:
-    """Refuse what the servos of these joints cannot do.
+    """Refuse options that the servos of these joints do not support.
 
     Raises:
-        SetupError: names the joints, and what can be done.
+        SetupError: names the joints, and the alternatives.
     """
     without_feedback = [
         name for name in names if not rig.joints[name].model_facts.measures_position
@@ -176,7 +176,7 @@ def _calibrate_smart_servo(bench: CalibrationJob, name: str, bus: str) -> JointM
 
 
 def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
-    """Return what switches one joint's servo off if this program dies or hangs."""
+    """Return the guardian that switches one joint's servo off if this program dies or hangs."""
     plan = release_plan(bench.rig, bus, bench.wire.paths[bus])
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
@@ -240,7 +240,7 @@ def _calibrate_hobby_servo(bench: CalibrationJob, name: str, bus: str) -> JointM
 def _torque_off_after(
     who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
 ) -> Iterator[None]:
-    """Switch the torque off however the block ends; nothing is printed if that works."""
+    """Switch the torque off after the block in all cases; nothing is printed on success."""
     with PowerDown(
         None,
         torque_off,
@@ -312,7 +312,7 @@ def calibrate_joints(
         if not dry_run:
             refuse_unwritable(rig, out)
             if out is None:
-                # A linkage that is spread over several lines cannot be rewritten: they are kept.
+                # A linkage on several lines of the file cannot be rewritten: the lines are kept.
                 behind_rods = [
                     one
                     for one in names

@@ -93,7 +93,7 @@ def refuse_unmeasurable(rig: Rig) -> None:
     """Refuse a rig whose neck cannot be measured.
 
     Raises:
-        SetupError: why.
+        SetupError: the message has the reason.
     """
     necks = [name for name in SWEPT if name in rig.joints]
     if "neck_pitch" not in necks:
@@ -109,12 +109,12 @@ def refuse_unmeasurable(rig: Rig) -> None:
 
 
 def mass_changes(rig: Rig, found: HeadBalance, weight_kg: float | None) -> dict[str, Any]:
-    """Return the values of a rig file that the loads give.
+    """Return the values of a rig file that follow from the loads.
 
     Args:
-        rig: the rig; its counterweights are known.
-        found: what the neck carries, counterweights of the head included.
-        weight_kg: of the head from a scale.
+        rig: the rig, with known counterweights.
+        found: balance of the head, including its counterweights.
+        weight_kg: mass of the head from a scale.
     """
     weights = [one for one in rig.mass.counterweights.values() if one.link == "head"]
     moment = np.array(found.moment_kg_m)

@@ -14,15 +14,15 @@ from gazerig.features.bringup.calibration.camera_calibration import lens_params
 from gazerig.robot.cli.terminal import say
 from gazerig.robot.model.frames import LensParams
 
-# A frame's own lens that differs by less is the calibration's, rounded.
+# If a frame's own lens differs by less, it is the calibration's with rounding.
 _SAME_SHARE = 2e-3
 
 
 def calibration_of_file(file: Path, params: OakParams) -> OakCalibration:
-    """Read a calibration that depthai's eepromToJsonFile has written.
+    """Read a calibration written by depthai's eepromToJsonFile.
 
     Raises:
-        CameraError: there is no such file, or it is none.
+        CameraError: the file does not exist, or is not a calibration.
     """
     dai = load_depthai()
     if not file.is_file():
@@ -46,7 +46,7 @@ def upright_calibration(found: OakCalibration, orientation: FrameOrientation) ->
 
 
 def with_frame_lens(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibration:
-    """Return the calibration with the lens of a frame; a difference is printed."""
+    """Return the calibration with the lens of a frame; print a difference."""
     if frame_lens is None:
         return found
     a, b = found.lens, frame_lens
@@ -66,7 +66,7 @@ def with_frame_lens(found: OakCalibration, frame_lens: Intrinsics | None) -> Oak
 
 
 def print_calibration(found: OakCalibration, params: OakParams) -> None:
-    """Print what the memory holds, also what is not for the rig's file."""
+    """Print the contents of the memory, including values that are not for the rig's file."""
     i = found.lens
     say(
         f"{found.label}: focal length {i.fx_px:.1f}, {i.fy_px:.1f} px, axis at {i.cx_px:.1f}, "
