@@ -1,4 +1,4 @@
-"""A run in simulated time for its figures only: nothing is shown, recorded or tuned."""
+"""Run in simulated time for its figures only: nothing is shown, recorded or tuned."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -34,8 +34,8 @@ def simulate(
         watch: receives every tick.
 
     Raises:
-        gazerig.config.load.ConfigError: a file that the rig names is at fault.
-        SetupError: the options do not fit the rig, or the run ended by a fault.
+        gazerig.config.load.ConfigError: a file that the rig names has a fault.
+        SetupError: the options do not fit the rig, or the run ended with a fault.
     """
     builder, failures = GazeTraceBuilder(), list[Exception]()
 
@@ -58,7 +58,7 @@ def simulate(
 
 
 def refuse_unfit(rig: Rig, options: RunOptions) -> None:
-    """Refuse options with which a run of a rig could not begin; nothing runs.
+    """Refuse options with which a run of a rig could not start; nothing runs.
 
     Raises:
         gazerig.config.load.ConfigError: a file that the rig names is at fault.

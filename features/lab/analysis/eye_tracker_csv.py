@@ -1,9 +1,9 @@
-"""CSV of an eye-tracker -> gaze samples or fixations; refuses ambiguous files.
+"""Reader of an eye tracker's CSV file: gaze samples or fixations; refuses ambiguous files.
 
 The first line names the columns, in any order and case; other columns are ignored:
 
-samples    time, x, y             one line a sample; an empty or NaN x or y is a lost eye
-fixations  start, duration, part  one line a fixation, already labelled; or x, y for part
+samples    time, x, y             one line per sample; an empty or NaN x or y is a lost eye
+fixations  start, duration, part  one line per fixation, already labelled; or x, y for part
 
 The name of a time column may end in its unit (time_s, time_ms, start_ms, ...). Without a unit, the
 size of the steps decides between seconds and milliseconds, and the note states the choice.
@@ -32,7 +32,7 @@ _NAMES = {
 _UNITS = {"_s": 1.0, "_ms": 1e-3}
 _LOST = ("", "nan", "na", "n/a", "none", "null", ".", "-")
 _OUTSIDE = (*_LOST, "outside", "other", "elsewhere")
-# Trackers take 20-2000 samples a second: 0.0005-0.05 in seconds, 0.5-50 in milliseconds.
+# Trackers take 20-2000 samples a second: steps of 0.0005-0.05 in seconds, 0.5-50 in milliseconds.
 _STEP_MS, _STEP_TOO_LARGE = 0.2, 200.0
 # Fixations last 0.05-2 s: a median above this is in milliseconds.
 _DURATION_MS = 5.0
@@ -86,7 +86,7 @@ def read_recording(path: Path) -> Samples | FixationTable:
     """Read samples or fixations.
 
     Raises:
-        SetupError: with the file, line and column, and the fault.
+        SetupError: the message has the file, line, column and fault.
     """
     table = _read(path)
     if _find(table, "duration") is not None:
@@ -149,7 +149,7 @@ def _fixations(table: _TrackerTable) -> FixationTable:
     )
 
 
-_LARGEST = 200_000_000  # bytes; an hour at 1000 Hz has about 100 MB
+_LARGEST = 200_000_000  # largest size, bytes; an hour at 1000 Hz has about 100 MB
 
 
 def _read(path: Path) -> _TrackerTable:
@@ -239,7 +239,7 @@ def _parse_or_lost(cell: str) -> float:
 
 
 def _part(table: _TrackerTable, column: _Column, line: int, cell: str) -> str | None:
-    """Read a part's code or name; None for a fixation outside."""
+    """Parse a part's code or name; None for a fixation outside."""
     word = cell.strip().lower()
     if word in _OUTSIDE:
         return None

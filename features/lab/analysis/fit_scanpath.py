@@ -1,4 +1,4 @@
-"""The fit-scanpath command: a recording of a person's gaze on a face -> a walk for ``run``."""
+"""The fit-scanpath command: from a recording of a person's gaze on a face to a walk for ``run``."""
 
 from math import isnan
 from pathlib import Path
@@ -38,7 +38,7 @@ def fit_to_recording(
     """Fit a walk to a recording, write it as YAML, and return a report as text.
 
     parts: rectangles of the parts in the recording's coordinates; not needed for labelled parts
-    smoothing: "none", "laplace" or "bootstrap"; seed: of the resampling
+    smoothing: "none", "laplace" or "bootstrap"; seed: seed of the resampling
     force: replace an existing file
 
     Raises:

@@ -1,7 +1,7 @@
-"""Gaze samples -> fixations on the parts of a face.
+"""Fixations on the parts of a face, from gaze samples.
 
-Fixations are found by dispersion (I-DT, Salvucci & Goldberg 2000) with pymovements. It needs
-samples without losses and at one rate, so it gets one unbroken stretch at a time.
+Fixations are found by dispersion (I-DT, Salvucci & Goldberg 2000) with pymovements. It requires
+samples without losses and at a constant rate, so it receives one unbroken stretch at a time.
 """
 
 from dataclasses import dataclass
@@ -134,7 +134,7 @@ def usual_side(boxes: PartBoxes) -> float:
 def _find_fixations(t_s: Floats, places: Floats, least: int, widest: float) -> list[_RawFixation]:
     """Find the fixations of one unbroken stretch."""
     try:
-        # Only this command needs it, and it takes a second to import.
+        # Only this command needs it, and its import takes a second.
         from pymovements.events import idt  # type: ignore[import-untyped]
     except ImportError:
         raise SetupError(

@@ -1,4 +1,4 @@
-"""The commands ``gazerig report`` and ``gazerig compare``: how human the gaze of a run was."""
+"""The commands ``gazerig report`` and ``gazerig compare``: human likeness of the gaze of a run."""
 
 from collections import Counter
 from dataclasses import replace
@@ -77,7 +77,7 @@ def report(
             raise SetupError("--bus needs --scene: a recording already has its bus")
         if file is None and other is not None:
             raise SetupError("--with takes the recording of another head: give both recordings")
-        # Drawing and models are heavy; `--help` does not import them.
+        # Drawing and models are slow to import; `--help` does not need them.
         from gazerig.features.lab.report.page import banner, refuse_foreign, report_files
         from gazerig.features.lab.report.report import FIGURE_KEYS, make_report, read_run
         from gazerig.robot.recording.read import RunRecording, report_bad_contents
@@ -162,7 +162,7 @@ def compare(
 
 
 def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
-    """Read the mutual gaze of two heads of one run."""
+    """Return the mutual gaze of two heads of one run."""
     from gazerig.features.lab.report.heads import mutual_gaze_report
     from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
@@ -238,7 +238,7 @@ def _load_config(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
     """Read the configuration in a recording.
 
     Raises:
-        gazerig.config.load.ConfigError: it is not valid today.
+        gazerig.config.load.ConfigError: it is not valid in this version.
     """
     from gazerig.config.load import load
     from gazerig.config.rig import Rig

@@ -147,8 +147,8 @@ def _plan_runs(
     Raises:
         ConfigError, SetupError: a point or an option cannot be run.
     """
-    # Models are heavy; `--help` does not import them. The figures need an extra; a missing extra
-    # is reported before hours of runs, not after them.
+    # Models are slow to import; `--help` does not need them. The figures need an extra; a missing
+    # extra is reported before hours of runs, not after them.
     import gazerig.features.lab.sweep.response_figure  # noqa: F401
     from gazerig.features.lab.simulated_run import refuse_unfit
     from gazerig.features.lab.sweep.axes import (

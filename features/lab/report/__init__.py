@@ -1,1 +1,1 @@
-"""A report on how human the gaze was: figures, pass bands and their sources."""
+"""Report on the human likeness of the gaze: figures, pass bands and their sources."""

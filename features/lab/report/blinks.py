@@ -1,4 +1,4 @@
-"""Blinks: their rate, their shape, and the gaze shifts that evoke them."""
+"""Blinks: their rate, their shape, and gaze shifts that evoke them."""
 
 from collections.abc import Sequence
 from math import nan
@@ -25,11 +25,11 @@ _AGAIN_S = 0.3
 _PART_S = 10.0
 _TIED_S = 0.006
 _SHUT = 0.96
-"""A blink of this depth has shut the eye, given the resolution of a servo."""
+"""Depth of a blink that counts as shut, given the resolution of a servo."""
 
 
 def blink_intervals(run: GazeTrace) -> Floats:
-    """Return seconds from blink to blink; a double blink counts once."""
+    """Return the intervals between blinks in seconds; a double blink counts once."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     apart = np.diff(onsets)
     return apart[apart > _DOUBLE_S]
@@ -45,9 +45,9 @@ def blink_shapes(blinks: Sequence[BlinkEvent]) -> Floats:
 
 
 def evoked_blinks(run: GazeTrace) -> Floats:
-    """Return (n, 2) amplitude of each saccade in deg and whether a blink came with it.
+    """Return (n, 2) amplitude of each saccade in deg and whether a blink accompanied it.
 
-    Shifts during an earlier blink are left out: shut eyes cannot shut.
+    Shifts during an earlier blink are omitted, because shut eyes cannot blink.
     """
     onsets = np.array([blink.onset_s for blink in run.blinks])
     opened = onsets + np.array([blink.duration_s for blink in run.blinks])
@@ -64,7 +64,7 @@ def evoked_blinks(run: GazeTrace) -> Floats:
 
 
 def saccade_blinks(run: GazeTrace) -> Floats:
-    """Return (n,) whether each blink begins at the same moment as a saccade."""
+    """Return (n,) whether each blink begins together with a saccade."""
     onsets = np.array([saccade.onset_s for saccade in run.saccades])
     if not len(onsets):
         return np.zeros(len(run.blinks))
@@ -95,7 +95,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
 
 
 def _counts(run: GazeTrace) -> Floats:
-    """Return (n, 2) blinks and seconds of each ten seconds of the run."""
+    """Return (n, 2) blinks and seconds in each ten seconds of the run."""
     if not len(run.rows):
         return np.zeros((0, 2))
     first, last = run.column("t")[[0, -1]]

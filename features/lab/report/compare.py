@@ -1,11 +1,11 @@
-"""Comparison of two runs: their figures, the differences, and the p values of these.
+"""Comparison of two runs: their figures, the differences, and their p values.
 
-For each measure, the events of both runs are pooled and dealt again at random (permutation test)
-to find how often chance makes a difference as large. If a measure has one number an event, the two
-distributions are compared too (Kolmogorov-Smirnov). All p values are corrected for their number
-(Holm 1979). The interval of the difference is a bootstrap's (Efron 1979). Events count as
-independent of each other, as is usual. Within a run they are not quite independent, so a
-difference just above chance deserves another run.
+For each measure, the events of both runs are pooled and divided again at random (permutation test)
+to find how often chance causes a difference as large. If a measure has one number per event, the
+two distributions are also compared (Kolmogorov-Smirnov). All p values are corrected for their
+number (Holm 1979). The interval of the difference is from a bootstrap (Efron 1979). Events count as
+independent of each other, as is usual. Within a run they are not quite independent, so a difference
+just above chance deserves another run.
 """
 
 import warnings
@@ -74,7 +74,7 @@ class MeasureDifference(NamedTuple):
 class Comparison(NamedTuple):
     """The differences, and the files with them.
 
-    warning: that one run is measured and the other estimated, "" if both have the same basis
+    warning: warning if one run is measured and the other estimated, "" if both have the same basis
     """
 
     differences: tuple[MeasureDifference, ...]
@@ -160,7 +160,7 @@ def shape_p_value(a: MeasuredValue, b: MeasuredValue) -> float:
     """Return the Kolmogorov-Smirnov p value of two distributions, nan for rows without one."""
     if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
         return nan
-    from scipy import stats  # takes a second to import, which other commands should not pay
+    from scipy import stats  # its import takes a second, which other commands do not need
 
     with warnings.catch_warnings():
         # If the exact p value overflows, SciPy uses the asymptotic one and warns.

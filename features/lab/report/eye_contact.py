@@ -19,7 +19,7 @@ def on_face(run: GazeTrace) -> NDArray[np.bool_]:
 
 
 def gaze_bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
-    """Return (n, 3) start, end, and whether the run cut it off, of each time with a true mask."""
+    """Return (n, 3) start, end, and whether the run cut it off, of each interval of a mask."""
     t = run.column("t")
     if not len(t):
         return np.zeros((0, 3))
@@ -37,12 +37,12 @@ def gaze_bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
 
 
 def face_looks(run: GazeTrace) -> Floats:
-    """Return the times of looks at a face, including cut ones."""
+    """Return the intervals of looks at a face, including those cut off."""
     return gaze_bouts(run, on_face(run))
 
 
 def mutual_looks(run: GazeTrace) -> Floats:
-    """Return the times in which both faces are turned to each other."""
+    """Return the intervals in which both faces are turned to each other."""
     return gaze_bouts(run, on_face(run) & (run.column("face_off") < _FACING_DEG))
 
 

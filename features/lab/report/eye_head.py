@@ -15,7 +15,7 @@ from gazerig.robot.analysis.event_detector import THRESHOLD_DEG_S
 LEAST_DEG = 5.0
 _AFTER_S, _BEFORE_S, _LEAST_AFTER_S = 0.9, 0.15, 0.45
 _SOON_S = 0.5
-"""A head that starts later does not belong to the eyes' shift."""
+"""A head movement that starts later does not belong to the shift of the eyes."""
 
 _NEXT_DEG = 8.0
 """A saccade of this size begins another shift."""
@@ -99,8 +99,8 @@ def stable_stretches(
 def vor_gains(run: GazeTrace) -> Floats:
     """Return (n, 2) gain of the eyes against the head and the head's speed, one row a stretch.
 
-    The required eye motion is the target's motion seen from the head, less the head's: a near
-    target requires more than the head's turn, which is no fault of the gain.
+    The required eye motion is the target's motion seen from the head, minus the head's: a near
+    target requires more than the head's rotation, which is not an error of the gain.
     """
     t = run.column("t")
     if len(t) < 20:
@@ -111,7 +111,7 @@ def vor_gains(run: GazeTrace) -> Floats:
     )
     still = np.hypot(run.column("target_yaw_rate"), run.column("target_pitch_rate"))
     mask = run.slow() & (still < _STILL_TARGET_DEG_S) & (np.hypot(head_y, head_p) > _HEAD_DEG_S)
-    # If the eyes cannot follow a fast head, that is part of the shift, short of the target.
+    # If the eyes cannot follow a fast head, this motion is part of the shift, short of the target.
     mask &= run.column("off_left") < 3.0
     rows = []
     for part in stable_stretches(mask, t, run.column("shift"), _STRETCH_S):
@@ -158,6 +158,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
 
 
 def _slope(rows: Floats) -> float:
-    """Return degrees of head for each degree beyond the eyes' own range."""
+    """Return degrees of head movement per degree beyond the eyes' own range."""
     beyond = rows[:, 0] - human.STAHL_FREE_DEG
     return float(beyond @ rows[:, 1] / (beyond @ beyond))

@@ -27,7 +27,7 @@ _SETTLED_S = 0.04
 _PAUSE_S = 0.3
 """Visits farther apart in time are not consecutive."""
 
-# Grid of the heat map: 4 mm, and half a degree seen from a metre away.
+# Grid of the heat map: 4 mm, and half a degree at a distance of one metre.
 _Y_M, _Z_M = np.arange(-0.1, 0.1001, 0.004), np.arange(-0.13, 0.1301, 0.004)
 _SPREAD_M = 0.0085
 GRID_M = (_Y_M, _Z_M)
@@ -232,7 +232,7 @@ class ReferenceWalk:
         self._steps, self._laws = steps, tuple(dwells)
 
     def visits(self, part: int, count: int, rng: np.random.Generator) -> Floats:
-        """Draw lengths of visits to a part, in s."""
+        """Draw random durations of visits to a part, in s."""
         steps = rng.geometric(1.0 - self._steps[part, part], count)
         return np.array([self._dwells(part, int(n), rng).sum() for n in steps])
 

@@ -1,4 +1,4 @@
-"""One pass over the ticks of a run: the data of every measure and figure of the report."""
+"""Data of all measures and figures of the report, from one pass over the ticks of a run."""
 
 from array import array
 from collections import defaultdict
@@ -33,9 +33,9 @@ _LONGEST_S = 1.0
 
 
 class MeasuredReaction(NamedTuple):
-    """A saccade to something that has just come into view.
+    """Saccade to a thing that has just come into view.
 
-    seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: of the thing
+    seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: its kind
     """
 
     seen_s: float
@@ -139,11 +139,11 @@ class TraceRow(NamedTuple):
 
 @dataclass(frozen=True)
 class GazeTrace:
-    """A whole run: columns (one value a tick), and events in the order of their start.
+    """Trace of a whole run: columns (one value per tick), and events in the order of their start.
 
     asked_blinks: blinks as commanded by the models; kinds: seconds per kind of target
     joints: joints of the rig, and which of them are estimated
-    reactions: to things that came into view
+    reactions: reactions to things that came into view
     """
 
     rows: Floats
@@ -182,7 +182,7 @@ class GazeTrace:
         return MODES[int(np.bincount(modes.astype(int)).argmax())] if len(modes) else "none"
 
     def between(self, start_s: float, end_s: float) -> slice:
-        """Return the rows from ``start_s`` until before ``end_s``."""
+        """Return the rows from ``start_s`` to before ``end_s``."""
         first, last = np.searchsorted(self.column("t"), (start_s, end_s))
         return slice(int(first), int(last))
 

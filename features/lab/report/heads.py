@@ -66,8 +66,8 @@ class MutualGazeReport(NamedTuple):
     """The report of two heads.
 
     Attributes:
-        first: name of the head that the report is about.
-        second: name of the other one.
+        first: name of the head of the report.
+        second: name of the other head.
         figures: result of ``mutual_gaze``, as in the summary of the run.
         png: timeline of the looks.
     """
@@ -109,12 +109,12 @@ def mutual_gaze_report(
     """Return the report of the mutual gaze of two heads.
 
     Args:
-        ticks: of both runs, on one clock.
-        placements: place of each head in their world, as in ``RunInfo.placement``.
-        names: of both.
+        ticks: ticks of both runs, on one clock.
+        placements: placement of each head in their world, as in ``RunInfo.placement``.
+        names: names of both heads.
 
     Raises:
-        SetupError: there was only one head, or both had the same place.
+        SetupError: the run had only one head, or both had the same position.
     """
     for name, place in zip(names, placements, strict=True):
         if not place:
@@ -132,7 +132,7 @@ def mutual_gaze_report(
     both = merge(
         ((tick.t_s, 0, tick) for tick in ticks[0]),
         ((tick.t_s, 1, tick) for tick in ticks[1]),
-        key=lambda each: each[:2],  # at one instant the first head comes first, as in the run
+        key=lambda each: each[:2],  # at equal times the first head comes first, as in the run
     )
     for _, head, tick in both:
         trace.update(head, tick)

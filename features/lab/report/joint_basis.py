@@ -13,7 +13,7 @@ from gazerig.robot.model.types import order_joints
 class JointBasis:
     """The joints of a run.
 
-    names: in their order; if empty, the joints are unknown and nothing is left out
+    names: names in order; if empty, the joints are unknown and nothing is omitted
     estimated: joints whose servos have no feedback
     """
 

@@ -8,7 +8,7 @@ from gazerig.gaze.types import Floats
 
 OVERSHOOT_DEG = (5.0, 20.0)
 FAR_DEG = 10.0
-"""From this size on people's saccades fall short."""
+"""Size above which people's saccades fall short."""
 
 _SETTLED_S = (0.06, 0.1)
 _LANDED_S = (0.02, 0.04)

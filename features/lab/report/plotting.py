@@ -31,7 +31,7 @@ HUMAN_FILL = "#dfe4e6"
 INK = "#2c3136"
 
 _STYLE: Any = {
-    "text.parse_math": False,  # names of files are no formulas
+    "text.parse_math": False,  # names of files are not formulas
     "font.family": "DejaVu Sans", "font.size": 10, "text.color": INK, "axes.labelcolor": INK,
     "axes.edgecolor": "#9aa3a9", "axes.titlesize": 11, "axes.titleweight": "bold",
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
@@ -41,7 +41,7 @@ _STYLE: Any = {
 }  # fmt: skip
 _DPI = 110
 _LAYOUT: Literal["constrained"] | None = "constrained"
-"""Makes room for all labels, which takes most of the drawing time; tests disable it."""
+"""Layout with room for all labels; it takes most of the drawing time, and tests disable it."""
 
 _Corner = Literal["upper left", "upper right", "lower right", "center right"]
 
@@ -92,7 +92,7 @@ def draw_png(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> by
 
 
 def draw_no_data(axes: Axes, what: str) -> None:
-    """Write a text in place of a figure without data."""
+    """Write a text instead of a figure without data."""
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(False)

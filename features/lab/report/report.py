@@ -1,4 +1,4 @@
-"""From ticks to a report: gather, measure, compare with bands, draw, write."""
+"""Creation of a report from ticks: collect, measure, compare with bands, draw, write."""
 
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
@@ -61,9 +61,9 @@ def make_report(
     force: bool = False,
     gaze: MutualGazeReport | None = None,
 ) -> Report:
-    """Write one HTML page, a PNG a figure, and the numbers as JSON; return the findings.
+    """Write one HTML page, one PNG per figure, and the numbers as JSON; return the findings.
 
-    out: the page to write; the PNGs go into the folder NAME_figures of the same parent
+    out: the page to write; the PNGs are written to the folder NAME_figures of the same parent
     force: replace existing files
     gaze: mutual gaze of this head and another one, None without another head
 
@@ -79,7 +79,7 @@ def make_report(
 
 
 def read_run(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTrace:
-    """Gather a run in one pass.
+    """Collect the data of a run in one pass.
 
     Raises:
         SetupError: the run is too short.

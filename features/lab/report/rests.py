@@ -38,9 +38,9 @@ def face_rests(run: GazeTrace) -> Floats:
 def largest_slot_excess(rests_s: Floats) -> float:
     """Return the largest excess share of rests in one slot of 10 ms over its neighbours.
 
-    A plausible law of dwell times is smooth; a floor gathers rests at one length. The slot is
-    chosen by every second rest and measured by the others, and vice versa: by chance alone, the
-    fullest of a hundred slots is fuller than the law.
+    A plausible law of dwell times is smooth; a lower limit accumulates rests at one duration. The
+    slot is chosen by every second rest and measured by the others, and vice versa, because by
+    chance alone the fullest of a hundred slots exceeds the law.
     """
     one, other = _beyond_neighbours(rests_s[::2]), _beyond_neighbours(rests_s[1::2])
     return 0.5 * float(other[np.argmax(one)] + one[np.argmax(other)])

@@ -28,7 +28,7 @@ EXPRESS_MS = 120.0
 def saccade_table(run: GazeTrace) -> Floats:
     """Return (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
 
-    Only commanded saccades count: a servo that swings back makes none.
+    Only commanded saccades count: the swing of a servo is not a saccade.
     """
     rows = [
         (s.amplitude_deg, 1e3 * s.duration_s, s.peak_deg_s, s.peak_share)

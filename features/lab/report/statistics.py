@@ -1,4 +1,4 @@
-"""A measure: rows, one per event, and a statistic of them; and the verdict by a pass band."""
+"""Measures (rows, one per event, and their statistic), and the verdict by a pass band."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ def judge(measured: MeasuredValue, band: NormBand) -> MeasureResult:
 
 
 def confidence_interval(measured: MeasuredValue) -> tuple[float, float]:
-    """Return the 95 % interval of a figure, (nan, nan) for an extreme, which has no chance.
+    """Return the 95 % interval of a figure, (nan, nan) for an extreme, which has no interval.
 
     Shares have the score interval of Wilson (1927), which is valid for few events too; all others
     that of the bootstrap (Efron 1979).

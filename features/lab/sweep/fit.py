@@ -1,4 +1,4 @@
-"""The parameters that put most of the report's measures inside their bands.
+"""Search for the parameters that put most of the report's measures inside their bands.
 
 The search minimises the number of measures outside their bands, each graded by its distance
 (``gazerig.features.lab.sweep.run_outcome.grade``), so that a step towards a band counts, too.
@@ -32,7 +32,7 @@ def search_best(scores: Scores, axes: Sequence[Axis], start: Point, count: int, 
 
     Begins with a Latin hypercube, and ``start`` if it is on the axes.
     """
-    from scipy.optimize import differential_evolution  # half a second of processor
+    from scipy.optimize import differential_evolution  # its import takes half a second of CPU time
 
     members = max(_LEAST, 2 * len(axes))
     rng = np.random.default_rng(seed)
@@ -144,7 +144,7 @@ def make_trial(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]
         for key in counted:
             verdict, value = one.figures.get(f"{VERDICT}{key}"), one.figures.get(f"{REPORT}{key}")
             if verdict not in _JUDGED or not isinstance(value, int | float):
-                grades.append(1.0)  # too few events are left
+                grades.append(1.0)  # too few events remain
             elif verdict == "outside":
                 grades.append(grade(value, BY_KEY[key].low, BY_KEY[key].high))
     n = len(outcomes)

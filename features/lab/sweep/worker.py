@@ -1,4 +1,4 @@
-"""A process of a sweep: imports once, then simulates one run after the other.
+"""Process of a sweep: imports once, then simulates one run after the other.
 
 The module gazerig.features.lab.sweep.worker_pool runs it as ``python -m
 gazerig.features.lab.sweep.worker``. Standard input: a pickled ``Job``, then a line of JSON for each
