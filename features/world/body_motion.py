@@ -1,4 +1,4 @@
-"""One person over a round: hips, trunk, head, arms and legs from the acts of a script.
+"""Motion of one person over a round: hips, trunk, head, arms and legs from the acts of a script.
 
 Frames of segments, standing upright: x ahead, y left, z up, origin at the joint nearest to the
 pelvis (a limb's upper end; a hand: x out of the palm, z from the fingers to the wrist).
@@ -70,11 +70,11 @@ _SIT_LEAN_RAD, _RECLINE_RAD = 0.62, -0.05
 _HEEL_RAD, _TOE_RAD, _BALL_M = 0.45, 0.22, 0.115
 
 Pose = tuple[Floats, Floats]
-"""Places (n, 3) and rotations (n, 3, 3) of one segment at all times."""
+"""Positions (n, 3) and rotations (n, 3, 3) of one segment at all times."""
 
 
 class BodyMotion:
-    """One person over a round, at times (n,); the seed is that of blinks, sway and gaze."""
+    """Motion of one person over a round, at times (n,); the seed is for blinks, sway and gaze."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class BodyMotion:
         self.eyes_about_m = self.hips_m + 0.07 * self.ahead + (0.0, 0.0, upright)
 
     def _hips(self) -> Floats:
-        """Return the middle between the hip joints, low enough for the legs to reach the ground."""
+        """Return the midpoint of the hip joints, low enough for the legs to reach the ground."""
         base, body = self.base, self.body
         sway = 0.006 * np.stack(
             [
@@ -142,7 +142,7 @@ class BodyMotion:
         return np.asarray(up - _TOE_RAD * lifted * smooth_rise((-back - 0.10) / 0.30))
 
     def ankle(self, foot: int) -> Floats:
-        """Return an ankle's places (n, 3) in the world."""
+        """Return an ankle's positions (n, 3) in the world."""
         base, pitch = self.base, np.maximum(self.heel(foot), 0.0)
         yaw = base.feet_rad[:, foot]
         ahead = np.stack((np.cos(yaw), np.sin(yaw)), axis=1)
@@ -152,7 +152,7 @@ class BodyMotion:
         return place
 
     def pose(self, eyes: Mapping[str, Floats]) -> list[Floats]:
-        """Return places and quaternions (n, 7) of every segment, in their order."""
+        """Return positions and quaternions (n, 7) of every segment, in order."""
         found: dict[str, Pose] = {}
         taken = object_handover.receiving_acts(self.timelines, self.name)
         hand_acts = [one for one in (*self.acts, *taken) if motions.moves_arm(one)]
@@ -282,7 +282,7 @@ class BodyMotion:
         found[f"{name}_hand"] = self.hands[name] = own
 
     def _swing(self, side: float) -> Floats:
-        """Return how far an arm swings ahead: as far as the other side's foot is."""
+        """Return the forward swing of an arm, which follows the foot of the other side."""
         other = 1 if side > 0 else 0
         way = self.base.feet_m[:, other, :2] - self.base.hips_m
         ahead = (way * self.ahead[:, :2]).sum(axis=1) * (1.0 - smooth_rise(2.0 * self.base.seated))

@@ -1,7 +1,7 @@
-"""Bodies below the head as meshes: clothes, hands, shoes and gloves, a segment each.
+"""Meshes of bodies below the head: clothes, hands, shoes and gloves, one per segment.
 
 Each mesh is in the frame of its segment (gazerig.features.world.figure) and follows from the
-measures of its body. Sections are ellipses that a skin connects.
+dimensions of its body. Sections are ellipses that a skin connects.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,11 +32,11 @@ _HAND_SCALE = 0.104
 _WRIST = 0.74
 
 Row = tuple[float, float, float, float]
-"""Height of a section, how far ahead its middle is, half its depth, half its width."""
+"""Height of a section, forward position of its centre, half its depth, half its width."""
 
 
 def loft_surface(rows: Sequence[Row], around: int = _AROUND) -> Mesh:
-    """Return a skin through sections from below to above, closed at both ends."""
+    """Return a skin through sections from bottom to top, closed at both ends."""
     first, last = rows[0], rows[-1]
     closed = [(first[0], first[1], 1e-4, 1e-4), *rows, (last[0], last[1], 1e-4, 1e-4)]
     turn = np.linspace(0.0, 2.0 * pi, around, endpoint=False).tolist()
@@ -50,10 +50,10 @@ def _limb(
     """Return a limb of round sections (share of its length below its joint, radius), rounded.
 
     Args:
-        rows: its sections from above to below.
-        scale: of the radii.
-        length: from joint to joint, m.
-        high: height of the rounding at its top as a multiple of a ball's.
+        rows: sections from top to bottom.
+        scale: factor of the radii.
+        length: length from joint to joint, m.
+        high: height of the rounding at the top as a multiple of a sphere's.
     """
     z0, r0 = rows[0]
     z1, r1 = rows[-1]
@@ -124,7 +124,7 @@ the body lower in front than behind."""
 
 
 def _shirt(look: PersonLook, k: float) -> Painted:
-    from scipy.interpolate import PchipInterpolator  # loads SciPy only to build a mesh
+    from scipy.interpolate import PchipInterpolator  # imports SciPy only to build a mesh
 
     at = np.linspace(0.0, len(_TORSO) - 1.0, 3 * (len(_TORSO) - 1) + 1)
     smooth = PchipInterpolator(np.arange(len(_TORSO)), np.array(_TORSO))(at)
@@ -204,7 +204,7 @@ def boxing_glove(k: float = 1.0) -> Painted:
 
 
 def cup_shape() -> Painted:
-    """Return a mug about the middle of its height, z up."""
+    """Return a mug, relative to the middle of its height, z up."""
     rows = [(-0.048, 0.0, 0.030, 0.030), (0.048, 0.0, 0.040, 0.040)]
     mug = paint(loft_surface(rows, 24), (236, 232, 222))
     stripe = smooth_step(0.014 - np.abs(mug.mesh.vertices[:, 2] + 0.048), 0.004)

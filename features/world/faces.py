@@ -24,7 +24,7 @@ from gazerig.sim_mock.scenes.timeline import TimedAct
 HEAD_YAW_RAD, HEAD_UP_RAD, HEAD_DOWN_RAD = radians(70.0), radians(45.0), radians(50.0)
 EYE_RAD = radians(38.0)
 LID_SHUT_RAD = radians(46.0)
-"""How far an upper lid turns down to the lower one."""
+"""Rotation of an upper lid down to the lower one."""
 
 _SACCADE_S, _HEAD_LATER_S = 0.06, 0.16
 _EASED_ROWS = 24
@@ -37,7 +37,7 @@ _SYLLABLES_HZ = 4.5
 
 
 class LookAngles(NamedTuple):
-    """Direction of head and eyes, a row a time.
+    """Direction of head and eyes, one row per time.
 
     yaw, pitch: of the head in the world, rad; p_m: (n, 3) gaze target
     wander: (n, 2) offset of the gaze from the target in yaw and pitch, rad
@@ -146,7 +146,7 @@ def head_gestures(t_s: Floats, acts: Sequence[TimedAct], round_s: float) -> tupl
 
 
 def lip_opening(t_s: Floats, acts: Sequence[TimedAct], rng: np.random.Generator) -> Floats:
-    """Return how far the mouth is open (n,), 0..1: syllables of several loudnesses, and pauses."""
+    """Return the opening of the mouth (n,), 0..1: syllables of several loudnesses, and pauses."""
     out = np.zeros_like(t_s)
     for one in acts:
         if one.act.do != "speak":
@@ -163,7 +163,7 @@ def lip_opening(t_s: Floats, acts: Sequence[TimedAct], rng: np.random.Generator)
 
 
 def lid_closure(t_s: Floats, rng: np.random.Generator) -> Floats:
-    """Return how far blinks have shut the lids (n,), 0..1."""
+    """Return the closure of the lids by blinks (n,), 0..1."""
     out, at_s = np.zeros_like(t_s), float(rng.uniform(0.5, 3.0))
     while at_s < t_s[-1] - 0.5:
         out = np.maximum(out, there_and_back(t_s, at_s, 0.08, 0.03, 0.17))

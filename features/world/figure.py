@@ -31,11 +31,11 @@ from gazerig.sim_mock.scenes.timeline import TimedAct
 _SEGMENT = {name: number for number, name in enumerate(SEGMENTS)}
 _KEPT_POSES = 16
 _PUNCH_OUT_M = 0.35
-"""A fist so far ahead of its guard is turned as in a punch."""
+"""Distance of a fist ahead of its guard at which it is turned as in a punch."""
 
 
 class Segments(NamedTuple):
-    """All segments at one time: places (n, 3) in m, quaternions (n, 4), w first."""
+    """All segments at one time: positions (n, 3) in m, quaternions (n, 4), w first."""
 
     p_m: Floats
     quat: Floats
@@ -45,7 +45,7 @@ class Figures:
     """All people of a script, and the things that they hold.
 
     Args:
-        script: checked (see script_faults).
+        script: checked script (see script_faults).
         seed: seed of blinks, gaze wandering, and acts with a random time.
         shared: file in which several processes share the motion, None for none.
     """
@@ -65,7 +65,7 @@ class Figures:
 
     @cached_property
     def timelines(self) -> Mapping[str, tuple[TimedAct, ...]]:
-        """Return what each person does when."""
+        """Return the timed acts of each person."""
         return {name: timed_acts(self.script, name, self.seed) for name in self.script.people}
 
     @cached_property
@@ -75,7 +75,7 @@ class Figures:
 
     @cached_property
     def _table(self) -> Floats:
-        """Return places and quaternions (rows, n, 7) over a round."""
+        """Return positions and quaternions (rows, n, 7) over a round."""
         if self.shared is not None:
             with suppress(OSError):  # the file is not written yet, or was deleted with the run
                 return np.asarray(np.load(self.shared, mmap_mode="r"))
@@ -160,7 +160,7 @@ class Figures:
     def _boxer_at(self, row: OpponentRow) -> Floats:
         """Return the boxer's segments (n, 7) as the person moves them; the last rows are kept."""
         if row.number not in self._poses:
-            rows = self._track.row_after(row)  # a whole array of times takes as long as one
+            rows = self._track.row_after(row)  # a whole array of times takes as long as one time
             for one, pose in zip(rows, self._boxer_over(rows), strict=True):
                 self._poses[one.number] = pose
             while len(self._poses) > _KEPT_POSES:

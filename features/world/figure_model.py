@@ -1,4 +1,4 @@
-"""People as bodies of a MuJoCo model: a mocap body a segment, with a mesh and shapes to collide."""
+"""People as bodies of a MuJoCo model: a mocap body per segment, with mesh and collision shapes."""
 
 from typing import Any
 
@@ -15,14 +15,14 @@ from gazerig.robot.description.texture import add_texture
 
 FINENESS = 0.45
 SOLID_GROUP = 3
-"""Group of the shapes that collide, which pictures do not show."""
+"""Group of the collision shapes, which pictures do not show."""
 _SPECULAR, _SHININESS = 0.12, 0.2
 
 
 def add_people(spec: Any, figures: Figures) -> None:
-    """Add the people of a script and their things to a specification, each body at its name.
+    """Add the people of a script and their things to a specification.
 
-    Bodies are mocap bodies with the names of ``figures.names``: their places are set at every time.
+    Bodies are mocap bodies with the names of ``figures.names``: their poses are set at every time.
     """
     gloves = {name: person.gloves for name, person in figures.script.people.items()}
     for name, shape in figure_shapes(figures).items():
@@ -56,7 +56,7 @@ def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Pai
 
 
 class PeoplePlacer:
-    """Puts people and things where they are: the mocap poses of MuJoCo's data."""
+    """Sets the poses of people and things: the mocap poses of MuJoCo's data."""
 
     def __init__(self, model: Any, figures: Figures) -> None:
         self._figures = figures
@@ -67,13 +67,13 @@ class PeoplePlacer:
             self._rows = slice(first, first + len(rows))
 
     def place(self, data: Any, t_s: float) -> None:
-        """Put everything in its place at a time of the script."""
+        """Set all poses for a time of the script."""
         found = self._figures.segments(t_s)
         data.mocap_pos[self._rows], data.mocap_quat[self._rows] = found.p_m, found.quat
 
 
 def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
-    """Add a painted mesh that collides with nothing to a body."""
+    """Add a painted mesh without collisions to a body."""
     mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
     material = spec.add_material(name=name, specular=_SPECULAR, shininess=_SHININESS)
     if np.ptp(shape.colours, axis=0).max() < 1.0:
@@ -102,7 +102,7 @@ def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
 
 
 def _add_solid(node: Any, segment: str, body: Measures, gloves: bool) -> None:
-    """Add the shape that a segment collides with; small ones have none."""
+    """Add the collision shape of a segment; small segments have none."""
     k = body.stature_m / 1.72
     part = segment.split("_", 1)[-1]
     capsules = {

@@ -24,19 +24,19 @@ from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
 RATE_HZ = 100.0
-"""Rows a second of all tables of motion."""
+"""Rows per second of all tables of motion."""
 
 _STRIDE_S, _SWING_SHARE = 0.52, 0.82
 _PATH_S, _HEADING_S = 0.6, 1.5
 _MIDDLE = 1.0 + 0.5 * _SWING_SHARE
-"""Steps from a foot's lifting to the middle of its next stance."""
+"""Steps from the lifting of a foot to the middle of its next stance."""
 _LIFT_M = 0.06
 _SAME_M = 1e-4
 _BOX_STANCE_M, _BOX_OUT_RAD = 0.16, 0.35
 
 
 class BasePose(NamedTuple):
-    """Hips and feet of a person, a row a time; heights above the floor.
+    """Hips and feet of a person, one row per time; heights above the floor.
 
     hips_m: (n, 2) on the floor; heading_rad: (n,) unwrapped; seated: (n,) 0 standing .. 1 sitting
     seat_m: (n,) height of the seat in use; feet_m: (n, 2, 3) ankle positions with z the height of
@@ -98,7 +98,7 @@ class _Path:
 
     def _walk(self, target: Place, via: Sequence[Place], start_s: float, end_s: float) -> None:
         points = way_points(self.at, target, via, (float(self.way[-1][0]), float(self.way[-1][1])))
-        # A person who is at the target already only turns.
+        # A person who is already at the target only turns.
         longer = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME_M
         points = points[np.concatenate(((True,), longer))]
         if len(points) < 2:
@@ -136,12 +136,12 @@ def base_motion(
     """Return hips and feet over a round.
 
     Args:
-        t_s: times of the rows (n,), RATE_HZ a second.
-        start: place at the beginning of the round; on a seat the person sits.
-        acts: those that move hips or feet, in order.
-        places: by name.
-        body: measures.
-        boxes: the person has a boxer's stance, one foot ahead and knees bent.
+        t_s: times of the rows (n,), RATE_HZ per second.
+        start: place at the start of the round; on a seat the person sits.
+        acts: acts that move hips or feet, in order.
+        places: places by name.
+        body: measures of the body.
+        boxes: whether the person has a boxer's stance, one foot ahead and knees bent.
     """
     path = _Path(t_s, start, places)
     for act in acts:
@@ -157,7 +157,7 @@ def base_motion(
 
 
 class _Feet:
-    """Both feet, planted and moved stretch by stretch."""
+    """Both feet, planted and moved in each stretch."""
 
     def __init__(
         self, t_s: Floats, way: Floats, heading: Floats, body: Measures, boxes: bool
@@ -197,7 +197,7 @@ class _Feet:
             self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * smooth_bump(share)[rows]
 
     def _home(self, foot: int, row: int) -> tuple[Floats, float]:
-        """Return place and direction of a foot under the hips of a row."""
+        """Return position and direction of a foot under the hips of a row."""
         heading, side = float(self.heading[row]), 1.0 - 2.0 * foot
         ahead, aside, out = 0.0, side * self.half, side * 0.10
         if self.boxes:

@@ -21,15 +21,15 @@ from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 
 _SHOWN_GROUPS = 3
-"""Groups of geoms below this are shown, as MuJoCo's own viewer does."""
+"""Groups of geoms below this are shown, as in MuJoCo's own viewer."""
 _FAR_M = 10.0
 """Half the size of an infinite plane."""
 _ROUND = 24
 _NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's colour of a geom without a colour; the colour of its material is then used."""
 _WALL_THICK_M, _WALL_WIDE_M = 0.06, 0.9
-"""A box as thin and as wide is a wall. Only the side that faces the room is shown, so that a view
-from outside sees the room."""
+"""Limits of thickness and width of a wall. Only the side that faces the room is shown, so that the
+room is visible from outside."""
 _ROOM_M = np.array((1.0, 0.0, 0.0))
 """A point in the room."""
 
@@ -50,7 +50,7 @@ def fixed_parts(
     Args:
         model: mujoco.MjModel
         moving: bodies that are shown elsewhere
-        rig_joints: bodies at these joints are left out, too
+        rig_joints: bodies at these joints are also omitted
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -1,4 +1,4 @@
-"""Servos without bytes that move a world's joints: goals in, a lag out, whatever the load."""
+"""Ideal servos of a world, without bus packets: they follow goals with a lag, whatever the load."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,7 +12,7 @@ FRICTION_NM = 0.006
 """The friction of an XL330, so that a limp head does not fall."""
 
 HOLD_NM_S = 2.0
-"""Torque for each rad/s by which the shaft is too slow."""
+"""Torque per rad/s by which the shaft is too slow."""
 MOST_NM = 3.0
 
 
@@ -94,12 +94,12 @@ class WorldIdealBus(IdealBus):
         )
 
     def write(self, goals_steps: Sequence[int]) -> None:
-        """Follow these goals, within the limits; with torque off they change nothing."""
+        """Follow goals within the limits; with torque off they have no effect."""
         if self._shafts[0].goal is not None:
             self._follow(goals_steps)
 
     def disable_torque(self) -> None:
-        """Let go of the shafts."""
+        """Switch off the torque of the shafts."""
         self._now_s()
         for one in self._shafts:
             one.goal = None

@@ -1,7 +1,7 @@
 """Play between the servos and the joints of a world, as in the emulated servos.
 
-MuJoCo moves a joint as one with its shaft. When the shaft reverses, a joint with play stays in its
-place until the play is taken up; weight and inertia act on both all the time.
+MuJoCo moves a joint together with its shaft. When the shaft reverses, a joint with play does not
+move until the play is taken up; weight and inertia always act on both.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 class JointPlay:
-    """The joints of a world that stay behind their shafts.
+    """Joints of a world that lag behind their shafts by their play.
 
     Args:
         mj: the compiled model.
@@ -46,7 +46,7 @@ class JointPlay:
         self._ratios = np.array([one[2] for one in followers])
 
     def begin(self) -> None:
-        """Keep the positions before a step of the world."""
+        """Store the positions before a step of the world."""
         self._before = self._qpos[self._at]
 
     def hold(self) -> None:

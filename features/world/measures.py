@@ -1,7 +1,7 @@
-"""Measures of a body as shares of its stature.
+"""Dimensions of a body as fractions of its stature.
 
 Lengths are those of Drillis & Contini (1966), Body segment parameters, fig. 1 (heights of the
-joints and breadths as shares of the stature), as reprinted by Winter, Biomechanics and motor
+joints and breadths as fractions of the stature), as reprinted by Winter, Biomechanics and motor
 control of human movement, fig. 4.1. The head is gazerig.robot.description.person_shape's, whose
 eyes are as far apart as those of Mitake et al., table 1; a child's is a little smaller.
 """
@@ -17,7 +17,7 @@ ADULT_M = 1.72
 class Measures(NamedTuple):
     """Lengths of one body, m, from its stature.
 
-    head_scale: size of the head against the canonical one
+    head_scale: size of the head relative to the canonical one
     """
 
     stature_m: float

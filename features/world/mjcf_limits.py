@@ -29,7 +29,7 @@ MOST_GRAVITY_M_S2 = 100.0
 MOST_ARENA_BYTES = 1 << 30
 MOST_SIZES = {"nconmax": 100_000, "njmax": 500_000, "nuserdata": 1_000_000, "nkey": 1000,
               "nstack": 100_000_000}  # fmt: skip
-"""Of the attributes of ``size`` that reserve memory; others that begin with "nuser": 1000."""
+"""Limits of the attributes of ``size`` that reserve memory; others beginning with "nuser": 1000."""
 
 _UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
@@ -41,8 +41,8 @@ def refuse_excessive(path: Path) -> None:
     """Check that a world can be loaded in reasonable time and memory.
 
     Raises:
-        SetupError: the file is absent or no XML, or something in it exceeds its limit; the message
-            names the file, the element and the permitted value.
+        SetupError: the file is absent or not XML, or one of its values exceeds its limit; the
+            message names the file, the element and the permitted value.
     """
     waiting, seen, elements = [path], set[Path](), 0
     while waiting:

@@ -17,7 +17,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.description.links import IDENTITY, ORIGIN
 
 STEP_S = 0.001
-"""Time of a step of physics: the control loop of the emulated servos has the same."""
+"""Time step of physics, which is also that of the control loop of the emulated servos."""
 
 MOUNT = "gazerig"
 """Name of the site or frame in a user's MJCF for the neck base of the first rig; that of a further
@@ -130,7 +130,7 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
         Prefix of its names there.
 
     Raises:
-        SetupError: the user's world has a part of its joints, or no place for it.
+        SetupError: the user's world has only some of its joints, or no place for it.
     """
     frame = None
     if mjcf_file is not None:

@@ -1,6 +1,6 @@
 """Motion of a person's hands over a round: hanging, in the lap, on guard, and during acts.
 
-A hand is given by its wrist and the directions of its fingers and palm; the elbow follows.
+A hand is defined by its wrist and the directions of its fingers and palm; the elbow follows.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,15 +15,15 @@ from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.timeline import TimedAct
 
 FIST_M = 0.07
-"""From the wrist to the middle of a hand or fist."""
+"""Distance from the wrist to the centre of a hand or fist."""
 PUNCH_ENDS_M = 0.30
-"""A punch stops this far before its target."""
+"""Distance before its target at which a punch stops."""
 PUSH_FROM_M, PUSH_BY_M = 0.13, 0.135
 _FOREHEAD = np.array((0.0, 0.0, 0.045))
 
 
 class Frame(NamedTuple):
-    """The body at all times, for an arm.
+    """Position of the body at all times, for one arm.
 
     shoulder_m, hips_m, chin_m: (n, 3); ahead, left: (n, 3) level directions of the body
     side: 1 the left arm, -1 the right one
@@ -39,7 +39,7 @@ class Frame(NamedTuple):
 
 
 class HandPose(NamedTuple):
-    """A hand at all times, rows (n, 3): wrist, directions of the fingers, palm and elbow."""
+    """Hand poses at all times, rows (n, 3): wrist, directions of the fingers, palm and elbow."""
 
     wrist_m: Floats
     fingers: Floats
@@ -47,12 +47,12 @@ class HandPose(NamedTuple):
     pole: Floats
 
     def towards(self, other: "HandPose", share: Floats) -> "HandPose":
-        """Return a hand between two, with a share per row."""
+        """Return the pose between two poses, with a fraction per row."""
         return HandPose(*(blend(a, b, share) for a, b in zip(self, other, strict=True)))
 
 
 class PostureShares(NamedTuple):
-    """Shares of the postures of the hands (n,), 0..1."""
+    """Weights of the postures of the hands (n,), 0..1."""
 
     seated: Floats
     guard: Floats
@@ -73,7 +73,7 @@ def _direction(frame: Frame, ahead: float, out: float, up: float) -> Floats:
 
 
 def resting_pose(frame: Frame, held: PostureShares, swing_rad: Floats, boxes: bool) -> HandPose:
-    """Return an idle hand: it hangs and swings, rests in the lap, holds a thing, or guards."""
+    """Return the pose of an idle hand: hanging, swinging, in the lap, holding, or guarding."""
     arm = frame.body.arm_m
     swing = swing_rad[:, None]
     down = 0.965 * arm * (np.sin(swing) * frame.ahead - np.cos(swing) * UP)
@@ -196,7 +196,7 @@ def _open(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPos
 
 
 def fist_pose(frame: Frame, wrist_m: Floats, out: Floats) -> HandPose:
-    """Return a fist at a place, from the guard (out 0) to a stretched punch (out 1), (n,)."""
+    """Return a fist at a position, from the guard (out 0) to a stretched punch (out 1), (n,)."""
     one = np.ones(len(wrist_m))
     guard = resting_pose(frame, PostureShares(0.0 * one, one, 0.0 * one), 0.0 * one, boxes=True)
     to = unit(wrist_m - frame.shoulder_m)
@@ -229,11 +229,11 @@ OUT_S: Mapping[str, tuple[float, float]] = {
     "reach": (0.28, 0.25),
     "pass": (0.34, 0.34),
 }
-"""Shares of an act's time for the hand's motion out and back."""
+"""Fractions of an act's time for the motion of the hand out and back."""
 
 
 def act_share(one: TimedAct, t_s: Floats) -> Floats:
-    """Return how far a hand has moved from rest to the pose of an act (n,), 0..1."""
+    """Return the progress of a hand from rest to the pose of an act (n,), 0..1."""
     lasts_s = one.end_s - one.start_s
     out, back = (min(1.2, share * lasts_s) for share in OUT_S[one.act.do])
     if one.act.do in ("wave", "gesture", "reach", "point"):
@@ -244,7 +244,7 @@ def act_share(one: TimedAct, t_s: Floats) -> Floats:
 def hand_pose(
     frame: Frame, t_s: Floats, acts: Sequence[TimedAct], at: Sequence[Floats], rest: HandPose
 ) -> HandPose:
-    """Return a hand over a round; ``at``: (n, 3) target of each act of this arm."""
+    """Return the poses of a hand over a round; ``at``: (n, 3) target of each act of this arm."""
     now = rest
     for one, target in zip(acts, at, strict=True):
         share = act_share(one, t_s)

@@ -1,4 +1,4 @@
-"""Things that go from hand to hand: the holder and the pose of each over time."""
+"""Things passed from hand to hand: the holder and the pose of each over time."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
@@ -19,7 +19,7 @@ _OTHER: Mapping[Side, Side] = {"left": "right", "right": "left"}
 
 
 class Holder(NamedTuple):
-    """A thing is in this hand from ``from_s`` on."""
+    """Hand that holds a thing from ``from_s`` on."""
 
     from_s: float
     person: str
@@ -54,7 +54,7 @@ def receiving_acts(timelines: Timelines, name: str) -> list[TimedAct]:
 
 
 def holding_share(t_s: Floats, found: Sequence[Holder], person: str, side: str) -> Floats:
-    """Return the holding posture of a hand (n,): 0 free, 1 holding."""
+    """Return the weight of the holding posture of a hand (n,): 0 free, 1 holding."""
     total = np.zeros_like(t_s)
     for i, one in enumerate(found):
         now = 1.0 if (one.person, one.side) == (person, side) else 0.0
@@ -69,13 +69,13 @@ def thing_poses(
     hands: Mapping[tuple[str, str], tuple[Floats, Floats]],
     ahead: Mapping[str, Floats],
 ) -> Floats:
-    """Return places and quaternions (n, 7) of a thing, which stays upright.
+    """Return positions and quaternions (n, 7) of a thing, which stays upright.
 
     Args:
         t_s: times of the rows.
-        found: its holders.
-        hands: places (n, 3) and rotations (n, 3, 3) of hands by person and side.
-        ahead: (n, 3) direction that each person faces.
+        found: holders of the thing.
+        hands: positions (n, 3) and rotations (n, 3, 3) of hands by person and side.
+        ahead: (n, 3) direction in which each person faces.
     """
     place, yaw = np.zeros((len(t_s), 3)), np.zeros_like(t_s)
     for i, one in enumerate(found):

@@ -1,7 +1,7 @@
-"""A boxer whose leading fist a person moves: bounded motion, its share of the pose, its events.
+"""Motion of a boxer whose leading fist a person moves: limits, weight in the pose, and events.
 
 The run's process computes the motion in steps of 10 ms, a little ahead of the time, and writes it
-where every process reads it. A second after the last order the script takes over again.
+where every process can read it. One second after the last order the script regains control.
 """
 
 import mmap
@@ -31,7 +31,7 @@ _KEPT = 1024
 
 
 class OpponentRow(NamedTuple):
-    """One step: its number, the share of the person in the pose, the fist, the body's shift."""
+    """One step: its number, the weight of the person in the pose, the fist, the body's shift."""
 
     number: float
     share: float
@@ -119,7 +119,7 @@ class OpponentMotion:
 def _follow_target(
     p: Floats, v: Floats, target: Floats, rate_hz: float, most_m_s: float
 ) -> tuple[Floats, Floats]:
-    """Return place and speed a step later: critically damped, within the limits."""
+    """Return position and speed one step later: critically damped, within the limits."""
     push = _limit_speed(rate_hz * (rate_hz * (target - p) - 2.0 * v), MAX_M_S2)
     v = _limit_speed(v + STEP_S * push, most_m_s)
     return p + STEP_S * v, v
@@ -130,10 +130,10 @@ def _limit_speed(v: Floats, most: float) -> Floats:
 
 
 class OpponentTrack:
-    """The rows of a motion where several processes read them; one of them writes.
+    """Rows of a motion that several processes read and one process writes.
 
     Args:
-        file: in which they are, created by whoever comes first; None: in this process alone.
+        file: file of the rows, created by the first process; None: only in this process.
     """
 
     def __init__(self, file: Path | None) -> None:
@@ -155,9 +155,9 @@ class OpponentTrack:
         self._newest[0] = row.number
 
     def rows(self, t_s: float) -> tuple[OpponentRow, OpponentRow, float] | None:
-        """Return the rows before and after a time and the share between them.
+        """Return the rows before and after a time and the fraction between them.
 
-        None: the script alone moves the boxer. If nothing newer is written, the last row holds.
+        None: only the script moves the boxer. Without newer rows, the last row is used.
         """
         newest = int(self._newest[0])
         if newest == 0:
@@ -172,7 +172,7 @@ class OpponentTrack:
         return before, after, min(1.0, t_s / STEP_S - number)
 
     def row_after(self, row: OpponentRow) -> list[OpponentRow]:
-        """Return a row and those after it that are written already."""
+        """Return a row and the later rows that are already written."""
         after = (self._row(int(row.number) + n) for n in range(1, AHEAD + 1))
         return [row, *(one for one in after if one is not None)]
 
@@ -184,10 +184,10 @@ class OpponentTrack:
 
 
 class Opponent:
-    """The boxer of a script, as a person moves it.
+    """Boxer of a script under a person's control.
 
     Args:
-        home: returns the place of the leading fist in guard.
+        home: returns the position of the leading fist in guard.
         track: receives the motion.
     """
 
@@ -216,7 +216,7 @@ class Opponent:
         self.update(t_s)
 
     def update(self, t_s: float) -> None:
-        """Write the rows up to a little after a time, if a person moves it."""
+        """Write the rows up to a little after a time, if a person moves the boxer."""
         while self._motion and self._next and self._next <= int(t_s / STEP_S) + AHEAD:
             self._track().write(self._motion.step(self._next))
             self._next = 0 if self._motion.is_at_rest else self._next + 1

@@ -1,4 +1,4 @@
-"""The other heads of a world as the page draws them: every body at its true pose.
+"""Shapes of the other heads of a world for the page: every body at its true pose.
 
 The emulator's process writes the newest state. The process that draws reads the joints in it and
 computes the poses of the bodies with its own model.
@@ -34,7 +34,7 @@ class HeadInState(NamedTuple):
 
 
 class OtherHeads:
-    """Several heads of a world; small to send."""
+    """Several heads of a world, as a value that is small to send."""
 
     def __init__(self, state: Path, heads: Sequence[HeadInState]) -> None:
         self._state, self._heads = state, tuple(heads)
@@ -52,7 +52,7 @@ class OtherHeads:
         return tuple(head.rig._replace(servos=()) for head in self._heads)
 
     def parts(self, model: "WorldModel", first: int) -> Iterator[WorldPart]:
-        """Yield everything of the heads, each part in the frame of its body."""
+        """Yield all parts of the heads, each in the frame of its body."""
         import mujoco
 
         from gazerig.features.world.geom_shapes import body_parts

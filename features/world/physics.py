@@ -1,4 +1,4 @@
-"""The world in time: MuJoCo in steps of a millisecond, moved by the servos of its rigs."""
+"""Simulation of the world: MuJoCo in steps of a millisecond, moved by the servos of its rigs."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -35,17 +35,17 @@ PEOPLE_MS = 4
 
 
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
-"""MuJoCo's warnings of diverged numbers; MuJoCo then resets, which no servo may see."""
+"""MuJoCo's warnings of diverged numbers; MuJoCo then resets, which must not reach any servo."""
 
 
 class WorldUnstable(Error):
-    """The numbers of a world have diverged; its joint angles are no longer valid."""
+    """Error: the numbers of a world have diverged; its joint angles are no longer valid."""
 
 
 class WorldState(NamedTuple):
-    """The state of a world; a picture needs only this and the script of the people.
+    """State of a world; a picture needs only this and the script of the people.
 
-    t_s: time since the script of its people began, 0 before
+    t_s: time since the start of the script of its people, 0 before
     qpos: positions of its joints as MuJoCo orders them, shape (nq,)
     """
 
@@ -54,7 +54,7 @@ class WorldState(NamedTuple):
 
 
 class _Push(NamedTuple):
-    """A force on a body in the world's directions, until a time."""
+    """Force on a body in the world's axes, until a time."""
 
     body: int
     force_n: NDArray[np.float64]
@@ -103,7 +103,7 @@ class World:
         """Build the servos of one bus, moved by this world.
 
         Raises:
-            ValueError: the device cannot exist.
+            ValueError: the device is impossible.
             SetupError: the device comes from a plugin package.
         """
         if isinstance(line, PluginLine):
@@ -133,7 +133,7 @@ class World:
             self._shafts.append(made.shaft)
             return made
 
-        self._busy = True  # no time passes while only some of its shafts are in the world
+        self._busy = True  # no time passes while only some of its shafts are part of the world
         try:
             device = build(line, self.now_s, seed, ShaftMakers(shaft, hobby))
         finally:
@@ -176,7 +176,7 @@ class World:
     # --- time
 
     def now_s(self) -> float:
-        """Return the time; the world has been simulated up to it."""
+        """Return the time up to which the world has been simulated."""
         if self._busy:  # a device queries the time while the world simulates it
             return self._ms / 1000.0
         now_s = self._clock_s()
@@ -253,7 +253,7 @@ class World:
         return max(0, self._ms - self._begun_ms) / 1000.0
 
     def begin(self, at_ms: int) -> None:
-        """Begin the script of the people at a time; until then they keep their first pose."""
+        """Start the script of the people at a time; until then they keep their first pose."""
         self._begun_ms = at_ms
 
     # --- from outside
@@ -265,7 +265,7 @@ class World:
 
         Args:
             body: its name in the rig, such as "head", with the prefix that a further rig has.
-            force_n: force in the world's directions.
+            force_n: force in the world's axes.
             for_s: duration.
             rig: number of the rig in the world.
 
@@ -285,7 +285,7 @@ class World:
         return self._body(body, rig) >= 0
 
     def _body(self, body: str, rig: int) -> int:
-        """Return the number of a rig's body, -1 if there is none."""
+        """Return the number of a rig's body, -1 if it does not exist."""
         placed = self.model.rigs[rig]
         name = placed.names + body.removeprefix(placed.rig.prefix)
         if placed.rig.prefix and not body.startswith(placed.rig.prefix):
@@ -293,7 +293,7 @@ class World:
         return int(mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, name))
 
     def move(self, body: str, p_m: tuple[float, float, float]) -> None:
-        """Move a mocap body of a user's world to a place; what it touches is pushed.
+        """Move a mocap body of a user's world to a position; it pushes bodies that it touches.
 
         Raises:
             ValueError: there is no such body.

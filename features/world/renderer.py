@@ -1,7 +1,7 @@
 """Pictures and distances of a MuJoCo world from any camera, without a display.
 
-The camera is the program's own pinhole (gazerig.drivers.camera.pinhole), principal point and all;
-what a lens and a sensor add is gazerig.sim_mock.cameras.optics.
+The camera is the program's own pinhole (gazerig.drivers.camera.pinhole), including the principal
+point; gazerig.sim_mock.cameras.optics adds the effects of lens and sensor.
 """
 
 import threading
@@ -42,7 +42,7 @@ class RendererParams:
 
 
 class Renderer:
-    """Renders one model; may be used by several threads, one at a time.
+    """Renderer of one model; several threads may use it, one at a time.
 
     Raises:
         NoRenderer: nothing on this machine can render.
@@ -98,12 +98,12 @@ class Renderer:
 
         Args:
             data: the state; its positions must have been computed.
-            lens: of pictures of this size.
+            lens: lens for pictures of this size.
             R: (3, 3) rotation of the camera in the world, its axes optical.
             p_m: (3,) position of the camera in the world.
             size_px: width and height; None: the largest.
-            depth: also return distances.
-            rows: the first row and the one after the last, if only these are wanted.
+            depth: whether to return distances, too.
+            rows: the first row and the one after the last, to render only these.
 
         Raises:
             ValueError: the picture is larger than the renderer's largest, or the renderer is
@@ -123,7 +123,8 @@ class Renderer:
             if not self._finalizer.alive:
                 raise ValueError("the renderer is closed")
             turn, place = np.asarray(R, float), np.asarray(p_m, float)
-            # Geoms wholly outside the picture are hidden: MuJoCo would draw each triangle of them.
+            # Geoms completely outside the picture are hidden: MuJoCo would draw all their
+            # triangles.
             sides, model = _sides(lens, width, (top, bottom)), self._model
             camera = (data.geom_xpos - place) @ turn
             out = (camera @ sides.T > model.geom_rbound[:, None]).any(axis=1)
@@ -149,7 +150,7 @@ class Renderer:
         return Rendered(image, metres)
 
     def close(self) -> None:
-        """Free everything; safe to call twice."""
+        """Free all resources; safe to call twice."""
         with self._lock:
             self._finalizer()
 
@@ -163,7 +164,7 @@ class Renderer:
     ) -> None:
         """Move the scene's camera, and a light fixed to it, to the pose of the camera."""
         forward, up = R[:, 2], -R[:, 1]
-        # Pixels have their centres at whole numbers: the frame reaches half a pixel further.
+        # Pixels have their centres at integers: the frame extends half a pixel further.
         left = (-0.5 - lens.cx_px) / lens.fx_px * _NEAREST_M
         right = (width - 0.5 - lens.cx_px) / lens.fx_px * _NEAREST_M
         for eye in self._scene.camera:
@@ -212,7 +213,7 @@ PlaceBodies = Callable[[mujoco.MjData, float], None]
 
 
 class WorldPicture:
-    """A SceneView of a world: everything is set to its pose at a time, and rendered.
+    """SceneView of a world: sets all poses for a time, and renders.
 
     The renderer is created with the first picture, in the process and thread that requests it, and
     created again for a larger picture.

@@ -1,4 +1,4 @@
-"""A rig in a world: its body as MJCF, and the transmission from its servos to its joints."""
+"""Rig in a world: its body as MJCF, and the transmission from its servos to its joints."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ position is less than 1e-5 rad with any rods of a neck."""
 
 
 class JointTransmission:
-    """A servo that turns one joint; line: of a linear transmission, else None."""
+    """Transmission of a servo that turns one joint; line: of a linear transmission, else None."""
 
     def __init__(self, linkage: Linkage) -> None:
         self._linkage = linkage
@@ -27,10 +27,10 @@ class JointTransmission:
 
 
 class PairTransmission:
-    """One of two servos that turn two joints together.
+    """Transmission of one of two servos that turn two joints together.
 
     Args:
-        coupling: of the pair.
+        coupling: coupling of the pair.
         index: 0 for servo a, 1 for servo b.
         linkage: between the servo's steps and its angle in the coupling.
     """
@@ -45,7 +45,7 @@ class PairTransmission:
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
         """Return the servo's position in steps, and the steps per radian of each joint.
 
-        A little beyond the joints' range the rods cannot follow; their last slope is then used.
+        A little beyond the joints' range the rods cannot follow; then their last slope is used.
         """
         first, second = joints_rad
         before = self._at_rad
@@ -68,17 +68,17 @@ class PairTransmission:
 
 
 Transmission = JointTransmission | PairTransmission
-"""The transmission from one servo to the joints that it helps to turn."""
+"""Transmission from one servo to the joints that it helps to turn."""
 
 
 class ServoInWorld(NamedTuple):
     """One servo of a rig.
 
-    name: of the joint of its entry in the rig's file
-    bus: name of its bus; id: on it
-    joints: that it turns: one, or both of a coupled pair
-    transmission: from it to them
-    steps_per_turn: of its shaft
+    name: name of the joint of its entry in the rig's file
+    bus: name of its bus; id: id on the bus
+    joints: joints that it turns: one, or both of a coupled pair
+    transmission: transmission from the servo to them
+    steps_per_turn: steps per turn of its shaft
     """
 
     name: str
@@ -97,8 +97,8 @@ class RigInWorld(NamedTuple):
     stops_rad: hard stops of each joint
     start_rad: initial angle of each joint, 0 if not given
     servos: the servos that turn the joints
-    prefix: of its names in the world, "" for the first rig
-    p_m, yaw_rad: position of its neck base in the world, and its turn to the left there
+    prefix: prefix of its names in the world, "" for the first rig
+    p_m, yaw_rad: position of its neck base in the world, and its rotation to the left
     """
 
     body: Callable[[], tuple[str, Mapping[str, bytes]]]

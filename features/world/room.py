@@ -1,4 +1,4 @@
-"""The rooms of a world: places to stand, sit and come in, and the paths around the furniture.
+"""Rooms of a world: places to stand, sit and enter, and paths around the furniture.
 
 Places are on the floor, in the world's axes: the neck base of the first head is above (0, 0).
 """
@@ -20,13 +20,13 @@ Point = tuple[float, float]
 
 
 class Place(NamedTuple):
-    """Somewhere to be: on the floor, or on a seat.
+    """Place of a person: on the floor, or on a seat.
 
-    x_m, y_m: of the hips' middle; facing_rad: direction of a person there
+    x_m, y_m: position of the centre of the hips; facing_rad: direction of a person there
     seat_m: height of the seat above the floor, None without a seat
     approach: points that a walk from the room's middle passes before it
-    outside: beyond a door, where several people wait unseen
-    height_m: of the target of looking, pointing or reaching there
+    outside: whether it is behind a door, where several people wait unseen
+    height_m: height of a target of looking, pointing or reaching there
     """
 
     x_m: float
@@ -38,7 +38,7 @@ class Place(NamedTuple):
     height_m: float = 1.3
 
     def ahead(self, by_m: float) -> Point:
-        """Return the point this far ahead of it."""
+        """Return the point at a distance ahead of the place."""
         return self.x_m + by_m * cos(self.facing_rad), self.y_m + by_m * sin(self.facing_rad)
 
 
@@ -52,7 +52,7 @@ def _chair(x_m: float, y_m: float, seat_m: float, *approach: Point) -> Place:
 
 _WAITING_M = 0.6
 SEAT_AHEAD_M = 0.40
-"""Distance in front of a seat's middle from which a person sits down."""
+"""Distance in front of a seat's centre from which a person sits down."""
 WALK_STARTS_S, WALK_ENDS_S = 0.6, 0.8
 """Durations of the turns before and after a walk."""
 SEAT_M, SOFA_M = 0.45, 0.41
@@ -101,7 +101,7 @@ ROOMS: Mapping[str, Mapping[str, Place]] = {
 
 
 def places_of(script: SceneScript) -> dict[str, Place]:
-    """Return all places of a world: its room's, and its own by the same or other names."""
+    """Return all places of a world: those of its room, replaced or extended by its own."""
     own = {
         name: Place(one.x_m, one.y_m, radians(one.facing_deg), height_m=one.height_m)
         for name, one in script.places.items()

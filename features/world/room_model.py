@@ -1,4 +1,4 @@
-"""The rooms of a world as geoms of a MuJoCo model: walls, furniture, light."""
+"""Rooms of a world as geoms of a MuJoCo model: walls, furniture, light."""
 
 from collections.abc import Sequence
 from math import cos, pi, sin
@@ -51,7 +51,7 @@ class _Room:
         solid: bool = False,
         repeat: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Add a box by its middle and its full sizes, with a colour or the name of a picture."""
+        """Add a box by its centre and full sizes, with a colour or the name of a picture."""
         quat = [cos(0.5 * yaw), 0.0, 0.0, sin(0.5 * yaw)]
         half = [0.5 * one for one in size]
         self._add(_BOX, middle, half, colour, shine, repeat, solid, quat=quat)
@@ -76,12 +76,12 @@ class _Room:
     def cylinder(
         self, foot: Vec3, radius: float, height: float, colour: Colour | str, shine: float = 0.1
     ) -> None:
-        """Add an upright cylinder by the middle of its foot."""
+        """Add an upright cylinder by the centre of its bottom."""
         x, y, z = foot
         self._add(_CYLINDER, (x, y, z + 0.5 * height), [radius, 0.5 * height, 0.0], colour, shine)
 
     def bush(self, middle: Vec3, size: Vec3, colour: Colour) -> None:
-        """Add an ellipsoid by its middle and its full sizes."""
+        """Add an ellipsoid by its centre and full sizes."""
         self._add(_ELLIPSOID, middle, [0.5 * one for one in size], colour, 0.02)
 
     def rod(self, start: Vec3, end: Vec3, radius: float, colour: Colour) -> None:
@@ -180,13 +180,13 @@ def _living_room(room: _Room) -> None:
 
 
 def _shelf(room: _Room, x: float, y: float, ahead: float = -1.0) -> None:
-    """Build shelves that face along the x axis, or against it."""
+    """Build shelves that face in the direction of the x axis, or the opposite direction."""
     room.box((x, y, 0.95), (0.32, 1.16, 1.9), _WOOD)
     room.panel((x + 0.17 * ahead, y, 0.96), 0.5 * pi * (1.0 - ahead), (1.08, 1.8), "books")
 
 
 def _chair(room: _Room, place: Place) -> None:
-    """Build a chair that faces the same direction as a person on it."""
+    """Build a chair that faces in the direction of a person on it."""
     yaw, (x, y) = place.facing_rad, (place.x_m, place.y_m)
     c, s = cos(yaw), sin(yaw)
 
@@ -270,7 +270,7 @@ def _hall(room: _Room) -> None:
 
 
 def _light(spec: Any, script: SceneScript) -> None:
-    """Light the room: from everywhere, from the window's side, and from the ceiling."""
+    """Light the room: ambient light, and light from the window and the ceiling."""
     light = script.light
     spec.visual.headlight.active = 1
     spec.visual.headlight.ambient = [light.ambient] * 3

@@ -1,6 +1,6 @@
 """Pictures for the surfaces of rooms, painted by the program: wood, cloth, books, a view.
 
-Each is (rows, columns, 3) in red, green, blue, 0..255, the first row at the top.
+Each has shape (rows, columns, 3): red, green, blue, 0..255, the first row at the top.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 
 
 class _Sheet(NamedTuple):
-    """A picture under construction: x and y in 0..1 from the left and the top."""
+    """Picture under construction: x and y in 0..1 from the left and the top."""
 
     rgb: Floats
     x: Floats

@@ -25,7 +25,7 @@ def yaw_pitch_roll(yaw: Floats, pitch: Floats, roll: Floats | float = 0.0) -> Fl
 
 
 def rotate_vectors(R: Floats, v: Floats) -> Floats:
-    """Return vectors (n, 3) or one (3,) turned by rotations (n, 3, 3)."""
+    """Rotate vectors (n, 3) or one vector (3,) by rotations (n, 3, 3)."""
     return np.asarray((R @ np.asarray(v)[..., None])[..., 0])
 
 
@@ -40,7 +40,7 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 
 def axes_along(z: Floats, x_wanted: Floats) -> Floats:
-    """Return rotations with the given z axis and an x axis as near as possible to another."""
+    """Return rotations with a given z axis and an x axis as near as possible to a direction."""
     up = unit(z)
     ahead = unit(x_wanted - dot(x_wanted, up) * up)
     return np.stack((ahead, np.cross(up, ahead), up), axis=-1)
@@ -95,7 +95,7 @@ def rotation_matrix(quat: Floats) -> Floats:
 
 
 def rotation_vector(R: Floats) -> Floats:
-    """Return the axis (3,) of a rotation (3, 3) of less than half a turn, as long as its angle."""
+    """Return the rotation vector (3,) of a rotation (3, 3) of less than half a turn."""
     sines = 0.5 * (R - R.T)[(2, 0, 1), (1, 2, 0)]
     sine = float(np.linalg.norm(sines))
     angle = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
@@ -109,15 +109,15 @@ def two_bones(
 
     Args:
         start: upper end of the upper bone (n, 3).
-        end: wanted end of the lower one (n, 3); moved into the reach of the bones.
+        end: desired end of the lower bone (n, 3); moved into the reach of the bones.
         upper_m: length of the upper bone.
-        lower_m: length of the lower one.
+        lower_m: length of the lower bone.
         pole: direction in which the joint between them points (n, 3).
     """
     way = end - start
     distance = np.linalg.norm(way, axis=-1, keepdims=True)
     ahead = way / np.maximum(distance, 1e-9)
-    # A bent joint turns by no more than 150 deg.
+    # A joint bends by at most 150 deg.
     least = np.sqrt(upper_m**2 + lower_m**2 - 2.0 * upper_m * lower_m * np.cos(np.radians(30.0)))
     reach = np.clip(distance, least, 0.9995 * (upper_m + lower_m))
     along = (reach**2 + upper_m**2 - lower_m**2) / (2.0 * reach)

@@ -1,7 +1,7 @@
-"""The world of emulated buses in its own process: it is kept up to date and publishes its state.
+"""World of emulated buses in its own process: it is kept up to date and publishes its state.
 
-People keep their first pose until the first client has sent something: a program may take seconds
-to start and must not miss a part of the round.
+People keep their first pose until the first message of a client: a program may take seconds to
+start and must not miss a part of the round.
 """
 
 import json
@@ -38,7 +38,7 @@ PUSH_S = 0.5
 """Default duration of a push."""
 
 MOST_N = 100.0
-"""A larger force breaks a head."""
+"""Largest force; a larger one would break a head."""
 
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:
@@ -105,7 +105,7 @@ class ServedWorld:
         return self.world.device(bus.device, name, bus.seed, bus.rig)
 
     def obey(self, text: str) -> str:
-        """Carry out a command of the world; return {"ok": ...} or {"error": ...} as JSON."""
+        """Execute a command of the world; return {"ok": ...} or {"error": ...} as JSON."""
         try:
             return json.dumps({"ok": COMMANDS.obey(self.world, text)})
         except ValueError as error:
@@ -118,7 +118,8 @@ class ServedWorld:
     def serve(self, heard: bool) -> None:
         """Simulate the world up to now, and write its state if it is due.
 
-        heard: a client has sent something; the first time this begins the script of the people
+        heard: whether a client has sent something; the first time this starts the script of the
+            people
         """
         now_ms = whole_ms(self._clock_s())
         if heard and not self._begun:

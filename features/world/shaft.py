@@ -1,6 +1,6 @@
-"""The shaft of an emulated servo with the mechanics of a world: its control loop moves a joint.
+"""Shaft of an emulated servo with the mechanics of a world: its control loop moves a joint.
 
-Registers, modes, profiles and protections stay those of the servo. Each millisecond its control
+Registers, modes, profiles and protections are those of the servo. Each millisecond its control
 loop computes a torque from the shaft's position. The part that depends on the speed at the end of
 the millisecond (D, part of P and the induced voltage of the motor) goes into MuJoCo's implicit
 step. So the equations are those of ``ShaftMotion``, with the world's inertia, gravity, contacts
@@ -45,23 +45,23 @@ LIMP: Effort = (0.0, 0.0, 0.0, 0.0)
 
 
 class ShaftAxis:
-    """One servo's shaft in a world: a tendon that turns with the servo's joints.
+    """Shaft of one servo in a world: a tendon that turns with the servo's joints.
 
-    Its position is in steps of an encoder with 4096 a turn, as inside emulated servos.
+    Its position is in steps of an encoder with 4096 per turn, as inside emulated servos.
 
     Args:
         mj: the compiled model.
         data: its state.
         lead_rad: angle of each joint's shaft beyond the joint (gazerig.features.world.joint_play).
-        rig: indices of its rig.
-        servo: its servo.
+        rig: indices of the rig.
+        servo: the servo.
 
     Attributes:
         actuator: its number in the model.
         zero, slope: its position at joint angle 0 and the steps per radian, for a linear
             transmission to one joint; slope is None if it depends on the joints' angles.
-        qpos, dof: of its first joint.
-        play_rad: half of the play of each joint that it has play with, by the joint's qpos.
+        qpos, dof: indices of its first joint.
+        play_rad: half of the play of each joint with play, by the joint's qpos.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class ShaftAxis:
     # --- every millisecond
 
     def motion(self, angles: Sequence[float], qvel: Sequence[float]) -> tuple[float, float]:
-        """Return position in steps and speed in steps a second of a nonlinear transmission.
+        """Return position in steps and speed in steps per second of a nonlinear transmission.
 
         Args:
             angles: of all joints, those with play turned as far as their shafts.
@@ -123,13 +123,13 @@ class ShaftAxis:
         return self._unit * self._servo.transmission.at(angles)[0]
 
     def joint_position(self) -> float:
-        """Return the same of the joint behind the play."""
+        """Return the position of the joint behind the play, in steps."""
         return self._unit * self._servo.transmission.at(self._angles(self._data.qpos))[0]
 
     def turn(self, steps: float) -> None:
         """Turn the shaft by hand, as far as its joints' stops allow.
 
-        Two joints of a coupled pair turn as little as they can.
+        Two joints of a coupled pair turn as little as possible.
         """
         share = steps / self._unit / sum(slope * slope for slope in self._slopes)
         for slope, at, dof in zip(self._slopes, self._qpos, self._dof, strict=True):
@@ -344,7 +344,7 @@ REST_STEPS_MS = 1e-3
 
 
 class DeadBandShaft(WorldShaft):
-    """A shaft that ignores small errors."""
+    """Shaft that ignores small errors."""
 
     __slots__ = ("dead",)
 
@@ -357,12 +357,12 @@ class DeadBandShaft(WorldShaft):
 
 
 class WorldHobbyServo(HobbyServo):
-    """One servo and the joint it moves, in a world.
+    """Hobby servo in a world, with the joint that it moves.
 
     Args:
-        spec: its speed, lag, dead band and torque; the world has its start and stops.
+        spec: speed, lag, dead band and torque; the world defines its start and stops.
         axis: its shaft in the world.
-        steps_per_turn: quarter microseconds of a whole turn.
+        steps_per_turn: quarter microseconds per full turn.
 
     Attributes:
         shaft: the shaft that the world moves.

@@ -1,4 +1,4 @@
-"""The shapes of a world for a process that draws it: geoms of its model and people's segments.
+"""Shapes of a world for a process that draws it: geoms of its model and segments of people.
 
 MuJoCo is loaded in the process that creates the shapes, not in the sender.
 """
@@ -31,7 +31,7 @@ _FINENESS = 0.6
 class SpecShapes(NamedTuple):
     """The shapes of a world without its first rig, which the page draws from measurements.
 
-    spec: with rigs that are only places
+    spec: the world, with rigs that are only placements
     rig_joints: a body of a user's world at one of these joints belongs to the rig
     others: the other heads in it, None if they are not shown
     """

@@ -1,4 +1,4 @@
-"""The newest state of a world, from the process that computes it to its readers.
+"""File with the newest state of a world, from the process that computes it to its readers.
 
 Both sides map a small file into memory. The writer fills the older of two entries and then
 increments a count; a reader reads the count before and after. Processes find the file by its path,
@@ -22,7 +22,7 @@ class HostState(NamedTuple):
 
     Attributes:
         host_s: time of the host's monotonic clock.
-        t_s: the world's own time, seconds from its beginning.
+        t_s: the world's own time, seconds from its start.
         qpos: all coordinates of its joints, in MuJoCo's order.
     """
 
@@ -32,7 +32,7 @@ class HostState(NamedTuple):
 
 
 class StateWriter:
-    """The one process that writes states."""
+    """Writer of states; only one process may use it."""
 
     def __init__(self, path: Path, size: int) -> None:
         with path.open("xb+") as file:
@@ -57,7 +57,7 @@ class StateReader:
     """Reads the newest state; the file must exist.
 
     Raises:
-        OSError: there is no such file.
+        OSError: the file does not exist.
     """
 
     def __init__(self, path: Path) -> None:
@@ -80,7 +80,7 @@ class StateReader:
         """Return the newest state, None before the first."""
         while count := self.count:
             row = self._rows[(count - 1) % 2].copy()
-            # If two states were written meanwhile, the copy may mix both.
+            # If two states were written in the meantime, the copy may mix both.
             if self.count <= count:
                 return HostState(float(row[0]), float(row[1]), row[2:])
         return None

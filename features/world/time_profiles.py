@@ -8,7 +8,7 @@ from gazerig.gaze.types import Floats
 
 
 def smooth_rise(share: Floats) -> Floats:
-    """Return a minimum-jerk path from 0 to 1 for shares of its time, constant before and after."""
+    """Return a minimum-jerk path from 0 to 1 over fractions of its time, constant outside."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s * s * s * (10.0 + s * (6.0 * s - 15.0)))
 
@@ -22,7 +22,7 @@ def there_and_back(
 
 
 def smooth_bump(share: Floats) -> Floats:
-    """Return a smooth hump over shares 0..1: 0 at its ends with level slopes, 1 in its middle."""
+    """Return a smooth bump over fractions 0..1: 0 with zero slope at its ends, 1 in its middle."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(16.0 * s * s * (1.0 - s) ** 2)
 
@@ -43,7 +43,7 @@ def moving_average(values: Floats, width: int) -> Floats:
 
 
 def blend(before: Floats, after: Floats, share: Floats) -> Floats:
-    """Return rows between two, with a share per row."""
+    """Return rows interpolated between two, with a fraction per row."""
     part = share.reshape(-1, *([1] * (max(before.ndim, after.ndim) - 1)))
     return np.asarray(before + part * (after - before))
 

@@ -1,4 +1,4 @@
-"""Acts of people in a room: durations by its paths, targets, faults that prevent the play."""
+"""Acts of people in a room: durations from its paths, targets, and faults of the script."""
 
 from collections.abc import Iterable, Iterator
 from math import hypot
@@ -26,7 +26,7 @@ def floor_m(script: SceneScript) -> float:
 
 
 def place_m(script: SceneScript, name: str) -> Vec3:
-    """Return what is looked or pointed at in a place."""
+    """Return the target of a look or a pointing gesture at a place."""
     place = places_of(script)[name]
     return (place.x_m, place.y_m, floor_m(script) + place.height_m)
 
@@ -89,7 +89,7 @@ def _misplaced_heads(script: SceneScript) -> Iterator[Fault]:
 
 
 def _space_faults(script: SceneScript) -> Iterator[Fault]:
-    """Find what only a script without a room may have, and things that nobody holds."""
+    """Find entries that only a script without a room may have, and things that no one holds."""
     people = ", ".join(script.people)
     for name, person in script.people.items():
         for i, act in enumerate(person.acts):
@@ -106,7 +106,7 @@ def _space_faults(script: SceneScript) -> Iterator[Fault]:
 
 
 def _walk_paths(script: SceneScript, name: str, person: PersonScript) -> Iterator[Fault]:
-    """Find a walk of a seated person, a sitting without a seat, or an end of round elsewhere."""
+    """Find walks of a seated person, sitting without a seat, and rounds that end elsewhere."""
     places = places_of(script)
     at = person.start
     seated = places[at].seat_m is not None

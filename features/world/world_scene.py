@@ -1,4 +1,4 @@
-"""A world as a scene for the score, the true gaze and detectors, in the frame of any head."""
+"""World as a scene for the score, the true gaze and detectors, in the frame of any head."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -20,7 +20,7 @@ from gazerig.sim_mock.scenes.timeline import HALF_FIELD_RAD, TimedAct, events_of
 GLOVE_M, HAND_M, THING_M = 0.078, 0.07, 0.05
 """Radii of the gaze targets."""
 _RAISED_M = 0.50
-"""A raised hand is at most this far below the nose."""
+"""Largest distance of a raised hand below the nose."""
 _GLOVE_MIDDLE_M = 0.09
 _SPIN_WITHIN_S = 0.01
 
@@ -80,11 +80,11 @@ class WorldScene:
         return self.figures.opponent
 
     def place(self, name: str) -> Vec3:
-        """Return a place, at the height of what is looked at there."""
+        """Return a place, at the height of its gaze target."""
         return place_m(self.figures.script, name)
 
     def reach_times_s(self, one: TimedAct) -> tuple[float, float]:
-        """Return how long a hand takes to its target, and back."""
+        """Return the times that a hand takes to its target, and back."""
         lasts_s = one.end_s - one.start_s
         out, back = OUT_S[one.act.do]
         return out * lasts_s, back * lasts_s
@@ -107,7 +107,7 @@ class WorldScene:
         return _vec(self._p(f"{name}/head", t_s) - self._R(f"{name}/head", t_s) @ back)
 
     def hand(self, name: str, side: str, t_s: float) -> Vec3:
-        """Return the middle of a hand or glove."""
+        """Return the centre of a hand or glove."""
         gloves = self.figures.script.people[name].gloves
         out = _GLOVE_MIDDLE_M if gloves else FIST_M
         segment = f"{name}/{side}_hand"
@@ -154,14 +154,14 @@ class RigFrame(NamedTuple):
 
 
 class HeadFace(NamedTuple):
-    """The face of a head now, in the world: rotation of the head, tip of the nose."""
+    """Present face of a head in the world: rotation of the head, tip of the nose."""
 
     R: Mat3
     nose_m: Vec3
 
 
 class HeadsScene:
-    """A scene in the world's frame and the faces of other heads, in the frame of one rig.
+    """Scene in the world's frame and the faces of other heads, in the frame of one rig.
 
     The events of a scene state expectations of the first head only.
     """
@@ -174,7 +174,7 @@ class HeadsScene:
         self.behaviours = scene.behaviours
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return the people, and after them the other heads as they are now."""
+        """Return the people, followed by the present faces of the other heads."""
         own = self._frame
         found = []
         for person in self._scene.people(t_s):
@@ -191,7 +191,7 @@ class HeadsScene:
         return tuple(found)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return what else can be looked at."""
+        """Return the other gaze targets."""
         things = self._scene.things(t_s)
         return tuple(one._replace(p_world_m=self._frame.point(one.p_world_m)) for one in things)
 

@@ -17,10 +17,10 @@ _SPEC, _STATE, _PEOPLE = "world", "state", "people.npy"
 
 
 class WorldSpec(NamedTuple):
-    """A room, its people and the rigs in it.
+    """Content of a world: a room, its people and the rigs in it.
 
     Attributes:
-        figures: the people, and by their script the room; None for an empty floor.
+        figures: the people, whose script defines the room; None for an empty floor.
         rigs: the program controls the first one.
         mjcf_file: a user's own world instead of the room.
     """
@@ -35,7 +35,7 @@ class WorldSpec(NamedTuple):
         Raises:
             SetupError: the user's file cannot be used; the message names the file and the remedy.
         """
-        import_mujoco()  # whatever MUJOCO_GL permits
+        import_mujoco()  # independent of MUJOCO_GL
         from gazerig.features.world.model import world_model
 
         return world_model(self.figures, self.rigs, self.mjcf_file)
@@ -51,7 +51,7 @@ class WorldSpec(NamedTuple):
 
     @staticmethod
     def read(folder: Path) -> "WorldSpec":
-        """Read a file of ``write``; never from a folder that another user can write."""
+        """Read a file of ``write``; the folder must not be writable by other users."""
         found: WorldSpec = pickle.loads((folder / _SPEC).read_bytes())
         return found
 

@@ -68,7 +68,7 @@ def has_other_heads(options: RunOptions) -> bool:
     """Return whether the requested world has other heads.
 
     Raises:
-        gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
+        gazerig.config.load.ConfigError: its file has a fault, or does not exist.
         SetupError: they cannot be run with these options.
     """
     if options.world is None:
@@ -118,7 +118,7 @@ def compose_group(options: RunOptions) -> "HeadGroup":
         world.close()
         raise
     pictures = None if options.fast else (found.camera.rate_hz, not options.no_pictures)
-    # The others are attached to the first, so that its commands can stop all.
+    # The other heads are attached to the first, so that its commands can stop all.
     leader, *rest = members
     robots = tuple(NamedRobot(one.name, one.composed.assembly.robot) for one in rest)
     made = leader.composed.assembly._replace(other_heads=robots)
@@ -134,7 +134,7 @@ def other_head_file(path: Path, name: str) -> Path:
 
 
 class LinkedInterrupts(Interrupts):
-    """Requests to end a head that ends with another one: its own, and those to the other."""
+    """Requests to end a head that ends with another head: its own, and those of the other."""
 
     def __init__(self, lead: Interrupts) -> None:
         super().__init__(also=lead, signals=False)
@@ -181,7 +181,7 @@ class HeadGroup:
     ) -> dict[str, object]:
         """Run until one head ends; return the figures of the first and of the others.
 
-        Args: as of ``gazerig.robot.app.session.run``; status, watch and browse are of the first.
+        Args: see ``gazerig.robot.app.session.run``; status, watch and browse belong to the first.
 
         Raises:
             SetupError: before any motion.
@@ -195,7 +195,7 @@ class HeadGroup:
 
         def end_all(reason: str) -> None:
             for number, one in enumerate(following, 1):
-                # A second request would skip the parking of a head that already ends.
+                # A second request would skip the parking of a head that is already ending.
                 if one.requests == 0 and number not in self._ending:
                     one.request(f"the end of the first head{reason and f' ({reason})'}")
 
@@ -217,11 +217,12 @@ class HeadGroup:
                 self.members[0].composed, lead, self._printer(say), status,
                 watch_first, browse, ended,
             )  # fmt: skip
-        except KeyboardInterrupt:  # an end was requested before the start, maybe by a failed head
+        # An end was requested before the start, possibly by a failed head
+        except KeyboardInterrupt:
             if not self._failures:
                 raise
         finally:
-            lead.only_record()  # the others have yet to park
+            lead.only_record()  # the other heads have yet to park
             end_all("")
             self._world.leave(0)
             for thread in threads:

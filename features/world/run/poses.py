@@ -20,7 +20,7 @@ class RigInState(NamedTuple):
     """The joints of a rig in the state of a world; can be sent to another process.
 
     Attributes:
-        kinematics: of the rig as built, independent of later changes.
+        kinematics: kinematics of the rig as built, independent of later changes.
         joints: index of each joint in the state.
     """
 
@@ -38,7 +38,7 @@ class RigInState(NamedTuple):
 
 
 class WorldPoses:
-    """The head of a rig in a world of another process, from the state that this writes.
+    """Head of a rig in a world of another process, from the state that the process writes.
 
     Attributes:
         state: the state of the last read, None before the first.
@@ -54,12 +54,12 @@ class WorldPoses:
 
     @property
     def begin_s(self) -> float | None:
-        """Return the host's time at which the script of the people began, None before."""
+        """Return the host's time at the start of the script of the people, None before."""
         return self._file().begin_s
 
     @property
     def first_s(self) -> float:
-        """Return the same, 0 before."""
+        """Return the same time, 0 before the start."""
         return self.begin_s or 0.0
 
     def newest(self) -> TimedPose | None:
@@ -84,7 +84,7 @@ class WorldPoses:
 
 
 class SimulatedPoses:
-    """The head of a rig in a world of this process, on the clock of the run.
+    """Head of a rig in a world of this process, on the clock of the run.
 
     Attributes:
         begin_s: start time of the people's script.

@@ -1,4 +1,4 @@
-"""A rig in a world with physics: its bus, its camera, and the shapes of the world."""
+"""Rig in a world with physics: its bus, its camera, and the shapes of the world."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RigRoom:
-    """A ``RunRoom`` of gazerig.robot.app.surroundings: a world as one of its rigs is in it."""
+    """``RunRoom`` of gazerig.robot.app.surroundings: a world from the view of one of its rigs."""
 
     world: RunWorld
     clock: Clock
@@ -84,7 +84,7 @@ class RigRoom:
         )
 
     def start_s(self) -> float | None:
-        """Return when the script of the people began, None before that."""
+        """Return the start time of the script of the people, None before it."""
         return self.head.begin_s
 
     def shapes(self) -> WorldShapes:

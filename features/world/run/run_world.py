@@ -1,4 +1,4 @@
-"""The world with physics of a run: its people and its rigs."""
+"""World with physics of a run: its people and its rigs."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -101,13 +101,13 @@ def _servo(rig: Rig, name: str) -> ServoInWorld:
 
 
 COARSE_HZ = 15.0
-"""Coarse pictures per second; without samples a picture of 320x240 takes 5 ms instead of 9."""
+"""Coarse pictures per second; without multisampling one of 320x240 takes 5 ms instead of 9."""
 MJCF = (".xml", ".mjcf")
 """Suffixes of MuJoCo's own world files."""
 
 
 class ServedRig(NamedTuple):
-    """The terminals of one of the rigs of a world that another process computes."""
+    """Terminals of one rig of a world that another process computes."""
 
     buses: "PtyBuses"
     paths: Mapping[str, str]
@@ -125,7 +125,8 @@ class RunWorld(NamedTuple):
 
     def computed(self, now_s: Callable[[], float]) -> "World":
         """Return the world in this process."""
-        model = self.spec.compile()  # imports MuJoCo, whatever library can render here
+        # Imports MuJoCo, independent of the library that can render here
+        model = self.spec.compile()
         from gazerig.features.world.physics import World
 
         return World(model, now_s)
@@ -184,7 +185,7 @@ def other_rigs(rig: Rig, script: SceneScript) -> dict[str, Rig]:
     """Return the rigs of the other heads of a script, by the heads' names.
 
     Raises:
-        gazerig.config.load.ConfigError: one of them is at fault.
+        gazerig.config.load.ConfigError: one of them has a fault.
     """
     return {
         name: load_rig(head.rig, further=[mesh_faults]) if head.rig else rig
@@ -228,7 +229,7 @@ def world_script(name_or_path: str) -> SceneScript:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
-    """Return a script; a run requests it several times, and reads it once."""
+    """Return a script; it is read only once, although a run requests it several times."""
 
     def unknown_rigs(script: SceneScript) -> Iterator[Fault]:
         for name, head in script.heads.items():

@@ -31,7 +31,7 @@ from gazerig.sim_mock.scenes.scene import Scene
 
 
 class Lockstep:
-    """A time that advances when all participants wait.
+    """Time that advances when all participants wait.
 
     Args:
         count: number of participants; each calls ``enter`` first and ``leave`` last.
@@ -57,7 +57,7 @@ class Lockstep:
             self._await(number)
 
     def wait(self, number: int, t_s: float) -> None:
-        """Let the other participants run until ``t_s``; return immediately if that is past."""
+        """Let the other participants run until ``t_s``; return immediately if that has passed."""
         with self._changed:
             if t_s <= self._now_s:
                 return

@@ -1,8 +1,8 @@
-"""The pictures of the rig's camera in a world with physics.
+"""Pictures of the rig's camera in a world with physics.
 
 In real time another process computes the world. The camera's process renders its newest state and
-detects faces and motion in the picture; the control loop gets neither MuJoCo nor a picture. If
-nothing on this machine can render, detections are computed instead, as those of a scene.
+detects faces and motion in the picture; the control loop needs neither MuJoCo nor pictures. If
+no library on this machine can render, detections are computed instead, like those of a scene.
 """
 
 from collections.abc import Callable
@@ -50,9 +50,9 @@ class WorldCamera:
     """A camera in a world in real time.
 
     Args:
-        process: renders and detects; None: nothing is rendered.
-        ideal: returns a camera that computes detections of a scene that began at a time.
-        poses: the pose of the head, and the start time of the people's script.
+        process: process that renders and detects; None: nothing is rendered.
+        ideal: returns a camera that computes detections of a scene with a start time.
+        poses: pose of the head, and start time of the people's script.
 
     Attributes:
         wrapped_camera: process, or camera that computes detections; None until one is chosen.
@@ -113,7 +113,7 @@ def no_pictures_message(error: NoRenderer) -> str:
 
 
 HEAD_LINK = "head"
-"""The link of a rig that carries its camera, which does not see it."""
+"""Link of a rig that carries its camera, and is invisible to it."""
 _LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
