@@ -25,7 +25,7 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
 WATCHDOG_S = 0.3
-"""Time of the watchdog: three consecutive lost readings must not trip it."""
+"""Timeout of the watchdog; three consecutive lost readings must not trip it."""
 
 LIMITS = ("min_position_limit", "max_position_limit")
 
