@@ -116,7 +116,7 @@ async def _send_text(socket: web.WebSocketResponse, text: str) -> None:
 
 
 _PAUSE_S = 0.04
-"""Time between messages to a browser, s: 25 a second; nobody could read more."""
+"""Time between messages to a browser, s: 25 a second; more would not be readable."""
 
 
 class WidgetSocket:
