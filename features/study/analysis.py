@@ -30,7 +30,7 @@ from gazerig.gaze.types import Floats
 class ConditionSummary:
     """A measure in one condition.
 
-    low95, high95: of the mean, within participants (Cousineau 2005, Morey 2008)
+    low95, high95: interval of the mean, within participants (Cousineau 2005, Morey 2008)
     """
 
     condition: str
@@ -47,7 +47,7 @@ class MeasureSummary:
     """Summary of a rating, the mean of a scale, or an objective measure.
 
     counts: (conditions, points) number of answers at each point; None for other measures
-    alpha: Cronbach's, of a scale
+    alpha: Cronbach's alpha of a scale
     """
 
     measure: Measure
@@ -61,9 +61,9 @@ class MeasureSummary:
 class ChoiceSummary:
     """Summary of choices between pairs.
 
-    wins: (conditions, conditions) how often the row was chosen over the column
+    wins: (conditions, conditions) number of choices of the row over the column
     circles: number of circular triads by majority, and of all triples of conditions
-    first: how often the first presentation was chosen, and the number of choices
+    first: number of choices of the first presentation, and of all choices
     """
 
     measure: Measure
@@ -141,7 +141,7 @@ def analyse_study(
 
 
 def without_simulated(people: Sequence[Participation]) -> tuple[Participation, ...]:
-    """Leave out simulated participants if there are real ones."""
+    """Omit simulated participants if the study has real ones."""
     if all(one.simulated for one in people):
         return tuple(people)
     return tuple(

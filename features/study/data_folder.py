@@ -33,7 +33,7 @@ _SECRET_BYTES = 32
 class InterimLook(NamedTuple):
     """An analysis before the planned sample was complete.
 
-    utc: its time; came, counted: participants at that time; planned: by the design
+    utc: time of the analysis; came, counted: participants at that time; planned: planned number
     """
 
     utc: str
@@ -68,7 +68,7 @@ class StudyData:
         return sha256
 
     def check(self, canonical: bytes) -> str:
-        """Return a design's hash if the folder may hold its data; nothing is written.
+        """Return a design's hash if the folder can contain its data; nothing is written.
 
         Raises:
             SetupError: it belongs to another design.

@@ -36,7 +36,7 @@ from gazerig.features.study.statistics.ranks import (
 from gazerig.gaze.types import Floats
 
 Verdict = Literal["supported", "not supported", "against", "too few"]
-"""against: a significant difference, but the test's effect has the other sign."""
+""""against": the difference is significant, but the test's effect has the other sign."""
 
 _LEAST_PEOPLE = 2
 
@@ -50,7 +50,7 @@ class Decision:
     n: participants with all conditions of both sides; standardised: d_z of their differences
     medians, means: of the better and of the other condition; for choices the shares in all direct
         choices, and no medians
-    too_few: why no result could have been significant, "" if one could
+    too_few: reason why no result could have been significant, "" if one could
     """
 
     hypothesis: Hypothesis
@@ -150,7 +150,7 @@ class _Sides:
 
     @property
     def better_first(self) -> NDArray[np.bool_]:
-        """Return which of them saw the better side first, (known,)."""
+        """Return whether each participant saw the better side first, (known,)."""
         first, second = self.found.first_seen(*self.better), self.found.first_seen(*self.than)
         found: NDArray[np.bool_] = (first < second)[self.have_data]
         return found

@@ -21,7 +21,7 @@ DECIDING: tuple[Test, ...] = ("signed_rank", "rank_sum", "sign")
 # fmt: off
 @dataclass(frozen=True)
 class Condition:
-    """One gaze of the study; missing entries are the rig's."""
+    """One gaze of the study; missing entries are those of the rig."""
 
     label: Annotated[str, "what the experimenter calls it; participants never see it"] = ""
     rig: Annotated[str | None, "shipped name or path; null: the study's"] = None
@@ -69,7 +69,7 @@ class Trials:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An expectation, and the test that decides on it."""
+    """Expectation, and the test that decides on it."""
 
     measure: Annotated[str, "questionnaire.item, questionnaire.scale or an objective measure"]
     better: Annotated[str, "condition, or level of a factor (gaze=moving), for which more is expected"]

@@ -33,7 +33,7 @@ class ParticipationOpened:
 
     design_sha256: of the design's canonical text (gazerig.features.study.preregistration)
     order: condition keys of all trials in order, for pairs "a|b" as first and second
-    program: version; simulated: whether the participant is simulated
+    program: version of the program; simulated: whether the participant is simulated
     """
 
     participant: str
@@ -195,7 +195,8 @@ class Journal:
             os.ftruncate(self._fd, whole)
             self._size = os.lseek(self._fd, whole, os.SEEK_SET)
             os.fsync(self._fd)
-            names = os.open(folder, os.O_RDONLY)  # of new files, to disk as well
+            # Also write the folder's entries of new files to disk
+            names = os.open(folder, os.O_RDONLY)
             try:
                 os.fsync(names)
             finally:

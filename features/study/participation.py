@@ -1,4 +1,4 @@
-"""From a study's folder to rows: the answers of each participant, and the design's exclusions."""
+"""Rows from a study's folder: the answers of each participant, with the design's exclusions."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,7 +31,7 @@ from gazerig.features.study.questionnaire import Questionnaire
 from gazerig.features.study.trial_order import PAIR
 
 LEAST_SAME = 8
-"""Least number of ratings for the rule of equal answers: fewer may well be honest."""
+"""Least number of ratings for the rule of equal answers: fewer equal answers may be honest."""
 
 
 @dataclass(frozen=True)
@@ -300,7 +300,7 @@ def collect_study(folder: Path) -> CollectedStudy:
                     f"{path} ({sha256[:12]}): data of two designs are two studies; move it to the "
                     "folder of its own"
                 )
-        if records:  # else it has no data
+        if records:  # otherwise it has no data
             check_records(records, design, questionnaires, each)
             people.append(participation(records, design, questionnaires))
             folders.append(each)

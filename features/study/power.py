@@ -177,7 +177,7 @@ def _signed_rank_power(asked: PowerQuestion, n: int, rng: np.random.Generator) -
         reach = range(1, asked.points)
         up = np.stack([np.trace(drawn, -k, 1, 2) for k in reach], axis=1)
         down = np.stack([np.trace(drawn, k, 1, 2) for k in reach], axis=1)
-    else:  # all differ: a participant is a column, in the order of the differences
+    else:  # all differ: each participant is a column, in the order of the differences
         d = rng.normal(asked.effect, 1.0, (_STUDIES, n))
         sign = np.take_along_axis(d, np.argsort(np.abs(d), axis=1), axis=1) > 0.0
         up, down = sign.astype(np.int64), (~sign).astype(np.int64)
@@ -240,7 +240,7 @@ def _rank_sum_power(asked: PowerQuestion, n: int, rng: np.random.Generator) -> f
 
 
 def _preference_probabilities(asked: PowerQuestion) -> tuple[float, float]:
-    """Return the probabilities that a participant chooses the better one more, or less, often."""
+    """Return the probabilities that a participant prefers the better condition and the other."""
     chances = stats.binom.pmf(
         np.arange(asked.choices + 1), asked.choices, choice_probability(asked.effect)
     )

@@ -192,7 +192,7 @@ def item_answers(
 def choice_wins(
     measure: Measure, people: Sequence[Participation], conditions: Sequence[str]
 ) -> NDArray[np.int64]:
-    """Return how often the row was chosen over the column, (conditions, conditions)."""
+    """Return the number of choices of the row over the column, (conditions, conditions)."""
     columns = {key: k for k, key in enumerate(conditions)}
     out = np.zeros((len(columns), len(columns)), np.int64)
     for one in people:
@@ -208,9 +208,9 @@ def choice_wins(
 def choice_differences(
     measure: Measure, people: Sequence[Participation], better: str, than: str
 ) -> Floats:
-    """Return how much more often each participant chose one condition than the other, (n,).
+    """Return each participant's choices of one condition minus those of the other, (n,).
 
-    Participants who did not choose between these two are left out.
+    Participants who did not choose between these two are omitted.
     """
     each = (choice_wins(measure, [one], (better, than)) for one in people)
     found = [int(table[0, 1]) - int(table[1, 0]) for table in each if table.any()]

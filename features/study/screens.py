@@ -33,11 +33,11 @@ class InstructionsScreen:
 
 @dataclass(frozen=True)
 class ReadyScreen:
-    """Before a presentation, which the participant starts.
+    """Screen before a presentation, which the participant starts.
 
-    number: of the trial, from 1; among ``trial_count`` trials, or practice trials
+    number: number of the trial, from 1, among ``trial_count`` trials or practice trials
     side: 0, or 1 for the second presentation of a pair
-    again: the presentation was cut short before, and is repeated
+    again: whether the presentation was cut short before and is repeated
     """
 
     number: int
@@ -77,7 +77,7 @@ class QuestionsScreen:
     """One page of questions.
 
     instruction: text above them, by language; empty without one
-    once: they are asked once at the end, not about a trial; number is then 0
+    once: whether they are asked once at the end instead of about a trial; number is then 0
     """
 
     number: int

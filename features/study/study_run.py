@@ -1,4 +1,4 @@
-"""Execution of one participant's session: screens out, answers in, all data on disk first.
+"""Execution of one participant's session: shows screens and stores answers on disk first.
 
 Conditions are presented by the head in the room, or by films in the browser. All methods may be
 called from any thread. A browser's request names its page; a repeated request, or one for a page
@@ -50,7 +50,7 @@ class Presenter(Protocol):
 
 
 class FilmPresenter:
-    """Does nothing, because the browser shows the films."""
+    """Presenter for films that does nothing, because the browser shows them."""
 
     def begin(self, shown: ShownTrial) -> None:
         """Do nothing."""
@@ -193,9 +193,9 @@ class StudyRun:
         """Record the end of a film; a film that was cut short starts again.
 
         Args:
-            page: its page.
-            seconds: time that was played, as reported by the browser. It is limited to the time
-                since the browser has the film; a film that was not fetched was not played.
+            page: page of the film.
+            seconds: played time, as reported by the browser. It is limited to the time since the
+                browser has the film; a film that was not fetched was not played.
 
         Raises:
             WriteFailed: it could not be written.
@@ -235,8 +235,8 @@ class StudyRun:
         """Record a page of answers; on return they are on disk.
 
         Args:
-            page: their page.
-            values: by the questions' numbers.
+            page: page of the questions.
+            values: answers by the questions' numbers.
             ms: response times as reported by the browser, limited to the time the page was shown.
 
         Raises:

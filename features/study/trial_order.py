@@ -27,7 +27,7 @@ def williams(n: int) -> tuple[tuple[int, ...], ...]:
     """
     if n < 1:
         raise ValueError(f"{n} conditions; at least one is needed")
-    # 0, 1, n-1, 2, n-2, ...: neighbours differ by every number but 0, each once if n is even.
+    # 0, 1, n-1, 2, n-2, ...: neighbours differ by every number except 0, each once if n is even.
     first = [0] + [(i + 1) // 2 if i % 2 else n - i // 2 for i in range(1, n)]
     square = [tuple((one + row) % n for one in first) for row in range(n)]
     mirrored = [row[::-1] for row in square] if n % 2 and n > 1 else []
@@ -124,7 +124,7 @@ def _step(table: tuple[tuple[str, ...], ...]) -> int:
 
 
 def _show_same(one: str, other: str) -> bool:
-    """Return whether two trials show the same, in either order."""
+    """Return whether two trials show the same conditions, in either order."""
     return set(one.split(PAIR)) == set(other.split(PAIR))
 
 

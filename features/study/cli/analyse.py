@@ -23,8 +23,8 @@ def analyse(
 ) -> None:
     """Analyse a study: one page for reviewers, tidy tables and a BIDS data set.
 
-    Tests, effects, figures and a sentence in APA form for each hypothesis; what the design leaves
-    out is left out, and listed. Run it again whenever there are more data. An analysis before the
+    Tests, effects, figures and a sentence in APA form for each hypothesis; what the design excludes
+    is omitted and listed. Run it again whenever there are more data. An analysis before the
     planned number of participants is recorded in the data with its date, and reported.
     """
     with clear_errors():

@@ -1,4 +1,4 @@
-"""The participant's page as JSON, in which nothing distinguishes conditions, and its events."""
+"""The participant's page as JSON that does not distinguish conditions, and its events."""
 
 from collections.abc import Mapping
 
@@ -163,7 +163,7 @@ class _FilmSeen(ParticipantEvent, tag="seen"):
     seconds: float
 
     def tell(self, run: StudyRun) -> None:
-        """Record how much of the film was seen."""
+        """Record the time of the film that was seen."""
         run.film_ended(self.page, self.seconds)
 
 

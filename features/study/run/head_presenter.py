@@ -1,8 +1,7 @@
-"""Shows the conditions of a study on the head in the room by changing parameters of its run.
+"""Presentation of a study's conditions on the head in the room by changing parameters of its run.
 
 A condition with its own rig needs another run: the head parks and restarts with that rig. The run
-is recorded if the participant has agreed to it; camera pictures only if the participant has agreed
-to these.
+and its camera pictures are each recorded only with the participant's consent.
 """
 
 import threading
@@ -189,7 +188,7 @@ class _HealthMonitor:
     def report(self, state: HeadState) -> HeadReport:
         """Return the head's health.
 
-        A head that is held for longer than a moment does not show its condition any more.
+        A head that is held for longer than a moment no longer shows its condition.
         """
         now_s = self._clock.now_s()
         if state.t_s != self._tick_s:

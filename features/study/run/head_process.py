@@ -29,9 +29,9 @@ class HeadProcess:
         client: the connection to it.
 
     Args:
-        options: what to run.
-        log: file of its output.
-        clock: the host's.
+        options: options of the run.
+        log: file for its output.
+        clock: clock of the host.
 
     Raises:
         HeadLost: it does not start; the message gives the reason.

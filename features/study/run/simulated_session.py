@@ -1,4 +1,4 @@
-"""Simulated participants do a study like real ones: same screens, same journals."""
+"""Sessions of simulated participants, with the same screens and journals as real ones."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta

@@ -116,7 +116,7 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     """Return a study by shipped name or path, with its questionnaires and the conditions' rigs.
 
     Args:
-        name_or_path: of the study; its file names are relative to its own folder.
+        name_or_path: name or path of the study; its file names are relative to its own folder.
         further: additional rules, such as for scenes; they receive the design with paths relative
             to the working folder.
 
@@ -326,7 +326,7 @@ def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator
 
 
 def _show_same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) -> bool:
-    """Return whether two conditions show the same."""
+    """Return whether two conditions show the same gaze."""
     one, two = design.conditions[key], design.conditions[other]
     files = [(c.recording, c.film) for c in (one, two)]
     if any(file is not None for pair in files for file in pair):

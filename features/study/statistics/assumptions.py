@@ -18,8 +18,9 @@ _AT_AN_END = 0.5
 class AssumptionCheck(NamedTuple):
     """The check of one assumption.
 
-    p: of the data under the assumption, nan without a test; fine: no evidence against it
-    words: the result, and the consequence if the assumption is violated
+    p: probability of the data under the assumption, nan without a test; fine: whether there is no
+        evidence against it
+    words: the result, and the consequence of a violated assumption
     """
 
     assumption: str
@@ -70,7 +71,7 @@ def difference_checks(
 
 
 def range_check(ratings: Floats, points: int) -> AssumptionCheck:
-    """Check whether a rating had room: differences are hidden if most answers are at one end.
+    """Check a rating for floor and ceiling effects, which hide differences.
 
     Args:
         ratings: (n,) at least one.

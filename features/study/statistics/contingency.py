@@ -19,7 +19,7 @@ _LEAST_EXPECTED = 5.0
 
 
 def counts_of(ratings: Floats, points: int) -> Counts:
-    """Return how often each of 1..points was answered, (points,)."""
+    """Return the number of answers at each of 1..points, (points,)."""
     return np.bincount(np.asarray(ratings, np.int64), minlength=points + 1)[1 : points + 1]
 
 

@@ -21,7 +21,7 @@ class EffectSize(NamedTuple):
     """An effect with its 95 % interval, nan without one.
 
     name: in words; symbol: as printed; method: of the interval
-    bounded: it cannot exceed 1, so no zero is printed before the decimal point
+    bounded: whether it cannot exceed 1, so that no zero is printed before the decimal point
     """
 
     name: str
@@ -38,8 +38,8 @@ class StatisticalTest:
     """The results of one test.
 
     symbol, statistic, df: as printed; df is nan for a statistic without degrees of freedom
-    p: by the statistic's distribution in large samples
-    exact_p: of the permutations of the data, nan if it was not computed
+    p: p value from the statistic's distribution in large samples
+    exact_p: p value from the permutations of the data, nan if it was not computed
     least_p: the smallest exact probability that is possible with this number of data
     n: participants, or answers if each counts separately
     notes: warnings for the reader, e.g. counts too small for the large-sample probability
@@ -129,7 +129,7 @@ def matched_correlation(differences: Floats, axis: int = -1) -> Floats:
 
 
 def cliffs_delta(a: Floats, b: Floats, paired: bool, resamples: int = RESAMPLES) -> EffectSize:
-    """Return Cliff's delta (1993): how much more often b exceeds a than a exceeds b.
+    """Return Cliff's delta (1993): excess of pairs with b above a over pairs with a above b.
 
     Args:
         a: (n,) answers.
