@@ -13,7 +13,7 @@ from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 
 _BIN_DEG = 2.0
 _LEAST_SHARE = 0.002
-"""Gaze with fewer samples gives no estimate of the lids' opening at rest."""
+"""Least share of samples near a gaze for an estimate of the lids' opening at rest."""
 
 _LEAST_OPEN = 0.15
 _GAP_S = 0.1
