@@ -126,7 +126,7 @@ class AuthProxy:
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
-        # The default loop of Windows cannot wait for Unix sockets
+        # The default loop of Windows cannot wait for sockets.
         self._loop = asyncio.SelectorEventLoop()
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()

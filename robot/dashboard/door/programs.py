@@ -138,7 +138,7 @@ class ProgramSocket:
     def add_news(self, news: HeadNews, now_s: float) -> None:
         """Store the news that the program wants."""
         period_s = self._period_s
-        # A little early is better than one period late
+        # A little early is better than one period late.
         if period_s and now_s >= self._due_s - 0.25 * period_s:
             self._due_s = max(self._due_s, now_s - 0.5 * period_s) + period_s
             self._state = news.state
@@ -239,7 +239,7 @@ class ProgramRoutes:
         if message.get("do") != "stop" and not self._is_within_rate():
             raise MessageRefused(BUSY, 429)
         if takes_control(message) and message.get("for_s") is not None:
-            # The order ends after its duration; a request has no connection that could be lost
+            # The order ends after its duration; a request has no connection that could be lost.
             message["stay"] = True
         return await self._forward_request(message, wait_s)
 

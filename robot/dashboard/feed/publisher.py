@@ -72,7 +72,7 @@ class ParamFeed:
     def _write(self) -> None:
         """Create messages: first with all parameters, then with changed values."""
         first = self._version is None
-        # Before reading, so that a change in the meantime is sent next
+        # Before reading, so that a change in the meantime is sent next.
         self._version = self._tuning.version
         if first:
             params = [to_plain(param._asdict()) for param in self._tuning.parameters()]

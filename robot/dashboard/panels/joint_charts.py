@@ -110,7 +110,7 @@ class JointSeries:
                 self._rows.clear()
             self._rows.append(row)
         while len(self._rows) > 1 and self._rows[-1].t_s - self._rows[1].t_s >= TRACE_S:
-            # Keep one older row, so that the lines start at the edge of the axis
+            # Keep one older row, so that the lines start at the edge of the axis.
             self._rows.popleft()
 
     def table(self, over_s: float) -> tuple[Floats, Floats]:

@@ -22,7 +22,7 @@ HALF_WIDTH = 0.84
 HEAD_SHARE = 0.64
 """Share of the canvas's height that the head fills in the view of the face."""
 _FACE_UP_RAD = radians(4.0)
-"""Elevation of the view of the face; almost straight ahead: the head faces the viewer."""
+"""Elevation of the view of the face, almost straight ahead, so that the head faces the viewer."""
 _FACE_AWAY = 10.5
 """Distance of the view of the face, in eye distances: near, but without distortion of the nose."""
 _FACE_WIDTH = 3.3
