@@ -80,7 +80,7 @@ def plan_search(
     for kind in ORDER:
         if kind in kinds:
             some = [rate for rate in RATES[kind] if rates is None or rate in rates]
-            # Search for a board at any rates: its presence must be known.
+            # Search for a Maestro even if its rates are not requested: its presence must be known.
             some = some or [BOARD_RATES[0]] if kind == "maestro" else some
             rows += [(kind, rate) for rate in some]
     return tuple(rows)

@@ -58,7 +58,7 @@ def walk_channel(
     Raises:
         ServoMissing: the board does not answer, or the channel is no servo's.
         ServoFault: the pulses do not end.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     slow = setup._replace(
         max_speed_steps_s=speed_steps_s, max_accel_steps_s2=None, rest_steps=places[0]
@@ -90,7 +90,7 @@ def start_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     Raises:
         ServoMissing: the board does not answer, or the channel is no servo's.
         ServoFault: the pulses do not end.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     log = EventLog()
     (pulse,) = board.find([setup], log)
@@ -134,7 +134,7 @@ def send_home(line: MaestroLink) -> tuple[str, ...]:
 
     Raises:
         ServoMissing: the board does not answer.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     register = line.wait_for_answer()
     if register is None:

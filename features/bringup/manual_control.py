@@ -261,9 +261,9 @@ class ManualControl:
         """Move one joint slowly; the others hold.
 
         Raises:
-            SetupError: there is no such joint, or the angle is no number or
+            SetupError: the joint does not exist, or the angle is not a number or
                 outside the joint's range.
-            DriverError: the bus is gone.
+            DriverError: the bus has disappeared.
         """
         refuse_angle(joint, angle_deg, self.body.names, self._guard.limits)
         return self.pose({joint: angle_deg})
@@ -272,8 +272,8 @@ class ManualControl:
         """Move several joints slowly, so that they arrive together; the others hold.
 
         Raises:
-            SetupError: there is no such joint, or an angle is no number.
-            DriverError: the bus is gone.
+            SetupError: the joint does not exist, or an angle is not a number.
+            DriverError: the bus has disappeared.
         """
         names = self.body.names
         refuse_unknown(angles_deg, names)
@@ -303,7 +303,7 @@ class ManualControl:
         """Hold the present goals for a time.
 
         Raises:
-            DriverError: the bus is gone.
+            DriverError: the bus has disappeared.
         """
         goal, end_s = self._goal, self._clock.now_s() + seconds
         return self.follow(
@@ -318,7 +318,7 @@ class ManualControl:
         stopped: called at every step; returns why to stop, None without a reason
 
         Raises:
-            DriverError: the bus is gone.
+            DriverError: the bus has disappeared.
         """
         before, self._stopped = self._stopped, stopped
         try:
@@ -341,7 +341,7 @@ class ManualControl:
         gently: whether the guard moves slowly throughout, not only at the start
 
         Raises:
-            DriverError: the bus is gone.
+            DriverError: the bus has disappeared.
         """
         clock, period = self._clock, 1.0 / self._params.rate_hz
         start_s = last_s = clock.now_s()

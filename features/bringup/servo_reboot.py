@@ -64,7 +64,7 @@ def read_snapshot(port: BusPort, kind: ServoKind, servo_id: int) -> ServoSnapsho
     """Return the status of a servo.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     registers = Registers(port, kind.family)
     status = registers.read(servo_id, kind.family.error_register)
@@ -87,7 +87,7 @@ def reboot_servo(
     Raises:
         ServoMissing: it does not answer, before or after.
         ServoFault: it answers, but has not restarted.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     find_servo(port, kind, servo_id, baud)
     before, began_s = read_snapshot(port, kind, servo_id), port.now_s()

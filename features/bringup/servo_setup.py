@@ -47,7 +47,7 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
     Raises:
         ServoMissing: no servo or more than one answers.
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
     """
     found: list[FoundServo] = []
     junk = 0
@@ -103,7 +103,7 @@ def assign_servo(
         ServoMissing: the servo has another model, or does not answer afterwards.
         ServoFault: it refuses.
         PortError: the adaptor does not support a rate.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     refuse_model(found, kind, setup, port.port_name)
     if not 0 <= setup.id <= kind.family.highest_id:

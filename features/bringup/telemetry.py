@@ -65,7 +65,7 @@ class TelemetryReader(Protocol):
         """Read a joint's servo; None if it does not reply.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port has disappeared.
         """
         ...
 
@@ -199,7 +199,7 @@ class Monitor:
         """Read every servo once.
 
         Raises:
-            BusLost: a port is gone.
+            BusLost: a port has disappeared.
         """
         start_s = self._now_s()
         servos = {name: self._readers[one.bus].read(one) for name, one in self._joints.items()}

@@ -61,7 +61,7 @@ def refuse_unfit(rig: Rig, options: RunOptions) -> None:
     """Refuse options with which a run of a rig could not start; nothing runs.
 
     Raises:
-        gazerig.config.load.ConfigError: a file that the rig names is at fault.
+        gazerig.config.load.ConfigError: a file that the rig names has a fault.
         SetupError: the options do not fit the rig.
     """
     made = assemble(rig, options)

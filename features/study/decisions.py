@@ -36,7 +36,7 @@ from gazerig.features.study.statistics.ranks import (
 from gazerig.gaze.types import Floats
 
 Verdict = Literal["supported", "not supported", "against", "too few"]
-""""against": the difference is significant, but the test's effect has the other sign."""
+"""Verdict; "against": the difference is significant, but the test's effect has the other sign."""
 
 _LEAST_PEOPLE = 2
 

@@ -195,7 +195,7 @@ class Journal:
             os.ftruncate(self._fd, whole)
             self._size = os.lseek(self._fd, whole, os.SEEK_SET)
             os.fsync(self._fd)
-            # Also write the folder's entries of new files to disk
+            # Write the folder's entries of new files to disk, too.
             names = os.open(folder, os.O_RDONLY)
             try:
                 os.fsync(names)

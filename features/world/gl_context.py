@@ -53,12 +53,13 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
                     raise RuntimeError("there is no display")
                 context = import_module(f"mujoco.{backend}").GLContext(64, 64)
                 try:
-                    with context.as_current():  # no longer than needed: another thread may render
+                    # No longer than necessary: another thread may render
+                    with context.as_current():
                         made = make()
                 except Exception:
                     context.free()
                     raise
-            except Exception as error:  # each library has errors of its own
+            except Exception as error:  # each library has its own errors
                 why[backend] = _one_line(error)
                 _forget_opengl()
                 continue
@@ -74,10 +75,10 @@ def render_in_calling_thread() -> None:
     """Make Mesa's llvmpipe render without its own threads, unless the user has set their number.
 
     Call this before the first context of the process. The threads, one per core, wake on every core
-    at once for a few milliseconds per picture and delay the threads that wait for servos, whatever
-    their priority: on two cores 290 to 320 of 6,000 ticks of 200 Hz (133 of 4,000 with one thread),
-    in the calling thread 10 of 4,000. Both render 28 pictures a second. On the simulated clock
-    nothing can be late.
+    simultaneously for a few milliseconds per picture and delay the threads that wait for servos,
+    regardless of their priority: on two cores 290 to 320 of 6,000 ticks of 200 Hz (133 of 4,000
+    with one thread), in the calling thread 10 of 4,000. Both render 28 pictures a second. On the
+    simulated clock nothing can be late.
     """
     os.environ.setdefault("LP_NUM_THREADS", "0")
 

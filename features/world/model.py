@@ -70,7 +70,7 @@ def world_model(
 
     Args:
         figures: the people of a script, and with it their room; None: an empty floor.
-        rigs: each with a prefix of its own.
+        rigs: each with its own prefix.
         mjcf_file: a user's world instead of the room.
 
     Raises:

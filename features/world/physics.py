@@ -270,7 +270,7 @@ class World:
             rig: number of the rig in the world.
 
         Raises:
-            ValueError: there is no such body.
+            ValueError: the body does not exist.
         """
         number = self._body(body, rig)
         if number < 0:
@@ -296,7 +296,7 @@ class World:
         """Move a mocap body of a user's world to a position; it pushes bodies that it touches.
 
         Raises:
-            ValueError: there is no such body.
+            ValueError: the body does not exist.
         """
         number = mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, body)
         place = int(self._mj.body_mocapid[number]) if number >= 0 else -1

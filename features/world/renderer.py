@@ -103,7 +103,7 @@ class Renderer:
             p_m: (3,) position of the camera in the world.
             size_px: width and height; None: the largest.
             depth: whether to return distances, too.
-            rows: the first row and the one after the last, to render only these.
+            rows: the first row and the one after the last, to render only this range.
 
         Raises:
             ValueError: the picture is larger than the renderer's largest, or the renderer is

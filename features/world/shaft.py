@@ -223,7 +223,7 @@ class WorldShaft(Shaft):
         self._since_ms = 0
 
     def place(self, position_steps: float) -> None:
-        """Set the shaft to its position in the world, whatever position is given."""
+        """Set the shaft to its position in the world; ignore the given position."""
         self.x = self.axis.position()
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
         if isinstance(self.profile, PositionProfile):

@@ -60,7 +60,7 @@ class BlinkFinder:
 
     def update(self, t_s: float, left: float, right: float) -> BlinkEvent | None:
         """Add both openings, 0 shut .. 1 open; return the blink that has just ended, if any."""
-        opening = left if left > right else right  # a wink is no blink
+        opening = left if left > right else right  # a wink is not a blink
         trace = self._trace
         if not trace:
             self._usual = opening

@@ -1,1 +1,1 @@
-"""The live page: what is shown, what can be done there, and the door to it."""
+"""The live page: its views, its controls, and access to it."""

@@ -78,7 +78,7 @@ class TrackRow(NamedTuple):
     gone_m: extra distance allowed if the clothes match
     fastest_m: largest motion along the view since it was seen
     upright_m2: variance of its height, if smaller than that of its position
-    proved: whether several frames confirm it, so that it is no false detection
+    proved: whether several frames confirm it, so that it is not a false detection
     """
 
     kind: int

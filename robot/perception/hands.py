@@ -354,8 +354,8 @@ class _Arm(NamedTuple):
         person's distance
     ratio: length at that distance per length of the patch
     shoulder_m: distance of its line from the person's shoulder
-    attached: it has an arm's size, points to the shoulder and is fastest at the other end
-    comes_in: it enters at the side, not from the shoulder, too wide for an arm at that distance
+    attached: whether it has an arm's size, points to the shoulder and is fastest at its end
+    comes_in: whether it enters at the side, not from the shoulder, too wide for an arm there
     """
 
     face: Known

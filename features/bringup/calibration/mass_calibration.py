@@ -85,7 +85,7 @@ def sweep(control: ManualControl, statics: Statics, recorder: LoadRecorder) -> N
     Raises:
         CalibrationStopped: the user or the system requested the end.
         CalibrationRefused: the guard or the bus stopped a movement.
-        DriverError: the bus is gone.
+        DriverError: the bus has disappeared.
     """
     _move(control, dict.fromkeys(statics.joints, 0.0))
     for name in (name for name in SWEPT if name in statics.joints):

@@ -101,7 +101,7 @@ def doctor(
 
 
 def examine_detector(params: FaceDetectorParams) -> Diagnostic:
-    """Return the detectors of faces and people, and the installation of missing ones."""
+    """Return the finding about the detectors of faces and people, with its remedy."""
     text, cure = detector_status(params)
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
 

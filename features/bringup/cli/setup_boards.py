@@ -104,7 +104,7 @@ def _try_channels(board: Board, task: SetupTask, explain: Explain) -> list[str]:
     Raises:
         ServoMissing: the board does not answer, and no user can answer (``yes``).
         ServoFault: pulses could not be stopped.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     say(
         "Now each channel moves its servo a little. Keep fingers away: as a servo's pulses begin "
@@ -191,7 +191,7 @@ def set_up_maestro(task: SetupTask) -> list[str]:
         SetupError: the file of settings cannot be written.
         PortError: the port cannot be opened, or no board answers.
         ServoFault: pulses could not be stopped.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     params, setups = task.config.maestro, task.setups
     say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
@@ -276,7 +276,7 @@ def set_up_pca9685(task: SetupTask) -> list[str]:
         PortError: the port cannot be opened.
         ServoMissing: a board does not answer.
         ServoFault: pulses could not be stopped.
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     params, setups = task.config.pca9685, task.setups
     say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")

@@ -192,7 +192,7 @@ def examine_maestro(
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
     """
     found, size = probe(port, params), USB_CHANNELS.get(usb)
     if found is None:
@@ -274,7 +274,7 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
     """
     found = probe(port, params)
     if found is None:
@@ -294,7 +294,7 @@ def examine_pca9685(
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")

@@ -115,7 +115,7 @@ def examine_bus(
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
     """
     presence = find_servos(port, kind, setups, baud, tell)
     if presence.missing and not presence.present and not presence.elsewhere:
@@ -145,7 +145,7 @@ def find_servos(
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: it has disappeared.
     """
     tell(f"asking all servos at {baud} bit/s")
     _open(port, baud)
@@ -202,7 +202,7 @@ def apply_fixes(
     write: writes one fix if that is safe; returns "" or the reason why it did not
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     for finding in findings:
         for fix in finding.fixes:

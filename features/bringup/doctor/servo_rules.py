@@ -135,7 +135,7 @@ def examine_servo(
     """Read one servo and examine it; its torque is not changed.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     checks = CHECKS[kind.family.name]
     return apply_rules(read_state(Registers(port, kind.family), checks, setup, found, corrupt))
@@ -147,7 +147,7 @@ def read_state(
     """Read all registers of one servo that the rules need.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     values = registers.read_many(setup.id, checks.registers)
     return ServoState(checks, setup, found, values, corrupt)
@@ -357,7 +357,7 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
     """Write a fix if the torque is off, so that it persists; return "" or the reason of a failure.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port has disappeared.
     """
     registers, servo_id = Registers(port, kind.family), fix.servo_id
     torque = registers.read(servo_id, "torque_enable")

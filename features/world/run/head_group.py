@@ -80,7 +80,7 @@ def compose_group(options: RunOptions) -> "HeadGroup":
     """Assemble a run of several heads; nothing moves.
 
     Raises:
-        gazerig.config.load.ConfigError: the world or one of the rigs is at fault.
+        gazerig.config.load.ConfigError: the world or one of the rigs has a fault.
         SetupError: they cannot be run with these options.
     """
     first = run_rig(options)

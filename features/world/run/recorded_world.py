@@ -23,7 +23,7 @@ def recorded_world_info(options: RunOptions, seed: int) -> WorldInfo | None:
     """Return the recording's entry for the world of a run, without its start time; None without.
 
     Raises:
-        gazerig.config.load.ConfigError: the script is at fault.
+        gazerig.config.load.ConfigError: the script has a fault.
     """
     if options.world is None or options.world_name is None:
         return None

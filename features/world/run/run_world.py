@@ -154,7 +154,7 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
     """Return the requested world.
 
     Raises:
-        gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
+        gazerig.config.load.ConfigError: its file has a fault or does not exist.
         SetupError: MuJoCo is not installed, or the rig has no rule for an event of the world.
     """
     asked = requested_world(options)
@@ -209,8 +209,8 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     """Return the people of a world; a user's own MJCF has none.
 
     Raises:
-        gazerig.config.load.ConfigError: the file is at fault, or there is none of that name.
-        SetupError: there is no such MJCF file.
+        gazerig.config.load.ConfigError: the file has a fault or does not exist.
+        SetupError: the MJCF file does not exist.
     """
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
@@ -222,7 +222,7 @@ def world_script(name_or_path: str) -> SceneScript:
     """Return the script of a world; paths of its heads' rigs are relative to the working folder.
 
     Raises:
-        gazerig.config.load.ConfigError: the file is at fault, or there is none of that name.
+        gazerig.config.load.ConfigError: the file has a fault or does not exist.
     """
     return _read(*script_file("worlds", name_or_path, HOME))
 
@@ -263,7 +263,7 @@ def mjcf_of(name_or_path: str) -> Path | None:
     """Return the user's own MJCF file, None if the world is a script.
 
     Raises:
-        SetupError: there is no such file.
+        SetupError: the file does not exist.
     """
     path = Path(name_or_path)
     if path.suffix not in MJCF:

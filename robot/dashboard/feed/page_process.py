@@ -1,6 +1,6 @@
 """Page process: shows the running rig on a web page and never delays the control loop.
 
-The page is a process of its own (``gazerig.robot.dashboard.page_main``), fed through a socket pair
+The page is a separate process (``gazerig.robot.dashboard.page_main``), fed through a socket pair
 with frozen values. Every call here returns immediately: data that the page cannot accept is dropped
 and counted, and a page that is slow, stopped or dead does not affect the caller. The page ends when
 this side of the socket closes, so it never outlives the program, however the program ends.

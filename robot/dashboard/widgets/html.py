@@ -78,7 +78,7 @@ def line(points: Iterable[tuple[float, float]], kind: str, dash: str = "") -> st
 
 
 def text(x: float, y: float, text: str, anchor: str = "start", size: float = LETTER_PX) -> str:
-    """Return text whose baseline starts, ends or is centred at a point."""
+    """Return text with a baseline that starts, ends or is centred at a point."""
     return (
         f"<text x='{x:.1f}' y='{y:.1f}' font-size='{size}' text-anchor='{anchor}' "
         f"class='svg-text'>{escape(text)}</text>"

@@ -101,7 +101,7 @@ def calibrate_face(
             mock=mock,
             # No user watches a script on an emulated rig, so simulated time is sufficient.
             fast=mock and answers is not None and camera is None and not oak,
-            seconds=0.0,  # enough for a film in simulated time; keys end it
+            seconds=0.0,  # required in simulated time; keys end the run
             scene=STILL_SCENE if mock and nothing else scene,
             video=video,
             camera=camera,
