@@ -39,7 +39,7 @@ _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.m
 
 
 class WorldUnstable(Error):
-    """Error: the numbers of a world have diverged; its joint angles are no longer valid."""
+    """Divergence of the numbers of a world; its joint angles are no longer valid."""
 
 
 class WorldState(NamedTuple):

@@ -71,7 +71,7 @@ _EDGE_RAD = radians(35.0)
 
 
 class MeshUnusable(ValueError):
-    """Error: a mesh file cannot be used; the message has the reason and a remedy."""
+    """Unusable mesh file; the message has the reason and a remedy."""
 
 
 def read_mesh(params: MeshParams) -> Painted:

@@ -34,7 +34,7 @@ _MOST_DROPPED = 0.2
 
 
 class CameraCalibrationRefused(SetupError):
-    """Error: the frames are not sufficient for a calibration; the message has reason and remedy."""
+    """Refusal of a camera calibration; the message has the reason and the remedy."""
 
 
 @dataclass(frozen=True)

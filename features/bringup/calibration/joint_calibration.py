@@ -40,7 +40,7 @@ ENDS = {
 
 
 class CalibrationRefused(SetupError):
-    """Error: the samples are not sufficient for a calibration; with reason and remedy."""
+    """Refusal of a joint calibration; the message has the reason and the remedy."""
 
 
 class Marks(NamedTuple):

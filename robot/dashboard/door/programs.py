@@ -58,7 +58,7 @@ _STATUS = {"ok": 200, "refused": 409, "failed": 503}
 
 
 class MessageRefused(ValueError):
-    """Error: a message was not sent to the rig; the text gives the reason.
+    """Refusal of a message to the rig; the text gives the reason.
 
     Attributes:
         status: Status of the HTTP answer.
