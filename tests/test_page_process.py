@@ -272,7 +272,9 @@ def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
         choices={}, emulated=None, watched=lambda: False, silent=lambda: None, show=show
     )
     # A door whose thread is stuck accepts tasks and never does them.
-    door = SimpleNamespace(is_open=lambda: True, soon=lambda do: None if stuck == "door" else do())
+    door = SimpleNamespace(
+        is_open=lambda: True, call_soon=lambda do: None if stuck == "door" else do()
+    )
     served = SimpleNamespace(door=door, pointer=SimpleNamespace(), outbox=Outbox(cast(Any, theirs)))
     run = threading.Thread(
         target=show_until_closed, args=(theirs, view, os.getppid(), served), daemon=True
