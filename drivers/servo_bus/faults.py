@@ -126,8 +126,10 @@ class ServoHealth:
         for servo_id in out:
             self._silent_since.setdefault(servo_id, now_s)
         late = lateness.late_answers(now_s)
-        if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
-            self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
+        longest_s = now_s - min(self._silent_since.values(), default=now_s)
+        if late and out and longest_s < BUSY_S:
+            if longest_s >= SAY_SILENT_S:
+                self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
         if self.all_silent_since_s is None:
             for servo_id in out:
