@@ -214,7 +214,10 @@ BAD = {
         "frames.1.time_s",
         "later than the previous frame",
     ),
-    "loop_s: [0.1, 0.5]\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("loop_s", "not the time of a frame"),
+    "loop_s: [0.1, 0.5]\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": (
+        "loop_s",
+        "not the time of a frame",
+    ),
     "frames:\n  - {time_s: 0.5, joints_deg: {neck_yaw: 1}}\n": (
         "frames.0.joints_deg.neck_yaw",
         "head_yaw_deg",

@@ -394,6 +394,7 @@ def desk() -> Iterator[Served]:
 
 
 @pytest.mark.pty
+@pytest.mark.own_timeouts
 def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     path = desk.ports
     process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", path)

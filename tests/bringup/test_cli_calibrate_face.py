@@ -190,6 +190,7 @@ def sitting_at(rig: Path, *words: str) -> OnTerminal:
     return OnTerminal("calibrate", "face", str(rig), "--mock", "--yes", *words)
 
 
+@pytest.mark.own_timeouts
 def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
     with sitting_at(rig, "--no-page") as sitting:
         sitting.reads("1/8 the tip of your nose: 0 mm")
