@@ -5,6 +5,7 @@ browser.
 """
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, cast
@@ -267,20 +268,23 @@ def test_the_head_follows_a_finger_and_the_view_does_not_turn(
         touch("touchMove", across + next(shifts))
         return found()
 
+    def is_near(point: Vec3, other: Vec3, distance_m: float) -> bool:
+        return math.dist(point, other) < distance_m
+
     def settled() -> bool:  # the view may still be on its path to the place it starts at
         person.wait_for_frames(UNHURRIED_FRAMES)
-        return len(points()) > 2 and abs(points()[-1][0] - points()[-2][0]) < 0.005
+        found = points()
+        return len(found) > 2 and is_near(found[-1], found[-3], 0.001)
 
     wait_for(lambda: moves_on(0.48, settled), "the finger's point")
-    ahead_m, left_m, _ = points()[-1]
-    before = len(rig.orders)
-    # Farther to the right in the same view: to the head's left. A finger that rests is sent again,
-    # so the next point may still be that of the place before, or of its small shifts.
+    first = points()[-1]
+    # A finger that rests is sent again, so the next point may still be that of the place before.
     wait_for(
-        lambda: moves_on(0.55, lambda: any(point[1] > left_m + 0.008 for point in points())),
+        lambda: moves_on(0.55, lambda: not is_near(points()[-1], first, 0.02)),
         "the finger's next point",
     )
-    assert all(abs(point[0] - ahead_m) < 0.02 for point in points())
+    # The view has not turned: the finger's first place is still the same point.
+    wait_for(lambda: moves_on(0.48, lambda: is_near(points()[-1], first, 0.003)), "the first point")
     touch("touchEnd")
 
     def rests() -> bool:  # twice as long as the page waits before it sends a place again
