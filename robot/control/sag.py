@@ -29,10 +29,11 @@ class SagCompensation:
     """
 
     def __init__(self, statics: Statics, names: Sequence[str], share: float) -> None:
-        self._statics, self._share = statics, share
+        self._share = share
         self._places = tuple((i, name) for i, name in enumerate(names) if name in statics.joints)
         self._at: tuple[float, ...] = ()
         self._wanted: tuple[float, ...] = ()
+        self._set_statics(statics)
         self.restart()
 
     def restart(self) -> None:
@@ -42,8 +43,7 @@ class SagCompensation:
 
     def retune(self, joints: Mapping[str, JointParams]) -> None:
         """Apply new parameters of joints."""
-        self._statics = self._statics.retuned(joints)
-        self._at = ()
+        self._set_statics(self._statics.retuned(joints))
 
     def offsets(self, command_rad: Sequence[float], t_s: float) -> tuple[tuple[int, float], ...]:
         """Return the change of goals in steps, by the number of the joint.
@@ -62,27 +62,33 @@ class SagCompensation:
             self._now = tuple(
                 _approach(now, wanted, room * steepest)
                 for now, wanted, steepest in zip(
-                    self._now, self._wanted, self._steepest(), strict=True
+                    self._now, self._wanted, self._steepest, strict=True
                 )
             )
         self._last_s = t_s
         return tuple([(i, steps) for (i, _), steps in zip(self._places, self._now, strict=True)])
 
-    def _steepest(self) -> list[float]:
-        return [self._statics.joints[name].make_linkage().steepest for _, name in self._places]
+    def _set_statics(self, statics: Statics) -> None:
+        joints = [statics.joints[name] for _, name in self._places]
+        self._statics = statics
+        self._stiffness = [joint.model_facts.stiffness(joint.gains) for joint in joints]
+        linkages = [joint.make_linkage() for joint in joints]
+        self._steepest = [linkage.steepest for linkage in linkages]
+        self._rising = [linkage.rising for linkage in linkages]
+        self._at = ()
 
     def _wanted_steps(self, at: Sequence[float]) -> Iterator[float]:
         pose = {name: angle for (_, name), angle in zip(self._places, at, strict=True)}
         shares = self._statics.drive_shares(pose)
-        for _, name in self._places:
-            joint = self._statics.joints[name]
-            stiff, linkage = joint.model_facts.stiffness(joint.gains), joint.make_linkage()
+        for (_, name), stiff, steepest, rising in zip(
+            self._places, self._stiffness, self._steepest, self._rising, strict=True
+        ):
             if not stiff:
                 yield 0.0
                 continue
-            most = linkage.steepest * radians(MOST_DEG)
+            most = steepest * radians(MOST_DEG)
             steps = min(max(-self._share * shares[name] / stiff, -most), most)
-            yield steps if linkage.rising else -steps
+            yield steps if rising else -steps
 
 
 def _approach(now: float, wanted: float, room: float) -> float:
