@@ -189,7 +189,7 @@ def test_old_joints_of_a_busy_computer_are_put_down_to_it(running: Running) -> N
     tick = running.go(0.1)[-1]
     reasons = ("neck_yaw: stale joints", "neck_pitch: stale joints", "jaw: too fast")
     held = tick.guard_result._replace(level="hold", reasons=reasons)
-    shown_s = [0.005 * k for k in range(600)]
+    shown_s = [0.005 * k for k in range(800)]
     for late, last in ((False, reasons), (True, ("jaw: too fast",))):
         builder = SnapshotBuilder(200.0)
         for k, t_s in enumerate(shown_s):

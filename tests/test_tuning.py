@@ -285,11 +285,14 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     bench = Bench(str(mine), scanpath="random", saccade="main_sequence")
     assert bench.tuning.unsaved() == ()
     bench.tuning.apply_character("bold")
+    bench.tuning.set_option("loop.rate_hz", 50.0)
     bench.tuning.reload(mine)
     assert bench.made.live_params.rig.gaze.scanpath.model == "random"
+    assert bench.made.live_params.rig.loop.rate_hz == 50.0 and bench.tuning.unsaved() == ()
     bench.tuning.set({"gaze.aversion.min_dwell_s": 0.3})
     bench.tuning.save()
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"
+    assert load_rig(str(mine)).loop.rate_hz == 200.0
     assert load_rig(str(mine)).gaze.aversion.min_dwell_s == 0.3
 
 
