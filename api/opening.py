@@ -30,8 +30,8 @@ def open(
 def open(
     rig: str = "desk", *, fast: Literal[False] = False, mock: bool = False,
     bus: Literal["emulated", "ideal"] | None = None,
-    port: str | None = None, page: str | None = None, scene: str | None = None, world: str | None = None,
-    video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
+    port: str | None = None, page: str | None = None, token_file: Path | str | None = None,
+    scene: str | None = None, world: str | None = None, video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
     detector: FaceDetector | None = None, attention: Chooser | None = None,
     character: str | None = None, profile: str | None = None, seed: int = 0,
     record: Path | str | None = None, say: Callable[[str], None] | None = None,
@@ -40,8 +40,8 @@ def open(
 
 def open(
     rig: str = "desk", *, fast: bool = False, mock: bool = False, bus: str | None = None,
-    port: str | None = None, page: str | None = None, scene: str | None = None, world: str | None = None,
-    video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
+    port: str | None = None, page: str | None = None, token_file: Path | str | None = None,
+    scene: str | None = None, world: str | None = None, video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
     detector: FaceDetector | None = None, attention: Chooser | None = None,
     character: str | None = None, profile: str | None = None, seed: int = 0,
     record: Path | str | None = None, say: Callable[[str], None] | None = None,
@@ -62,6 +62,8 @@ def open(
             default) or "ideal" (goals in, a lag out, no bytes: faster).
         port: serial port instead of the rig's.
         page: HOST:PORT of the live page; ``say`` receives its address.
+        token_file: file with the page's token, as in ``gazerig run --token-file``; None: each start
+            makes one.
         scene: simulated people, as in ``gazerig run --scene``.
         world: a world with physics, by name or path, as in ``gazerig run --world``.
         video: a film or image to look at.
@@ -89,7 +91,8 @@ def open(
     mock = mock or fast
     drawn = scene is not None or (mock and not sees and own is None)
     options = RunOptions(
-        rig=rig, mock=mock, fast=fast, bus=bus, port=port, page=page, scene=scene, world=world, video=_path(video),
+        rig=rig, mock=mock, fast=fast, bus=bus, port=port, page=page, token_file=_path(token_file),
+        scene=scene, world=world, video=_path(video),
         camera=seen, oak=oak, pixels=detector is not None and drawn,
         character=character, profile=profile, seed=seed, record=_path(record), seconds=_FOR_EVER_S,
     )  # fmt: skip

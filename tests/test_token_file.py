@@ -11,6 +11,7 @@ import pytest
 from command_line import GAZERIG, invoked
 from shown_page import free_port, wait_for
 
+import gazerig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.dashboard.door.token_file import read_token
@@ -98,3 +99,14 @@ def test_a_program_keeps_its_token_when_the_head_is_started_again(
             finally:
                 process.send_signal(signal.SIGINT)
                 assert process.wait(60.0) == 0
+
+
+def test_a_program_gives_the_page_a_token_file(tmp_path: Path) -> None:
+    path = tmp_path / "head.token"
+    gazerig.open("desk", mock=True, page="127.0.0.1:0", token_file=path)
+    token = path.read_text(encoding="utf-8").strip()
+    gazerig.open("desk", mock=True, page="127.0.0.1:0", token_file=str(path))
+    assert len(token) >= 22 and path.read_text(encoding="utf-8").strip() == token
+    path.chmod(0o644)
+    with pytest.raises(gazerig.Error, match="other users may read it"):
+        gazerig.open("desk", mock=True, page="127.0.0.1:0", token_file=path)
