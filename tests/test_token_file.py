@@ -103,10 +103,10 @@ def test_a_program_keeps_its_token_when_the_head_is_started_again(
 
 def test_a_program_gives_the_page_a_token_file(tmp_path: Path) -> None:
     path = tmp_path / "head.token"
-    gazerig.open("desk", mock=True, page="127.0.0.1:0", token_file=path)
+    gazerig.open("desk", mock=True, page="127.0.0.1:8080", token_file=path)
     token = path.read_text(encoding="utf-8").strip()
-    gazerig.open("desk", mock=True, page="127.0.0.1:0", token_file=str(path))
+    gazerig.open("desk", mock=True, page="127.0.0.1:8080", token_file=str(path))
     assert len(token) >= 22 and path.read_text(encoding="utf-8").strip() == token
     path.chmod(0o644)
     with pytest.raises(gazerig.Error, match="other users may read it"):
-        gazerig.open("desk", mock=True, page="127.0.0.1:0", token_file=path)
+        gazerig.open("desk", mock=True, page="127.0.0.1:8080", token_file=path)
