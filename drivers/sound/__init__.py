@@ -1,0 +1,1 @@
+"""Sound: playback in a process of its own, and speech programs."""

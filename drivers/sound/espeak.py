@@ -1,0 +1,99 @@
+"""Process that synthesises a text with espeak-ng's library, which reports the time of each phoneme.
+
+``python -m gazerig.drivers.sound.espeak`` reads (text, voice) and writes (rate in Hz, samples,
+phonemes) as MessagePack, an error text, or "" without a library. The library keeps global state, so
+each text has a process. The calls are those of espeak-ng's ``speak_lib.h``.
+"""
+
+import ctypes
+import sys
+from typing import Any
+
+import msgspec
+
+_LIBRARIES = ("libespeak-ng.so.1", "libespeak-ng.dylib")
+_RETRIEVAL = 1
+_PHONEME_EVENTS, _DONT_EXIT = 0x0001, 0x8000
+_UTF8 = 1
+_END_OF_LIST, _PHONEME = 0, 7
+_BUFFER_MS = 100
+
+
+class _Event(ctypes.Structure):
+    """The structure ``espeak_EVENT``."""
+
+    _fields_ = [
+        ("type", ctypes.c_int),
+        ("identifier", ctypes.c_uint),
+        ("text_position", ctypes.c_int),
+        ("length", ctypes.c_int),
+        ("audio_ms", ctypes.c_int),
+        ("sample", ctypes.c_int),
+        ("user_data", ctypes.c_void_p),
+        ("name", ctypes.c_char * 8),
+    ]
+
+
+_CALLBACK = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.POINTER(ctypes.c_short), ctypes.c_int, ctypes.POINTER(_Event)
+)
+
+
+def synthesise(text: str, voice: str) -> tuple[int, bytes, list[tuple[str, float]]]:
+    """Return the rate in Hz, samples (signed, 16 bits) and phonemes with their begins in s.
+
+    Raises:
+        OSError: the library cannot be loaded.
+        ValueError: it has no such voice.
+    """
+    library = _load()
+    rate_hz = library.espeak_Initialize(_RETRIEVAL, _BUFFER_MS, None, _PHONEME_EVENTS | _DONT_EXIT)
+    if rate_hz <= 0:
+        raise OSError("it finds no voices")
+    if library.espeak_SetVoiceByName(voice.encode()) != 0:
+        raise ValueError(f"no voice {voice!r}; list them with: espeak-ng --voices")
+    samples, phonemes = bytearray(), []
+
+    def collect(wave: Any, count: int, events: Any) -> int:
+        if wave and count:
+            samples.extend(ctypes.string_at(wave, 2 * count))
+        i = 0
+        while events[i].type != _END_OF_LIST:
+            if events[i].type == _PHONEME:
+                phonemes.append(
+                    (events[i].name.decode("utf-8", "replace"), events[i].sample / rate_hz)
+                )
+            i += 1
+        return 0
+
+    callback = _CALLBACK(collect)
+    library.espeak_SetSynthCallback(callback)
+    data = text.encode()
+    library.espeak_Synth(data, len(data) + 1, 0, 1, 0, _UTF8, None, None)
+    library.espeak_Synchronize()
+    return rate_hz, bytes(samples), phonemes
+
+
+def _load() -> ctypes.CDLL:
+    for name in _LIBRARIES:
+        try:
+            return ctypes.CDLL(name)
+        except OSError:
+            continue
+    raise OSError("its library is missing")
+
+
+def main() -> None:
+    """Answer one request."""
+    answer: object
+    try:
+        answer = synthesise(*msgspec.msgpack.decode(sys.stdin.buffer.read(), type=tuple[str, str]))
+    except OSError:
+        answer = ""
+    except ValueError as error:
+        answer = str(error)
+    sys.stdout.buffer.write(msgspec.msgpack.encode(answer))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+"""Parameters of the sound."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from gazerig.params import Bounds
+
+NULL_DEVICE = "null"
+"""Name of the device that plays nothing but keeps time."""
+
+
+@dataclass(frozen=True)
+class SoundParams:
+    """Loudspeaker and voice of the head."""
+
+    # fmt: off
+    device: Annotated[str, "name of the loudspeaker or a part of it; empty: the system's default; null: silent, but keeps time"] = ""
+    volume: Annotated[float, Bounds(0, 1), "factor on all sounds"] = 1.0
+    latency_ms: Annotated[float, Bounds(0, 1000),
+        "delay of the loudspeaker itself, e.g. by Bluetooth; motion waits for it"] = 0.0
+    folders: Annotated[tuple[str, ...],
+        "folders whose sounds may be played, relative to this file; empty: this file's folder"] = ()
+    speech: Annotated[Literal["auto", "espeak-ng", "piper"],
+        "program that speaks texts; auto: piper if a voice is given as a file, otherwise espeak-ng"] = "auto"
+    voice: Annotated[str, "voice of that program: a name of espeak-ng such as en-us or de, or piper's .onnx file"] = "en-us"
+    # fmt: on

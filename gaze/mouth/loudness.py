@@ -1,0 +1,68 @@
+"""Loudness of speech as a mouth shows it.
+
+Loudness is a power function of the sound pressure with the exponent 0.6 (Stevens 1956, "The direct
+estimation of sensory magnitudes: loudness"): 10 dB more are heard as twice as loud. The pressure is
+that between 0.5 and 4 kHz. There are the resonances of an open mouth; the murmur of m, the voice
+bar of b and most of an s are outside, so that a closed mouth is quiet although its sound is not.
+"""
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+
+FRAME_S = 0.01
+"""Time between two values."""
+WINDOW_S = 0.02
+"""Length of the sound that a value describes, centred at its time."""
+EXPONENT = 0.6
+_BAND_HZ = 500.0, 4000.0
+_BLOCK = 2000
+_LOUD = 0.95
+
+
+def band_pressures(samples: Floats, rate_hz: float) -> Floats:
+    """Return the pressure of speech in every frame.
+
+    Args:
+        samples: (n,) one channel, -1..1.
+        rate_hz: Rate of the samples.
+
+    Returns:
+        (n / rate / FRAME_S,) root mean squares, the first one centred at WINDOW_S / 2.
+    """
+    step, length = round(FRAME_S * rate_hz), round(WINDOW_S * rate_hz)
+    if len(samples) < length:
+        return np.zeros(0)
+    windows = np.lib.stride_tricks.sliding_window_view(samples, length)[::step]
+    taper = np.hanning(length)
+    frequencies = np.fft.rfftfreq(length, 1.0 / rate_hz)
+    band = (frequencies >= _BAND_HZ[0]) & (frequencies <= _BAND_HZ[1])
+    powers = np.concatenate(
+        [
+            (np.abs(np.fft.rfft(windows[i : i + _BLOCK] * taper, axis=1)[:, band]) ** 2).sum(axis=1)
+            for i in range(0, len(windows), _BLOCK)
+        ]
+    )
+    pressures: Floats = np.sqrt(2.0 * powers / (length * (taper**2).sum()))
+    return pressures
+
+
+def loud_pressure(pressures: Floats) -> float:
+    """Return the pressure of the loudest parts, 0 for silence."""
+    heard = pressures[pressures > 1e-4]
+    return float(np.quantile(heard, _LOUD)) if len(heard) else 0.0
+
+
+def openings(pressures: Floats, loud: float, quiet_db: float) -> Floats:
+    """Return openings 0..1 by loudness: 0 at ``quiet_db`` and 1 at the loudest parts.
+
+    Args:
+        pressures: (n,) from ``band_pressures``.
+        loud: Pressure of the loudest parts; 0: all are shut.
+        quiet_db: Level relative to it at which the mouth is shut.
+    """
+    if loud <= 0.0:
+        return np.zeros(len(pressures))
+    shut = 10.0 ** (quiet_db / 20.0 * EXPONENT)
+    opened: Floats = np.clip(((pressures / loud) ** EXPONENT - shut) / (1.0 - shut), 0.0, 1.0)
+    return opened
