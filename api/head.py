@@ -173,18 +173,18 @@ class Head(ABC):
 
     # Face and behaviour
 
-    def play(self, gesture: str, *, speed: float = 1.0, times: int = 0) -> Order:
-        """Play a gesture over gaze, once; the eyes keep their target.
+    def play(self, track: str, *, speed: float = 1.0, times: int = 0) -> Order:
+        """Play a track over gaze, once; the eyes keep their target.
 
         Args:
-            gesture: its name; "" ends the present one.
+            track: its name; "" ends the present one.
             speed: factor on the speed at which it was written.
-            times: number of repetitions; 0: as the gesture defines.
+            times: number of repetitions; 0: as the track defines.
 
         Raises:
-            Refused: the rig has no such gesture; the message lists its gestures.
+            Refused: the rig has no such track; the message lists its tracks.
         """
-        return self._send(Play(gesture, speed, times, self._who))
+        return self._send(Play(track, speed, times, self._who))
 
     def express(self, expression: str, strength: float = 1.0) -> Order:
         """Blend to an expression of the rig's table, and keep it.
@@ -363,7 +363,7 @@ class Head(ABC):
 
     @abstractmethod
     def _progress(self) -> Progress:
-        """Return the owner of gaze and joints, and the newest gesture."""
+        """Return the owner of gaze and joints, and the newest track."""
 
     @abstractmethod
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:

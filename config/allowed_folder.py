@@ -14,7 +14,7 @@ from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 _KIND_OF_KEY = {
     "gaze.scanpath.transition_matrix": "scanpaths",
     "profile": "profiles",
-    "gesture_files": "",
+    "track_files": "",
     "detector.model_file": "",
     "oak.face_model": "",
 }

@@ -21,18 +21,18 @@ from gazerig.config.plugin_sections import extend_type
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.config.shipped_files import shipped_names as shipped_names
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.plugins import GESTURES, RIGS, yaml_files
+from gazerig.drivers.plugins import RIGS, TRACKS, yaml_files
 
 T = TypeVar("T")
-_GROUPS = {"rigs": RIGS, "gestures": GESTURES}
+_GROUPS = {"rigs": RIGS, "tracks": TRACKS}
 """Kinds of files that packages can provide too."""
 
 
-RIGS_FOLDER, GESTURES_FOLDER = SHIPPED / "rigs", SHIPPED / "gestures"
-"""Folders that this package registers in the groups of rigs and gestures."""
+RIGS_FOLDER, TRACKS_FOLDER = SHIPPED / "rigs", SHIPPED / "tracks"
+"""Folders that this package registers in the groups of rigs and tracks."""
 
 
-_FILES_BESIDE, _MESHES = "gesture_files", "meshes"
+_FILES_BESIDE, _MESHES = "track_files", "meshes"
 """Keys of a rig with file paths, relative to the folder of the file that contains them."""
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
@@ -147,7 +147,7 @@ def shipped_path(kind: str, name: str, home: Path | None = None) -> Path:
 
 
 def package_file_path(kind: str, name: str) -> Path:
-    """Return the path of a rig or gesture file of another package.
+    """Return the path of a rig or track file of another package.
 
     Raises:
         ConfigError: no package has a file of this name, or a package cannot be imported.
@@ -179,13 +179,13 @@ def _resolve_paths(layer: Entry) -> Entry:
     if not isinstance(layer.value, dict):
         return layer
     folder, found = Path(layer.file).parent, dict(layer.value)
-    gestures = found.get(_FILES_BESIDE)
-    if gestures is not None and isinstance(gestures.value, tuple):
+    tracks = found.get(_FILES_BESIDE)
+    if tracks is not None and isinstance(tracks.value, tuple):
         paths = tuple(
             replace(one, value=str(folder / str(one.value))) if _is_relative(one.value) else one
-            for one in gestures.value
+            for one in tracks.value
         )
-        found[_FILES_BESIDE] = replace(gestures, value=paths)
+        found[_FILES_BESIDE] = replace(tracks, value=paths)
     meshes = found.get(_MESHES)
     if meshes is not None and isinstance(meshes.value, dict):
         beside = {name: _relative_mesh(one, folder) for name, one in meshes.value.items()}

@@ -22,14 +22,14 @@ from gazerig.gaze.attention.idle import IdleParams
 from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
-from gazerig.gaze.gesture.breathing import BreathingParams
-from gazerig.gaze.gesture.gesture import GestureParams
-from gazerig.gaze.gesture.level import LevelParams
-from gazerig.gaze.gesture.sway import SwayParams
 from gazerig.gaze.lids.lids import LidParams
 from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
+from gazerig.gaze.track.breathing import BreathingParams
+from gazerig.gaze.track.level import LevelParams
+from gazerig.gaze.track.sway import SwayParams
+from gazerig.gaze.track.track import TrackParams
 from gazerig.params import Bounds, Choices, Unit
 from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.model.coupling_params import CouplingParams
@@ -39,7 +39,7 @@ from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.mass_params import MassParams
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import order_joints
 
 
@@ -142,7 +142,7 @@ class GazeConfig:
     breathing: Annotated[BreathingParams, "breathing of the head"] = field(default_factory=BreathingParams)
     sway: Annotated[SwayParams, "random sway of the head"] = field(default_factory=SwayParams)
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
-    gestures: Annotated[GestureParams, "gestures added to the gaze"] = field(default_factory=GestureParams)
+    tracks: Annotated[TrackParams, "tracks added to the gaze"] = field(default_factory=TrackParams)
     oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = field(default_factory=OculomotorParams)
     # fmt: on
 
@@ -177,11 +177,11 @@ class Rig:
     face_parts_mm: Annotated[Mapping[str, tuple[float, float, float]], Bounds(-300, 300),
         "measured positions of one person's face parts (DN FL LE M N FR RE UP) relative to the nose tip: "
         "out of the face, to that person's left, up; omitted parts have an average adult's position"] = field(default_factory=dict)
-    tracks: Annotated[TrackParams, "tracking of identities"] = field(default_factory=TrackParams)
+    tracker: Annotated[TrackerParams, "tracking of identities"] = field(default_factory=TrackerParams)
     loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
-    gesture_files: Annotated[tuple[str, ...], "YAML files with further gestures, relative to this file; file names are gesture names"] = ()
+    track_files: Annotated[tuple[str, ...], "YAML files with further tracks, relative to this file; file names are track names"] = ()
     expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; for a lid, to the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5

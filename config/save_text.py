@@ -17,10 +17,10 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from gazerig.config.bounds import Shape, shape_at
 from gazerig.config.entries import compose_yaml
-from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
 from gazerig.config.load import load
 from gazerig.config.parameters import to_plain
 from gazerig.config.schema import load_walk
+from gazerig.config.tracks import TrackSet, load_track, track_name, track_path
 
 Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
 WIDTH = 100
@@ -257,26 +257,26 @@ def walk_text(name_or_path: str) -> str:
     return "".join(_lines(to_plain(load_walk(name_or_path))))
 
 
-def gestures_text(files: Sequence[str]) -> str:
-    """Return the rig's own gestures as one YAML text, "" without any.
+def tracks_text(files: Sequence[str]) -> str:
+    """Return the rig's own tracks as one YAML text, "" without any.
 
     Raises:
         gazerig.config.load.ConfigError: one has a fault.
     """
-    found = {gesture_name(file): load_gesture(gesture_path(file)) for file in files}
-    return "".join(_lines(to_plain(GestureSet(found)))) if found else ""
+    found = {track_name(file): load_track(track_path(file)) for file in files}
+    return "".join(_lines(to_plain(TrackSet(found)))) if found else ""
 
 
-def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
-    """Write each gesture of a text from ``gestures_text`` to a separate file; return the files.
+def track_files(text: Path, folder: Path) -> tuple[str, ...]:
+    """Write each track of a text from ``tracks_text`` to a separate file; return the files.
 
     Raises:
         gazerig.config.load.ConfigError: the text has a fault.
     """
     files = []
-    for name, gesture in load(text, GestureSet).gestures.items():
+    for name, track in load(text, TrackSet).tracks.items():
         file = folder / f"{name}.yaml"
-        file.write_text("".join(_lines(to_plain(gesture))), encoding="utf-8")
+        file.write_text("".join(_lines(to_plain(track))), encoding="utf-8")
         files.append(str(file))
     return tuple(files)
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from gazerig.config.bounds import shapes_of
 from gazerig.config.export import suggestion_text
-from gazerig.config.gestures import gesture_name, gesture_path, load_gesture, shipped_gestures
 from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped_path
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
+from gazerig.config.tracks import load_track, shipped_tracks, track_name, track_path
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.types import ServoConfig
@@ -22,10 +22,10 @@ from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable_text
-from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, gesture_motions
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.mass_params import MassParams
+from gazerig.robot.model.track_fit import TrackFit, TrackRefused, track_motions
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 
@@ -390,14 +390,14 @@ def _too_fast(rig: Rig, move: _KeyedMove, key: str) -> Iterable[tuple[str, str]]
     )
 
 
-def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find gestures that the rig cannot play, and rules that name unknown gestures."""
-    known = set(shipped_gestures())
-    for i, file in enumerate(rig.gesture_files):
+def track_rules(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find tracks that the rig cannot play, and rules that name unknown tracks."""
+    known = set(shipped_tracks())
+    for i, file in enumerate(rig.track_files):
         try:
-            gesture = load_gesture(gesture_path(file))
-            known.add(gesture_name(file))
-            # A gesture that the rig cannot play from the middle of its ranges is rejected.
+            track = load_track(track_path(file))
+            known.add(track_name(file))
+            # A track that the rig cannot play from the middle of its ranges is rejected.
             limits = [rig.joints[name].limit() for name in rig.names]
             middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
             spans = {}
@@ -405,19 +405,19 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
                 shut, wide = rig.lid_joints.ends_deg(name)
                 if name in rig.joints and shut is not None and wide is not None:
                     spans[name] = radians(wide - shut)
-            GestureFit(rig.names, spans).fit(
+            TrackFit(rig.names, spans).fit(
                 "",
-                gesture_motions(gesture, rig.names),
+                track_motions(track, rig.names),
                 1.0,
                 middle,
                 limits,
-                rig.gaze.gestures.limit_share,
+                rig.gaze.tracks.limit_share,
             )
         except ConfigError as error:
             for fault in error.faults:
-                yield f"gesture_files.{i}", str(fault)
-        except GestureRefused as refused:
-            yield f"gesture_files.{i}", f"{file}: {refused}"
+                yield f"track_files.{i}", str(fault)
+        except TrackRefused as refused:
+            yield f"track_files.{i}", f"{file}: {refused}"
     for behaviour, rule in rig.gaze.top_down.rules.items():
         if rule.gesture and rule.gesture not in known:
             near = suggestion_text(rule.gesture, sorted(known)) or ";"
@@ -441,6 +441,6 @@ RULES = (
     _couplings,
     expressions,
     levels,
-    gesture_rules,
+    track_rules,
 )
 """Rules between several sections of a rig."""

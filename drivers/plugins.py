@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from gazerig.drivers.serial.port import BusPort
 
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
-ATTENTION, GESTURES, RIGS = "gazerig.attention", "gazerig.gestures", "gazerig.rigs"
+ATTENTION, TRACKS, RIGS = "gazerig.attention", "gazerig.tracks", "gazerig.rigs"
 COMMAND, SCHEMA, PAGE_PANEL = "gazerig.command", "gazerig.schema", "gazerig.page_panel"
 SURROUNDINGS = "gazerig.surroundings"
 GROUPS: Mapping[str, str] = {
@@ -30,7 +30,7 @@ GROUPS: Mapping[str, str] = {
     CAMERA: "camera",
     DETECTOR: "detector",
     ATTENTION: "attention",
-    GESTURES: "gestures",
+    TRACKS: "tracks",
     RIGS: "rigs",
     COMMAND: "command",
     SCHEMA: "schema",
@@ -56,7 +56,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "yunet": "gazerig.drivers.vision.face.detector:YUNET",
     },
     ATTENTION: {"attention": "gazerig.gaze.attention.attention:Attention"},
-    GESTURES: {"gazerig": "gazerig.config.load:GESTURES_FOLDER"},
+    TRACKS: {"gazerig": "gazerig.config.load:TRACKS_FOLDER"},
     RIGS: {"gazerig": "gazerig.config.load:RIGS_FOLDER"},
     COMMAND: {
         "report": "gazerig.features.lab.commands:REPORT",
@@ -72,7 +72,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "look-at": "gazerig.features.bringup.commands:LOOK_AT",
         "monitor": "gazerig.features.bringup.commands:MONITOR",
         "reboot": "gazerig.features.bringup.commands:REBOOT",
-        "record-gesture": "gazerig.features.bringup.commands:RECORD_GESTURE",
+        "record-track": "gazerig.features.bringup.commands:RECORD_TRACK",
         "fit-scanpath": "gazerig.features.lab.commands:FIT_SCANPATH",
     },
     SCHEMA: {
@@ -85,7 +85,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
-Gestures and rigs are folders of YAML files: a module of that folder, or its path. A command is a
+Tracks and rigs are folders of YAML files: a module of that folder, or its path. A command is a
 ``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills;
 surroundings a subclass of ``gazerig.robot.app.surroundings.Surroundings``.
 """
@@ -356,7 +356,7 @@ def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
 
 
 def folder_of(found: Registration) -> Path:
-    """Return the folder of YAML files that a part of gestures or rigs names.
+    """Return the folder of YAML files that a part of tracks or rigs names.
 
     Raises:
         PluginError: it cannot be imported or is not a folder.

@@ -1,6 +1,6 @@
-"""Gestures: two that come with gazerig, and one of one's own in bow.yaml.
+"""Tracks: two that come with gazerig, and one of one's own in bow.yaml.
 
-Shows: ``play``, what a gesture does to the joints, and how a rig gets further gestures.
+Shows: ``play``, what a track does to the joints, and how a rig gets further tracks.
 Run:   python examples/gesture.py          emulated servos
        python examples/gesture.py my.yaml  your own head
 """
@@ -14,11 +14,11 @@ POLITE = Path(__file__).with_name("polite.yaml")  # names bow.yaml
 
 
 def perform(head: gazerig.Head) -> None:
-    """Play some gestures; the eyes stay on a point meanwhile."""
+    """Play some tracks; the eyes stay on a point meanwhile."""
     head.look_at(1.0, 0.1, 0.25)
     head.sleep(3.0)
-    for gesture in ("nod", "shake", "bow"):
-        order, lowest_deg = head.play(gesture), 90.0
+    for track in ("nod", "shake", "bow"):
+        order, lowest_deg = head.play(track), 90.0
         while order.outcome is None:
             head.sleep(0.02)
             lowest_deg = min(lowest_deg, head.joints["neck_pitch"].measured_deg)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import RULES, load_rig
-from gazerig.gaze.gesture.level import LevelParams
+from gazerig.gaze.track.level import LevelParams
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 

@@ -10,13 +10,13 @@ from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.gesture.breathing import Breathing
 from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
+from gazerig.gaze.track.breathing import Breathing
 from gazerig.gaze.types import GazeCommand, Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState

@@ -166,13 +166,13 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead) -> None:
     head.behave(behaviour)
     head.wink("left")
     nod = head.play("nod")
-    assert nod.reply.gesture is not None and nod.outcome is None
+    assert nod.reply.track is not None and nod.outcome is None
     began_s = head.time_s
     assert nod.wait() == "arrived"
-    assert head.time_s - began_s == pytest.approx(nod.reply.gesture.duration_s, abs=0.02)
+    assert head.time_s - began_s == pytest.approx(nod.reply.track.duration_s, abs=0.02)
     first = head.play("shake")
     second = head.play("nod")
-    assert first.wait() == "taken over" and "another gesture: nod" in first.why
+    assert first.wait() == "taken over" and "another track: nod" in first.why
     head.stop("a hand")
     assert (
         second.wait() == "taken over"

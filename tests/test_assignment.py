@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception import data_association
 from gazerig.robot.perception.data_association import (
     FORBIDDEN,
@@ -125,8 +125,8 @@ def test_pairs_cost_the_same_one_by_one_and_all_at_once() -> None:
     for _ in range(400):
         tracks = [a_track(rng) for _ in range(rng.integers(1, 6))]
         found = [a_detection(rng) for _ in range(rng.integers(1, 6))]
-        few = pair_costs(tracks, found, TrackParams())
-        many = data_association._all_pairs(tracks, found, TrackParams(), None)
+        few = pair_costs(tracks, found, TrackerParams())
+        many = data_association._all_pairs(tracks, found, TrackerParams(), None)
         np.testing.assert_allclose(few, many, rtol=1e-12, atol=1e-12)
         possible += sum(cost < FORBIDDEN for row in few for cost in row)
     assert possible > 500
@@ -139,7 +139,7 @@ def test_a_pair_among_many_costs_what_it_costs_alone() -> None:
         y = 0.05 * k + 0.02 * rng.random()
         tracks.append(TrackRow(k % 2, -1, 1.0, y, 0.0, 2.0, 1e-4, 1e-2, 0.1, 1.0, 0.0, False))
         found.append(DetectionRow(k % 2, -1, 1.0, y + 0.01, 0.0, 2.1, 0.01, 0.1, 0.1, 1))
-    many = pair_costs(tracks, found, TrackParams())
-    alone = [[pair_costs([t], [d], TrackParams())[0][0] for d in found] for t in tracks]
+    many = pair_costs(tracks, found, TrackerParams())
+    alone = [[pair_costs([t], [d], TrackerParams())[0][0] for d in found] for t in tracks]
     np.testing.assert_allclose(many, alone, rtol=1e-12)
     assert 9 < sum(cost < FORBIDDEN for row in alone for cost in row) < 81

@@ -5,7 +5,7 @@ from math import degrees
 import numpy as np
 import pytest
 
-from gazerig.gaze.gesture.breathing import Breathing, BreathingParams
+from gazerig.gaze.track.breathing import Breathing, BreathingParams
 
 
 def sway(model: Breathing, t: np.ndarray) -> np.ndarray:

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from gazerig.config.schema import load_rig
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.gesture.expression import Expressions
-from gazerig.gaze.gesture.gesture import GestureParams
-from gazerig.gaze.gesture.gesture_player import GesturePlayer
 from gazerig.gaze.lids.lids import LidParams, Lids
+from gazerig.gaze.track.expression import Expressions
+from gazerig.gaze.track.track import TrackParams
+from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.command_choices import Menus
-from gazerig.robot.control.gesture_choices import GestureChoices
+from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.command_json import as_json, check_command, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
 
@@ -222,7 +222,7 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
         expected[name] = blinks_in_two_minutes(lids)
     assert expected["conversation"] > expected["rest"] + 5
     lids = Lids(LidParams(), np.random.default_rng(1))
-    none = GestureChoices({}, GesturePlayer(0), GestureParams(), ("eyes_pan",), {})
+    none = TrackChoices({}, TrackPlayer(0), TrackParams(), ("eyes_pan",), {})
     aversion = Aversion(AversionParams(), np.random.default_rng(2))
     menus = Menus(aversion, lids, Expressions({}, 0.5, 0), none)
     for asked in ("none" if mode != "none" else "talk", mode):

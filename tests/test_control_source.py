@@ -98,7 +98,7 @@ def test_what_was_looked_at_before_joints_were_held_leads_again(running: Running
     )
 
 
-def test_a_person_who_was_chosen_and_a_gesture(running: Running) -> None:
+def test_a_person_who_was_chosen_and_a_track(running: Running) -> None:
     running.order(LookAtPerson(1, "ann"))
     tick = running.go(0.3)[-1]
     assert (
@@ -108,7 +108,7 @@ def test_a_person_who_was_chosen_and_a_gesture(running: Running) -> None:
     running.order(LookAt(None, "ann"))
     running.order(Play("nod", who="ben"))
     tick = running.go(0.2)[-1]
-    assert tick_control_source(tick)[:3] == ("gesture", "ben", "nod")
+    assert tick_control_source(tick)[:3] == ("track", "ben", "nod")
     assert head_activity(tick).headline.startswith("it plays nod for ben, and looks at person 1")
     assert tick_control_source(running.go(4.0)[-1]) == ControlSource()
 

@@ -15,7 +15,7 @@ from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -55,7 +55,7 @@ def turned(*frames: tuple[float, int, int]) -> list[Percept]:
     """See a face ahead of a head at yaws (deg), with the scene and the starts of the camera."""
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
     perception, poses, percepts = (
-        Perception(mount, 69.0, Tracker(TrackParams())), PoseHistory(Neck()), []
+        Perception(mount, 69.0, Tracker(TrackerParams())), PoseHistory(Neck()), []
     )  # fmt: skip
     for number, (yaw_deg, scene, starts) in enumerate(frames, start=1):
         yaw = radians(yaw_deg)
@@ -106,7 +106,7 @@ def test_a_hand_at_rest_ends_with_its_scene() -> None:
 
 def test_a_camera_without_the_count_of_scenes_goes_on_as_ever() -> None:
     perception, poses = (
-        Perception(CameraMount(CameraParams(mount="base")), 69.0, Tracker(TrackParams())),
+        Perception(CameraMount(CameraParams(mount="base")), 69.0, Tracker(TrackerParams())),
         PoseHistory(Neck()),
     )
     poses.remember(0.0, (0.0, 0.0, 0.0))

@@ -24,7 +24,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
+from gazerig.gaze.track.track import LID_GROUPS, KeyFrame, Track
 from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.model.joint import JointParams
@@ -62,7 +62,7 @@ def keys() -> set[str]:
             walk(shape.inner)
 
     walk(Shape("params", params=Rig))
-    walk(Shape("params", params=Gesture))
+    walk(Shape("params", params=Track))
     for rig in RIGS.values():
         found |= set(rig.joints)
     return found
@@ -138,8 +138,8 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
     shown = [YAML(typ="safe").load(block.text) for block in blocks("yaml")]
     assert len(shown) >= 2
     for data in shown:
-        if set(data) <= set(shapes_of(Gesture)):
-            _fits(Shape("params", params=Gesture), data, "gesture")
+        if set(data) <= set(shapes_of(Track)):
+            _fits(Shape("params", params=Track), data, "track")
             continue
         if "people" in data:
             _fits(Shape("params", params=script.SceneScript), data, "world")
@@ -293,7 +293,7 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
         *DYNAMIXEL.registers,
         *FEETECH.registers,
     }
-    words |= {field.name for field in (*fields(KeyFrame), *fields(Gesture))} | {*LID_GROUPS}
+    words |= {field.name for field in (*fields(KeyFrame), *fields(Track))} | {*LID_GROUPS}
     scripts = (
         *(script.SceneScript, script.PersonScript, script.PlaceScript),
         *(script.ThingScript, script.Act, script.ExpectedLook),
@@ -349,9 +349,7 @@ def test_the_glossary_has_a_line_for_every_section_of_gaze() -> None:
     sections = {field.name for field in fields(GazeConfig)} - {
         "field_of_view", "chooser", "attention", "idle", "breathing", "lids", "oculomotor",
     }  # fmt: skip
-    named = set(re.findall(r"`gaze\.(\w+)", text)) | {
-        "gestures" for term in terms if term == "gesture"
-    }
+    named = set(re.findall(r"`gaze\.(\w+)", text)) | {"tracks" for term in terms if term == "track"}
     assert sections <= named
 
 

@@ -126,12 +126,12 @@ LEFT_OUT = {
     r"ctl fault": "needs emulated servos or a world: tests/test_emulate.py, tests/world",
     r"models fetch": "needs the network",
     r"new ": "asks questions: tests/test_new_rig.py",
-    r"record-gesture ": "needs a hand that moves the head",
+    r"record-track ": "needs a hand that moves the head",
     r".*(--camera|--oak)|calibrate (camera|face)": "needs a camera",
     r"setup |calibrate |doctor --port": "asks for one servo after the other: tests/bringup",
     r"run .*(--port|--world|--record)": "needs another program, a renderer or minutes: tests/world",
-    r"(report|compare|sweep|fit-scanpath|replay|import-gesture|study) ": "needs minutes, a browser "
-    "or other data: tests/lab, tests/study, tests/test_replay.py, tests/test_gesture_files.py",
+    r"(report|compare|sweep|fit-scanpath|replay|import-track|study) ": "needs minutes, a browser "
+    "or other data: tests/lab, tests/study, tests/test_replay.py, tests/test_track_files.py",
 }
 """Commands that no test here runs, and why."""
 

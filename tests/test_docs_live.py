@@ -77,10 +77,10 @@ def works_until_ctrl_c(words: str, first: str) -> None:
 
 @pytest.mark.slow
 def test_commands_to_a_running_head_work(folder: Path) -> None:
-    """Of one head for all: the expressive one with the gesture of the tutorial."""
+    """Of one head for all: the expressive one with the track of the tutorial."""
     [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
     (folder / "agree.yaml").write_text(agree, encoding="utf-8")
-    copy("expressive", folder / "head.yaml", "\ngesture_files: [agree.yaml]\n")
+    copy("expressive", folder / "head.yaml", "\ntrack_files: [agree.yaml]\n")
     with gazerig.open("head.yaml", mock=True, scene="face-to-face", say=lambda line: None):
         for words in TO_A_HEAD:
             _works_on_a_head(words)

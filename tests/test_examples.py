@@ -96,8 +96,8 @@ def test_the_jaw_follows_moods_and_loudness(shown: Shown) -> None:
     assert jaw["speaking:"] > 8.0
 
 
-def test_gestures_move_the_head_as_far_as_they_say(shown: Shown) -> None:
-    nod, shake, bow = shown("gesture.py")
+def test_tracks_move_the_head_as_far_as_they_say(shown: Shown) -> None:
+    nod, shake, bow = shown("track.py")
     lowest = [numbers(line)[-1] for line in (nod, shake, bow)]
     assert nod.startswith("nod takes") and bow.startswith("bow takes")
     assert lowest[2] < lowest[0] - 3.0 and lowest[0] < lowest[1] - 4.0

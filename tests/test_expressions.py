@@ -9,10 +9,10 @@ import pytest
 from expressive_rig import expressive_rig, faults, started
 from fakes.runs import ticks
 
-from gazerig.gaze.gesture.expression import Expressions
-from gazerig.gaze.gesture.level import HOLD_S, LevelParams, LevelRange, Levels
-from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
+from gazerig.gaze.track.expression import Expressions
+from gazerig.gaze.track.level import HOLD_S, LevelParams, LevelRange, Levels
+from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.rig_limits import pose_offset
 from gazerig.robot.control.tick import Tick

@@ -30,7 +30,7 @@ from gazerig.gaze.types import Face, Percept
 from gazerig.robot.control.tick_stream import _percept_row, decode_plain, encode
 from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import SeenFace
 from gazerig.robot.perception import mesh_reading
 from gazerig.robot.perception.mesh_reading import EYES_SHUT, MeshReading, read_mesh
@@ -166,7 +166,7 @@ def test_speech_is_a_mouth_that_opens_and_closes_again_and_again() -> None:
 
 
 def seen_faces(meshes: list[FaceMesh]) -> list[Face]:
-    perception = Perception(AT_EYES, 65.0, Tracker(TrackParams()))
+    perception = Perception(AT_EYES, 65.0, Tracker(TrackerParams()))
     out = []
     for k, mesh in enumerate(meshes):
         marks = mesh.points[[33, 263, 4, 61, 291], :2].astype(np.float64)

@@ -19,7 +19,7 @@ COMMANDS = {
     "world": (),
     "bringup": (
         *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
-        "record-gesture",
+        "record-track",
     ),
 }
 IN_WORLD = ("run", "desk", "--mock", "--fast", "--no-page", "--world", "living-room")

@@ -22,7 +22,7 @@ from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception import frame_locator
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
@@ -43,7 +43,7 @@ class OneFace:
 
 
 def perception(lens: LensParams | None = None) -> Perception:
-    return Perception(STILL, FIELD_DEG, Tracker(TrackParams()), lens=lens)
+    return Perception(STILL, FIELD_DEG, Tracker(TrackerParams()), lens=lens)
 
 
 def percept_of(seeing: Perception, found: Detections) -> Percept:

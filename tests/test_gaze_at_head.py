@@ -19,7 +19,7 @@ from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Perc
 from gazerig.robot.control.tick_stream import _percept_row, decode_plain, encode
 from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import SeenFace
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
@@ -68,7 +68,7 @@ def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:
         np.random.default_rng(seed),
     )
     camera.open()
-    perception = Perception(AT_EYES, 69.0, Tracker(TrackParams()))
+    perception = Perception(AT_EYES, 69.0, Tracker(TrackerParams()))
     out, number = [], 0
     for k in range(round(30 * seconds)):
         seen = camera.latest(k / 30 + 0.001)
@@ -102,7 +102,7 @@ def test_e77_on_the_edge_the_answer_does_not_flicker(off_deg: float) -> None:
 
 
 def test_what_was_found_before_stays_between_the_edges() -> None:
-    params, sd = TrackParams(face_at_head_deg=10.0), radians(4.0)
+    params, sd = TrackerParams(face_at_head_deg=10.0), radians(4.0)
     for off_deg, before, looks in [
         (7.9, None, True), (7.9, False, True), (8.1, False, False), (8.1, None, False),
         (8.1, True, True), (11.9, True, True), (12.1, True, False),
@@ -142,7 +142,7 @@ def detection(gaze: Vec3 | None) -> Detections:
     ("gaze", "looks"), [(None, False), ((0.0, 0.0, -1.0), True), ((0.3, 0.0, -0.95), False)]
 )
 def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
-    percept = Perception(AT_EYES, 65.0, Tracker(TrackParams())).see(detection(gaze), standing())
+    percept = Perception(AT_EYES, 65.0, Tracker(TrackerParams())).see(detection(gaze), standing())
     assert percept is not None
     (face,) = percept.faces
     assert face.looks_at_head is looks

@@ -1,4 +1,4 @@
-"""Events of gaze, people and gestures are those of the ticks, each once and in order."""
+"""Events of gaze, people and tracks are those of the ticks, each once and in order."""
 
 import pytest
 from commanded_robot import running_desk
@@ -11,7 +11,7 @@ from gazerig.robot.model.commands import Play
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
-def test_every_saccade_blink_and_gesture_of_the_ticks_is_an_event() -> None:
+def test_every_saccade_blink_and_track_of_the_ticks_is_an_event() -> None:
     feed = TickFeed()
     with running_desk() as running:
         ticks = running.go(4.0)
@@ -28,7 +28,7 @@ def test_every_saccade_blink_and_gesture_of_the_ticks_is_an_event() -> None:
     assert all(0.0 < landing - start < 0.3 for start, landing in pairs)
     blinks = sum(b.gaze.blink > a.gaze.blink for a, b in zip(ticks, ticks[1:], strict=False))
     assert len(times["blink"]) == blinks > 0
-    assert [e.subject for e in found if e.kind == "gesture_finished"] == ["nod"]
+    assert [e.subject for e in found if e.kind == "track_finished"] == ["nod"]
     numbers = [event.number for event in feed.events()]
     assert numbers == list(range(1, len(numbers) + 1))
     assert [e.number for e in feed.events(numbers[-3])] == numbers[-2:]

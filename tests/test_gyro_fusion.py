@@ -25,7 +25,7 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.face_fit import rotation_by
 from gazerig.robot.perception.gyro_fusion import GyroFusion, rotation_vector
 from gazerig.robot.perception.motion_source import MotionSource
@@ -155,7 +155,7 @@ def test_gyro_is_tried_again_after_a_minute_and_told_no_second_time():
 def test_camera_that_is_placed_anew_is_there_at_once():
     mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
     fusion, base = GyroFusion(lambda line: None), Base(shaken, 3.0)
-    perception = Perception(mount, 69.0, Tracker(TrackParams()), gyro=fusion)
+    perception = Perception(mount, 69.0, Tracker(TrackerParams()), gyro=fusion)
     poses = PoseHistory(KINEMATICS)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     places = []
@@ -202,7 +202,7 @@ def wander_deg(gyro):
     base = Base(shaken, 4.0)
     mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
     fusion = GyroFusion(lambda line: None)
-    perception = Perception(mount, 69.0, Tracker(TrackParams()), gyro=fusion)
+    perception = Perception(mount, 69.0, Tracker(TrackerParams()), gyro=fusion)
     poses = PoseHistory(KINEMATICS)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])

@@ -163,7 +163,7 @@ def test_a_rig_without_brows_and_jaw_shows_expressions_drawn_only(
     view = HeadView(server.scene)
     view.show(SHOT)
     assert _turned_deg(view, "left_brow_link") == _turned_deg(view, "jaw_link") == 0.0
-    both = ("surprised", "happy")  # a gesture comes before the expression beneath it
+    both = ("surprised", "happy")  # a track comes before the expression beneath it
     angles = []
     for k in range(1, 21):
         view.show(replace(SHOT, t_s=SHOT.t_s + 0.05 * k, expressed=both))

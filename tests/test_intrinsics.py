@@ -16,7 +16,7 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, LensParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays, undistort
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -92,7 +92,7 @@ def test_a_face_is_placed_through_the_lens_as_measured() -> None:
     mount = CameraMount(CameraParams("base", (0.0, 0.0, 0.0)))
     off = []
     for lens in (LENS, None):
-        percept = Perception(mount, 67.4, Tracker(TrackParams()), lens=lens).see(found, poses)
+        percept = Perception(mount, 67.4, Tracker(TrackerParams()), lens=lens).see(found, poses)
         assert percept is not None
         x, y, z = percept.faces[0].p_world_m
         off.append(np.linalg.norm(np.array((-y, -z, x)) - where))

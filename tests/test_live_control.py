@@ -9,7 +9,7 @@ import pytest
 
 from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.control.gesture_choices import GestureInfo
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Command
 from gazerig.robot.remote.client import connect_to_all
@@ -25,7 +25,7 @@ class Robot:
     def menus(self) -> dict[str, tuple[str, ...]]:
         return {}
 
-    def gestures(self) -> tuple[GestureInfo, ...]:
+    def tracks(self) -> tuple[TrackInfo, ...]:
         return ()
 
 

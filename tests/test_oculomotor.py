@@ -26,9 +26,9 @@ from gazerig.gaze.angles import (
     yaw_pitch,
 )
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.gesture.breathing import Breathing, BreathingParams
 from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
+from gazerig.gaze.track.breathing import Breathing, BreathingParams
 from gazerig.gaze.types import Angles2, GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState

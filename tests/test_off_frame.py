@@ -11,7 +11,7 @@ from gazerig.drivers.camera.capture_loop import FrameAnalyzer, is_off_frame
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -39,7 +39,7 @@ def test_one_point_far_outside_is_no_face() -> None:
 
 
 def test_the_others_are_looked_at() -> None:
-    perception = Perception(AT_EYES, 65.0, Tracker(TrackParams()))
+    perception = Perception(AT_EYES, 65.0, Tracker(TrackerParams()))
     percept = perception.see(Detections(1.0, 1, 640, 480, (OFF, FACE), lens=CAMERA), standing())
     assert percept is not None and len(percept.faces) == 1
     none = perception.see(Detections(9.0, 2, 640, 480, (OFF,), lens=CAMERA), standing())

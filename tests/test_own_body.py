@@ -13,7 +13,7 @@ from gazerig.gaze.types import Bodies, Percept, Vec3
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Capsule
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -30,7 +30,7 @@ def kind_of(
     mm = tuple(1e3 * x for x in camera_m)
     placed = CameraMount(CameraParams(mount=mount, position_mm=mm))  # type: ignore[arg-type]
     own = NECK.body_volumes
-    perception = Perception(placed, 69.0, Tracker(TrackParams()), own_parts=own)
+    perception = Perception(placed, 69.0, Tracker(TrackerParams()), own_parts=own)
     poses = PoseHistory(NECK)
     poses.remember(0.0, (radians(yaw_deg), 0.0, 0.0))
     R, p = placed.pose(*poses.head_pose(0.0))

@@ -196,7 +196,7 @@ def test_what_is_of_one_browser_is_neither_seen_nor_set_by_another(widgets: Widg
 
 def test_a_button_that_was_removed_a_moment_ago_is_pressed_in_good_faith(widgets: Widgets) -> None:
     section = widgets.panel("steer").section("face")
-    buttons = section.buttons("gesture", ("nod",))
+    buttons = section.buttons("track", ("nod",))
     tab = Tab(widgets)
     assert tab.read() == [1, 2]
     section.remove()

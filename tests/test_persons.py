@@ -18,7 +18,7 @@ from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
+from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Bodies, Face, Percept, Target, Vec3
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
@@ -235,7 +235,7 @@ def test_e78_where_nobody_does_it_all_are_looked_at() -> None:
 
 
 def test_a_gesture_of_such_a_rule_is_for_the_named_alone() -> None:
-    trigger, rule = GestureTrigger(), Rule("person:waving", 0.9, gesture="nod")
+    trigger, rule = TrackTrigger(), Rule("person:waving", 0.9, gesture="nod")
     face = Target(LEFT, EYE, 0.0, "face", 5, 0.9, True, None, 0, "")
     assert trigger.step("greet", rule, face, 0.0) == ""
     assert trigger.step("greet", rule, face, 0.1, frozenset((2,))) == ""

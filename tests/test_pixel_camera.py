@@ -19,7 +19,7 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -294,7 +294,7 @@ def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float 
     placed_s: error of the pictures' times
     """
     poses = PoseHistory(Neck())
-    perception = Perception(MOUNT, 69.0, Tracker(TrackParams()))
+    perception = Perception(MOUNT, 69.0, Tracker(TrackerParams()))
 
     def head(t_s: float) -> tuple[Mat3, Vec3]:
         return rotation((0.3 * np.sin(2.5 * t_s), 0.05, 0.0)), (0.0, 0.0, 0.0)

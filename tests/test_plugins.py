@@ -12,10 +12,10 @@ import pytest
 from features_there import skip_without_part
 from outside_package import install, on_path
 
-from gazerig.config.gestures import gestures_of
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import apply_changes, parameters
 from gazerig.config.schema import Rig, load_rig
+from gazerig.config.tracks import tracks_of
 from gazerig.drivers import plugins
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import (
@@ -24,12 +24,12 @@ from gazerig.drivers.plugins import (
     CAMERA,
     COMMAND,
     DETECTOR,
-    GESTURES,
     GROUPS,
     RIGS,
     SCHEMA,
     SHIPPED,
     SURROUNDINGS,
+    TRACKS,
     AttentionPlugin,
     CameraPlugin,
     Plugin,
@@ -99,11 +99,11 @@ def test_ours_are_found_and_loaded_by_the_same_code(group, name):
     assert found.is_ours
     assert replace(found, version=plugins._version()) in plugins.registrations(group)
     part = found.load()
-    if group in (RIGS, GESTURES):
+    if group in (RIGS, TRACKS):
         assert any(plugins.folder_of(found).glob("*.yaml"))
     if group == RIGS:
         assert plugins.folder_of(found).joinpath("desk.yaml").is_file()
-    elif group not in (ATTENTION, GESTURES, COMMAND, SCHEMA, SURROUNDINGS):
+    elif group not in (ATTENTION, TRACKS, COMMAND, SCHEMA, SURROUNDINGS):
         assert isinstance(part, Plugin)
 
 
@@ -220,23 +220,23 @@ def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(fold
     assert chosen.gaze.tallest.height_m == 1.0
 
 
-# --- gestures and rigs
+# --- tracks and rigs
 
 
-def test_rigs_and_gestures_of_a_package_are_found_by_their_names(folder, tmp_path):
-    parts = {RIGS: {"heads": "my_heads.rigs"}, GESTURES: {"moves": "my_heads.moves"}}
+def test_rigs_and_tracks_of_a_package_are_found_by_their_names(folder, tmp_path):
+    parts = {RIGS: {"heads": "my_heads.rigs"}, TRACKS: {"moves": "my_heads.moves"}}
     install(folder, "my-heads", parts, {"my_heads.__init__": "", "my_heads.moves.__init__": ""})
     (folder / "my_heads/rigs").mkdir()
     text = DESK.read_text(encoding="utf-8").replace("name: desk", "name: other", 1)
     (folder / "my_heads/rigs/other.yaml").write_text(text, encoding="utf-8")
-    nod = DESK.parents[1] / "gestures" / "nod.yaml"
+    nod = DESK.parents[1] / "tracks" / "nod.yaml"
     (folder / "my_heads/moves/bow.yaml").write_text(nod.read_text(encoding="utf-8"))
     assert load_rig("other").name == "other"
-    assert "bow" in gestures_of(("bow",))
+    assert "bow" in tracks_of(("bow",))
     with pytest.raises(ConfigError, match="did you mean 'other'"):
         load_rig("othr")
     with pytest.raises(ConfigError, match="did you mean 'bow'"):
-        gestures_of(("bov",))
+        tracks_of(("bov",))
 
 
 def test_a_package_that_names_no_folder_is_refused(folder):
@@ -265,7 +265,7 @@ def test_kinds_lists_all_with_package_abilities_and_proof(folder, capsys):
     assert "not run on hardware" in dynamixel["proven"]
     assert by_name["attention", "tallest"]["version"] == "1.2"
     assert "desk" in by_name["rigs", "gazerig"]["abilities"]
-    assert "nod" in by_name["gestures", "gazerig"]["abilities"]
+    assert "nod" in by_name["tracks", "gazerig"]["abilities"]
     (fish,) = [row for row in listed["kinds"] if row["name"] == "fish"]
     assert "camera 'fish' of bad 7 cannot be loaded: ModuleNotFoundError" in fish["fault"]
     (taken,) = listed["left_out"]

@@ -173,10 +173,10 @@ def test_orders_have_outcomes(rig: Rig) -> None:
     status, answer = rig.post({"do": "look_at", "p_world_m": LEFT, "tag": "a"}, "?wait_s=15")
     assert status == 200 and answer["tag"] == "a" and answer["outcome"] == "arrived"
     assert rig.post({"do": "look_at", "p_world_m": [-1, 0.1, 0.3]})[1]["outcome"] == "out of reach"
-    assert rig.post({"do": "play", "gesture": "nod"}, "?wait_s=15")[1]["outcome"] == "arrived"
+    assert rig.post({"do": "play", "track": "nod"}, "?wait_s=15")[1]["outcome"] == "arrived"
     status, answer = rig.post({"do": "look_at_person", "id": 99})
     assert status == 409 and "99" in answer["refused"] and answer["reply"]["refused"]
-    assert "outcome" not in rig.post({"do": "play", "gesture": "nod"}, "?wait_s=0")[1]
+    assert "outcome" not in rig.post({"do": "play", "track": "nod"}, "?wait_s=0")[1]
     assert "neck_yaw" in rig.post({"do": "status"})[1]["ok"]["joints_deg"]
 
 
@@ -550,7 +550,7 @@ def test_the_lines_for_node_work(rig: Rig, tmp_path: Path) -> None:
     try:
         assert process.stdout is not None
         said = ""
-        while '"gesture":{"name":"nod"' not in said:
+        while '"track":{"name":"nod"' not in said:
             assert (line := process.stdout.readline())
             said += line
         assert '"version":1' in said

@@ -6,10 +6,10 @@ from desk import GAZE_JOINTS
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.dashboard.panels.controls import GESTURES, refused_moves
+from gazerig.robot.dashboard.panels.controls import TRACKS, refused_moves
 
 LIDLESS = tuple(joint for joint in GAZE_JOINTS if "lid" not in joint)
-ALL = {"gesture": ("none", *GESTURES)}
+ALL = {"track": ("none", *TRACKS)}
 
 
 @pytest.mark.parametrize("rig", ["desk", "maker", "feetech", "expressive"])
@@ -21,7 +21,7 @@ def test_the_shipped_rigs_can_do_all_five(rig: str) -> None:
 
 
 def test_without_lids_a_button_says_that_there_are_none() -> None:
-    only_neck = {"gesture": ("none", "nod", "shake")}
+    only_neck = {"track": ("none", "nod", "shake")}
     assert refused_moves(only_neck, LIDLESS) == dict.fromkeys(
         ("wink", "surprised", "sleepy"), "this rig has no lids"
     )
@@ -29,9 +29,9 @@ def test_without_lids_a_button_says_that_there_are_none() -> None:
 
 
 def test_joints_that_are_absent_and_a_calibration_are_named() -> None:
-    assert "none of the joints" in refused_moves({"gesture": ("none",)}, GAZE_JOINTS)["nod"]
+    assert "none of the joints" in refused_moves({"track": ("none",)}, GAZE_JOINTS)["nod"]
     calibrating = refused_moves({"steer": ("next",)}, GAZE_JOINTS)
-    assert set(calibrating) == {*GESTURES, "wink"}
+    assert set(calibrating) == {*TRACKS, "wink"}
     assert set(calibrating.values()) == {"not while a calibration is under way"}
 
 

@@ -347,13 +347,13 @@ def test_what_the_planner_chose_is_recorded_and_chosen_again(tmp_path: Path) -> 
     assert again.is_same and again.sent_bytes_same is True
 
 
-# A recorded run with gestures is done again to the same bytes, without the gestures' files
+# A recorded run with tracks is done again to the same bytes, without the tracks' files
 
 
 PLAYS = {300: Play("mine"), 380: Play("shake", 1.3), 450: Play(""), 500: Play("nod", times=2)}
 
 
-def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+def test_tracks_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     mine = tmp_path / "mine.yaml"
     mine.write_text(
         "description: x\nframes:\n  - {time_s: 0.3, head_yaw_deg: 6, lids: {all: 0.5}}\n"
@@ -362,7 +362,7 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     rules = load_rules("greeting")
     rig = replace(
         rig,
-        gesture_files=(str(mine),),
+        track_files=(str(mine),),
         gaze=replace(
             rig.gaze,
             top_down=replace(
@@ -379,11 +379,11 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
 
     ticks = record(path, rig, 3.5, VISIT, ask)
     events = [line for tick in ticks for line in tick.events]
-    told = [line for line in events if line.startswith("gesture")]
+    told = [line for line in events if line.startswith("track")]
     assert any("rule wait: nod" in line for line in told)
     assert any("mine takes 0.7 s" in line for line in told) and len(told) == 4
     mine.unlink()
     recording = RunRecording(path)
-    assert "head_yaw_deg: 6" in recording.info.gestures_yaml
+    assert "head_yaw_deg: 6" in recording.info.tracks_yaml
     again = rerun(recording, joints="emulated")
     assert again.is_same and again.sent_bytes_same is True

@@ -63,7 +63,7 @@ def some_changes(
             yield {key: {**size, "fx_px": 500.0, "fy_px": 500.0}}
         case "text":
             yield {
-                key: {"behaviour": "attack", "look_at": "hand", "gesture": "nod"}.get(
+                key: {"behaviour": "attack", "look_at": "hand", "track": "nod"}.get(
                     key.split(".")[-1], walk
                 )
             }
@@ -132,7 +132,7 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
 OF_GAZE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion",
     "oculomotor", "saccade", "pursuit", "head", "breathing", "lids",
-    "gestures",
+    "tracks",
 )  # fmt: skip
 
 OF_BODY = ("guard", "body", "kinematics", "head", "oculomotor")

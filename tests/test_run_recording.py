@@ -41,7 +41,7 @@ from gazerig.robot.control.tick_stream import TickBatch, TickStream
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import commands
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
-from gazerig.robot.model.control_source import ControlState, GestureState
+from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.read import RunRecording
@@ -74,7 +74,7 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
         "guard_result", "events", "commands", "stopped", "controlled_by", "client_control",
-            "gesture", "parking",
+            "track", "parking",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299
@@ -390,13 +390,13 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
     assert repr(back.dt_s) == repr(odd)
 
 
-def test_leads_and_gestures_come_back(recorded: Recorded) -> None:
-    gesture = GestureState(2, "nod", "", "somebody", 3.5)
+def test_leads_and_tracks_come_back(recorded: Recorded) -> None:
+    track = TrackState(2, "nod", "", "somebody", 3.5)
     lead = ControlState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
-    tick = recorded.ticks[-1]._replace(client_control=lead, gesture=gesture, percept=None)
+    tick = recorded.ticks[-1]._replace(client_control=lead, track=track, percept=None)
     data = msgspec.json.decode(msgspec.json.encode(moments.as_json(handed_over(tick)[1])))
     back = moments.from_json(data, {}).tick
-    assert (back.client_control, back.gesture) == (lead, gesture)
+    assert (back.client_control, back.track) == (lead, track)
 
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])

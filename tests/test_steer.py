@@ -162,8 +162,8 @@ class Rig:
         self.in_control = False
         self.told.append("free")
 
-    def play(self, gesture: str) -> None:
-        self.told.append(gesture)
+    def play(self, track: str) -> None:
+        self.told.append(track)
 
     def ask(self, menu: str, choice: str) -> None:
         self.told.append(choice)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.gaze.gesture.sway import Sway, SwayParams
+from gazerig.gaze.track.sway import Sway, SwayParams
 from gazerig.gaze.types import Floats
 
 DT = 0.005

@@ -1,434 +1,269 @@
-"""Identities and velocities from picture to picture."""
+"""Tracks as data: curves of least jerk, what a rig can do of them, and bad input."""
 
-from dataclasses import replace
+from math import degrees, radians
+from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.drivers.types import Clothing
-from gazerig.gaze.types import FIRST_THING, body_name
-from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.perception import covariance
-from gazerig.robot.perception.track import LocalisedDetection, Track
-from gazerig.robot.perception.tracker import Tracker, blend
-
-CAMERA = (0.0, 0.0, 0.2)
-IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def face(x: float, y: float, kind: str = "face") -> LocalisedDetection:
-    return LocalisedDetection(
-        kind, (x, y, 0.2), IDENTITY if kind == "face" else None, 0.1, 0.0, 0.9
-    )
-
-
-@pytest.fixture
-def tracker() -> Tracker:
-    return Tracker(TrackParams())
-
-
-def test_velocity_is_learned_and_the_lag_vanishes(tracker: Tracker) -> None:
-    for k in range(60):
-        t = k / 30
-        (track,) = tracker.step([face(1.0, 0.3 * t)], CAMERA, t)
-    assert track.v_world_m_s[1] == pytest.approx(0.3, abs=0.01)
-    assert track.p_world_m[1] == pytest.approx(0.3 * t, abs=0.003)
-
-
-def test_noise_in_distance_hardly_moves_the_place_across() -> None:
-    rng, tracker = np.random.default_rng(0), Tracker(TrackParams())
-    places = []
-    for k in range(200):
-        (track,) = tracker.step([face(1.0 + rng.normal(0, 0.08), 0.0)], CAMERA, k / 30)
-        places.append(track.p_world_m)
-    assert np.std([p[0] for p in places[30:]]) < 0.035
-    assert max(abs(p[1]) for p in places) < 1e-3
-
-
-def test_two_people_keep_their_identities_when_listed_in_any_order(tracker: Tracker) -> None:
-    first = tracker.step([face(1.0, -0.3), face(1.0, 0.3)], CAMERA, 0.0)
-    ids = {track.p_world_m[1] > 0: track.id for track in first}
-    for k in range(1, 30):
-        pair = [face(1.0, 0.3), face(1.0, -0.3)]
-        tracks = tracker.step(pair if k % 2 else pair[::-1], CAMERA, k / 30)
-        assert {track.p_world_m[1] > 0: track.id for track in tracks} == ids
-
-
-def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker: Tracker) -> None:
-    (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
-    assert [track.id for track in tracker.step([], CAMERA, 0.1)] == [seen.id]
-    assert tracker.step([], CAMERA, 0.6) == ()
-    assert tracker.step([face(1.0, 0.05)], CAMERA, 1.0)[0].id == seen.id
-
-
-@pytest.mark.parametrize(
-    ("y", "after_s", "remember_s", "same"),
-    [(0.05, 10.0, 20.0, True), (0.5, 10.0, 20.0, False), (0.05, 25.0, 20.0, False),
-     (0.05, 10.0, 0.0, False)],
-)  # fmt: skip
-def test_a_face_that_stays_where_it_was_is_known_again_after_long(
-    y: float, after_s: float, remember_s: float, same: bool
-) -> None:
-    tracker = Tracker(TrackParams(remember_face_s=remember_s, remember_person_s=0.0))
-    for k in range(10):
-        (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, k / 30)
-    for k in range(10, round(30 * after_s)):
-        assert k < 20 or tracker.step([], CAMERA, k / 30) == ()
-    assert (tracker.step([face(1.0, y)], CAMERA, after_s)[0].id == seen.id) is same
-
-
-def test_a_thing_out_of_sight_is_not_remembered(tracker: Tracker) -> None:
-    (hand,) = tracker.step([face(1.0, 0.0, "hand")], CAMERA, 0.0)
-    assert tracker.step([], CAMERA, 3.0) == ()
-    assert tracker.step([face(1.0, 0.0, "hand")], CAMERA, 3.1)[0].id != hand.id
-
-
-def test_far_apart_is_somebody_else_and_kinds_never_mix(tracker: Tracker) -> None:
-    (one,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
-    after = tracker.step([face(1.0, 0.6), face(1.0, 0.01, "hand")], CAMERA, 0.033)
-    assert {track.detection.kind for track in after if track.id != one.id} == {"face", "hand"}
-
-
-def test_blended_rotations_stay_rotations() -> None:
-    turned = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    middle = np.array(blend(IDENTITY, turned, 0.5))
-    assert middle @ middle.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.degrees(np.arctan2(middle[1, 0], middle[0, 0])) == pytest.approx(45.0)
-
-
-def across(y: float, x: float = 1.5, kind: str = "face") -> LocalisedDetection:
-    return LocalisedDetection(
-        kind,
-        (x, y, 0.2),
-        IDENTITY if kind == "face" else None,
-        0.1,
-        0.0,
-        0.9,
-        across_sd_m=0.002,
-        along_sd_m=0.1,
-    )
-
-
-def test_an_identity_survives_a_second_behind_something(tracker: Tracker) -> None:
-    for k in range(30):
-        (seen,) = tracker.step([across(0.4 * k / 30)], CAMERA, k / 30)
-    for k in range(30, 60):
-        assert tracker.step([], CAMERA, k / 30) == () or k < 40
-    (back,) = tracker.step([across(0.4 * 2.0)], CAMERA, 2.0)
-    assert back.id == seen.id
-
-
-@pytest.mark.parametrize("apart_m", [0.0, 0.1, 0.4])
-def test_people_who_cross_keep_their_identities(apart_m: float) -> None:
-    """Two walk past each other at 1 m/s each; while one hides the other, one face is found."""
-    rng, tracker = np.random.default_rng(3), Tracker(TrackParams())
-    first: dict[str, int] = {}
-    for k in range(91):
-        t = k / 30
-        left, right = 1.5 - t, t - 1.5
-        ways = [across(left + rng.normal(0, 2e-3), 1.5), across(right, 1.5 + apart_m)]
-        if abs(left - right) < 0.25:
-            ways = ways[:1]
-        tracks = tracker.step(ways, CAMERA, t)
-        if k == 10:
-            first = {"left": max(tracks, key=_y).id, "right": min(tracks, key=_y).id}
-    assert {"left": min(tracks, key=_y).id, "right": max(tracks, key=_y).id} == first
-
-
-def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker) -> None:
-    """A man walks behind a woman; a third person appears half a metre from them."""
-    near, far = across(0.0, 1.0), across(0.02, 2.0)
-    for k in range(30):
-        tracks = tracker.step([near, far], CAMERA, k / 30)
-    after = tracker.step([near, across(0.5, 2.0)], CAMERA, 1.0)
-    assert max(after, key=_y).id not in {track.id for track in tracks}
-    # Nobody before him, and the same jump is his own.
-    tracker = Tracker(TrackParams())
-    for k in range(30):
-        (alone,) = tracker.step([far], CAMERA, k / 30)
-    assert tracker.step([across(0.5, 2.0)], CAMERA, 1.0)[0].id == alone.id
-
-
-def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker: Tracker) -> None:
-    """A patch whose middle jumps by half a metre keeps the number that the detector gave it."""
-    near, far = across(0.0, 1.9, "thing"), across(0.05, 2.0, "thing")
-    near.mark, far.mark = 1, 2
-    for k in range(10):
-        tracks = tracker.step([near, far], CAMERA, k / 30)
-    jumped = replace(far, p_world_m=(2.0, 0.5, 0.2))
-    after = tracker.step([near, jumped], CAMERA, 10 / 30)
-    assert [track.id for track in after] == [track.id for track in tracks]
-
-
-def _y(track: Track) -> float:
-    return track.p_world_m[1]
-
-
-def test_pairs_are_the_likeliest_as_a_whole(tracker: Tracker) -> None:
-    """Both have moved 0.2 m to the left: the nearest pair alone would swap them."""
-    first = tracker.step([face(1.0, 0.0), face(1.0, 0.3)], CAMERA, 0.0)
-    after = tracker.step([face(1.0, 0.5), face(1.0, 0.2)], CAMERA, 0.033)
-    ids = [track.id for track in first]
-    assert [track.id for track in sorted(after, key=_y)] == ids
-
-
-def test_whoever_could_be_anywhere_does_not_take_over_from_who_is_followed(
-    tracker: Tracker,
-) -> None:
-    """Seen once and lost, somebody may be near every place; that is no reason to be there."""
-    tracker.step([across(-0.5, 1.0), across(0.5, 1.0)], CAMERA, 0.0)
-    for k in range(1, 30):
-        (followed, *_) = tracker.step([across(-0.5 + 0.8 * k / 30, 1.0)], CAMERA, k / 30)
-    (now,) = tracker.step([across(0.42, 1.0)], CAMERA, 1.0)
-    assert now.id == followed.id
-
-
-def test_a_distance_known_badly_is_no_reason_to_be_somebody_else(tracker: Tracker) -> None:
-    (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
-    (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
-    assert same.id == one.id
-    exact = LocalisedDetection("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
-    tracker = Tracker(TrackParams(gate_m=0.1))
-    (one,) = tracker.step([exact], CAMERA, 0.0)
-    moved = replace(exact, p_world_m=(4.2, 0.0, 0.2))
-    assert {track.id for track in tracker.step([moved], CAMERA, 0.033)} != {one.id}
-
-
-def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
-    """Quiet while nothing happens, lively when something does."""
-    rng, tracker = np.random.default_rng(1), Tracker(TrackParams())
-    lag, speeds = [], []
-    for k in range(180):
-        t = k / 30
-        y = 0.5 * min(1.0, max(0.0, (t - 4.0) / 0.5))
-        (track,) = tracker.step([across(y + rng.normal(0.0, 1e-3), 1.0)], CAMERA, t)
-        lag.append(abs(track.p_world_m[1] - y))
-        if 1.0 < t < 4.0:
-            speeds.append(track.v_world_m_s[1])
-    assert np.std(speeds) < 0.01
-    assert max(lag) < 0.02
-
-
-def cov_of(track: Track) -> np.ndarray:
-    f = track.filter
-    return np.array(covariance(f.view, f.across, f.along)).reshape(6, 6)
-
-
-def test_the_covariance_tells_how_far_off_the_track_is() -> None:
-    """Normalised errors squared of a still person average to about the 3 dimensions."""
-    errors = []
-    for seed in range(40):
-        rng, tracker = np.random.default_rng(seed), Tracker(TrackParams())
-        for k in range(40):
-            noisy = across(rng.normal(0.0, 2e-3), 1.0 + rng.normal(0.0, 0.1))
-            noisy.p_world_m = (*noisy.p_world_m[:2], 0.2 + rng.normal(0.0, 2e-3))
-            (track,) = tracker.step([noisy], CAMERA, k / 30)
-        off = np.subtract(track.p_world_m, (1.0, 0.0, 0.2))
-        errors.append(off @ np.linalg.solve(cov_of(track)[:3, :3], off))
-    assert 1.0 < np.mean(errors) < 5.0
-
-
-def test_a_velocity_that_was_measured_is_taken_over_at_once() -> None:
-    blob = across(0.0, 2.0, "thing")
-    blob.v_world_m_s, blob.across_sd_m_s, blob.along_sd_m_s = (0.0, 1.0, 0.0), 0.05, 0.3
-    (track,) = Tracker(TrackParams()).step([blob], CAMERA, 0.0)
-    assert track.v_world_m_s == pytest.approx((0.0, 1.0, 0.0), abs=0.02)
-
-
-def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker: Tracker) -> None:
-    """A child's face looks 20 % farther than it is; through a hole it stays where it is."""
-    by_depth = replace(across(0.0, 1.0), depth_measured=True, along_sd_m=0.01, size_depth=1.25)
-    for k in range(20):
-        (track,) = tracker.step([by_depth], CAMERA, k / 30)
-    assert track.depth_from == "camera" and track.face_size == pytest.approx(0.8)
-    by_size = across(0.0, 1.25)
-    for k in range(20, 40):
-        (track,) = tracker.step([by_size], CAMERA, k / 30)
-    assert track.depth_from == "face size"
-    assert track.p_world_m[0] == pytest.approx(1.0, abs=0.01)
-
-
-@given(
-    st.lists(
-        st.lists(
-            st.tuples(
-                st.floats(0.3, 5.0), st.floats(-3.0, 3.0), st.sampled_from(["face", "thing"])
-            ),
-            max_size=6,
-        ),
-        max_size=12,
-    ),
-    st.floats(0.001, 0.5),
+from gazerig.config.load import ConfigError, shipped_names, shipped_path
+from gazerig.config.schema import load_rig
+from gazerig.config.tracks import load_track, shipped_tracks, tracks_of
+from gazerig.gaze.track import minimum_jerk_curve
+from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.track import POSE_CHANNELS, KeyFrame, Track, channel_keys
+from gazerig.gaze.types import Floats
+from gazerig.robot.app.rig_limits import lid_spans, limits
+from gazerig.robot.model.track_fit import (
+    FittedTrack,
+    TrackFit,
+    TrackRefused,
+    track_motions,
 )
-def test_nothing_makes_it_give_what_is_no_number(
-    pictures: list[list[tuple[float, float, str]]], dt_s: float
+
+RIGS = {name: load_rig(name) for name in shipped_names("rigs") if name != "minimal"}
+"""The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
+
+
+def fitted(track: Track, rig: str = "desk", speed: float = 1.0, **at: float) -> FittedTrack:
+    """Return a track on a shipped rig, with joints at angles in degrees, else at 0."""
+    joints = RIGS[rig].names
+    base = np.array([radians(at.get(name, 0.0)) for name in joints])
+    fit = TrackFit(joints, lid_spans(RIGS[rig]))
+    return fit.fit("x", track_motions(track, joints), speed, base, limits(RIGS[rig].joints), 0.8)
+
+
+def test_there_are_the_tracks_promised() -> None:
+    assert set(shipped_tracks()) >= {
+        *("nod", "shake", "tilt", "double_take", "eye_roll", "look_around", "sleepy"),
+        *("surprised", "laugh", "brow_shrug"),
+    }
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("name", shipped_tracks())
+def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name: str, rig: str) -> None:
+    track = shipped_tracks()[name]
+    brows = {"left_brow", "right_brow"} <= set(RIGS[rig].names)
+    if name == "brow_shrug" and not brows:
+        with pytest.raises(TrackRefused, match="left_brow, right_brow"):
+            fitted(track, rig)
+        return
+    found = fitted(track, rig)
+    assert found.slowed_by == 1.0 and found.reduced_joints == ()
+    samples = found.track.motion.samples
+    assert np.abs(samples.value).max() > radians(3.0)
+    for end in (0, -1):
+        for column in samples[1:]:
+            assert np.abs(column[end]).max() < 1e-9
+
+
+def spline_of_least_jerk(times: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
+    from scipy.interpolate import make_interp_spline
+
+    rest = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline([0.0, *times], [0.0, *values], k=5, bc_type=(rest, rest))
+    return spline(at), spline(at, 1)
+
+
+@given(keys=st.lists(st.tuples(st.floats(0.05, 2.0), st.floats(0.1, 30.0)), min_size=1, max_size=8))
+@settings(max_examples=100, deadline=None)
+def test_a_curve_that_does_not_turn_is_the_spline_of_least_jerk_unless_that_swings_back(
+    keys: list[tuple[float, float]],
 ) -> None:
-    tracker, t_s = Tracker(TrackParams()), 0.0
-    for picture in pictures:
-        t_s += dt_s
-        tracks = tracker.step([face(x, y, kind) for x, y, kind in picture], CAMERA, t_s)
-        assert len({track.id for track in tracks}) == len(tracks) >= len(picture)
-        for track in tracks:
-            assert np.isfinite((track.p_world_m, track.v_world_m_s)).all()
-            assert np.linalg.eigvalsh(cov_of(track)).min() > -1e-9
+    spans, steps = np.array(keys).T
+    times, values = np.cumsum(spans), np.cumsum(steps)
+    curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
+    at = np.linspace(0.0, times[-1], 500)
+    least, rate = spline_of_least_jerk(times, values, at)
+    value, speed, acceleration = curve.sample_at(at)
+    assert speed.min() > -1e-4 * speed.max()  # never back
+    if rate.min() > 0.0:
+        assert np.abs(value - least).max() < 1e-6 * np.abs(least).max()
+    before = np.maximum(0.0, times - 1e-9)
+    for one, other in zip(curve.sample_at(before)[1:], curve.sample_at(times)[1:], strict=True):
+        assert np.abs(one - other).max() < 1e-5 * max(1.0, np.abs(acceleration).max())
+    assert [curve.value_at(t) for t in at[::50]] == pytest.approx(value[::50], abs=1e-9)
 
 
-def dressed(found: LocalisedDetection, *bins: int) -> LocalisedDetection:
-    """Return the same in clothes of one colour or of several in equal parts."""
-    colours = tuple(len(bins) ** -0.5 * (k in bins) for k in range(24))
-    return replace(found, clothing=Clothing(colours, 1.0))
+def test_most_even_curves_are_those_of_least_jerk() -> None:
+    for steps in ((3.0, 4.0, 5.0, 4.0), (2.0, 2.0, 2.0), (1.0, 3.0, 3.0, 1.0)):
+        times, values = np.cumsum(np.full(len(steps), 0.2)), np.cumsum(np.array(steps))
+        at = np.linspace(0.0, times[-1], 100)
+        curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
+        least, rate = spline_of_least_jerk(times, values, at)
+        assert np.abs(curve.sample_at(at)[0] - least).max() < 1e-9
 
 
-@pytest.mark.parametrize(("worn", "same"), [(3, True), (7, False)])
-def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
-    tracker: Tracker, worn: int, same: bool
+def test_many_keys_give_the_curve_of_few_and_take_time_in_proportion(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for k in range(15):
-        (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
-    tracker.step([], CAMERA, 6.0)
-    (back,) = tracker.step([dressed(across(-0.9, 2.0), worn)], CAMERA, 6.03)
-    assert (back.id == gone.id) is same
+    rng = np.random.default_rng(1)
+    times, values = np.cumsum(rng.uniform(0.05, 0.06, 300)), np.cumsum(rng.uniform(1.0, 1.1, 300))
+    at = np.linspace(0.0, times[-1], 5000)
+    least, rate = spline_of_least_jerk(times, values, at)
+    assert rate.min() > -1e-6 * rate.max()  # it does not swing back
+    value = MinimumJerkCurve(0.0, times.tolist(), values.tolist()).sample_at(at)[0]
+    assert np.abs(value - least).max() < 1e-6 * np.abs(least).max()
+    solved: list[int] = []
+    coefficients = minimum_jerk_curve._coefficients
+
+    def counted(span: Floats, *states: Floats) -> Floats:
+        solved.append(len(span))
+        return coefficients(span, *states)
+
+    monkeypatch.setattr(minimum_jerk_curve, "_coefficients", counted)
+    for count in (500, 20_000):
+        solved.clear()
+        MinimumJerkCurve(0.0, np.arange(1, count + 1).tolist(), np.arange(1.0, count + 1).tolist())
+        assert sum(solved) <= 10 * count
 
 
-def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
-    tracker = Tracker(TrackParams(remember_face_s=5.0, remember_person_s=60.0))
-    for k in range(15):
-        (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
-    tracker.step([], CAMERA, 6.0)
-    for t_s, same in ((50.0, True), (150.0, False)):
-        (back,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, t_s)
-        assert (back.id == gone.id) is same
-        tracker.step([], CAMERA, t_s + 2.0)
+def test_a_track_of_too_many_frames_is_refused() -> None:
+    frames = tuple(KeyFrame(0.02 * (k + 1), head_pitch_deg=1.0) for k in range(2001))
+    Track("long", frames[:2000])
+    with pytest.raises(ValueError, match="2001 frames: a track has at most 2000"):
+        Track("long", frames)
+    with pytest.raises(ValueError, match="2001 frames: a track has at most 2000"):
+        Track("long", frames[:1], frames_without_neck=frames)
 
 
-def visit(tracker: Tracker, start_s: float, *found: LocalisedDetection) -> list[int]:
-    """Show a person in consecutive frames, then no one for 2 s; return the numbers."""
-    tracker.step([], CAMERA, start_s - 1.0)
-    shown = [
-        tracker.step([one], CAMERA, start_s + k / 30)[0].id for k, one in enumerate(found)
-    ]  # fmt: skip
-    tracker.step([], CAMERA, start_s + len(found) / 30 + 2.0)
-    return shown
+def test_a_curve_rests_where_it_turns_and_never_swings_past() -> None:
+    curve = MinimumJerkCurve(0.0, [0.3, 0.6, 0.9, 1.4], [10.0, -4.0, -4.0, 0.0])
+    value, speed, acceleration = curve.sample_at(np.linspace(0.0, 1.5, 3001))
+    assert value.max() <= 10.0 + 1e-9 and value.min() >= -4.0 - 1e-9
+    at = curve.sample_at(np.array([0.3, 0.6, 0.9, 1.4]))
+    assert np.abs(at[1]).max() < 1e-9 and np.abs(at[2]).max() < 1e-6
+    assert np.abs(np.gradient(value, 5e-4) - speed).max() < 0.2
+    assert np.abs(np.gradient(speed, 5e-4) - acceleration)[5:-5].max() < 20.0
 
 
-def test_people_and_things_count_separately(tracker: Tracker) -> None:
-    found = [across(0.5, kind="thing"), across(-0.5), across(0.0, kind="hand")]
-    ids = [track.id for track in tracker.step(found, CAMERA, 0.0)]
-    assert ids == [FIRST_THING, 1, FIRST_THING + 1]
-    assert [body_name("hand", i) for i in ids] == ["hand 1", "hand 1", "hand 2"]
+def nod(**more: object) -> Track:
+    frames = (KeyFrame(0.2, head_pitch_deg=-8.0), KeyFrame(0.5, head_pitch_deg=0.0))
+    return Track("a nod", frames, **more)  # type: ignore[arg-type]
 
 
-def test_a_person_who_comes_back_at_the_other_side_keeps_the_number(tracker: Tracker) -> None:
-    assert {*visit(tracker, 0.0, *[across(0.5)] * 15)} == {1}
-    assert {*visit(tracker, 40.0, *[across(-0.9)] * 15)} == {1}
-    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.6))
-    assert {*visit(tracker, 80.0, *[taller] * 15)} == {2}
+def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
+    fast = (KeyFrame(0.05, head_pitch_deg=-10.0),)
+    with pytest.raises(
+        TrackRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, but tracks may use 1600"
+    ):
+        fitted(Track("a jerk", fast))  # fmt: skip
+    slow = fitted(Track("a jerk", fast, fit="slow"))
+    # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
+    assert slow.slowed_by == pytest.approx((23094.0 / 1600.0) ** 0.5, rel=0.01)
+    assert slow.slow_joint == "neck_pitch"
+    most = np.abs(slow.track.motion.samples.scale(np.array(slow.track.sizes), slow.track.speed).acceleration)  # fmt: skip
+    assert degrees(most.max()) == pytest.approx(1600.0, rel=0.01)
 
 
-def test_nobody_is_faster_than_a_walker(tracker: Tracker) -> None:
-    visit(tracker, 0.0, *[across(0.0, 3.0)] * 15)
-    far = replace(across(0.0), p_world_m=(1.5, 20.0, 0.2))
-    assert {*visit(tracker, 4.0, *[far] * 15)} == {2}
+def test_at_the_end_of_a_range_it_is_smaller_or_refused() -> None:
+    with pytest.raises(TrackRefused, match=r"neck_pitch at 0\.\d\d s: leaves its range -35\.\.35"):
+        fitted(nod(), neck_pitch=-31.0)  # fmt: skip
+    found = fitted(nod(fit="slow"), neck_pitch=-31.0)
+    assert found.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)
+    with pytest.raises(TrackRefused, match="neck_pitch is at the end of its range"):
+        fitted(nod(fit="slow"), neck_pitch=-34.5)
 
 
-def test_a_false_detection_gives_its_number_back(tracker: Tracker) -> None:
-    visit(tracker, 0.0, *[across(0.5)] * 3)
-    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.9))
-    assert {*visit(tracker, 10.0, *[taller] * 15)} == {1}
+def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_name() -> None:
+    jaw = (KeyFrame(0.3, head_pitch_deg=5.0, joints_deg={"jaw": 10.0}),)
+    with pytest.raises(TrackRefused, match="it moves jaw, which this rig lacks"):
+        fitted(Track("a yawn", jaw))
+    made = track_motions(Track("a yawn", jaw, optional=("jaw",)), RIGS["desk"].names)
+    assert made.left_out == ("jaw",)
+    with pytest.raises(TrackRefused, match="this rig has none of the joints"):
+        track_motions(Track("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)), RIGS["desk"].names)  # fmt: skip
 
 
-def test_a_false_detection_does_not_keep_the_number_of_a_person_who_left(tracker: Tracker) -> None:
-    visit(tracker, 0.0, *[across(0.5)] * 15)
-    assert visit(tracker, 30.0, across(-0.5)) == [1]
-    assert {*visit(tracker, 60.0, *[across(-0.9)] * 15)} == {1}
+def test_a_loop_repeats_and_all_ends_at_rest() -> None:
+    laugh = shipped_tracks()["laugh"]
+    once, often = (channel_keys(laugh, laugh.frames, count) for count in (1, 5))
+    pitch = once["head_pitch"], often["head_pitch"]
+    assert len(pitch[1].times_s) == len(pitch[0].times_s) + 4 * 2
+    assert pitch[1].times_s[-1] == pytest.approx(pitch[0].times_s[-1] + 4 * 0.3)
+    aside = Track("aside", (KeyFrame(0.3, eyes_yaw_deg=5.0),), return_s=0.7)
+    assert channel_keys(aside, aside.frames, 1)["eyes_yaw"].times_s == (0.3, 1.0)
 
 
-def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker) -> None:
-    visit(tracker, 0.0, *[dressed(across(0.5), 3)] * 15)
-    stranger = visit(tracker, 30.0, across(0.4), *[dressed(across(0.4), 7)] * 15)
-    assert stranger[0] == 1 and stranger[-1] == 2
-    low = replace(across(0.4), p_world_m=(1.5, 0.4, 0.0))
-    known = visit(tracker, 60.0, low, *[dressed(low, 3)] * 15)
-    assert known[0] != 1 and known[-1] == 1
+def test_in_joint_space_the_eyes_go_along_with_the_head() -> None:
+    for space, follows in (("gaze", 0.0), ("joint", 1.0)):
+        motion = track_motions(nod(space=space), RIGS["desk"].names).motion
+        flat = [0.0] * len(POSE_CHANNELS)
+        motion.add_to(flat, 0.2, (1.0,) * len(flat))
+        assert flat[1] == pytest.approx(radians(-8.0))
+        assert flat[POSE_CHANNELS.index("eyes_pitch")] == pytest.approx(follows * radians(-8.0))
+        eyes = motion.samples.value[:, POSE_CHANNELS.index("eyes_pitch")]
+        assert np.allclose(eyes, follows * motion.samples.value[:, 1])
 
 
-def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes(
-    tracker: Tracker,
+BAD = {
+    "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names no motion"),
+    "frames:\n  - {time_s: 0.2, head_pich_deg: 3}\n": ("frames.0.head_pich_deg", "head_pitch_deg"),
+    "frames:\n  - {time_s: 0.2, head_pitch_deg: 300}\n": ("frames.0.head_pitch_deg", "90"),
+    "frames:\n  - {time_s: 0.2, lids: {top: 0.5}}\n": ("frames.0", "unknown lids 'top'"),
+    "frames:\n  - {time_s: 0.2, head_yaw_deg: .nan}\n": ("frames.0.head_yaw_deg", ""),
+    "frames: []\n": ("", "at least one frame"),
+    "frames:\n  - {time_s: 0.5, head_yaw_deg: 1}\n  - {time_s: 0.5, head_yaw_deg: 2}\n": (
+        "frames.1.time_s",
+        "later than the previous frame",
+    ),
+    "loop_s: [0.1, 0.5]\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": (
+        "loop_s",
+        "not the time of a frame",
+    ),
+    "frames:\n  - {time_s: 0.5, joints_deg: {neck_yaw: 1}}\n": (
+        "frames.0.joints_deg.neck_yaw",
+        "head_yaw_deg",
+    ),
+    "fit: maybe\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("fit", "slow"),
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_file_is_answered_with_line_key_and_rule(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"description: mine\n{text}", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_track(file)
+    key, rule = BAD[text]
+    (fault,) = caught.value.faults
+    assert fault.key == key and rule in fault.rule
+    assert fault.line is not None and fault.line >= 1
+
+
+def test_a_rig_with_tracks_of_its_own_is_checked_with_them(tmp_path: Path) -> None:
+    good, bad = tmp_path / "wave_back.yaml", tmp_path / "twitch.yaml"
+    good.write_text("description: x\nframes:\n  - {time_s: 0.5, head_yaw_deg: 5}\n")
+    bad.write_text("description: x\nframes:\n  - {time_s: 0.05, head_yaw_deg: 30}\n")
+    assert "wave_back" in tracks_of([str(good)])
+    mine = tmp_path / "rig.yaml"
+    mine.write_text(f"track_files: [{good}, {bad}]\n")
+    whole = Path("config/rigs/desk.yaml").read_text(encoding="utf-8")
+    mine.write_text(f"{whole}\ntrack_files: [{good}, {bad}]\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_rig(str(mine))
+    (fault,) = caught.value.faults
+    assert fault.key == "track_files.1" and "neck_yaw at 0.0" in fault.rule
+    assert fault.line == whole.count("\n") + 2
+
+
+def test_paths_of_tracks_begin_at_the_rig_s_file_and_bare_names_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for k in range(30):
-        both = [dressed(across(-0.3, 2.0), 3), dressed(across(0.3, 2.0), 7)]
-        tracks = tracker.step(both, CAMERA, k / 30)
-    left, right = (track.id for track in sorted(tracks, key=_y))
-    for k in range(30, 60):  # they have changed sides behind something
-        tracker.step([], CAMERA, k / 30)
-    for k in range(60, 90):
-        both = [across(-0.3, 2.0), across(0.3, 2.0)]
-        if k > 65:
-            both = [dressed(both[0], 7), dressed(both[1], 3)]
-        tracks = tracker.step(both, CAMERA, k / 30)
-    assert [track.id for track in sorted(tracks, key=_y)] == [right, left]
-
-
-def test_people_always_in_sight_keep_their_numbers_whatever_they_put_on(tracker: Tracker) -> None:
-    for k in range(120):
-        worn = (3, 7) if k < 40 else (7, 3)
-        both = [dressed(across(y, 2.0), w) for y, w in zip((-0.4, 0.4), worn, strict=True)]
-        tracks = tracker.step(both, CAMERA, k / 30)
-        if k == 0:
-            ids = [track.id for track in sorted(tracks, key=_y)]
-    assert [track.id for track in sorted(tracks, key=_y)] == ids
-
-
-def test_a_face_six_metres_farther_away_is_another_person(tracker: Tracker) -> None:
-    for k in range(10):
-        (near,) = tracker.step([replace(across(0.0, 3.0), along_sd_m=0.2)], CAMERA, k / 30)
-    far = replace(across(0.0, 9.0), along_sd_m=1.2)
-    assert near.id not in {t.id for t in tracker.step([far], CAMERA, 0.36) if t.seen_s == t.at_s}
-
-
-def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tracker) -> None:
-    for k in range(12):
-        up = replace(across(0.0, 2.0), p_world_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
-        (one,) = tracker.step([up], CAMERA, k / 30)
-    assert np.linalg.norm(one.v_world_m_s) <= 4.0
-    before = one.p_world_m[2]
-    for k in range(12, 18):
-        tracker.step([], CAMERA, k / 30)
-    assert one.p_world_m[2] == pytest.approx(before, abs=0.05)
-
-
-def _seen_with_a_hand(jumps: float, from_frame: int) -> tuple[float, int]:
-    """Return by what part a face 2 m away is misplaced at most, and how often it is covered.
-
-    jumps: standard deviation of its lower half, as a part
-    from_frame: from when on a hand is before the mouth, and the face looks 1.3 times as far away
-    """
-    rng, tracker, off, covered = np.random.default_rng(0), Tracker(TrackParams()), 0.0, 0
-    for k in range(180):
-        lower, farther = (0.7, 1.3) if k >= from_frame else (1.0, 1.0)
-        found = replace(across(0.0, 2.0 * farther), along_sd_m=0.2, box_m=0.13 * farther)
-        found = replace(found, lower_face=lower * (1.0 + rng.normal(0.0, jumps)))
-        (one,) = tracker.step([found], CAMERA, k / 30)
-        off, covered = (
-            max(off, abs(one.filter.range_m / 2.0 - 1.0)),
-            covered + (one.covered_frames > 0),
-        )
-    return off, covered
-
-
-def test_a_hand_before_the_mouth_moves_nobody_and_points_that_jump_are_no_hand() -> None:
-    off, covered = _seen_with_a_hand(0.02, 150)
-    assert off < 0.05 and covered == 30
-    assert _seen_with_a_hand(0.15, 180)[1] == 0
-
-
-def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker: Tracker) -> None:
-    moving = replace(face(2.0, 0.9, "thing"), mark=7)
-    (thing,) = tracker.step([moving], CAMERA, 0.0)
-    hand = replace(moving, kind="hand", p_world_m=(0.6, 0.27, 0.2))
-    other = replace(face(1.0, -0.5, "hand"), mark=8)
-    found = {track.detection.mark: track for track in tracker.step([hand, other], CAMERA, 0.03)}
-    assert found[7].id == thing.id != found[8].id
-    assert found[7].p_world_m == pytest.approx(hand.p_world_m)
+    (tmp_path / "rigs").mkdir()
+    (tmp_path / "rigs" / "hello.yaml").write_text(
+        "description: x\nframes:\n  - {time_s: 0.5, head_yaw_deg: 5}\n", encoding="utf-8"
+    )
+    mine = tmp_path / "rigs" / "mine.yaml"
+    whole = shipped_path("rigs", "desk").read_text(encoding="utf-8")
+    mine.write_text(f"{whole}\ntrack_files: [hello.yaml]\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)  # not in the rig's folder
+    rig = load_rig("rigs/mine.yaml")
+    assert "hello" in tracks_of(rig.track_files)
+    mine.write_text(f"{whole}\ntrack_files: [hello]\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="hello") as caught:
+        load_rig("rigs/mine.yaml")
+    assert "rigs/hello" not in str(caught.value)  # looked for among packages, not in the folder

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.cli.tune import app
-from gazerig.robot.control.gesture_choices import GestureInfo
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.remote.client import RobotClient
@@ -41,8 +41,8 @@ class TickedRig:
     def menus(self) -> dict[str, tuple[str, ...]]:
         return self.made.robot.menus()
 
-    def gestures(self) -> tuple[GestureInfo, ...]:
-        return self.made.robot.gestures()
+    def tracks(self) -> tuple[TrackInfo, ...]:
+        return self.made.robot.tracks()
 
     def write(self, request: object, within_s: float) -> None:
         self.answer = self.handler.answer(request)

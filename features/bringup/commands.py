@@ -88,12 +88,12 @@ REBOOT = CommandEntry(
     "Bring-up",
     examples={"reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),)},
 )
-RECORD_GESTURE = CommandEntry(
-    "gazerig.features.bringup.cli.record_gesture",
-    "Record a gesture in YAML while you move the head by hand, torque off.",
+RECORD_TRACK = CommandEntry(
+    "gazerig.features.bringup.cli.record_track",
+    "Record a track in YAML while you move the head by hand, torque off.",
     examples={
-        "record-gesture": (
-            ("record-gesture my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
+        "record-track": (
+            ("record-track my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
         )
     },
 )

@@ -19,9 +19,6 @@ from gazerig.gaze.angles import (
     unit,
 )
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.gesture.animation import NO_OFFSET, PoseOffset
-from gazerig.gaze.gesture.breathing import Breathing
-from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.binocular import EyeGeometry
 from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint
@@ -30,6 +27,9 @@ from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
+from gazerig.gaze.track.animation import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.breathing import Breathing
+from gazerig.gaze.track.sway import Sway
 from gazerig.gaze.types import (
     ORDERED,
     Angles2,
@@ -158,7 +158,7 @@ class Oculomotor:
 
         state: head and eyes as measured now
         dt_s: time since the last step
-        offset: offset by gestures and expressions
+        offset: offset by tracks and expressions
         """
         if not self._started:
             self.reset(t_s, state)

@@ -6,10 +6,10 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from gazerig.config.gestures import gestures_of
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.config.shipped_files import shipped_names
+from gazerig.config.tracks import tracks_of
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
@@ -18,9 +18,9 @@ from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
+from gazerig.gaze.track.animation import Animation
 from gazerig.robot.app.camera_factory import (
     camera_placement,
     camera_poses,
@@ -39,9 +39,9 @@ from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
-from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.robot_group import NamedRobot
+from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.coupling_params import coupled_pairs
@@ -258,7 +258,7 @@ def _build_components(
 ) -> Components:
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
-    tracker = Tracker(rig.tracks)
+    tracker = Tracker(rig.tracker)
     moves = motion_models(rig, random.head, random.sway)
     field_of_view, bottom_up = FieldOfView(rig.gaze.field_of_view), BottomUp(rig.gaze.bottom_up)
     top_down, idle = TopDown(rig.gaze.top_down), Idle(rig.gaze.idle, random.idle)
@@ -309,10 +309,10 @@ def _build_components(
         sway=moves.sway,
         lids=lids,
         animation=animation,
-        gestures=GestureChoices(
-            gestures_of(rig.gesture_files),
-            animation.gestures,
-            rig.gaze.gestures,
+        tracks=TrackChoices(
+            tracks_of(rig.track_files),
+            animation.tracks,
+            rig.gaze.tracks,
             rig.names,
             lid_spans(rig),
         ),
@@ -342,7 +342,7 @@ def _build_robot(
         parts.oculomotor,
         parts.lids,
         parts.animation,
-        parts.gestures,
+        parts.tracks,
         parts.guard,
         live,
         PixelToWorld(parts.mount, poses, lambda: live.camera),

@@ -8,13 +8,13 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, create, find, is_ours, load
-from gazerig.gaze.gesture.breathing import Breathing
-from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
+from gazerig.gaze.track.breathing import Breathing
+from gazerig.gaze.track.sway import Sway
 from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
 from gazerig.robot.control.chooser import LONGEST_S, GuardedChooser, TargetChooser
 from gazerig.robot.model.kinematics import Kinematics

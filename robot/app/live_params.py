@@ -20,15 +20,15 @@ from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.gesture.animation import Animation
-from gazerig.gaze.gesture.breathing import Breathing
-from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk
+from gazerig.gaze.track.animation import Animation
+from gazerig.gaze.track.breathing import Breathing
+from gazerig.gaze.track.sway import Sway
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
     animation_tables,
@@ -41,7 +41,7 @@ from gazerig.robot.app.rig_limits import (
 )
 from gazerig.robot.app.rig_weight import rest_park_pose
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.gesture_choices import GestureChoices
+from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.coupling_params import coupled_pairs, joint_partners
 from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
@@ -79,7 +79,7 @@ class Components(NamedTuple):
     sway: Sway
     lids: Lids
     animation: Animation
-    gestures: GestureChoices
+    tracks: TrackChoices
 
 
 class CameraPlacement(NamedTuple):
@@ -183,8 +183,8 @@ class LiveParams:
             parts.head.retune(now.head, *head_limits(new))
         if (tables := animation_tables(new)) != animation_tables(before):
             parts.animation.retune(tables)
-        if now.gestures != was.gestures or new.lid_joints != before.lid_joints:
-            parts.gestures.retune(now.gestures, lid_spans(new))
+        if now.tracks != was.tracks or new.lid_joints != before.lid_joints:
+            parts.tracks.retune(now.tracks, lid_spans(new))
         self._walk = walk
         said = self._apply_to_machine(before, new)
         return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)
@@ -201,8 +201,8 @@ class LiveParams:
             parts.guard.start_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
             parts.guard.set_period(1.0 / new.loop.rate_hz)
-        if new.tracks != old.tracks:
-            parts.tracker.retune(new.tracks)
+        if new.tracker != old.tracker:
+            parts.tracker.retune(new.tracker)
         placed, was_placed = self._placed.camera(new), self._placed.camera(old)
         if placed != was_placed:
             parts.mount.retune(replace(placed, mount=self._placed.mount))

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from gazerig.config.load import ConfigError, load, shipped_path
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import gesture_files, params_text
+from gazerig.config.save_text import params_text, track_files
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.analysis.summary import Summary
@@ -294,11 +294,11 @@ def _resimulation_rig(
         by_path = "/" in character or character.endswith((".yaml", ".yml"))
         file = Path(character) if by_path else shipped_path("characters", character)
         found = load(file, Rig, defaults=(whole,))
-    if rig is None and recording.info.gestures_yaml:
-        # The files of gestures may also have changed since then.
-        kept = _write_text(recording.info.gestures_yaml, folder / "gestures.yaml")
-        (folder / "gestures").mkdir()
-        found = replace(found, gesture_files=gesture_files(kept, folder / "gestures"))
+    if rig is None and recording.info.tracks_yaml:
+        # The files of tracks may also have changed since then.
+        kept = _write_text(recording.info.tracks_yaml, folder / "tracks.yaml")
+        (folder / "tracks").mkdir()
+        found = replace(found, track_files=track_files(kept, folder / "tracks"))
     scanpath = found.gaze.scanpath
     same_walk = rig is None and scanpath.transition_matrix == base.gaze.scanpath.transition_matrix
     if not same_walk or not recording.info.walk_yaml:

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import radians
 
 from gazerig.config.rig import Rig
-from gazerig.gaze.gesture.animation import AnimationTables
-from gazerig.gaze.gesture.level import LevelParams, LevelRange
-from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.animation import AnimationTables
+from gazerig.gaze.track.level import LevelParams, LevelRange
+from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from typing import TypeVar
 
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import gestures_text, params_text, walk_text
+from gazerig.config.save_text import params_text, tracks_text, walk_text
 from gazerig.config.schema import load_rig, load_rules
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.attention.top_down import TopDownParams
@@ -124,7 +124,7 @@ def run_info(rig: Rig, options: RunOptions, placement: tuple[float, ...] = ()) -
         character=options.character,
         config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
-        gestures_yaml=gestures_text(rig.gesture_files),
+        tracks_yaml=tracks_text(rig.track_files),
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,
         started_utc=datetime.now(UTC).isoformat(),

@@ -1,4 +1,4 @@
-"""Commands that move the face of a rig in another terminal: expressions, levels, gestures."""
+"""Commands that move the face of a rig in another terminal: expressions, levels, tracks."""
 
 import contextlib
 import sys
@@ -9,11 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_GESTURE
+from gazerig.robot.model.commands import NO_TRACK
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -75,8 +75,8 @@ def level(
 
 @app.command()
 def play(
-    gesture: Annotated[
-        str | None, typer.Argument(help="A gesture, e.g. nod; none ends the present one.")
+    track: Annotated[
+        str | None, typer.Argument(help="A track, e.g. nod; none ends the present one.")
     ] = None,
     speed: Annotated[
         float,
@@ -90,28 +90,28 @@ def play(
             "--count",
             min=0,
             max=MAX_COUNT,
-            help="Number of repetitions; 0: as the gesture defines.",
+            help="Number of repetitions; 0: as the track defines.",
         ),
     ] = 0,
-    listed: Annotated[bool, typer.Option("--list", help="List the gestures.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the tracks.")] = False,
     pid: PidOption = None,
 ) -> None:
-    """Play a gesture on the running head, or list all gestures with their fit to this rig."""
+    """Play a track on the running head, or list all tracks with their fit to this rig."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
-        if gesture is None or listed:
-            for one in rig.gestures():
-                say(_gesture_line(one))
+        if track is None or listed:
+            for one in rig.tracks():
+                say(_track_line(one))
             return
-        say(rig.play("" if gesture == NO_GESTURE else gesture, speed, count).text())
+        say(rig.play("" if track == NO_TRACK else track, speed, count).text())
 
 
-def _gesture_line(gesture: Mapping[str, Any]) -> str:
-    """Return one line about a gesture."""
-    head = f"{gesture['name']:<14}{gesture['description']}"
-    if gesture["refused"]:
-        return f"{head}; not on this rig: {gesture['refused']}"
-    slower = f", slower by {gesture['slowed_by']:.2f}" if gesture["slowed_by"] > 1.0 else ""
-    return f"{head} ({gesture['duration_s']:.1f} s{slower})"
+def _track_line(track: Mapping[str, Any]) -> str:
+    """Return one line about a track."""
+    head = f"{track['name']:<14}{track['description']}"
+    if track["refused"]:
+        return f"{head}; not on this rig: {track['refused']}"
+    slower = f", slower by {track['slowed_by']:.2f}" if track["slowed_by"] > 1.0 else ""
+    return f"{head} ({track['duration_s']:.1f} s{slower})"
 
 
 def _repeat_value(value: float, seconds: float | None) -> Iterator[float]:

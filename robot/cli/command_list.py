@@ -83,7 +83,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "kinds": CommandEntry(
             "kinds",
-            "List buses, cameras, detectors, rules, gestures and rigs, of this program and of "
+            "List buses, cameras, detectors, rules, tracks and rigs, of this program and of "
             "packages.",
         ),
         "schema": CommandEntry(
@@ -97,9 +97,9 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         "record-camera": CommandEntry(
             "record", "Record the frames of a camera, for gazerig run --camera-recording FILE."
         ),
-        "import-gesture": CommandEntry(
-            "gestures",
-            "Import key frames of an animation program as a gesture in YAML.",
+        "import-track": CommandEntry(
+            "tracks",
+            "Import key frames of an animation program as a track in YAML.",
         ),
     },
 }

@@ -41,8 +41,8 @@ EXAMPLES: dict[str, Examples] = {
         ("models fetch yunet", "only this one"),
         ("models fetch people --from ~/downloads", "offline, from downloaded files"),
     ),
-    "import-gesture": (
-        ("import-gesture my.yaml wave.csv wave --fps 24", "key frames from an animation program"),
+    "import-track": (
+        ("import-track my.yaml wave.csv wave --fps 24", "key frames from an animation program"),
     ),
     "record-camera": (
         ("record-camera seen.mcap --oak", "record frames, depth and times of a camera"),
@@ -92,7 +92,7 @@ EXAMPLES: dict[str, Examples] = {
     "play": (
         ("ctl play nod", "nod twice; the eyes stay on the person"),
         ("ctl play laugh --count 6 --speed 1.2", "longer and faster"),
-        ("ctl play --list", "the gestures, and whether this rig can play them"),
+        ("ctl play --list", "the tracks, and whether this rig can play them"),
         ("ctl play none", "end the present one"),
     ),
     "status": (

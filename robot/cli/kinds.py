@@ -27,7 +27,7 @@ app = typer.Typer()
 def kinds(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """List buses, cameras, detectors, rules, gestures and rigs, of this program and of packages."""
+    """List buses, cameras, detectors, rules, tracks and rigs, of this program and of packages."""
     with clear_errors():
         rows = [_part_row(one) for group in GROUPS for one in registrations(group)]
         taken = [line for group in GROUPS for line in name_conflicts(group)]

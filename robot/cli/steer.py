@@ -15,7 +15,7 @@ from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import LookAtDirection
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 from gazerig.robot.remote.gamepad import Gamepad, open_gamepad
-from gazerig.robot.remote.steering import GESTURES, STOP, Steering
+from gazerig.robot.remote.steering import STOP, TRACKS, Steering
 
 app = typer.Typer()
 _EVERY_S = 0.05
@@ -33,7 +33,7 @@ class SteeringInput(Protocol):
     """An input device for steering."""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Apply moved controls, and return the pressed ones: gestures, STOP, END."""
+        """Apply moved controls, and return the pressed ones: tracks, STOP, END."""
         ...
 
 
@@ -94,12 +94,12 @@ def run_steering(
             return
         wanted = steering.direction_rad(now_s)
         try:
-            for gesture in pressed:
-                if gesture in GESTURES:
-                    if gesture == "wink":
+            for track in pressed:
+                if track in TRACKS:
+                    if track == "wink":
                         rig.ask("lids", "wink left")
                     else:
-                        rig.play(gesture)
+                        rig.play(track)
             if wanted is not None and (wanted != looks or not rig.in_control):
                 rig.send(LookAtDirection(wanted, "world", _FAR_M, rig.who))
             elif wanted is None and looks is not None:
@@ -136,7 +136,7 @@ class KeyControls:
             if key in self._ARROWS:
                 steering.key(*self._ARROWS[key], now_s)
             elif key in "12345":
-                pressed.append(GESTURES[int(key) - 1])
+                pressed.append(TRACKS[int(key) - 1])
             elif key == " ":
                 pressed.append(STOP)
             elif key in "qQ":

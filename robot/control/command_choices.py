@@ -5,11 +5,11 @@ from math import degrees, radians
 
 from gazerig.gaze.attention.aversion import MODES, Aversion
 from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.gesture.animation import Animation
-from gazerig.gaze.gesture.expression import Expressions
 from gazerig.gaze.lids.lids import Lids
-from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.model.commands import NO_GESTURE, Ask, Command, Express, Jog, Play, SetLevel
+from gazerig.gaze.track.animation import Animation
+from gazerig.gaze.track.expression import Expressions
+from gazerig.robot.control.track_choices import TrackChoices
+from gazerig.robot.model.commands import NO_TRACK, Ask, Command, Express, Jog, Play, SetLevel
 from gazerig.robot.model.joint import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
@@ -25,15 +25,15 @@ LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
 
 
 class Menus:
-    """The menus of behaviours, conversation, lids, expressions and gestures."""
+    """The menus of behaviours, conversation, lids, expressions and tracks."""
 
     def __init__(
-        self, aversion: Aversion, lids: Lids, expressions: Expressions, gestures: GestureChoices
+        self, aversion: Aversion, lids: Lids, expressions: Expressions, tracks: TrackChoices
     ) -> None:
         self._aversion = aversion
         self._lids = lids
         self._expressions = expressions
-        self._gestures = gestures
+        self._tracks = tracks
 
     def choices(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
@@ -44,8 +44,8 @@ class Menus:
         }
         if names := self._expressions.names:
             menus["expression"] = _put_first(self._expressions.name, names)
-        menus["gesture"] = _put_first(
-            self._gestures.playing or NO_GESTURE, (NO_GESTURE, *self._gestures.names)
+        menus["track"] = _put_first(
+            self._tracks.playing or NO_TRACK, (NO_TRACK, *self._tracks.names)
         )
         return menus
 
@@ -68,7 +68,7 @@ def refuse_impossible(
     menus: Callable[[], Mapping[str, Sequence[str]]],
     joints: Sequence[str],
     animation: Animation,
-    gestures: GestureChoices,
+    tracks: TrackChoices,
 ) -> None:
     """Refuse a command that names something that this robot does not have.
 
@@ -77,7 +77,7 @@ def refuse_impossible(
         menus: Returns the menus.
         joints: Joints of the rig.
         animation: Expressions and levels of the rig.
-        gestures: Gestures of the rig.
+        tracks: Tracks of the rig.
 
     Raises:
         ValueError: The message lists the available choices.
@@ -91,7 +91,7 @@ def refuse_impossible(
     elif isinstance(command, SetLevel):
         animation.levels.require(command.level)
     elif isinstance(command, Play):
-        gestures.require(command)
+        tracks.require(command)
 
 
 def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:

@@ -2,20 +2,20 @@
 
 from collections.abc import Callable
 
-from gazerig.gaze.gesture.animation import Animation
-from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
+from gazerig.gaze.track.animation import Animation
+from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Target
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import Menus
-from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.look_point import LookPoints
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
+from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.commands import (
-    NO_GESTURE,
+    NO_TRACK,
     Ask,
     Command,
     ControlCommand,
@@ -52,7 +52,7 @@ class CommandExecutor:
         attention: Target chooser with the behaviours.
         oculomotor: Computes how far eyes and head can follow.
         animation: Expressions and levels.
-        gestures: Gestures that can be played.
+        tracks: Tracks that can be played.
         kinematics: Gaze to joint angles.
         guard: Guard, which moves slowly after a change of control.
         tune: Changes parameters and returns messages about it.
@@ -69,7 +69,7 @@ class CommandExecutor:
         attention: TargetChooser,
         oculomotor: Oculomotor,
         animation: Animation,
-        gestures: GestureChoices,
+        tracks: TrackChoices,
         kinematics: Kinematics,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
@@ -78,15 +78,15 @@ class CommandExecutor:
     ) -> None:
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
-        self._animation, self._gestures = animation, gestures
+        self._animation, self._tracks = animation, tracks
         self._guard, self._tune, self._messages, self._looks = guard, tune, messages, looks
         self._taken_over = False
-        self._trigger = GestureTrigger()
+        self._trigger = TrackTrigger()
         self.commanded_rad: JointAngles = ()
         self.opponent: TickClockOpponent | None = None
 
     def reset(self) -> None:
-        """Forget the gestures that rules have played."""
+        """Forget the tracks that rules have played."""
         self._trigger.reset()
 
     def models_took_over(self) -> bool:
@@ -111,8 +111,8 @@ class CommandExecutor:
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Execute a command; return its reply."""
         match command:
-            case Ask("gesture", name):
-                return self.execute(Play("" if name == NO_GESTURE else name), t_s)
+            case Ask("track", name):
+                return self.execute(Play("" if name == NO_TRACK else name), t_s)
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
             case _ if isinstance(command, ControlCommand):
@@ -138,7 +138,7 @@ class CommandExecutor:
                     return CommandReply(f"{command.who or 'you'} no longer control the head")
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
-                self._gestures.drop_present()
+                self._tracks.drop_present()
                 self._stop.halt(command, self._body, t_s)
             case Resume():
                 return self._resume(command, t_s)
@@ -167,8 +167,8 @@ class CommandExecutor:
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""
         names = self._body.names
-        if command.angles_rad and (name := self._gestures.drop_present()):
-            self._messages.append(f"gesture {name} ends: a client controls the joints")
+        if command.angles_rad and (name := self._tracks.drop_present()):
+            self._messages.append(f"track {name} ends: a client controls the joints")
         self._change_control(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
             # A slider may jump from end to end.
@@ -176,17 +176,17 @@ class CommandExecutor:
         return jog_reply(command, names, self._guard.limits)
 
     def _play(self, command: Play, t_s: float) -> CommandReply:
-        """Play a gesture on top of the gaze, unless a client holds the joints."""
-        if command.gesture and self._lead.pose_rad:
+        """Play a track on top of the gaze, unless a client holds the joints."""
+        if command.track and self._lead.pose_rad:
             return CommandReply(f"{self._lead.controlled_by}: the joints are held at their angles")
-        reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
-        if command.gesture:
+        reply = self._tracks.play(command, t_s, self.commanded_rad, self._guard.limits)
+        if command.track:
             by = f" for {command.who}" if command.who else ""
-            self._messages.append(f"gesture{by}: {reply.text()}")
+            self._messages.append(f"track{by}: {reply.text()}")
         return reply
 
-    def play_rule_gesture(self, target: Target, t_s: float) -> None:
-        """Play the gesture of the present rule when the gaze reaches the rule's target.
+    def play_rule_track(self, target: Target, t_s: float) -> None:
+        """Play the track of the present rule when the gaze reaches the rule's target.
 
         Args:
             target: Target of the gaze.
@@ -199,7 +199,7 @@ class CommandExecutor:
         if name and not self._stop.stop_reason and not self._lead.active:
             reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
             if reply.refused:
-                self._messages.append(f"gesture for rule {top_down.behaviour} {reply.text()}")
+                self._messages.append(f"track for rule {top_down.behaviour} {reply.text()}")
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change the client in control; the models start slowly if they take over joints."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.control.gesture_choices import GestureInfo
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.command_json import from_json
 from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
@@ -23,7 +23,7 @@ QUESTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "status": ("Name, target, reason, guard, joints and last messages of the rig", {}),
     "state": ("Newest tick, and the events numbered above after", {"after": int}),
     "menus": ("Behaviours, modes of conversation, lid movements; the present one first", {}),
-    "gestures": ("Gestures, and why the rig refuses them", {}),
+    "tracks": ("Tracks, and why the rig refuses them", {}),
     "parameters": ("Rules and defaults of keys with a prefix", {"prefix": str}),
     "get": ("Present values of keys with a prefix", {"prefix": str}),
     "unsaved": ("Values that differ from the rig's file", {}),
@@ -133,8 +133,8 @@ class CommandTarget(Protocol):
         """Return the menus."""
         ...
 
-    def gestures(self) -> Sequence[GestureInfo]:
-        """Return the available gestures."""
+    def tracks(self) -> Sequence[TrackInfo]:
+        """Return the available tracks."""
         ...
 
 
@@ -225,8 +225,8 @@ class CommandHandler:
                 return QuestionAnswer(
                     {menu: list(them) for menu, them in self._robot.menus().items()}
                 )
-            case {"do": "gestures", **rest} if not rest:
-                return QuestionAnswer([to_plain(one._asdict()) for one in self._robot.gestures()])
+            case {"do": "tracks", **rest} if not rest:
+                return QuestionAnswer([to_plain(one._asdict()) for one in self._robot.tracks()])
             case {"do": "fault", "text": str(text), **rest} if not rest:
                 if self._fault is None:
                     raise ValueError(REAL)

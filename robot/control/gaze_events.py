@@ -1,4 +1,4 @@
-"""Events of gaze, people and gestures, found in consecutive ticks."""
+"""Events of gaze, people and tracks, found in consecutive ticks."""
 
 from typing import Literal, NamedTuple, get_args
 
@@ -9,7 +9,7 @@ from gazerig.robot.model.client_control import GONE_S
 
 EventKind = Literal[
     "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
-    "person_left", "gesture_finished",
+    "person_left", "track_finished",
 ]  # fmt: skip
 """message: of the bus, the camera or a program's request; all others are found in the ticks."""
 EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
@@ -21,7 +21,7 @@ class GazeChange(NamedTuple):
     Attributes:
         text: Description in one line.
         kind: Kind of event.
-        subject: Number of the person, name of the target or of the gesture.
+        subject: Number of the person, name of the target or of the track.
     """
 
     text: str
@@ -53,11 +53,11 @@ class GazeEvents:
             found.append(_target_change("saccade to", "saccade_start", target))
         if gaze.blink and not last.gaze.blink:
             found.append(GazeChange("blink", "blink", ""))
-        was, now = last.gesture, tick.gesture
+        was, now = last.track, tick.track
         if was.name and (was.number, was.name) != (now.number, now.name):
-            ended = now.end_reason if now.number == was.number else "another gesture"
+            ended = now.end_reason if now.number == was.number else "another track"
             text = f"{was.name} has finished" if not ended else f"{was.name} ended: {ended}"
-            found.append(GazeChange(text, "gesture_finished", was.name))
+            found.append(GazeChange(text, "track_finished", was.name))
         return found + self._people(tick)
 
     def _people(self, tick: Tick) -> list[GazeChange]:

@@ -17,10 +17,10 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, target_name, tick_control_source
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
-    NO_GESTURE,
+    NO_TRACK,
     ControlSource,
     ControlState,
-    GestureState,
+    TrackState,
 )
 
 
@@ -30,7 +30,7 @@ class JointReading:
 
     Attributes:
         name: Name in the rig file.
-        desired_rad: Angle requested by the gaze, a gesture or a program.
+        desired_rad: Angle requested by the gaze, a track or a program.
         commanded_rad: Angle that the guard sent to the servo.
         measured_rad: Angle reported by the servo; see ``estimated``.
         velocity_rad_s: Measured speed.
@@ -142,7 +142,7 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class HeadEvent:
-    """An event: a message, or a change of gaze, people or gesture.
+    """An event: a message, or a change of gaze, people or track.
 
     Attributes:
         number: Number of the event, from 1.
@@ -150,8 +150,8 @@ class HeadEvent:
         text: Description in one line.
         kind: "message" (of the bus, the camera or a program's request), "saccade_start",
             "saccade_landing", "blink", "target", "person_arrived", "person_left" or
-            "gesture_finished".
-        subject: Number of the person, name of the target or of the gesture, "" for none.
+            "track_finished".
+        subject: Number of the person, name of the target or of the track, "" for none.
     """
 
     number: int
@@ -175,8 +175,8 @@ class HeadState:
         stopped: Reason for a stop, "" while the head moves.
         controlled_by: Client in control and its command, "" while the head chooses.
         client_control: State of the newest client's control.
-        gesture: The newest gesture.
-        control_source: Present source of control: gaze models, a client, a gesture, a stop.
+        track: The newest track.
+        control_source: Present source of control: gaze models, a client, a track, a stop.
         headline: Present activity of the head in one sentence.
         frame_s: Time of the newest camera frame, None before the first.
     """
@@ -190,7 +190,7 @@ class HeadState:
     stopped: str
     controlled_by: str
     client_control: ControlState = field(default=NO_CLIENT_CONTROL)
-    gesture: GestureState = field(default=NO_GESTURE)
+    track: TrackState = field(default=NO_TRACK)
     frame_s: float | None = None
     control_source: ControlSource = field(default=ControlSource())
     headline: str = ""
@@ -211,7 +211,7 @@ def head_state(tick: Tick) -> HeadState:
         tick.stopped,
         tick.controlled_by,
         tick.client_control,
-        tick.gesture,
+        tick.track,
         percept.captured_s if percept is not None else None,
         tick_control_source(tick),
         head_activity(tick).headline,
@@ -222,7 +222,7 @@ def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
     named: dict[str, Any] = {
         "client_control": state.client_control,
-        "gesture": state.gesture,
+        "track": state.track,
         "control_source": state.control_source,
     }
     return {**asdict(state), **{name: value._asdict() for name, value in named.items()}}
@@ -248,7 +248,7 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
         for one in data["people"]
     )
     made["client_control"] = ControlState(**_known_fields(ControlState, data["client_control"]))
-    made["gesture"] = GestureState(**_known_fields(GestureState, data["gesture"]))
+    made["track"] = TrackState(**_known_fields(TrackState, data["track"]))
     if "control_source" in data:
         made["control_source"] = ControlSource(
             **_known_fields(ControlSource, data["control_source"])

@@ -8,10 +8,10 @@ from typing import NamedTuple
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.aversion import Aversion
-from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.scanpath.scanpath import Scanpath
+from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
@@ -22,12 +22,12 @@ from gazerig.robot.control.command_choices import (
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
-from gazerig.robot.control.gesture_choices import GestureChoices, GestureInfo
 from gazerig.robot.control.look_point import LastObservation, LookPoints
 from gazerig.robot.control.real_time import freeze_objects
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import stopped_result
+from gazerig.robot.control.track_choices import TrackChoices, TrackInfo
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import check_command
@@ -65,8 +65,8 @@ class Robot:
         aversion: Looks away in a conversation.
         oculomotor: Target to eyes, head and lids; reports whether the gaze has arrived.
         lids: Lids, for winks and sleepiness.
-        animation: Gestures and expressions on top of the gaze.
-        gestures: Gestures that can be played.
+        animation: Tracks and expressions on top of the gaze.
+        tracks: Tracks that can be played.
         guard: Guard between desired angles and the bus.
         tune: Applies changed parameters and returns messages about it.
         pixels: Converts pixels of a camera frame to points in the world.
@@ -86,7 +86,7 @@ class Robot:
         oculomotor: Oculomotor,
         lids: Lids,
         animation: Animation,
-        gestures: GestureChoices,
+        tracks: TrackChoices,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
         pixels: PixelToWorld,
@@ -101,9 +101,9 @@ class Robot:
         self._scanpath = scanpath
         self._aversion = aversion
         self._oculomotor = oculomotor
-        self._menus = Menus(aversion, lids, animation.expressions, gestures)
+        self._menus = Menus(aversion, lids, animation.expressions, tracks)
         self._animation = animation
-        self._gestures = gestures
+        self._tracks = tracks
         self._guard = guard
         self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
@@ -112,7 +112,7 @@ class Robot:
         self._stop = StopControl(self._messages)
         self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(
-            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, gestures,
+            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, tracks,
             kinematics, guard, tune, self._messages, self._looks,
         )  # fmt: skip
 
@@ -151,7 +151,7 @@ class Robot:
             ValueError: As ``command``.
         """
         check_command(command)
-        refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
+        refuse_impossible(command, self.menus, self.body.names, self._animation, self._tracks)
         return self._commands.add(command)
 
     def set_opponent(self, opponent: TickClockOpponent) -> None:
@@ -176,9 +176,9 @@ class Robot:
         """Return the choices of ``ask``: menu -> choices, the present one first."""
         return self._menus.choices(self.attention.top_down)
 
-    def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return all gestures with their fit to this rig."""
-        return self._gestures.all_gestures(self._guard.limits)
+    def tracks(self) -> tuple[TrackInfo, ...]:
+        """Return all tracks with their fit to this rig."""
+        return self._tracks.all_tracks(self._guard.limits)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.
@@ -238,7 +238,7 @@ class Robot:
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         chosen = self.attention.choose(percept, pose, t_s)
-        self._executor.play_rule_gesture(chosen, t_s)
+        self._executor.play_rule_track(chosen, t_s)
         target = self._lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
         target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active, rests_s)
@@ -262,7 +262,7 @@ class Robot:
         self._messages.clear()
         tick = tuple.__new__(Tick, (
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            stopped, self._lead.controlled_by, lead, self._gestures.state, False,
+            stopped, self._lead.controlled_by, lead, self._tracks.state, False,
         ))  # fmt: skip
         self._looks.newest = tick
         return tick

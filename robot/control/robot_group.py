@@ -4,9 +4,9 @@ import contextlib
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.tick_text import head_activity
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.types import OtherHead
@@ -58,9 +58,9 @@ class RobotGroup:
         """Return the first head's menus."""
         return self._first.menus()
 
-    def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return the first head's gestures."""
-        return self._first.gestures()
+    def tracks(self) -> tuple[TrackInfo, ...]:
+        """Return the first head's tracks."""
+        return self._first.tracks()
 
 
 class _GroupTicket(Ticket):

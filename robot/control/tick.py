@@ -7,9 +7,9 @@ from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
-    NO_GESTURE,
+    NO_TRACK,
     ControlState,
-    GestureState,
+    TrackState,
 )
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
@@ -23,7 +23,7 @@ class Tick(NamedTuple):
         stopped: Reason for a stop, "" while the robot moves.
         controlled_by: Client that controls gaze or joints, and its command; "" without one.
         client_control: State of the newest client's control, with arrival at its target.
-        gesture: The newest gesture and its state.
+        track: The newest track and its state.
         parking: The run is over and the head moves to its parking pose; such ticks are only
             displayed.
     """
@@ -42,7 +42,7 @@ class Tick(NamedTuple):
     stopped: str = ""
     controlled_by: str = ""
     client_control: ControlState = NO_CLIENT_CONTROL
-    gesture: GestureState = NO_GESTURE
+    track: TrackState = NO_TRACK
     parking: bool = False
 
     def parking_tick(

@@ -18,7 +18,7 @@ from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Perce
 from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import as_recorded_json
-from gazerig.robot.model.control_source import ControlState, GestureState
+from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
@@ -75,7 +75,7 @@ class TickRow(NamedTuple):
     stopped: str
     controlled_by: str
     client_control: ControlState
-    gesture: GestureState
+    track: TrackState
     parking: bool
     before: list[Any]
 
@@ -169,7 +169,7 @@ class TickStream:
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
                 [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.controlled_by,
-                tick.client_control, tick.gesture, tick.parking, before,
+                tick.client_control, tick.track, tick.parking, before,
             ))  # fmt: skip
         return encode((percepts, rows))
 

@@ -74,7 +74,7 @@ class Activity(NamedTuple):
 
 def tick_control_source(tick: Tick) -> ControlSource:
     """Return the source of control of the head."""
-    return control_source(tick.stopped, tick.parking, tick.client_control, tick.gesture)
+    return control_source(tick.stopped, tick.parking, tick.client_control, tick.track)
 
 
 def head_activity(tick: Tick) -> Activity:
@@ -91,7 +91,7 @@ def head_activity(tick: Tick) -> Activity:
         distance = _distance_text(tick) if leads.kind in ("person", "pointer") else ""
         return Activity(said + distance, control_title(leads), said + distance, phase)
     looks = _gaze_text(tick.target)
-    headline = f"{said}, and {looks}" if leads.kind == "gesture" else looks
+    headline = f"{said}, and {looks}" if leads.kind == "track" else looks
     return Activity(headline, target_name(tick.target), tick.target.why, phase)
 
 

@@ -5,7 +5,7 @@ Every receiver of commands calls these checks first.
 
 from math import pi
 
-from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.model.commands import (
     COMMANDS,
     OPPONENT_BOX_M,
@@ -79,15 +79,15 @@ def check_command(command: Command) -> None:
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
             _check_share("a level", "value", level, value)
-        case Play(gesture, speed, times, who):
-            if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
-                raise ValueError("a gesture must be given by its name")
+        case Play(track, speed, times, who):
+            if not isinstance(track, str) or len(track) > MAX_WORDS:
+                raise ValueError("a track must be given by its name")
             if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:
                 raise ValueError(
-                    f"the speed of a gesture must be a number {MIN_SPEED:g}..{MAX_SPEED:g}"
+                    f"the speed of a track must be a number {MIN_SPEED:g}..{MAX_SPEED:g}"
                 )
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
-                raise ValueError(f"the times of a gesture must be a whole number 0..{MAX_COUNT}")
+                raise ValueError(f"the times of a track must be a whole number 0..{MAX_COUNT}")
             _check_who(who)
         case MoveOpponent(p):
             if not _are_numbers(p, 3, MAX_COORDINATE_M) or any(

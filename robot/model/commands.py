@@ -149,21 +149,21 @@ class SetLevel(NamedTuple):
     value: float
 
 
-NO_GESTURE = "none"
-"""Choice in the menu of gestures that ends the present one."""
+NO_TRACK = "none"
+"""Choice in the menu of tracks that ends the present one."""
 
 
 class Play(NamedTuple):
-    """Play a gesture; "" ends the present one.
+    """Play a track; "" ends the present one.
 
     Attributes:
-        gesture: Name of the gesture.
+        track: Name of the track.
         speed: Factor on its defined speed.
-        times: Number of repetitions, 0 for the gesture's own.
+        times: Number of repetitions, 0 for the track's own.
         who: Name of the client.
     """
 
-    gesture: str
+    track: str
     speed: float = 1.0
     times: int = 0
     who: str = ""

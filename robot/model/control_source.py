@@ -6,7 +6,7 @@ The page, the status line, other programs and Python all use these texts.
 from typing import Literal, NamedTuple
 
 ControlKind = Literal[
-    "gaze", "person", "pointer", "joint", "gesture", "stopped", "parking", "recording"
+    "gaze", "person", "pointer", "joint", "track", "stopped", "parking", "recording"
 ]
 """gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
 target is a person's mouse pointer; joint: joints are held; recording: a recorded run is shown."""
@@ -45,12 +45,12 @@ class ControlState(NamedTuple):
     since_s: float = 0.0
 
 
-class GestureState(NamedTuple):
-    """The newest gesture, after a tick.
+class TrackState(NamedTuple):
+    """The newest track, after a tick.
 
     Attributes:
-        number: Number of the gesture since the start, 0 before the first.
-        name: Name of the present gesture, "" if there is none.
+        number: Number of the track since the start, 0 before the first.
+        name: Name of the present track, "" if there is none.
         end_reason: Reason for its end, "" if it is playing or has finished.
         who: Name of the client, "" if unknown.
         since_s: Time of its start.
@@ -64,7 +64,7 @@ class GestureState(NamedTuple):
 
 
 NO_CLIENT_CONTROL = ControlState()
-NO_GESTURE = GestureState()
+NO_TRACK = TrackState()
 
 
 class ControlSource(NamedTuple):
@@ -73,7 +73,7 @@ class ControlSource(NamedTuple):
     Attributes:
         kind: Kind of control.
         who: Name of the client for display, "" for none or unknown.
-        description: "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, a stop's reason.
+        description: "look at 1 0 0.3", "neck_yaw at 17.2 deg", a track's name, a stop's reason.
         joints: Held joints.
         since_s: Start of the control on the rig's clock, None if unknown.
     """
@@ -87,11 +87,11 @@ class ControlSource(NamedTuple):
     @property
     def overrides_gaze(self) -> bool:
         """Return whether something other than the gaze models moves or holds the head."""
-        return self.kind not in ("gaze", "gesture")
+        return self.kind not in ("gaze", "track")
 
 
 def control_source(
-    stopped: str, parking: bool, lead: ControlState, gesture: GestureState
+    stopped: str, parking: bool, lead: ControlState, track: TrackState
 ) -> ControlSource:
     """Return the source of control.
 
@@ -99,7 +99,7 @@ def control_source(
         stopped: Reason for a stop, "" while the robot moves.
         parking: Whether the run is over and the head moves to its parking pose.
         lead: The newest control by a client.
-        gesture: The newest gesture.
+        track: The newest track.
     """
     if stopped:
         return ControlSource("stopped", "", stopped)
@@ -108,8 +108,8 @@ def control_source(
     if lead.active:
         who = lead.who or "a client"
         return ControlSource(lead.kind, who, lead.description, lead.joints, lead.since_s)
-    if gesture.name:
-        return ControlSource("gesture", gesture.who, gesture.name, (), gesture.since_s)
+    if track.name:
+        return ControlSource("track", track.who, track.name, (), track.since_s)
     return ControlSource()
 
 
@@ -124,7 +124,7 @@ def control_title(leader: ControlSource) -> str:
             return "looks at the pointer"
         case "joint":
             return f"{' and '.join(leader.joints) or 'joints'} held"
-        case "gesture":
+        case "track":
             return leader.description
         case _:
             return leader.kind
@@ -146,7 +146,7 @@ def control_sentence(leader: ControlSource, t_s: float) -> str:
             said = f"it looks at the pointer of {leader.who}"
         case "joint":
             said = f"{leader.who} holds {leader.description}"
-        case "gesture":
+        case "track":
             said = f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
         case "stopped":
             return f"stopped: {leader.description}; the torque is off"

@@ -84,7 +84,7 @@ LidEnds = tuple[float, float]
 
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
 LOWER_NECK = ("lower_neck_yaw", "lower_neck_pitch")
-"""Two further joints below the neck: expressions and gestures move them, and gaze compensates."""
+"""Two further joints below the neck: expressions and tracks move them, and gaze compensates."""
 LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
 
 

@@ -5,9 +5,9 @@ from typing import Literal, NamedTuple
 from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
-    NO_GESTURE,
+    NO_TRACK,
     ControlState,
-    GestureState,
+    TrackState,
 )
 from gazerig.robot.model.reply import CommandReply
 
@@ -15,7 +15,7 @@ Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out
 """How an order ended.
 
 arrived: the gaze was measured within 1 degree of the point, or the joint within 1 degree of its
-    angle; a gesture has ended; any other order was accepted
+    angle; a track has ended; any other order was accepted
 refused: nothing was done; ``Order.why`` gives the reason
 out of reach: the gaze will rest more than 1 degree off the point, at the limits of the joints.
     This is known as soon as the reply arrives. ``Order.why`` gives the error, and the joints that
@@ -27,27 +27,27 @@ timed out: none of these within the given time
 
 
 class Progress(NamedTuple):
-    """The progress of a client's command and of a gesture.
+    """The progress of a client's command and of a track.
 
     Attributes:
-        client_control, gesture: The newest ones.
+        client_control, track: The newest ones.
         controlled_by: Client that controls gaze or joints, and its command; "" without one.
     """
 
     client_control: ControlState = NO_CLIENT_CONTROL
-    gesture: GestureState = NO_GESTURE
+    track: TrackState = NO_TRACK
     controlled_by: str = ""
 
 
 def command_outcome(reply: CommandReply, now: Progress) -> tuple[Outcome, str] | None:
     """Return the outcome of a command and the reason for it, None while it is in progress."""
-    played = reply.gesture.number if reply.gesture is not None else 0
+    played = reply.track.number if reply.track is not None else 0
     if reply.refused:
         return "refused", reply.refused
     if played:
-        newest = now.gesture
+        newest = now.track
         if newest.number > played:
-            return "taken over", f"another gesture: {newest.name or newest.end_reason}"
+            return "taken over", f"another track: {newest.name or newest.end_reason}"
         if newest.number < played or newest.name and not newest.end_reason:
             return None
         return ("taken over", newest.end_reason) if newest.end_reason else ("arrived", "")

@@ -42,17 +42,17 @@ class JointReply(NamedTuple):
         )
 
 
-class GestureReply(NamedTuple):
-    """The reply for a gesture that starts, or with name "" for the end of the present one.
+class TrackReply(NamedTuple):
+    """The reply for a track that starts, or with name "" for the end of the present one.
 
     Attributes:
-        name: Name of the gesture.
+        name: Name of the track.
         duration_s: Time until everything is at rest again.
         slowed_by: Factor by which it takes longer than requested.
         slow_joint: Joint whose limits need this factor.
         reduced_joints: (joint, share of its motion that its range leaves).
-        left_out: Joints of the gesture that the rig lacks.
-        number: Number of the gesture (``gazerig.robot.model.control_source.GestureState``).
+        left_out: Joints of the track that the rig lacks.
+        number: Number of the track (``gazerig.robot.model.control_source.TrackState``).
     """
 
     name: str
@@ -66,7 +66,7 @@ class GestureReply(NamedTuple):
     def text(self) -> str:
         """Return one line for users."""
         if not self.name:
-            return f"gestures end within {self.duration_s:.2f} s"
+            return f"tracks end within {self.duration_s:.2f} s"
         parts = [f"{self.name} takes {self.duration_s:.1f} s"]
         if self.slow_joint:
             parts.append(f"slower by {self.slowed_by:.2f} for {self.slow_joint}")
@@ -88,7 +88,7 @@ class CommandReply(NamedTuple):
             worse eye, or of the mean line of sight if one linkage pans both eyes.
         control_number: Number of the control that it started (``ControlState``),
             0 for none.
-        gesture: Gesture that is played, None for other commands.
+        track: Track that is played, None for other commands.
     """
 
     refused: str = ""
@@ -97,7 +97,7 @@ class CommandReply(NamedTuple):
     joints: tuple[JointReply, ...] = ()
     error_rad: float = 0.0
     control_number: int = 0
-    gesture: GestureReply | None = None
+    track: TrackReply | None = None
 
     @property
     def error_deg(self) -> float:
@@ -113,8 +113,8 @@ class CommandReply(NamedTuple):
         """Return one line for users, "" if there is nothing to report."""
         if self.refused:
             return f"refused: {self.refused}"
-        if self.gesture is not None:
-            return self.gesture.text()
+        if self.track is not None:
+            return self.track.text()
         ends = "; ".join(joint.text() for joint in self.joints)
         if self.asked_m is None:
             return ends
@@ -142,7 +142,7 @@ class CommandReply(NamedTuple):
                 }
                 for one in self.joints
             ],
-            "gesture": None if self.gesture is None else self.gesture._asdict(),
+            "track": None if self.track is None else self.track._asdict(),
             "text": text,
         }
 
@@ -165,14 +165,14 @@ class CommandReply(NamedTuple):
             for one in data["joints"]
         )
         asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
-        gesture = data.get("gesture")
-        if gesture is not None:
-            reduced = tuple((joint, share) for joint, share in gesture["reduced_joints"])
-            changed = {"reduced_joints": reduced, "left_out": tuple(gesture["left_out"])}
-            gesture = GestureReply(**{**gesture, **changed})
+        track = data.get("track")
+        if track is not None:
+            reduced = tuple((joint, share) for joint, share in track["reduced_joints"])
+            changed = {"reduced_joints": reduced, "left_out": tuple(track["left_out"])}
+            track = TrackReply(**{**track, **changed})
         error_rad = radians(data["error_deg"])
         return cls(
-            data["refused"], asked, done, joints, error_rad, data.get("control_number", 0), gesture
+            data["refused"], asked, done, joints, error_rad, data.get("control_number", 0), track
         )
 
 

@@ -31,7 +31,7 @@ GAZE_JOINTS = (
 )
 """The joints that gaze moves. A rig has some of them: eyes that turn separately or on a common
 linkage (``eyes_pan``, ``eyes_tilt``), any of the lids, any axes of the neck. Joints with other
-names (jaw, brows, ears) are moved by gestures, expressions, levels and programs."""
+names (jaw, brows, ears) are moved by tracks, expressions, levels and programs."""
 
 JOINT_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 """Pattern of joint names."""
@@ -344,7 +344,7 @@ class Snapshot:
         plan: Choice of the action planner and its reason, "" without one or under a client's
             control.
         others: The other heads of the same world.
-        expressed: Names of the present gesture and expression, "" for none.
+        expressed: Names of the present track and expression, "" for none.
     """
 
     t_s: float

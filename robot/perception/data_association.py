@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.types import Clothing
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 
 FORBIDDEN: Final = 1e6
 """Cost of an impossible pair; larger than the cost of all possible pairs."""
@@ -122,7 +122,7 @@ class DetectionRow(NamedTuple):
 def pair_costs(
     tracks: Sequence[TrackRow],
     detections: Sequence[DetectionRow],
-    par: TrackParams,
+    par: TrackerParams,
     clothing: Sequence[Sequence[float]] | None = None,
 ) -> list[list[float]]:
     """Return the cost of each pair: minus twice the log likelihood.
@@ -181,7 +181,7 @@ def clothing_costs(
 def _all_pairs(
     tracks: Sequence[TrackRow],
     detections: Sequence[DetectionRow],
-    par: TrackParams,
+    par: TrackerParams,
     clothing: Sequence[Sequence[float]] | None = None,
 ) -> list[list[float]]:
     """Return the costs of all pairs, in array expressions."""
@@ -247,7 +247,7 @@ def _hidden_tracks(t: Floats) -> NDArray[np.bool_]:
 
 
 def _pair_cost(
-    k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackParams, worn: float
+    k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackerParams, worn: float
 ) -> float:
     """Return the cost of track k and one detection; same rules as ``_all_pairs``."""
     kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, in_sight, *_ = (

@@ -38,8 +38,8 @@ from gazerig.robot.perception.kalman import Variances
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.track import (
     UNNAMED,
+    BodyTrack,
     EyeObservation,
-    Track,
     angle_off_head_rad,
     looks_at_head,
     place_in_world,
@@ -85,7 +85,7 @@ class Perception:
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
         self._hands = Hands()
-        self._tracks: tuple[Track, ...] = ()
+        self._tracks: tuple[BodyTrack, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._p_head: Vec3 = (0.0, 0.0, 0.0)
         self._residual = EgomotionResidual()
@@ -209,7 +209,7 @@ class Perception:
         most_rad_s = turn_bound(before, after) / (2.0 * _HALF_TURN_S)
         self._residual.step(t_s, turn, self._p_camera, seen, most_rad_s)
 
-    def _face(self, track: Track) -> Face:
+    def _face(self, track: BodyTrack) -> Face:
         """Return a tracked face with its eight parts."""
         R = track.R_world_face
         assert R is not None  # visible faces are tracked with their pose
@@ -287,7 +287,7 @@ def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) ->
     return bool(0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
 
 
-def _bodies(tracks: tuple[Track, ...]) -> Bodies:
+def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
     """Return faces and moving things as bodies; a spin in the image is about the view line."""
     if not tracks:
         return Bodies(pv_cov=np.zeros((0, 6, 6)))

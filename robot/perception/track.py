@@ -9,7 +9,7 @@ import numpy as np
 from gazerig.drivers.types import Clothing, DetectionInCamera, FaceSigns
 from gazerig.gaze.angles import add, angle_between, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.kalman import TrackFilter
 from gazerig.robot.perception.returning_people import SeenPerson
 
@@ -54,7 +54,7 @@ def angle_off_head_rad(R_world_face: Mat3, gaze_world: Vec3 | None, from_face_m:
 
 
 def looks_at_head(
-    params: TrackParams, off_rad: float, turn_sd_rad: float, by_eyes: bool, before: bool | None
+    params: TrackerParams, off_rad: float, turn_sd_rad: float, by_eyes: bool, before: bool | None
 ) -> bool | None:
     """Return whether a person looks at the head, None if that is too uncertain.
 
@@ -228,7 +228,7 @@ class LocalisedDetection:
 
 
 @dataclass(slots=True, eq=False)
-class Track:
+class BodyTrack:
     """Track of one person or thing through time.
 
     R_world_face: axes of a face; None for a thing, and while the person's face is not visible

@@ -14,7 +14,7 @@ from math import inf, sqrt
 
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
 from gazerig.gaze.types import FIRST_THING, Mat3, Vec3
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.data_association import (
     FORBIDDEN,
     NO_MARK,
@@ -27,7 +27,13 @@ from gazerig.robot.perception.data_association import (
 )
 from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, view_and_range
 from gazerig.robot.perception.returning_people import SeenPerson, find_returned
-from gazerig.robot.perception.track import FACE, UNNAMED, KnownClothes, LocalisedDetection, Track
+from gazerig.robot.perception.track import (
+    FACE,
+    UNNAMED,
+    BodyTrack,
+    KnownClothes,
+    LocalisedDetection,
+)
 
 # Number of frames with clothes after which they identify a person; number below which the person
 # may be one who returned.
@@ -45,11 +51,11 @@ _DOUBT_KEPT = 0.9
 
 
 def resolve_identities(
-    tracks: list[Track],
+    tracks: list[BodyTrack],
     worn: list[list[float]],
     column: dict[int, int],
     detections: list[LocalisedDetection],
-    params: TrackParams,
+    params: TrackerParams,
 ) -> None:
     """Restore by their clothes the numbers of people who were confused while hidden.
 
@@ -93,7 +99,7 @@ def resolve_identities(
         _renumber(tracks, [track for track in unsure if track.is_person], params)
 
 
-def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> None:
+def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack], params: TrackerParams) -> None:
     """Exchange the numbers of the tracks in sight so that they match all of them best."""
     people = [
         track
@@ -125,7 +131,7 @@ def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> No
                 tracks.remove(one)  # the supposed new person was this one
 
 
-def _reachable(one: Track, other: Track, params: TrackParams) -> bool:
+def _reachable(one: BodyTrack, other: BodyTrack, params: TrackerParams) -> bool:
     """Return whether a person out of sight can have reached the position of a track."""
     known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
     gone = params.gate_speed_m_s * (other.at_s - other.seen_s)
@@ -151,15 +157,15 @@ _COVERED_S = 0.3
 class Tracker:
     """Tracker of faces and moving things: identities and velocities."""
 
-    def __init__(self, params: TrackParams) -> None:
-        self._tracks: list[Track] = []
+    def __init__(self, params: TrackerParams) -> None:
+        self._tracks: list[BodyTrack] = []
         self._next_person, self._next_thing = 1, FIRST_THING
         self._free: set[int] = set()
         self._left: list[SeenPerson] = []
         self._worn: list[list[float]] | None = None
         self.retune(params)
 
-    def retune(self, params: TrackParams) -> None:
+    def retune(self, params: TrackerParams) -> None:
         """Use other parameters from now on; all tracks are kept."""
         self._params = params
         lively = params.lively_accel_m_s2
@@ -173,13 +179,13 @@ class Tracker:
         self._tracks, self._left = [], []
 
     @property
-    def params(self) -> TrackParams:
+    def params(self) -> TrackerParams:
         """Return the present parameters."""
         return self._params
 
     def step(
         self, detections: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
-    ) -> tuple[Track, ...]:
+    ) -> tuple[BodyTrack, ...]:
         """Associate the detections of one frame with the tracks; return the tracks in sight."""
         for track in self._tracks:
             if not self._is_remembered(track):
@@ -225,23 +231,23 @@ class Tracker:
         self._tracks = kept
         return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
 
-    def shows_face(self, track: Track) -> bool:
+    def shows_face(self, track: BodyTrack) -> bool:
         """Return whether the face of a person was seen recently."""
         coast_s = self._params.coast_ms / 1e3
         return track.R_world_face is not None and track.at_s - track.faced_s <= coast_s
 
-    def _coasts_s(self, track: Track) -> float:
+    def _coasts_s(self, track: BodyTrack) -> float:
         """Return the time for which a track without a detection is still reported."""
         by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
         return (self._params.coast_person_ms if by_body else self._params.coast_ms) / 1e3
 
-    def _kept_s(self, track: Track) -> float:
+    def _kept_s(self, track: BodyTrack) -> float:
         """Return the time for which a track is kept without a detection."""
         par = self._params
         known = track.is_person and track.frames >= _KNOWN
         return max(par.forget_ms / 1e3, par.remember_face_s if known else 0.0)
 
-    def _is_remembered(self, track: Track) -> bool:
+    def _is_remembered(self, track: BodyTrack) -> bool:
         """Return whether a track has been out of sight for so long that it is assumed to stay."""
         return track.at_s - track.seen_s > self._params.forget_ms / 1e3
 
@@ -288,8 +294,8 @@ class Tracker:
         )
         return pair_costs(tracks, rows, self._params, self._worn)
 
-    def _begin_track(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
-        track = Track(
+    def _begin_track(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> BodyTrack:
+        track = BodyTrack(
             0,
             detection,
             TrackFilter(
@@ -315,7 +321,7 @@ class Tracker:
             track.id, self._next_thing = self._next_thing, self._next_thing + 1
         return track
 
-    def _number(self, track: Track) -> None:
+    def _number(self, track: BodyTrack) -> None:
         """Give a person's new track the number of the person who has returned, or a free one."""
         par, now_s = self._params, track.at_s
         if track.returned_person is not None:
@@ -347,7 +353,7 @@ class Tracker:
         self._next_person += 1
         return self._next_person - 1
 
-    def _retire_track(self, track: Track) -> None:
+    def _retire_track(self, track: BodyTrack) -> None:
         """Store a person who left; the number of a false detection becomes free."""
         if track.frames >= _KNOWN:
             self._left = [*self._left, _person(track)][-_MOST_LEFT:]
@@ -356,7 +362,9 @@ class Tracker:
         else:
             self._free.add(track.id)
 
-    def _update_track(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
+    def _update_track(
+        self, track: BodyTrack, detection: LocalisedDetection, p_camera: Vec3
+    ) -> None:
         """Update a track with a detection."""
         place = correct_distance(track, detection, p_camera)
         covered = _is_covered(track, detection)
@@ -390,7 +398,7 @@ class Tracker:
         self._learn_size(track, detection, gain)
         track.detection = detection
 
-    def _learn_size(self, track: Track, detection: LocalisedDetection, gain: float) -> None:
+    def _learn_size(self, track: BodyTrack, detection: LocalisedDetection, gain: float) -> None:
         """Learn the size of a face whose distance is measured."""
         if detection.size_depth is None:
             return
@@ -399,7 +407,7 @@ class Tracker:
         track.depth_s = track.at_s
 
 
-def _person(track: Track) -> SeenPerson:
+def _person(track: BodyTrack) -> SeenPerson:
     """Return the features of the person of a track."""
     before, worn = track.returned_person, track.clothes.colours
     size = None if track.depth_s is None else track.face_size
@@ -409,7 +417,7 @@ def _person(track: Track) -> SeenPerson:
     return SeenPerson(track.id, track.p_world_m, track.seen_s, size, worn)
 
 
-def _is_covered(track: Track, found: LocalisedDetection) -> bool:
+def _is_covered(track: BodyTrack, found: LocalisedDetection) -> bool:
     """Return whether the lower half of a face is covered, e.g. by a hand, which falsifies its size.
 
     The network places hidden points nearer to the visible ones, so the face seems farther away.
@@ -423,7 +431,9 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
     return track.at_s - track.covered_s <= _COVERED_S
 
 
-def _covered_position(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:
+def _covered_position(
+    track: BodyTrack, found: LocalisedDetection, place: Vec3, p_camera: Vec3
+) -> Vec3:
     """Return the position of a covered face: its last distance, corrected for its motion since.
 
     Half of the correction is from its points and half from its box, whose error is opposite.
@@ -437,7 +447,7 @@ def _covered_position(track: Track, found: LocalisedDetection, place: Vec3, p_ca
     return add(p_camera, scale(measured, share * track.cover_share))
 
 
-def _learn_shape(track: Track, found: LocalisedDetection) -> None:
+def _learn_shape(track: BodyTrack, found: LocalisedDetection) -> None:
     """Learn the sizes of the box and the lower half of a face while nothing covers it."""
     if not (found.box_m > 0.0 and found.lower_face > 0.0):
         return
@@ -451,12 +461,12 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
         track.lower_var += gain * ((off / track.lower_face) ** 2 - track.lower_var)
 
 
-def _is_another_now(track: Track, renamed: set[int]) -> bool:
+def _is_another_now(track: BodyTrack, renamed: set[int]) -> bool:
     """Return whether the detector's number of a thing now belongs to another known thing."""
     return track.detection.kind == UNNAMED and track.detection.mark in renamed
 
 
-def _correct_velocity(track: Track, found: LocalisedDetection) -> None:
+def _correct_velocity(track: BodyTrack, found: LocalisedDetection) -> None:
     """Update a track with a velocity that was measured in the image."""
     if found.v_world_m_s is not None:
         sds = found.across_sd_m_s, found.along_sd_m_s
@@ -472,7 +482,7 @@ def _sight(p_m: Vec3, p_camera: Vec3) -> tuple[float, float, float, float]:
     return x, y, z, range_m
 
 
-def correct_distance(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
+def correct_distance(track: BodyTrack, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
     """Return a detection's position with its distance corrected by the learned size of the face."""
     by_face = detection.R_world_face is not None
     if detection.depth_measured or track.depth_s is None or not by_face:

@@ -8,7 +8,7 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -96,7 +96,7 @@ class PlaybackPerception(Perception):
     """
 
     def __init__(self, mount: CameraMount, horizontal_field_deg: float) -> None:
-        super().__init__(mount, horizontal_field_deg, Tracker(TrackParams()))
+        super().__init__(mount, horizontal_field_deg, Tracker(TrackerParams()))
         self.percept: Percept | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:

@@ -25,7 +25,7 @@ class RunInfo:
         rate_hz: Control rate at the start.
         started_utc: Wall clock at the start, ISO 8601.
         walk_yaml: The face walk's file.
-        gestures_yaml: The gestures that the rig defines, "" if it defines none.
+        tracks_yaml: The tracks that the rig defines, "" if it defines none.
         scene: The simulated scene, None with a camera.
         eyes: Description of the camera.
         mock: Whether the servos were emulated.
@@ -45,7 +45,7 @@ class RunInfo:
     started_utc: str
     character: str | None = None
     walk_yaml: str = ""
-    gestures_yaml: str = ""
+    tracks_yaml: str = ""
     scene: str | None = None
     eyes: str = ""
     mock: bool = False
@@ -129,7 +129,7 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
         info = RunInfo(**found)
     except TypeError as error:
         raise ValueError(str(error)) from None
-    texts = ("rig", "profile", "config_yaml", "walk_yaml", "gestures_yaml", "eyes", "bus")
+    texts = ("rig", "profile", "config_yaml", "walk_yaml", "tracks_yaml", "eyes", "bus")
     optional = [key for key in ("character", "scene") if getattr(info, key) is not None]
     if not all(isinstance(getattr(info, key), str) for key in (*texts, *optional)):
         raise ValueError("a name of the run is not text")

@@ -376,26 +376,26 @@ class RobotClient:
         """
         self._command(SetLevel(level, value))
 
-    def play(self, gesture: str, speed: float = 1.0, times: int = 0) -> CommandReply:
-        """Play a gesture over gaze; "" ends the present one.
+    def play(self, track: str, speed: float = 1.0, times: int = 0) -> CommandReply:
+        """Play a track over gaze; "" ends the present one.
 
         Args:
-            gesture: Name of the gesture.
-            speed: Factor on the gesture's own speed.
-            times: Number of repetitions; 0: as the gesture defines.
+            track: Name of the track.
+            speed: Factor on the track's own speed.
+            times: Number of repetitions; 0: as the track defines.
 
         Returns:
-            Reply whose ``gesture`` has the duration and the reductions by the rig's limits.
+            Reply whose ``track`` has the duration and the reductions by the rig's limits.
 
         Raises:
-            RequestRejected: there is no such gesture, this rig cannot do it, the joints are under
+            RequestRejected: there is no such track, this rig cannot do it, the joints are under
                 manual control or the rig is stopped.
         """
-        return self._command(Play(gesture, speed, times, self.who))
+        return self._command(Play(track, speed, times, self.who))
 
-    def gestures(self) -> tuple[dict[str, Any], ...]:
-        """Return all gestures: name, description, duration_s, slowed_by, refused (if it is)."""
-        return tuple(cast(list[dict[str, Any]], self._connection.ask("gestures")))
+    def tracks(self) -> tuple[dict[str, Any], ...]:
+        """Return all tracks: name, description, duration_s, slowed_by, refused (if it is)."""
+        return tuple(cast(list[dict[str, Any]], self._connection.ask("tracks")))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point in the frame of the neck base: x ahead, y left, z up, m.

@@ -15,7 +15,7 @@ BUTTONS = {
     _SOUTH: "nod", _EAST: "shake", _WEST: "wink", _NORTH: "surprised", _LEFT_SHOULDER: "sleepy",
     _START: STOP,
 }  # fmt: skip
-"""Code of a button -> gesture or ``STOP``."""
+"""Code of a button -> track or ``STOP``."""
 
 
 class GamepadLost(DriverError):

@@ -17,8 +17,8 @@ from typing import NamedTuple, Protocol
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.robot.control.command_handler import CommandTarget, ParamAccess, PathGuard
-from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandTaker, Ticket
@@ -332,6 +332,6 @@ class _StopOnlyRobot:
         """Return no menus."""
         return {}
 
-    def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return no gestures."""
+    def tracks(self) -> tuple[TrackInfo, ...]:
+        """Return no tracks."""
         return ()

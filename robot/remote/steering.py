@@ -9,8 +9,8 @@ from math import hypot, radians
 
 from gazerig.gaze.angles import Angles2
 
-GESTURES = ("nod", "shake", "wink", "surprised", "sleepy")
-"""Gestures of the buttons, in the order of the page's buttons."""
+TRACKS = ("nod", "shake", "wink", "surprised", "sleepy")
+"""Tracks of the buttons, in the order of the page's buttons."""
 
 STOP = "stop"
 """Action of the button that switches the torque off."""

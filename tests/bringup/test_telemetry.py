@@ -13,13 +13,13 @@ from emulated_rig import EmulatedRig, mixed_rig
 from present import present
 from typer.testing import CliRunner
 
-from gazerig.config.gestures import load_gesture
 from gazerig.config.schema import Rig, load_rig
+from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
-from gazerig.features.bringup.cli.record_gesture import app
+from gazerig.features.bringup.cli.record_track import app
 from gazerig.features.bringup.hand_recording import record_hand_motion, switch_off
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.features.bringup.telemetry import (
@@ -32,12 +32,12 @@ from gazerig.features.bringup.telemetry import (
     telemetry_of,
 )
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
+from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
 from gazerig.robot.model.coupling import Differential
 from gazerig.robot.model.coupling_params import CoupledPair
-from gazerig.robot.model.gesture_fit import gesture_motions
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.mass_params import LinkMassParams, MassParams
+from gazerig.robot.model.track_fit import track_motions
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -262,7 +262,7 @@ def test_the_monitor_shows_the_joints_of_coupled_servos() -> None:
     assert joint_telemetry(pair, None, telemetry(1.0))[0] is None
 
 
-# --- A gesture that is recorded by hand: torque off, and the head's motion becomes its keys
+# --- A track that is recorded by hand: torque off, and the head's motion becomes its keys
 
 
 DESK = load_rig("desk")
@@ -303,7 +303,7 @@ class HandBench:
         return sample
 
 
-def test_a_head_moved_by_hand_becomes_a_gesture_that_moves_it_so(tmp_path: Path) -> None:
+def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(tmp_path: Path) -> None:
     bench = HandBench()
     switch_off(DESK.joints, bench.port)
 
@@ -313,13 +313,13 @@ def test_a_head_moved_by_hand_becomes_a_gesture_that_moves_it_so(tmp_path: Path)
 
     found = record_hand_motion(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
     assert found.ended_by == "the time is over" and set(found.series) == set(DESK.names)
-    path, fitted = write_gesture(
-        DESK, "mine", gesture_text(DESK, found.series, "by hand"), tmp_path, False
+    path, fitted = write_track(
+        DESK, "mine", track_text(DESK, found.series, "by hand"), tmp_path, False
     )
-    gesture = load_gesture(path)
-    assert gesture.space == "joint" and len(gesture.frames) < 40
+    track = load_track(path)
+    assert track.space == "joint" and len(track.frames) < 40
     assert fitted.slowed_by == 1.0
-    motion = gesture_motions(gesture, DESK.names).motion
+    motion = track_motions(track, DESK.names).motion
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at).value)
     wanted = np.array([how(t)["neck_pitch"] for t in at])

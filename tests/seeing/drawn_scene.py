@@ -103,7 +103,7 @@ def frames(scene: Scene, start_s: float, end_s: float, depth: bool = False) -> I
     locate = FrameLocator(None, radians(field))
     motion = SyntheticMotionDetector(rig.motion)
     camera = PixelCamera(drawn, later, mount, still, faces, rng, motion, locate)
-    perception = Perception(mount, field, Tracker(rig.tracks))
+    perception = Perception(mount, field, Tracker(rig.tracker))
     poses = PoseHistory(_Standing())  # type: ignore[arg-type]
     poses.remember(0.0, (0.0, 0.0, 0.0))
     for number in range(round(_HZ * (end_s - start_s))):

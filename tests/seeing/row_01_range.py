@@ -22,7 +22,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
-from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -78,7 +78,7 @@ def still_thing(noise_deg: float, swings: bool, pictures: int, seed: int) -> NDA
         seed: of the noise.
     """
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-    perception = Perception(mount, FIELD_DEG, Tracker(TrackParams(gate_m=5.0, gate_sigma=20.0)))
+    perception = Perception(mount, FIELD_DEG, Tracker(TrackerParams(gate_m=5.0, gate_sigma=20.0)))
     poses, rng, found = PoseHistory(_Neck()), np.random.default_rng(seed), []
     true = np.array([ASSUMED_M, 0.0, 0.1])
     for k in range(1, pictures + 1):

@@ -17,7 +17,7 @@ import gazerig
 from gazerig.config.export import abbreviate
 from gazerig.config.parameters import to_plain
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import gestures_text, params_text, walk_text
+from gazerig.config.save_text import params_text, tracks_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.lab.sweep.axes import Axis, Point
@@ -159,7 +159,7 @@ class SweepSpec:
             "search": dict(self.search),
             "rig": to_plain(self.rig),
             "walk": walk_text(scanpath.transition_matrix),
-            "gestures": gestures_text(self.rig.gesture_files),
+            "tracks": tracks_text(self.rig.track_files),
         }
 
     @property

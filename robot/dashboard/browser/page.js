@@ -75,8 +75,8 @@ window.addEventListener("rig-state", (event) => show(event.detail));
 // --- buttons --------------------------------------------------------------------------
 
 for (const button of moves) {
-  const { gesture, menu, choice } = button.dataset;
-  const what = gesture ? { do: "play", gesture } : { do: "ask", menu, choice };
+  const { track, menu, choice } = button.dataset;
+  const what = track ? { do: "play", track } : { do: "ask", menu, choice };
   button.addEventListener("click", () => {
     if (button.getAttribute("aria-disabled") === "true") return say(button.title);
     ask(what).catch((error) => say(`not done: ${error.message}`));
@@ -97,7 +97,7 @@ $("#swap").addEventListener("click", () => {
 
 const POINT_MS = 50, AGAIN_MS = 250;
 const RESTED_MS = 3000; // the rig ends the control a second after the last point
-const FREE = new Set(["", "gaze", "gesture", "pointer"]); // that the pointer may replace
+const FREE = new Set(["", "gaze", "track", "pointer"]); // that the pointer may replace
 const following = () => $("#pointer").getAttribute("aria-pressed") === "true";
 // The pointer moves the opponent of a boxing world instead of the gaze.
 const boxing = () => !$("#opponent").hidden && $("#opponent").getAttribute("aria-pressed") === "true";

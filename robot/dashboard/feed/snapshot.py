@@ -158,7 +158,7 @@ class SnapshotBuilder:
             trail=tuple(trail),
             events=tuple(events),
             others=said.others,
-            expressed=(self._newest.gesture.name, said.expression),
+            expressed=(self._newest.track.name, said.expression),
         )
 
 

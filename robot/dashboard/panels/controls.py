@@ -6,13 +6,13 @@ from math import degrees, radians
 
 import viser
 
-from gazerig.gaze.gesture.expression import NEUTRAL
+from gazerig.gaze.track.expression import NEUTRAL
 from gazerig.robot.dashboard.panels.param_panel import ParamPanels
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
-from gazerig.robot.model.commands import NO_GESTURE, Ask, Express, Jog, LookAt, Play
+from gazerig.robot.model.commands import NO_TRACK, Ask, Express, Jog, LookAt, Play
 from gazerig.robot.model.types import Snapshot, order_joints
 
 STEER = "steer"
@@ -47,8 +47,8 @@ class Controls:
         for name, choices in menus.items():
             if name == EXPRESSION:
                 self._face.offer(choices)
-            elif name == GESTURE:
-                self._face.offer_gestures(choices)
+            elif name == TRACK:
+                self._face.offer_tracks(choices)
             else:
                 self._lead.offer(name, choices)
                 self._first.offer(name, choices)
@@ -227,21 +227,21 @@ class FirstMenus:
 
 
 EXPRESSION = "expression"
-GESTURE = "gesture"
+TRACK = "track"
 """Names of the menus that are shown here."""
 _SPEEDS, _SPEED_STEP = (0.5, 2.0), 0.1
-"""Slowest and fastest speed of gestures, and its step."""
+"""Slowest and fastest speed of tracks, and its step."""
 
 
 class AnimationPanel:
-    """Section of the controls; it appears when the rig offers expressions or gestures."""
+    """Section of the controls; it appears when the rig offers expressions or tracks."""
 
     def __init__(self, place: Container, outbox: Outbox) -> None:
         self._place, self._outbox = place, outbox
         self._section: Container | None = None
         self.expressions: Buttons | None = None
         self.strength: Slider | None = None
-        self.gestures: Buttons | None = None
+        self.tracks: Buttons | None = None
         self.speed: Slider | None = None
 
     def offer(self, names: Sequence[str]) -> None:
@@ -259,25 +259,25 @@ class AnimationPanel:
 
         self.expressions.on_press(express)
 
-    def offer_gestures(self, names: Sequence[str]) -> None:
-        """Show a button for each gesture, instead of the previous ones; the first ends a gesture.
+    def offer_tracks(self, names: Sequence[str]) -> None:
+        """Show a button for each track, instead of the previous ones; the first ends a track.
 
         Args:
-            names: Gestures that the rig can play, and the name that ends the present one.
+            names: Tracks that the rig can play, and the name that ends the present one.
         """
-        options = tuple(sorted(names, key=lambda name: (name != NO_GESTURE, name)))
-        if self.gestures is not None:
-            self.gestures.options = options
+        options = tuple(sorted(names, key=lambda name: (name != NO_TRACK, name)))
+        if self.tracks is not None:
+            self.tracks.options = options
             return
         section = self._open_section()
-        self.gestures = section.buttons(GESTURE, options, order=3)
+        self.tracks = section.buttons(TRACK, options, order=3)
         speed = self.speed = section.slider("speed", _SPEEDS, _SPEED_STEP, 1.0, order=4)
 
         def play(name: str, client: str) -> None:
-            gesture = "" if name == NO_GESTURE else name
-            self._outbox.command(Play(gesture, float(speed.value)), client)
+            track = "" if name == NO_TRACK else name
+            self._outbox.command(Play(track, float(speed.value)), client)
 
-        self.gestures.on_press(play)
+        self.tracks.on_press(play)
 
     def _open_section(self) -> Container:
         """Return the section; create it at the first call."""
@@ -286,7 +286,7 @@ class AnimationPanel:
         return self._section
 
 
-GESTURES = ("nod", "shake", "surprised", "sleepy")
+TRACKS = ("nod", "shake", "surprised", "sleepy")
 WINK = "wink"
 _WITH_LIDS = ("surprised", "sleepy")
 _NO_LIDS = "this rig has no lids"
@@ -305,13 +305,13 @@ def refused_moves(
     """
     if not menus:
         return {}
-    if "gesture" not in menus:
-        return dict.fromkeys((*GESTURES, WINK), _NOT_NOW)
+    if "track" not in menus:
+        return dict.fromkeys((*TRACKS, WINK), _NOT_NOW)
     no_lids = joints is not None and not any("lid" in joint for joint in joints)
     refused = {
         name: _NO_LIDS if no_lids and name in _WITH_LIDS else _NO_JOINTS
-        for name in GESTURES
-        if name not in menus["gesture"]
+        for name in TRACKS
+        if name not in menus["track"]
     }
     return {**refused, WINK: _NO_LIDS} if no_lids else refused
 

@@ -13,7 +13,7 @@ from gazerig.robot.control.command_handler import (
     PendingCommand,
     QuestionAnswer,
 )
-from gazerig.robot.control.gesture_choices import GestureInfo
+from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import set_client
 from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume
@@ -150,8 +150,8 @@ class _CommandSink:
         """Return no menus: the page receives them separately."""
         return {}
 
-    def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return no gestures: the page receives their names separately."""
+    def tracks(self) -> tuple[TrackInfo, ...]:
+        """Return no tracks: the page receives their names separately."""
         return ()
 
 

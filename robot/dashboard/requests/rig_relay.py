@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.robot.control.command_handler import CHANGES
-from gazerig.robot.model.control_source import ControlState, GestureState
+from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import CONNECT_S
 from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, connect_to_socket
@@ -161,7 +161,7 @@ class StateFeed:
                 return None
         progress = Progress(
             ControlState(**state["client_control"]),
-            GestureState(**state["gesture"]),
+            TrackState(**state["track"]),
             state["controlled_by"],
         )
         lines = tuple(_line({"event": event}) for event in events)

@@ -60,7 +60,7 @@ _FACES_DEG: Mapping[str, tuple[float, float]] = {
     "sleepy": (-4.0, 3.0),
     "laugh": (5.0, 9.0),
 }
-"""Brows up and jaw down in an expression or a gesture of this name, as in the rig "expressive"."""
+"""Brows up and jaw down in an expression or a track of this name, as in the rig "expressive"."""
 _DRAWN_ONLY = ("left_brow", "right_brow", "jaw")
 """Joints that are drawn even if the rig does not have them."""
 _FACE_TAU_S = 0.15

@@ -1,4 +1,4 @@
-"""Fit of a gesture to a rig's joints, ranges and speeds, and of key frames to a motion.
+"""Fit of a track to a rig's joints, ranges and speeds, and of key frames to a motion.
 
 A densely sampled motion becomes few keys with minimum-jerk curves between. It is smoothed first.
 Keys are placed at its turning points, and at further points until the curve through the keys
@@ -11,91 +11,91 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture.gesture import (
-    EYE_TRACKS,
-    HEAD_TRACKS,
-    LID_TRACKS,
-    POSE_TRACKS,
-    Gesture,
+from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.track import (
+    EYE_CHANNELS,
+    HEAD_CHANNELS,
+    LID_CHANNELS,
+    POSE_CHANNELS,
     KeyFrame,
-    track_keys,
+    Track,
+    channel_keys,
 )
-from gazerig.gaze.gesture.gesture_motion import GestureMotion, MotionSamples
-from gazerig.gaze.gesture.gesture_player import OffsetState, PlayedGesture
-from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.track_motion import MotionSamples, TrackMotion
+from gazerig.gaze.track.track_player import OffsetState, PlayedTrack
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import further_joints
 
 _SMALLEST = 0.2
-"""Smallest share of a gesture that a range may leave; less is hardly visible and is not played."""
+"""Smallest share of a track that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-class GestureRefused(ValueError):
-    """A gesture that a rig cannot play; the message gives the joint, the time and the limit."""
+class TrackRefused(ValueError):
+    """A track that a rig cannot play; the message gives the joint, the time and the limit."""
 
 
-class FittedGesture(NamedTuple):
-    """A gesture fitted to this rig.
+class FittedTrack(NamedTuple):
+    """A track fitted to this rig.
 
     Attributes:
-        gesture: The gesture to play.
+        track: The track to play.
         slowed_by: Factor by which it takes longer than requested.
         slow_joint: Joint that needs this factor.
         reduced_joints: (joint, remaining share of its motion) for joints with too small ranges.
     """
 
-    gesture: PlayedGesture
+    track: PlayedTrack
     slowed_by: float = 1.0
     slow_joint: str = ""
     reduced_joints: tuple[tuple[str, float], ...] = ()
 
 
-class GestureMotions(NamedTuple):
-    """A gesture's curves on one rig, and the joints that the rig lacks."""
+class TrackMotions(NamedTuple):
+    """A track's curves on one rig, and the joints that the rig lacks."""
 
-    gesture: Gesture
-    motion: GestureMotion
+    track: Track
+    motion: TrackMotion
     left_out: tuple[str, ...]
 
 
-def gesture_motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureMotions:
-    """Return a gesture as curves of a rig's joints.
+def track_motions(track: Track, joints: Sequence[str], count: int = 0) -> TrackMotions:
+    """Return a track as curves of a rig's joints.
 
     Args:
-        gesture: The gesture.
+        track: The track.
         joints: Joints of the rig.
-        count: Number of repetitions, 0 for the gesture's own.
+        count: Number of repetitions, 0 for the track's own.
 
     Raises:
-        GestureRefused: It needs a joint that the rig lacks.
+        TrackRefused: It needs a joint that the rig lacks.
     """
-    frames, left_out = _frames_for(gesture, joints)
-    tracks = track_keys(gesture, frames, count or gesture.count)
-    there = {*joints, *EYE_TRACKS} - {*HEAD_TRACKS}
-    there |= {track for track in HEAD_TRACKS if _neck(track) in joints}
-    kept = {name: keys for name, keys in tracks.items() if name in there}
+    frames, left_out = _frames_for(track, joints)
+    channels = channel_keys(track, frames, count or track.count)
+    there = {*joints, *EYE_CHANNELS} - {*HEAD_CHANNELS}
+    there |= {channel for channel in HEAD_CHANNELS if _neck(channel) in joints}
+    kept = {name: keys for name, keys in channels.items() if name in there}
     if not kept:
-        raise GestureRefused(f"this rig has none of the joints that it moves: {', '.join(tracks)}")
-    motion = GestureMotion(kept, further_joints(joints), gesture.space == "joint")
-    return GestureMotions(gesture, motion, left_out)
+        raise TrackRefused(f"this rig has none of the joints that it moves: {', '.join(channels)}")
+    motion = TrackMotion(kept, further_joints(joints), track.space == "joint")
+    return TrackMotions(track, motion, left_out)
 
 
 def _frames_for(
-    gesture: Gesture, joints: Sequence[str]
+    track: Track, joints: Sequence[str]
 ) -> tuple[tuple[KeyFrame, ...], tuple[str, ...]]:
     """Return the frames that a rig plays, and the joints that it lacks."""
-    frames, lacking = gesture.frames, _missing_joints(gesture.frames, joints)
-    needed = [name for name in lacking if name not in gesture.optional]
-    if gesture.frames_without_neck and any(name.startswith("neck_") for name in needed):
-        frames, neck = gesture.frames_without_neck, lacking
+    frames, lacking = track.frames, _missing_joints(track.frames, joints)
+    needed = [name for name in lacking if name not in track.optional]
+    if track.frames_without_neck and any(name.startswith("neck_") for name in needed):
+        frames, neck = track.frames_without_neck, lacking
         lacking = [*neck, *_missing_joints(frames, joints)]
-        needed = [n for n in lacking if n not in gesture.optional and n not in neck]
+        needed = [n for n in lacking if n not in track.optional and n not in neck]
     if needed:
-        raise GestureRefused(
+        raise TrackRefused(
             f"it moves {', '.join(needed)}, which this rig lacks; list joints that it does not need "
             "under optional"
         )
@@ -106,19 +106,19 @@ def _missing_joints(frames: tuple[KeyFrame, ...], joints: Sequence[str]) -> list
     """Return the joints in frames that a rig lacks; groups of lids adapt to the rig."""
     named: dict[str, None] = {}
     for frame in frames:
-        heads = [_neck(t) for t in HEAD_TRACKS if getattr(frame, f"{t}_deg") is not None]
-        lids = [lid for lid in frame.lids if lid in LID_TRACKS]
+        heads = [_neck(t) for t in HEAD_CHANNELS if getattr(frame, f"{t}_deg") is not None]
+        lids = [lid for lid in frame.lids if lid in LID_CHANNELS]
         named |= dict.fromkeys([*heads, *lids, *frame.joints_deg])
     return [name for name in named if name not in joints]
 
 
-def _neck(track: str) -> str:
-    """Return the joint of a track of the head."""
-    return track.replace("head", "neck")
+def _neck(channel: str) -> str:
+    """Return the joint of a channel of the head."""
+    return channel.replace("head", "neck")
 
 
-class GestureFit:
-    """The fit of gestures to the limits of one rig.
+class TrackFit:
+    """The fit of tracks to the limits of one rig.
 
     Joint angles are linear in the offset: the eyes turn against the head, and a lid turns by
     its factor times its full range.
@@ -130,7 +130,7 @@ class GestureFit:
 
     def __init__(self, joints: tuple[str, ...], lid_spans_rad: Mapping[str, float]) -> None:
         self.joints = joints
-        channels = (*POSE_TRACKS, *further_joints(joints))
+        channels = (*POSE_CHANNELS, *further_joints(joints))
         self._matrix = np.zeros((len(channels), len(joints)))
         for j, name in enumerate(joints):
             if name in channels:
@@ -140,11 +140,11 @@ class GestureFit:
             else:
                 axis = 0 if name.endswith("pan") else 1
                 self._matrix[axis, j] = -1.0
-                self._matrix[channels.index(EYE_TRACKS[axis]), j] = 1.0
+                self._matrix[channels.index(EYE_CHANNELS[axis]), j] = 1.0
         # Ranges are checked only for direct motion of a joint: lids are limited by their
         # openings, and eyes that compensate for the head move as far as they can.
         self._own = np.where(self._matrix > 0.0, self._matrix, 0.0)
-        self._own[[channels.index(lid) for lid in LID_TRACKS]] = 0.0
+        self._own[[channels.index(lid) for lid in LID_CHANNELS]] = 0.0
 
     def subtract_offset(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
         """Return commanded joint angles without the offset's part."""
@@ -154,38 +154,38 @@ class GestureFit:
     def fit(
         self,
         name: str,
-        made: GestureMotions,
+        made: TrackMotions,
         speed: float,
         base_rad: Floats,
         limits: Sequence[JointLimit],
         share: float,
-    ) -> FittedGesture:
-        """Fit a gesture to the rig at its present angles.
+    ) -> FittedTrack:
+        """Fit a track to the rig at its present angles.
 
         Args:
-            name: Name of the gesture.
+            name: Name of the track.
             made: Its curves on this rig.
             speed: Factor on its defined speed.
             base_rad: Joint angles to which it is added.
             limits: Limits of the joints.
-            share: Share of speed and acceleration limits for gestures; the rest is for gaze.
+            share: Share of speed and acceleration limits for tracks; the rest is for gaze.
 
         Raises:
-            GestureRefused: It cannot be done, or only with changes that it does not allow.
+            TrackRefused: It cannot be done, or only with changes that it does not allow.
         """
-        slow, motion = made.gesture.fit == "slow", made.motion
+        slow, motion = made.track.fit == "slow", made.motion
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
         if smaller and not slow:
-            raise GestureRefused(self._beyond_range(motion.samples, base_rad, limits))
+            raise TrackRefused(self._beyond_range(motion.samples, base_rad, limits))
         if smaller and min(left for _, left in smaller) < _SMALLEST:
             joint = min(smaller, key=lambda one: one[1])[0]
-            raise GestureRefused(f"{joint} is at the end of its range")
+            raise TrackRefused(f"{joint} is at the end of its range")
         samples = motion.samples.scale(sizes, speed)
         factor, joint, text = self._too_fast(samples, limits, share)
         if factor > 1.0 + _ROUNDING and not slow:
-            raise GestureRefused(text)
-        played = PlayedGesture(name, motion, speed / factor, tuple(sizes.tolist()))
-        return FittedGesture(played, factor, joint if factor > 1.0 + _ROUNDING else "", smaller)
+            raise TrackRefused(text)
+        played = PlayedTrack(name, motion, speed / factor, tuple(sizes.tolist()))
+        return FittedTrack(played, factor, joint if factor > 1.0 + _ROUNDING else "", smaller)
 
     def _sizes(
         self, samples: MotionSamples, base_rad: Floats, limits: Sequence[JointLimit]
@@ -234,7 +234,7 @@ class GestureFit:
                 asked = degrees(ratio[row, j] * most[j])
                 found = factor, self.joints[j], (
                     f"{self.joints[j]} at {samples.times_s[row]:.2f} s: needs {asked:.0f} {unit}, but "
-                    f"gestures may use {degrees(most[j]):.0f} ({share:g} of the joint's limit)"
+                    f"tracks may use {degrees(most[j]):.0f} ({share:g} of the joint's limit)"
                 )  # fmt: skip
         return found
 
@@ -256,11 +256,11 @@ class GestureFit:
         self,
         state: OffsetState,
         fade_s: float,
-        played: PlayedGesture,
+        played: PlayedTrack,
         limits: Sequence[JointLimit],
         share: float,
     ) -> float:
-        """Return the time for which a gesture must wait for the present one to fade."""
+        """Return the time for which a track must wait for the present one to fade."""
         if not any(map(np.any, state)):
             return 0.0
         fade = _fade_samples(state, fade_s)

@@ -1,20 +1,20 @@
-"""Gestures begin, end and are interrupted at random moments: no joint jumps or breaks a limit."""
+"""Tracks begin, end and are interrupted at random moments: no joint jumps or breaks a limit."""
 
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from gazerig.config.gestures import shipped_gestures
 from gazerig.config.schema import load_rig
-from gazerig.gaze.gesture.gesture import GestureParams
-from gazerig.gaze.gesture.gesture_player import GesturePlayer
-from gazerig.gaze.gesture.pose_offset import PoseOffset
+from gazerig.config.tracks import shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
+from gazerig.gaze.track.pose_offset import PoseOffset
+from gazerig.gaze.track.track import TrackParams
+from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits
-from gazerig.robot.control.gesture_choices import GestureChoices
+from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import Play
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.types import further_joints
@@ -24,11 +24,11 @@ TARGET = (1.0, 0.0, 0.25)
 
 
 class Moments(NamedTuple):
-    """What a chain of interrupted gestures asked of the joints.
+    """What a chain of interrupted tracks asked of the joints.
 
     step_deg, speed_share, accel_share: (joints,) largest step in a tick, and largest speed and
         acceleration over the joint's limit
-    began: gestures that were begun
+    began: tracks that were begun
     """
 
     joints: tuple[str, ...]
@@ -65,18 +65,16 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     return np.stack([angles[name] for name in rig.names], axis=1)
 
 
-def interrupted(
-    gesture: str, rig_name: str, moments: int, seed: int, dt_s: float = DT_S
-) -> Moments:
-    """Play a gesture and, at random moments, another one, the same again, or nothing."""
+def interrupted(track: str, rig_name: str, moments: int, seed: int, dt_s: float = DT_S) -> Moments:
+    """Play a track and, at random moments, another one, the same again, or nothing."""
     rig, random = load_rig(rig_name), np.random.default_rng(seed)
-    player = GesturePlayer(len(further_joints(rig.joints)))
-    choices = GestureChoices(shipped_gestures(), player, GestureParams(), rig.names, lid_spans(rig))
-    bounds, others = limits(rig.joints), (*choices.names, gesture, gesture, "")
+    player = TrackPlayer(len(further_joints(rig.joints)))
+    choices = TrackChoices(shipped_tracks(), player, TrackParams(), rig.names, lid_spans(rig))
+    bounds, others = limits(rig.joints), (*choices.names, track, track, "")
     at_rest = tuple([0.0] * len(rig.names))
     offsets, t, began = [player.step(0.0)] * 3, 0.0, 0
     for _ in range(moments):
-        name = gesture if not player.playing else others[int(random.integers(len(others)))]
+        name = track if not player.playing else others[int(random.integers(len(others)))]
         speed = float(random.uniform(0.5, 2.0))
         reply = choices.play(Play(name, speed), t, at_rest, bounds)
         began += bool(name) and not reply.refused
@@ -96,13 +94,13 @@ def interrupted(
 
 
 RIG_OF = dict(
-    zip(shipped_gestures(), ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
+    zip(shipped_tracks(), ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("gesture", shipped_gestures())
-def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(gesture: str) -> None:
-    found = interrupted(gesture, RIG_OF[gesture], 400, seed=len(gesture))
+@pytest.mark.parametrize("track", shipped_tracks())
+def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(track: str) -> None:
+    found = interrupted(track, RIG_OF[track], 400, seed=len(track))
     assert found.began > 280
     assert found.step_deg.max() > 0.1  # something has moved
     assert found.speed_share.max() < 1.0
@@ -110,17 +108,17 @@ def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(gesture: str) ->
 
 
 def test_a_player_that_jumps_would_be_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def at_once(self: GesturePlayer, played: object, t: float, fade: float, wait: float) -> None:
+    def at_once(self: TrackPlayer, played: object, t: float, fade: float, wait: float) -> None:
         self._played, self._begins_s, self._fades = played, t, []  # type: ignore[assignment]
 
-    monkeypatch.setattr(GesturePlayer, "play", at_once)
+    monkeypatch.setattr(TrackPlayer, "play", at_once)
     found = interrupted("nod", "desk", 50, seed=1)
     assert found.accel_share.max() > 10.0
 
 
 if __name__ == "__main__":
     for rig_name in ("desk", "feetech", "maker", "expressive"):
-        for name in shipped_gestures():
+        for name in shipped_tracks():
             if name == "brow_shrug" and rig_name != "expressive":
                 continue
             one = interrupted(name, rig_name, 1000, seed=7, dt_s=0.005)

@@ -1,4 +1,4 @@
-"""Motion added to gaze: gestures, expressions and levels as offsets of the head's pose.
+"""Motion added to gaze: tracks, expressions and levels as offsets of the head's pose.
 
 Gaze continues: the eyes compensate offsets of the head's angles and stay on their target (the
 vestibulo-ocular reflex of ``gazerig.gaze.oculomotor.oculomotor``).
@@ -7,11 +7,11 @@ vestibulo-ocular reflex of ``gazerig.gaze.oculomotor.oculomotor``).
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from gazerig.gaze.gesture.expression import Expressions
-from gazerig.gaze.gesture.gesture_player import GesturePlayer
-from gazerig.gaze.gesture.level import LevelRange, Levels
-from gazerig.gaze.gesture.pose_offset import NO_OFFSET as NO_OFFSET
-from gazerig.gaze.gesture.pose_offset import PoseOffset as PoseOffset
+from gazerig.gaze.track.expression import Expressions
+from gazerig.gaze.track.level import LevelRange, Levels
+from gazerig.gaze.track.pose_offset import NO_OFFSET as NO_OFFSET
+from gazerig.gaze.track.pose_offset import PoseOffset as PoseOffset
+from gazerig.gaze.track.track_player import TrackPlayer
 
 
 class AnimationTables(NamedTuple):
@@ -31,7 +31,7 @@ NO_TABLES = AnimationTables({}, 0.5, {})
 class Animation:
     """Sum of all motions besides gaze, as one offset per tick.
 
-    expressions, levels, gestures: parts that accept the commands
+    expressions, levels, tracks: parts that accept the commands
     """
 
     def __init__(self, joints: tuple[str, ...] = (), tables: AnimationTables = NO_TABLES) -> None:
@@ -43,14 +43,14 @@ class Animation:
         """
         self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))
         self.levels = Levels(tables.levels, len(joints))
-        self.gestures = GesturePlayer(len(joints))
+        self.tracks = TrackPlayer(len(joints))
         self._sum = NO_OFFSET
 
     def reset(self, t_s: float) -> None:
         """Begin at rest at a time."""
         self.expressions.reset()
         self.levels.reset()
-        self.gestures.reset()
+        self.tracks.reset()
 
     def retune(self, tables: AnimationTables) -> None:
         """Change the tables; motions continue without a jump."""
@@ -59,8 +59,8 @@ class Animation:
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset of the pose in this tick."""
-        expressions, levels, gestures = self.expressions, self.levels, self.gestures
-        if expressions.moves or levels.moves or gestures.moves:
+        expressions, levels, tracks = self.expressions, self.levels, self.tracks
+        if expressions.moves or levels.moves or tracks.moves:
             face = expressions.step(t_s).combine(levels.step(t_s))
-            self._sum = face.combine(gestures.step(t_s))
+            self._sum = face.combine(tracks.step(t_s))
         return self._sum

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Annotated, NamedTuple
 
-from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
+from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.params import Bounds
 
 HOLD_S = 0.5

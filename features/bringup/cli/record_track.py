@@ -1,4 +1,4 @@
-"""The command record-gesture: torque off, and a gesture is recorded by hand."""
+"""The command record-track: torque off, and a track is recorded by hand."""
 
 import sys
 from contextlib import ExitStack
@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from gazerig.config.gestures import gesture_name
 from gazerig.config.schema import load_rig
+from gazerig.config.tracks import track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.features.bringup.cli.motion import enter_pressed
@@ -22,7 +22,6 @@ from gazerig.features.bringup.cli.ports import (
 from gazerig.features.bringup.hand_recording import LONGEST_S, record_hand_motion, switch_off
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
-from gazerig.robot.cli.gestures import FolderOption, print_gesture_fit
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
@@ -32,16 +31,17 @@ from gazerig.robot.cli.terminal import (
     record_signals,
     say,
 )
+from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
 
 
-@app.command("record-gesture", cls=RigCommand)
-def record_gesture(
+@app.command("record-track", cls=RigCommand)
+def record_track(
     rig: RigArgument = "desk",
     *,
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the gesture.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the track.")],
     seconds: Annotated[
         float, typer.Option(min=0.5, max=LONGEST_S, help="Longest time, s; Enter ends it earlier.")
     ] = LONGEST_S,
@@ -53,9 +53,9 @@ def record_gesture(
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Record a gesture in YAML while you move the head by hand, torque off."""
+    """Record a track in YAML while you move the head by hand, torque off."""
     with clear_errors(rig, port, mock):
-        from gazerig.robot.app.gesture_file import gesture_text, write_gesture
+        from gazerig.robot.app.track_file import track_text, write_track
 
         loaded = load_rig(rig)
         measured = [one for one in loaded.names if loaded.joints[one].model_facts.measures_position]
@@ -63,7 +63,7 @@ def record_gesture(
             raise SetupError(
                 f"{rig}: hobby servos do not report their position: none can be recorded"
             )
-        gesture_name(f"{name}.yaml")
+        track_name(f"{name}.yaml")
         refuse_existing(folder / f"{name}.yaml", force=force)
         confirm_safe(
             "the torque of all servos goes off and stays off: a heavy head drops",
@@ -94,5 +94,5 @@ def record_gesture(
             raise typer.Exit(INTERRUPTED)
         for one in recorded.left_out:
             say(f"{one}: answered too seldom and is left out")
-        text = gesture_text(loaded, recorded.series, "recorded by hand")
-        print_gesture_fit(loaded.name, *write_gesture(loaded, name, text, folder, force))
+        text = track_text(loaded, recorded.series, "recorded by hand")
+        print_track_fit(loaded.name, *write_track(loaded, name, text, folder, force))

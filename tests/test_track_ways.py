@@ -1,4 +1,4 @@
-"""Gestures from the command line, from Python, on the page, from menus and by rules."""
+"""Tracks from the command line, from Python, on the page, from menus and by rules."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import RULES, load_rig
 from gazerig.gaze.attention.top_down import Rule
-from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
+from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
@@ -33,29 +33,29 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
-def test_gestures_from_the_command_line(rig: TickedRig) -> None:
+def test_tracks_from_the_command_line(rig: TickedRig) -> None:
     assert "nod takes 1.0 s" in gazerig("ctl", "play", "nod")
     assert rig.commands[-1] == Play("nod", 1.0, 0, rig.commands[-1].who)  # type: ignore[union-attr]
     before = rig.tick(20)["neck_pitch"]
     assert rig.tick(25)["neck_pitch"] < before - 4.0
     assert "laugh takes" in gazerig("ctl", "play", "laugh", "--count", "6", "--speed", "1.2")
-    assert "gestures end within" in gazerig("ctl", "play", "none")
+    assert "tracks end within" in gazerig("ctl", "play", "none")
     listed = gazerig("ctl", "play", "--list")
     assert "brow_shrug    who knows: the brows go up (1.2 s)" in listed and "nod " in listed
-    assert "no gesture 'wink'; available: brow_shrug" in gazerig("ctl", "play", "wink")
+    assert "no track 'wink'; available: brow_shrug" in gazerig("ctl", "play", "wink")
 
 
 def test_the_reply_says_what_is_really_done(rig: TickedRig) -> None:
     client = RobotClient.connect()
     reply = client.play("nod", speed=4.0)
-    assert reply.gesture is not None and reply.gesture.slow_joint == "neck_pitch"
-    assert reply.gesture.duration_s == pytest.approx(reply.gesture.slowed_by / 4.0)
-    assert f"slower by {reply.gesture.slowed_by:.2f} for neck_pitch" in reply.text()
-    names = {one["name"]: one for one in client.gestures()}
+    assert reply.track is not None and reply.track.slow_joint == "neck_pitch"
+    assert reply.track.duration_s == pytest.approx(reply.track.slowed_by / 4.0)
+    assert f"slower by {reply.track.slowed_by:.2f} for neck_pitch" in reply.text()
+    names = {one["name"]: one for one in client.tracks()}
     assert names["nod"]["duration_s"] == pytest.approx(1.0) and not names["nod"]["refused"]
 
 
-def test_whoever_is_stopped_or_led_by_hand_does_not_gesture(rig: TickedRig) -> None:
+def test_whoever_is_stopped_or_led_by_hand_does_not_track(rig: TickedRig) -> None:
     rig.command(Play("nod"))
     rig.tick(40)
     rig.command(Stop("test", "me"))
@@ -64,47 +64,47 @@ def test_whoever_is_stopped_or_led_by_hand_does_not_gesture(rig: TickedRig) -> N
     rig.tick(410)
     reply = rig.command(Resume("me", True)).wait(0.0)
     assert reply is not None and not reply.refused, reply
-    assert rig.made.robot.menus()["gesture"][0] == "none"  # the stop has ended the nod
+    assert rig.made.robot.menus()["track"][0] == "none"  # the stop has ended the nod
     rig.command(Jog((("jaw", 0.1),), "me", True))
     with pytest.raises(RequestRejected, match="held at their angles"):
         RobotClient.connect().play("nod")
 
 
 def test_menus_offer_what_this_rig_can_do_and_what_is_under_way(rig: TickedRig) -> None:
-    assert rig.made.robot.menus()["gesture"][:2] == ("none", "brow_shrug")
-    rig.command(Ask("gesture", "tilt"))
+    assert rig.made.robot.menus()["track"][:2] == ("none", "brow_shrug")
+    rig.command(Ask("track", "tilt"))
     rig.tick(5)
-    assert rig.made.robot.menus()["gesture"][0] == "tilt"
-    rig.command(Ask("gesture", "none"))
+    assert rig.made.robot.menus()["track"][0] == "tilt"
+    rig.command(Ask("track", "none"))
     rig.tick(200)
-    assert rig.made.robot.menus()["gesture"][0] == "none"
+    assert rig.made.robot.menus()["track"][0] == "none"
 
 
 def test_the_command_is_data() -> None:
     command = Play("nod", 1.5, 3, "me")
     assert from_json(as_json(command)) == command
     assert from_recorded_json(as_recorded_json(command)) == command
-    assert from_json({"do": "play", "gesture": "nod"}) == Play("nod")
+    assert from_json({"do": "play", "track": "nod"}) == Play("nod")
     for wrong in (
         *(Play("nod", speed) for speed in (0.0, -1.0, 9.0, float("nan"), float("inf"))),
         *(Play("nod", 1.0, times) for times in (-1, 21, True, 1.5)),  # type: ignore[arg-type]
         Play("n" * 999),
         Play(3),  # type: ignore[arg-type]
     ):
-        with pytest.raises(ValueError, match="gesture"):
+        with pytest.raises(ValueError, match="track"):
             check_command(wrong)
 
 
 def test_buttons_and_speed_on_the_page() -> None:
     outbox = Outbox()
     panel = AnimationPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
-    panel.offer_gestures(["tilt", "none", "nod"])
-    gestures, speed = panel.gestures, panel.speed
-    assert gestures is not None and speed is not None
-    assert gestures.options == ("none", "nod", "tilt")
+    panel.offer_tracks(["tilt", "none", "nod"])
+    tracks, speed = panel.tracks, panel.speed
+    assert tracks is not None and speed is not None
+    assert tracks.options == ("none", "nod", "tilt")
     speed.receive_input(1.5, "5")
     for chosen in ("nod", "none"):
-        gestures.receive_input(chosen, "5")
+        tracks.receive_input(chosen, "5")
     assert outbox.asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
 
 
@@ -112,9 +112,9 @@ def looked_at(kind: str, number: int = 1) -> Target:
     return Target((1.0, 0.0, 0.2), (0.0, 0.0, 0.0), 0.0, kind, number, 0.5, True, None, 0, "")
 
 
-def test_a_rule_plays_its_gesture_at_its_onset_and_not_again_too_soon() -> None:
+def test_a_rule_plays_its_track_at_its_onset_and_not_again_too_soon() -> None:
     rule = Rule("face", 0.5, gesture="nod", gesture_at="hand", gesture_refractory_s=2.0)
-    trigger = GestureTrigger()
+    trigger = TrackTrigger()
     seen = [(0.0, "face"), (0.1, "hand"), (0.2, "hand"), (0.3, "face"), (0.4, "hand"),
             (1.9, "face"), (2.2, "hand"), (9.0, "hand")]  # fmt: skip
     played = [t for t, kind in seen if trigger.step("wait", rule, looked_at(kind), t)]
@@ -131,12 +131,12 @@ def test_a_visitor_who_waves_is_nodded_to() -> None:
     )
     said: list[str] = []
     session.run(session.compose(options), lambda: None, said.append)
-    (nod,) = [line for line in said if "gesture" in line]
+    (nod,) = [line for line in said if "track" in line]
     at_s = float(nod.split(" s: ")[0])
     assert 17.5 < at_s < 18.5 and "for rule wait: nod takes 1.0 s" in nod  # the wave begins at 17.5
 
 
-def test_a_rule_that_names_no_gesture_is_refused_with_those_there_are() -> None:
+def test_a_rule_that_names_no_track_is_refused_with_those_there_are() -> None:
     with pytest.raises(ConfigError, match=r"rules\.wait\.gesture: no gesture 'nodd'.*nod"):
         apply_changes(load_rig("desk"), {"gaze.top_down.rules.wait.gesture": "nodd"})
     assert not [1 for rule in RULES for _ in rule(load_rig("desk"))]

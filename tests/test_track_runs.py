@@ -1,4 +1,4 @@
-"""Gestures on whole robots over emulated servos in simulated time: followed, within every limit."""
+"""Tracks on whole robots over emulated servos in simulated time: followed, within every limit."""
 
 from dataclasses import replace
 from math import degrees
@@ -36,17 +36,17 @@ def steady(name: str) -> Rig:
     return replace(rig, gaze=gaze)
 
 
-def played(made: Assembly, gesture: str) -> tuple[CommandReply, list[Tick]]:
-    """Play a gesture and go on until shortly after its end."""
-    ticket = made.robot.command(Play(gesture))
+def played(made: Assembly, track: str) -> tuple[CommandReply, list[Tick]]:
+    """Play a track and go on until shortly after its end."""
+    ticket = made.robot.command(Play(track))
     first = ticks(made, 1)
     reply = ticket.wait(0.0)
-    assert reply is not None and reply.gesture is not None, reply
-    return reply, first + ticks(made, int(reply.gesture.duration_s / DT) + 60)
+    assert reply is not None and reply.track is not None, reply
+    return reply, first + ticks(made, int(reply.track.duration_s / DT) + 60)
 
 
 @pytest.mark.parametrize("name", ("desk", "expressive", "feetech", "maker"))
-def test_joints_follow_gestures_within_limits_and_the_eyes_stay_on_the_point(name: str) -> None:
+def test_joints_follow_tracks_within_limits_and_the_eyes_stay_on_the_point(name: str) -> None:
     rig = steady(name)
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
     bounds = limits(rig.joints)
@@ -55,8 +55,8 @@ def test_joints_follow_gestures_within_limits_and_the_eyes_stay_on_the_point(nam
         made.robot.start(made.clock)
         made.robot.command(LookAt(POINT, "test", stay=True))
         before = ticks(made, 500)[-1]
-        for gesture in ("nod", "shake", "laugh", "look_around"):
-            _, done = played(made, gesture)
+        for track in ("nod", "shake", "laugh", "look_around"):
+            _, done = played(made, track)
             desired = np.array([tick.desired_rad for tick in done])
             commanded = np.array([tick.guard_result.command_rad for tick in done])
             measured = np.array([tick.joints.position_rad for tick in done])
@@ -68,12 +68,12 @@ def test_joints_follow_gestures_within_limits_and_the_eyes_stay_on_the_point(nam
             # A blink may come in between and ask for more than a lid can do; nothing else may.
             assert np.array_equal(desired[:, ~lids], commanded[:, ~lids])
             moved = np.ptp(commanded[:, ~lids], axis=0)
-            if gesture != "laugh" or "neck_pitch" in rig.names:
+            if track != "laugh" or "neck_pitch" in rig.names:
                 assert degrees(moved.max()) > 4.0
             behind = np.abs(commanded - measured)[:, ~lids].max(axis=0)
             assert degrees(behind.max()) < 7.0 and (behind < 0.75 * moved + 0.02).all()
             assert np.abs(desired[-1] - before.desired_rad)[~lids].max() < np.radians(0.1)
-            if gesture in ("nod", "shake", "laugh") and "neck_pitch" in rig.names:
+            if track in ("nod", "shake", "laugh") and "neck_pitch" in rig.names:
                 errors = [
                     gaze_error(POINT, tick.pose, "eyes_pan" not in rig.names) for tick in done
                 ]

@@ -7,7 +7,7 @@ from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
-class TrackParams:
+class TrackerParams:
     """Assumed motion of people and things, and times of the tracking."""
 
     # fmt: off

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
+from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 
 NEUTRAL = "neutral"
 """The initial expression. It always exists; without an entry all its offsets are 0."""

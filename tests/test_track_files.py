@@ -1,4 +1,4 @@
-"""Gestures from tables of animation programs."""
+"""Tracks from tables of animation programs."""
 
 from math import pi
 from pathlib import Path
@@ -8,14 +8,14 @@ import pytest
 from typer.testing import CliRunner
 
 from gazerig.config.allowed_folder import AllowedFolder
-from gazerig.config.gestures import load_gesture
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
+from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
-from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, read_table, write_gesture
-from gazerig.robot.cli.gestures import app
-from gazerig.robot.model.gesture_fit import fit_keys, smooth
+from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.robot.app.track_file import TOLERANCE_DEG, read_table, track_text, write_track
+from gazerig.robot.cli.tracks import app
+from gazerig.robot.model.track_fit import fit_keys, smooth
 
 DESK = load_rig("desk")
 
@@ -32,16 +32,16 @@ FRAMES = "frame\tneck_pitch\tneck_yaw\n0\t0\t5\n12\t-8\t\n24\t0\t9\n"
 
 
 @pytest.mark.parametrize("text", [WIDE, LONG, FRAMES])
-def test_wide_and_long_tables_and_frame_numbers_are_the_same_gesture(
+def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
     text: str, tmp_path: Path
 ) -> None:
-    found = gesture_text(DESK, read_table(table(tmp_path, text), 24.0), "x")
-    path, fitted = write_gesture(DESK, "mine", found, tmp_path, False)
-    assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_gesture(path).frames] == [
+    found = track_text(DESK, read_table(table(tmp_path, text), 24.0), "x")
+    path, fitted = write_track(DESK, "mine", found, tmp_path, False)
+    assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
         (0.5, -8.0, None),
         (1.0, 0.0, 4.0),
     ]
-    assert fitted.slowed_by == 1.0 and fitted.gesture.duration_s == pytest.approx(1.4)
+    assert fitted.slowed_by == 1.0 and fitted.track.duration_s == pytest.approx(1.4)
 
 
 BAD = {
@@ -56,14 +56,14 @@ BAD = {
     "time,neck_yaw\n": "no rows",
     "time,tail\n0,1\n1,5\n": "no joint 'tail'; available: left_eye_pan",
     "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
-    "time,neck_yaw\n0,1\n99,5\n": "a gesture takes at most 60 s",
+    "time,neck_yaw\n0,1\n99,5\n": "a track takes at most 60 s",
 }
 
 
 @pytest.mark.parametrize("text", BAD)
 def test_bad_rows_are_named_with_their_line(text: str, tmp_path: Path) -> None:
     with pytest.raises(SetupError) as caught:
-        gesture_text(DESK, read_table(table(tmp_path, text), None), "x")
+        track_text(DESK, read_table(table(tmp_path, text), None), "x")
     assert BAD[text] in str(caught.value)
 
 
@@ -99,8 +99,8 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     assert len(still[0]) == 0
 
 
-def test_a_page_names_gesture_files_in_its_folder_alone(tmp_path: Path) -> None:
+def test_a_page_names_track_files_in_its_folder_alone(tmp_path: Path) -> None:
     folder = AllowedFolder(tmp_path)
-    folder.check_changes({"gesture_files": [str(tmp_path / "mine.yaml")]})
-    with pytest.raises(ConfigError, match="gesture_files"):
-        folder.check_changes({"gesture_files": [str(tmp_path / "mine.yaml"), "/etc/passwd.yaml"]})
+    folder.check_changes({"track_files": [str(tmp_path / "mine.yaml")]})
+    with pytest.raises(ConfigError, match="track_files"):
+        folder.check_changes({"track_files": [str(tmp_path / "mine.yaml"), "/etc/passwd.yaml"]})

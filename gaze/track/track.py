@@ -1,8 +1,8 @@
-"""Gestures as data: key frames of motion that is added to gaze, such as a nod.
+"""Tracks as data: key frames of motion that is added to gaze, such as a nod.
 
 A frame sets head, eyes, lids and further joints at a time, relative to their positions by gaze. A
-track without a value in a frame continues to the next frame that has one. Between the frames
-everything moves with least jerk (``gazerig.gaze.gesture.minimum_jerk_curve``), from rest and back
+channel without a value in a frame continues to the next frame that has one. Between the frames
+everything moves with least jerk (``gazerig.gaze.track.minimum_jerk_curve``), from rest and back
 to rest.
 """
 
@@ -15,33 +15,33 @@ from typing import Annotated, Literal, NamedTuple
 from gazerig.params import Bounds
 
 MIN_SPEED, MAX_SPEED = 0.1, 4.0
-"""Range of factors on the original speed of a gesture."""
+"""Range of factors on the original speed of a track."""
 MAX_COUNT = 20
-"""Largest number of repetitions of a gesture by one command."""
+"""Largest number of repetitions of a track by one command."""
 MAX_FRAMES = 2000
-"""Largest number of frames of a gesture: 33 per second for a minute."""
-HEAD_TRACKS = ("head_yaw", "head_pitch", "head_roll")
-EYE_TRACKS = ("eyes_yaw", "eyes_pitch")
-LID_TRACKS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
-POSE_TRACKS = (*HEAD_TRACKS, *EYE_TRACKS, *LID_TRACKS)
-"""The tracks of all rigs, in the order of PoseOffset.flat(); further joints follow them."""
+"""Largest number of frames of a track: 33 per second for a minute."""
+HEAD_CHANNELS = ("head_yaw", "head_pitch", "head_roll")
+EYE_CHANNELS = ("eyes_yaw", "eyes_pitch")
+LID_CHANNELS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
+POSE_CHANNELS = (*HEAD_CHANNELS, *EYE_CHANNELS, *LID_CHANNELS)
+"""The channels of all rigs, in the order of PoseOffset.flat(); further joints follow them."""
 LID_GROUPS: Mapping[str, tuple[str, ...]] = {
-    "all": LID_TRACKS,
-    "upper": LID_TRACKS[:2],
-    "lower": LID_TRACKS[2:],
-    "left": LID_TRACKS[::2],
-    "right": LID_TRACKS[1::2],
-    **{name: (name,) for name in LID_TRACKS},
+    "all": LID_CHANNELS,
+    "upper": LID_CHANNELS[:2],
+    "lower": LID_CHANNELS[2:],
+    "left": LID_CHANNELS[::2],
+    "right": LID_CHANNELS[1::2],
+    **{name: (name,) for name in LID_CHANNELS},
 }
 """Lids that a frame may name, groups before single lids."""
 
 
 @dataclass(frozen=True)
 class KeyFrame:
-    """Positions at one time of a gesture; anything that is not named does not move."""
+    """Positions at one time of a track; anything that is not named does not move."""
 
     # fmt: off
-    time_s: Annotated[float, Bounds(0.02, 60), "time since the start of the gesture"]
+    time_s: Annotated[float, Bounds(0.02, 60), "time since the start of the track"]
     head_yaw_deg: Annotated[float | None, Bounds(-90, 90), "head turn to the left, added to the gaze"] = None
     head_pitch_deg: Annotated[float | None, Bounds(-90, 90), "head turn upwards, added to the gaze"] = None
     head_roll_deg: Annotated[float | None, Bounds(-90, 90), "head tilt towards the right shoulder"] = None
@@ -71,23 +71,23 @@ class KeyFrame:
             raise ValueError("names no motion; give e.g. head_pitch_deg")
 
     def values(self) -> dict[str, float]:
-        """Return the value of each track that the frame names: radians, and factors of lids."""
+        """Return the value of each channel that the frame names: radians, and factors of lids."""
         angles = {
-            name: getattr(self, f"{name}_deg") for name in (*HEAD_TRACKS, *EYE_TRACKS)
+            name: getattr(self, f"{name}_deg") for name in (*HEAD_CHANNELS, *EYE_CHANNELS)
         } | dict(self.joints_deg)
         found = {name: radians(angle) for name, angle in angles.items() if angle is not None}
-        for group, tracks in LID_GROUPS.items():
+        for group, channels in LID_GROUPS.items():
             if group in self.lids:
-                found.update(dict.fromkeys(tracks, self.lids[group]))
+                found.update(dict.fromkeys(channels, self.lids[group]))
         return found
 
 
 @dataclass(frozen=True)
-class Gesture:
-    """One gesture."""
+class Track:
+    """One track."""
 
     # fmt: off
-    description: Annotated[str, "meaning of the gesture"]
+    description: Annotated[str, "meaning of the track"]
     frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; everything returns to rest after the last one"]
     space: Annotated[Literal["gaze", "joint"],
         "gaze: the eyes stay on their target while the head moves; joint: they move with the head"] = "gaze"
@@ -95,11 +95,11 @@ class Gesture:
         "if a rig cannot do it: slow: play it more slowly, and smaller at the end of a range; refuse: do not play it"] = "refuse"
     count: Annotated[int, Bounds(1, MAX_COUNT), "number of repetitions"] = 1
     loop_s: Annotated[tuple[float, float] | None, Bounds(0, 60),
-        "times of the two frames between which it repeats; null: the whole gesture repeats"] = None
-    return_s: Annotated[float, Bounds(0.05, 10), "time in which the tracks that are displaced in the last frame return to rest"] = 0.4
-    optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the gesture"] = ()
+        "times of the two frames between which it repeats; null: the whole track repeats"] = None
+    return_s: Annotated[float, Bounds(0.05, 10), "time in which the channels that are displaced in the last frame return to rest"] = 0.4
+    optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the track"] = ()
     frames_without_neck: Annotated[tuple[KeyFrame, ...],
-        "alternative frames for rigs that lack a non-optional neck joint of the gesture"] = ()
+        "alternative frames for rigs that lack a non-optional neck joint of the track"] = ()
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -109,34 +109,34 @@ class Gesture:
             ValueError: there are no frames, or too many.
         """
         if not self.frames:
-            raise ValueError("a gesture needs at least one frame")
+            raise ValueError("a track needs at least one frame")
         most = max(len(self.frames), len(self.frames_without_neck))
         if most > MAX_FRAMES:
-            raise ValueError(f"{most} frames: a gesture has at most {MAX_FRAMES}; omit some")
+            raise ValueError(f"{most} frames: a track has at most {MAX_FRAMES}; omit some")
 
 
 @dataclass(frozen=True)
-class GestureParams:
-    """Interaction of gestures with other motion of the joints."""
+class TrackParams:
+    """Interaction of tracks with other motion of the joints."""
 
     # fmt: off
     limit_share: Annotated[float, Bounds(0.1, 1),
-        "share of the joints' speed and acceleration limits that a gesture may use; the rest is left to gaze"] = 0.8
+        "share of the joints' speed and acceleration limits that a track may use; the rest is left to gaze"] = 0.8
     blend_out_ms: Annotated[float, Bounds(100, 5000),
-        "shortest time in which a gesture that is interrupted returns to rest"] = 250.0
+        "shortest time in which a track that is interrupted returns to rest"] = 250.0
     # fmt: on
 
 
-class TrackKeys(NamedTuple):
-    """The keys of one track: times, and values relative to rest (0, of lids 1)."""
+class ChannelKeys(NamedTuple):
+    """The keys of one channel: times, and values relative to rest (0, of lids 1)."""
 
     times_s: tuple[float, ...]
     values: tuple[float, ...]
 
 
-def rest_value(track: str) -> float:
-    """Return the neutral value of a track."""
-    return 1.0 if track in LID_TRACKS else 0.0
+def rest_value(channel: str) -> float:
+    """Return the neutral value of a channel."""
+    return 1.0 if channel in LID_CHANNELS else 0.0
 
 
 def frame_faults(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
@@ -148,12 +148,12 @@ def frame_faults(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
     ]
 
 
-def loop_fault(gesture: Gesture) -> str:
+def loop_fault(track: Track) -> str:
     """Return the fault of the times of a loop, "" without one."""
-    if gesture.loop_s is None:
+    if track.loop_s is None:
         return ""
-    begin_s, end_s = gesture.loop_s
-    for frames in filter(None, (gesture.frames, gesture.frames_without_neck)):
+    begin_s, end_s = track.loop_s
+    for frames in filter(None, (track.frames, track.frames_without_neck)):
         times = [frame.time_s for frame in frames]
         absent = [t for t in (begin_s, end_s) if t not in times and t != 0.0]
         if absent:
@@ -164,19 +164,19 @@ def loop_fault(gesture: Gesture) -> str:
     return ""
 
 
-def track_keys(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[str, TrackKeys]:
-    """Return the keys of every track with its loop repeated, ending at rest.
+def channel_keys(track: Track, frames: tuple[KeyFrame, ...], count: int) -> dict[str, ChannelKeys]:
+    """Return the keys of every channel with its loop repeated, ending at rest.
 
     Args:
-        gesture: defines the loop.
+        track: defines the loop.
         frames: those of its frames that are played.
         count: number of repetitions.
     """
-    tracks: dict[str, list[tuple[float, float]]] = {}
-    for time_s, values in _repeat_loop(frames, gesture.loop_s, count):
+    channels: dict[str, list[tuple[float, float]]] = {}
+    for time_s, values in _repeat_loop(frames, track.loop_s, count):
         for name, value in values.items():
-            tracks.setdefault(name, []).append((time_s, value))
-    return {name: _end_at_rest(name, keys, gesture.return_s) for name, keys in tracks.items()}
+            channels.setdefault(name, []).append((time_s, value))
+    return {name: _end_at_rest(name, keys, track.return_s) for name, keys in channels.items()}
 
 
 def _repeat_loop(
@@ -193,9 +193,9 @@ def _repeat_loop(
     return [*before, *rounds, *((later_s + t_s, values) for t_s, values in keys if t_s > end_s)]
 
 
-def _end_at_rest(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:
+def _end_at_rest(name: str, keys: list[tuple[float, float]], return_s: float) -> ChannelKeys:
     rest = rest_value(name)
     if keys[-1][1] != rest:
         keys = [*keys, (keys[-1][0] + return_s, rest)]
     times, values = zip(*keys, strict=True)
-    return TrackKeys(times, values)
+    return ChannelKeys(times, values)

@@ -1,21 +1,21 @@
-"""Motion of one gesture as smooth curves, and as samples for the check of limits."""
+"""Motion of one track as smooth curves, and as samples for the check of limits."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture.gesture import EYE_TRACKS, POSE_TRACKS, TrackKeys, rest_value
-from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.track.track import EYE_CHANNELS, POSE_CHANNELS, ChannelKeys, rest_value
 from gazerig.gaze.types import Floats
 
 _SAMPLE_S = 0.005
 _MOST_SAMPLES = 6000
-_FIRST_EYE = POSE_TRACKS.index(EYE_TRACKS[0])
+_FIRST_EYE = POSE_CHANNELS.index(EYE_CHANNELS[0])
 
 
 class MotionSamples(NamedTuple):
-    """A gesture sampled over its whole time, relative to rest.
+    """A track sampled over its whole time, relative to rest.
 
     times_s: (n,); value, speed, acceleration: (n, channels), in the order of PoseOffset.flat()
     """
@@ -40,30 +40,30 @@ class MotionSamples(NamedTuple):
         )
 
 
-class GestureMotion:
-    """Curves of one gesture on one rig, at its original speed and size.
+class TrackMotion:
+    """Curves of one track on one rig, at its original speed and size.
 
     duration_s: time until everything is at rest again
     samples: samples of all channels
 
     Args:
-        tracks: keys by track; at least one track.
+        keys: keys by channel; at least one channel.
         joints: the rig's further joints, the channels after those of every rig.
         eyes_follow_head: the eyes keep their angles in the head, instead of their target.
     """
 
     def __init__(
-        self, tracks: Mapping[str, TrackKeys], joints: tuple[str, ...], eyes_follow_head: bool
+        self, keys: Mapping[str, ChannelKeys], joints: tuple[str, ...], eyes_follow_head: bool
     ) -> None:
-        channels = (*POSE_TRACKS, *joints)
+        channels = (*POSE_CHANNELS, *joints)
         self._rests = [rest_value(name) for name in channels]
         self.rest = np.array(self._rests)
         self._follow = eyes_follow_head
         self._curves = [
-            (channels.index(name), MinimumJerkCurve(rest_value(name), keys.times_s, keys.values))
-            for name, keys in tracks.items()
+            (channels.index(name), MinimumJerkCurve(rest_value(name), found.times_s, found.values))
+            for name, found in keys.items()
         ]
-        self._keys_s = [np.array(keys.times_s) for keys in tracks.values()]
+        self._keys_s = [np.array(found.times_s) for found in keys.values()]
         self.duration_s = max(curve.duration_s for _, curve in self._curves)
         self.samples = self._sample_evenly()
 

@@ -1,29 +1,29 @@
-"""Player of gestures, one at a time, without jumps at a start, an end or an interruption.
+"""Player of tracks, one at a time, without jumps at a start, an end or an interruption.
 
-A gesture begins from rest and returns to rest. When another one replaces it, or it ends early, its
+A track begins from rest and returns to rest. When another one replaces it, or it ends early, its
 offset returns to rest on a fifth-order polynomial that begins with the present offset, speed and
-acceleration, and the next gesture is added to that.
+acceleration, and the next track is added to that.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture.gesture import POSE_TRACKS, rest_value
-from gazerig.gaze.gesture.gesture_motion import GestureMotion
-from gazerig.gaze.gesture.pose_offset import PoseOffset
 from gazerig.gaze.minimum_jerk import Quintic
+from gazerig.gaze.track.pose_offset import PoseOffset
+from gazerig.gaze.track.track import POSE_CHANNELS, rest_value
+from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.types import Floats
 
 
-class PlayedGesture(NamedTuple):
-    """A gesture with its speed and sizes of play.
+class PlayedTrack(NamedTuple):
+    """A track with its speed and sizes of play.
 
     speed: factor on its original speed; sizes: factor of every channel
     """
 
     name: str
-    motion: GestureMotion
+    motion: TrackMotion
     speed: float
     sizes: tuple[float, ...]
 
@@ -41,8 +41,8 @@ class OffsetState(NamedTuple):
     acceleration: Floats
 
 
-class GesturePlayer:
-    """Player of the present gesture.
+class TrackPlayer:
+    """Player of the present track.
 
     moves: whether ``step`` may return another offset than last time
 
@@ -51,13 +51,13 @@ class GesturePlayer:
     """
 
     def __init__(self, joints: int) -> None:
-        self._rest_flat = (*map(rest_value, POSE_TRACKS), *(0.0,) * joints)
+        self._rest_flat = (*map(rest_value, POSE_CHANNELS), *(0.0,) * joints)
         self._rest = PoseOffset.from_flat(self._rest_flat)
         self.reset()
 
     def reset(self) -> None:
         """Rest immediately, for a head whose joints are hand-guided or switched off."""
-        self._played: PlayedGesture | None = None
+        self._played: PlayedTrack | None = None
         self._begins_s = 0.0
         self._fades: list[tuple[int, Quintic]] = []
         self._fades_from_s = self._faded_s = 0.0
@@ -65,16 +65,16 @@ class GesturePlayer:
 
     @property
     def playing(self) -> str:
-        """Return the name of the present gesture, "" without one."""
+        """Return the name of the present track, "" without one."""
         return self._played.name if self._played is not None else ""
 
-    def play(self, played: PlayedGesture | None, t_s: float, fade_s: float, wait_s: float) -> None:
-        """Begin a gesture, or none; the present one returns to rest meanwhile.
+    def play(self, played: PlayedTrack | None, t_s: float, fade_s: float, wait_s: float) -> None:
+        """Begin a track, or none; the present one returns to rest meanwhile.
 
         Args:
-            played: the next gesture; None: no gesture.
+            played: the next track; None: no track.
             t_s: present time, seconds.
-            fade_s: time in which the present gesture returns to rest.
+            fade_s: time in which the present track returns to rest.
             wait_s: time until the next begins.
         """
         states = zip(*self.state(t_s), strict=True)

@@ -1,4 +1,4 @@
-"""Gestures by name: shipped ones, and those of a rig's own files; all are checked."""
+"""Tracks by name: shipped ones, and those of a rig's own files; all are checked."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from gazerig.config.load import (
     shipped_names,
     shipped_path,
 )
-from gazerig.gaze.gesture.gesture import Gesture, frame_faults, loop_fault
+from gazerig.gaze.track.track import Track, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 _HEAD_KEYS = {
@@ -24,41 +24,39 @@ _HEAD_KEYS = {
 }
 
 
-def load_gesture(path: Path) -> Gesture:
-    """Return the gesture of a file.
+def load_track(path: Path) -> Track:
+    """Return the track of a file.
 
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    return load(path, Gesture, checks=CHECKS)
+    return load(path, Track, checks=CHECKS)
 
 
-def shipped_gestures() -> Mapping[str, Gesture]:
-    """Return the gestures of this package by name."""
+def shipped_tracks() -> Mapping[str, Track]:
+    """Return the tracks of this package by name."""
     return _shipped()
 
 
 @cache
-def _shipped() -> Mapping[str, Gesture]:
-    return {
-        name: load_gesture(shipped_path("gestures", name)) for name in shipped_names("gestures")
-    }
+def _shipped() -> Mapping[str, Track]:
+    return {name: load_track(shipped_path("tracks", name)) for name in shipped_names("tracks")}
 
 
-def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
-    """Return the gestures of a rig: shipped ones, and its own by the names of their files.
+def tracks_of(files: Sequence[str]) -> dict[str, Track]:
+    """Return the tracks of a rig: shipped ones, and its own by the names of their files.
 
     Args:
-        files: Paths of its own gestures; they replace shipped gestures of the same name.
+        files: Paths of its own tracks; they replace shipped tracks of the same name.
 
     Raises:
         gazerig.config.load.ConfigError: lists every fault of all files.
     """
-    found = dict(shipped_gestures())
+    found = dict(shipped_tracks())
     faults: list[ConfigFault] = []
     for file in files:
         try:
-            found[gesture_name(file)] = load_gesture(gesture_path(file))
+            found[track_name(file)] = load_track(track_path(file))
         except ConfigError as error:
             faults += error.faults
     if faults:
@@ -67,25 +65,25 @@ def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
 
 
 @dataclass(frozen=True)
-class GestureSet:
-    """Gestures as stored in a recording."""
+class TrackSet:
+    """Tracks as stored in a recording."""
 
-    gestures: Annotated[Mapping[str, Gesture], "gestures of the rig by name"]
+    tracks: Annotated[Mapping[str, Track], "tracks of the rig by name"]
 
 
-def gesture_path(file: str) -> Path:
-    """Return the path of a gesture file; a name alone selects a gesture of a package.
+def track_path(file: str) -> Path:
+    """Return the path of a track file; a name alone selects a track of a package.
 
     Raises:
-        gazerig.config.load.ConfigError: no package has a gesture of this name.
+        gazerig.config.load.ConfigError: no package has a track of this name.
     """
     if "/" in file or file.endswith((".yaml", ".yml")):
         return Path(file).expanduser()
-    return package_file_path("gestures", file)
+    return package_file_path("tracks", file)
 
 
-def gesture_name(file: str) -> str:
-    """Return the name of a gesture in a file.
+def track_name(file: str) -> str:
+    """Return the name of a track in a file.
 
     Raises:
         gazerig.config.load.ConfigError: it is not a valid name.
@@ -93,21 +91,21 @@ def gesture_name(file: str) -> str:
     name = Path(file).stem
     if JOINT_NAME.fullmatch(name):
         return name
-    rule = "the file name is the gesture's name: lower-case letters, digits and _, beginning with a letter, at most 40 characters"
+    rule = "the file name is the track's name: lower-case letters, digits and _, beginning with a letter, at most 40 characters"
     raise ConfigError([ConfigFault(file, None, "", repr(name), rule)])
 
 
-def _frame_times(gesture: Gesture) -> Iterable[tuple[str, str]]:
+def _frame_times(track: Track) -> Iterable[tuple[str, str]]:
     for key in ("frames", "frames_without_neck"):
-        for i, rule in frame_faults(getattr(gesture, key)):
+        for i, rule in frame_faults(getattr(track, key)):
             yield f"{key}.{i}.time_s", rule
-    if rule := loop_fault(gesture):
+    if rule := loop_fault(track):
         yield "loop_s", rule
 
 
-def _joint_names(gesture: Gesture) -> Iterable[tuple[str, str]]:
+def _joint_names(track: Track) -> Iterable[tuple[str, str]]:
     for key in ("frames", "frames_without_neck"):
-        for i, frame in enumerate(getattr(gesture, key)):
+        for i, frame in enumerate(getattr(track, key)):
             for joint in frame.joints_deg:
                 if joint in GAZE_JOINTS:
                     instead = _HEAD_KEYS.get(joint, "lids" if joint.endswith("lid") else "eyes_yaw_deg and eyes_pitch_deg")  # fmt: skip

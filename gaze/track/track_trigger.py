@@ -1,4 +1,4 @@
-"""Trigger of the present rule's gesture: once, when the gaze reaches the rule's target."""
+"""Trigger of the present rule's track: once, when the gaze reaches the rule's target."""
 
 from math import inf
 
@@ -6,14 +6,14 @@ from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.types import Target
 
 
-class GestureTrigger:
-    """Trigger of the gestures of rules."""
+class TrackTrigger:
+    """Trigger of the tracks of rules."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the last target and the time of the last gesture."""
+        """Forget the last target and the time of the last track."""
         self._named_by: str | None = None
         self._played_s: dict[str, float] = {}
 
@@ -25,7 +25,7 @@ class GestureTrigger:
         t_s: float,
         named_ids: frozenset[int] = frozenset(),
     ) -> str:
-        """Return the gesture to play now, "" for none.
+        """Return the track to play now, "" for none.
 
         Args:
             behaviour: present behaviour.
@@ -49,7 +49,7 @@ class GestureTrigger:
 
 
 def _is_named(rule: Rule, target: Target, named_ids: frozenset[int]) -> bool:
-    """Return whether a target triggers the rule's gesture."""
+    """Return whether a target triggers the rule's track."""
     if rule.gesture_at:
         return target.kind == rule.gesture_at
     if rule.person is not None:

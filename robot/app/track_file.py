@@ -1,4 +1,4 @@
-"""Conversion of joint angles over time to a gesture's YAML file, which the rig's loader reads.
+"""Conversion of joint angles over time to a track's YAML file, which the rig's loader reads.
 
 Such angles come from recordings, or from CSV tables of animation programs, one row per frame or
 key. Wide: a column of times and one of angles for each joint. Long: columns time, joint, angle, one
@@ -13,25 +13,25 @@ from pathlib import Path
 
 import numpy as np
 
-from gazerig.config.gestures import gesture_name, load_gesture
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import format_value
+from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.drivers.files.file_output import write_file
-from gazerig.gaze.gesture.gesture import HEAD_TRACKS, Gesture
+from gazerig.gaze.track.track import HEAD_CHANNELS, Track
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.model.gesture_fit import (
-    GRID_S,
-    FittedGesture,
-    GestureFit,
-    GestureRefused,
-    fit_keys,
-    gesture_motions,
-    smooth,
-)
 from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.model.track_fit import (
+    GRID_S,
+    FittedTrack,
+    TrackFit,
+    TrackRefused,
+    fit_keys,
+    smooth,
+    track_motions,
+)
 from gazerig.robot.model.types import GAZE_JOINTS
 
 TOLERANCE_DEG = 0.7
@@ -46,20 +46,20 @@ Series = tuple[Floats, Floats]
 Keys = dict[str, list[tuple[float, float]]]
 
 
-def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> str:
-    """Return a gesture as YAML.
+def track_text(rig: Rig, series: Mapping[str, Series], description: str) -> str:
+    """Return a track as YAML.
 
     Args:
         rig: the rig whose joints it moves.
-        series: times in seconds and angles in degrees, by joint of the rig; the gesture is the
+        series: times in seconds and angles in degrees, by joint of the rig; the track is the
             motion relative to the first angle.
-        description: meaning of the gesture.
+        description: meaning of the track.
 
     Raises:
-        SetupError: a joint does not exist in the rig, the gesture is too long, or nothing moves.
+        SetupError: a joint does not exist in the rig, the track is too long, or nothing moves.
     """
-    tracks = {_track_of_joint(name) for name in rig.names}
-    unknown = [name for name in series if _track_of_joint(name) not in tracks]
+    channels = {_channel_of_joint(name) for name in rig.names}
+    unknown = [name for name in series if _channel_of_joint(name) not in channels]
     if unknown:
         raise SetupError(
             f"no joint {unknown[0]!r}; available: {', '.join(rig.names)}; rename the column"
@@ -68,60 +68,60 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
     end_s = max(float(times[-1]) for times, _ in series.values())
     if not GRID_S < end_s - start_s <= _LARGEST_S:
         raise SetupError(
-            f"it takes {end_s - start_s:.1f} s: a gesture takes at most {_LARGEST_S:g} s"
+            f"it takes {end_s - start_s:.1f} s: a track takes at most {_LARGEST_S:g} s"
         )
     keys: Keys = {}
     for name, (times, angles) in series.items():
         for time_s, value in _joint_keys(rig, name, times, angles, start_s):
-            keys.setdefault(_track_of_joint(name), []).append((time_s, value))
-    keys = {track: _average_keys(found) for track, found in keys.items() if found}
+            keys.setdefault(_channel_of_joint(name), []).append((time_s, value))
+    keys = {channel: _average_keys(found) for channel, found in keys.items() if found}
     if not keys:
         raise SetupError(f"nothing moves; movements below {TOLERANCE_DEG:g} deg count as jitter")
     frames: dict[float, dict[str, float]] = {}
-    for track, found in keys.items():
+    for channel, found in keys.items():
         for time_s, value in found:
-            frames.setdefault(time_s, {})[track] = value
+            frames.setdefault(time_s, {})[channel] = value
     lines = [f"description: {format_value(description)}", "space: joint", "fit: slow", "frames:"]
     lines += [f"  - {{{', '.join(_frame_lines(t, frames[t]))}}}" for t in sorted(frames)]
     return "\n".join(lines) + "\n"
 
 
-def write_gesture(
+def write_track(
     rig: Rig, name: str, text: str, folder: Path, force: bool
-) -> tuple[Path, FittedGesture]:
-    """Write a gesture's file and check it against the rig.
+) -> tuple[Path, FittedTrack]:
+    """Write a track's file and check it against the rig.
 
     Returns:
-        The file, and the gesture fitted to the rig.
+        The file, and the track fitted to the rig.
 
     Raises:
         SetupError: the file cannot be written, or the rig cannot play it.
-        gazerig.config.load.ConfigError: the name or the gesture breaks a rule.
+        gazerig.config.load.ConfigError: the name or the track breaks a rule.
     """
     path = folder / f"{name}.yaml"
-    gesture_name(str(path))
+    track_name(str(path))
     write_file(path, text, force)
     try:
-        return path, fit_to_rig(rig, load_gesture(path))
-    except GestureRefused as refused:
+        return path, fit_to_rig(rig, load_track(path))
+    except TrackRefused as refused:
         raise SetupError(f"{path} is written, but {rig.name} cannot play it: {refused}") from None
 
 
-def fit_to_rig(rig: Rig, gesture: Gesture) -> FittedGesture:
-    """Return a gesture fitted to a rig, from the middle of its ranges.
+def fit_to_rig(rig: Rig, track: Track) -> FittedTrack:
+    """Return a track fitted to a rig, from the middle of its ranges.
 
     Raises:
-        gazerig.robot.model.gesture_fit.GestureRefused: the rig cannot play it.
+        gazerig.robot.model.track_fit.TrackRefused: the rig cannot play it.
     """
     bounds = limits(rig.joints)
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
-    fit = GestureFit(rig.names, lid_spans(rig))
-    share = rig.gaze.gestures.limit_share
-    return fit.fit("", gesture_motions(gesture, rig.names), 1.0, middle, bounds, share)
+    fit = TrackFit(rig.names, lid_spans(rig))
+    share = rig.gaze.tracks.limit_share
+    return fit.fit("", track_motions(track, rig.names), 1.0, middle, bounds, share)
 
 
-def _track_of_joint(joint: str) -> str:
-    """Return the track of a joint: both eyes have one."""
+def _channel_of_joint(joint: str) -> str:
+    """Return the channel of a joint: both eyes have one."""
     if joint.startswith("neck_"):
         return joint.replace("neck", "head")
     if joint.endswith(("eye_pan", "eyes_pan")):
@@ -156,7 +156,7 @@ def _joint_keys(
 
 
 def _average_keys(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return keys in the order of their times; two joints of one track are averaged."""
+    """Return keys in the order of their times; two joints of one channel are averaged."""
     at: dict[float, list[float]] = {}
     for time_s, value in sorted(keys):
         at.setdefault(time_s, []).append(value)
@@ -165,7 +165,9 @@ def _average_keys(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:
     own = [
-        f"{n}_deg: {v}" for n, v in values.items() if n in (*HEAD_TRACKS, "eyes_yaw", "eyes_pitch")
+        f"{n}_deg: {v}"
+        for n, v in values.items()
+        if n in (*HEAD_CHANNELS, "eyes_yaw", "eyes_pitch")
     ]
     lids = [f"{n}: {v}" for n, v in values.items() if n in LIDS]
     others = [

@@ -1,1 +1,0 @@
-"""Motion that is added to the gaze: gestures, expressions, levels such as a jaw, and breathing."""

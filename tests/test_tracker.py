@@ -1,0 +1,434 @@
+"""Identities and velocities from picture to picture."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gazerig.drivers.types import Clothing
+from gazerig.gaze.types import FIRST_THING, body_name
+from gazerig.robot.model.tracker_params import TrackerParams
+from gazerig.robot.perception.perception import covariance
+from gazerig.robot.perception.track import BodyTrack, LocalisedDetection
+from gazerig.robot.perception.tracker import Tracker, blend
+
+CAMERA = (0.0, 0.0, 0.2)
+IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def face(x: float, y: float, kind: str = "face") -> LocalisedDetection:
+    return LocalisedDetection(
+        kind, (x, y, 0.2), IDENTITY if kind == "face" else None, 0.1, 0.0, 0.9
+    )
+
+
+@pytest.fixture
+def tracker() -> Tracker:
+    return Tracker(TrackerParams())
+
+
+def test_velocity_is_learned_and_the_lag_vanishes(tracker: Tracker) -> None:
+    for k in range(60):
+        t = k / 30
+        (track,) = tracker.step([face(1.0, 0.3 * t)], CAMERA, t)
+    assert track.v_world_m_s[1] == pytest.approx(0.3, abs=0.01)
+    assert track.p_world_m[1] == pytest.approx(0.3 * t, abs=0.003)
+
+
+def test_noise_in_distance_hardly_moves_the_place_across() -> None:
+    rng, tracker = np.random.default_rng(0), Tracker(TrackerParams())
+    places = []
+    for k in range(200):
+        (track,) = tracker.step([face(1.0 + rng.normal(0, 0.08), 0.0)], CAMERA, k / 30)
+        places.append(track.p_world_m)
+    assert np.std([p[0] for p in places[30:]]) < 0.035
+    assert max(abs(p[1]) for p in places) < 1e-3
+
+
+def test_two_people_keep_their_identities_when_listed_in_any_order(tracker: Tracker) -> None:
+    first = tracker.step([face(1.0, -0.3), face(1.0, 0.3)], CAMERA, 0.0)
+    ids = {track.p_world_m[1] > 0: track.id for track in first}
+    for k in range(1, 30):
+        pair = [face(1.0, 0.3), face(1.0, -0.3)]
+        tracks = tracker.step(pair if k % 2 else pair[::-1], CAMERA, k / 30)
+        assert {track.p_world_m[1] > 0: track.id for track in tracks} == ids
+
+
+def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker: Tracker) -> None:
+    (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
+    assert [track.id for track in tracker.step([], CAMERA, 0.1)] == [seen.id]
+    assert tracker.step([], CAMERA, 0.6) == ()
+    assert tracker.step([face(1.0, 0.05)], CAMERA, 1.0)[0].id == seen.id
+
+
+@pytest.mark.parametrize(
+    ("y", "after_s", "remember_s", "same"),
+    [(0.05, 10.0, 20.0, True), (0.5, 10.0, 20.0, False), (0.05, 25.0, 20.0, False),
+     (0.05, 10.0, 0.0, False)],
+)  # fmt: skip
+def test_a_face_that_stays_where_it_was_is_known_again_after_long(
+    y: float, after_s: float, remember_s: float, same: bool
+) -> None:
+    tracker = Tracker(TrackerParams(remember_face_s=remember_s, remember_person_s=0.0))
+    for k in range(10):
+        (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, k / 30)
+    for k in range(10, round(30 * after_s)):
+        assert k < 20 or tracker.step([], CAMERA, k / 30) == ()
+    assert (tracker.step([face(1.0, y)], CAMERA, after_s)[0].id == seen.id) is same
+
+
+def test_a_thing_out_of_sight_is_not_remembered(tracker: Tracker) -> None:
+    (hand,) = tracker.step([face(1.0, 0.0, "hand")], CAMERA, 0.0)
+    assert tracker.step([], CAMERA, 3.0) == ()
+    assert tracker.step([face(1.0, 0.0, "hand")], CAMERA, 3.1)[0].id != hand.id
+
+
+def test_far_apart_is_somebody_else_and_kinds_never_mix(tracker: Tracker) -> None:
+    (one,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
+    after = tracker.step([face(1.0, 0.6), face(1.0, 0.01, "hand")], CAMERA, 0.033)
+    assert {track.detection.kind for track in after if track.id != one.id} == {"face", "hand"}
+
+
+def test_blended_rotations_stay_rotations() -> None:
+    turned = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    middle = np.array(blend(IDENTITY, turned, 0.5))
+    assert middle @ middle.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.degrees(np.arctan2(middle[1, 0], middle[0, 0])) == pytest.approx(45.0)
+
+
+def across(y: float, x: float = 1.5, kind: str = "face") -> LocalisedDetection:
+    return LocalisedDetection(
+        kind,
+        (x, y, 0.2),
+        IDENTITY if kind == "face" else None,
+        0.1,
+        0.0,
+        0.9,
+        across_sd_m=0.002,
+        along_sd_m=0.1,
+    )
+
+
+def test_an_identity_survives_a_second_behind_something(tracker: Tracker) -> None:
+    for k in range(30):
+        (seen,) = tracker.step([across(0.4 * k / 30)], CAMERA, k / 30)
+    for k in range(30, 60):
+        assert tracker.step([], CAMERA, k / 30) == () or k < 40
+    (back,) = tracker.step([across(0.4 * 2.0)], CAMERA, 2.0)
+    assert back.id == seen.id
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.1, 0.4])
+def test_people_who_cross_keep_their_identities(apart_m: float) -> None:
+    """Two walk past each other at 1 m/s each; while one hides the other, one face is found."""
+    rng, tracker = np.random.default_rng(3), Tracker(TrackerParams())
+    first: dict[str, int] = {}
+    for k in range(91):
+        t = k / 30
+        left, right = 1.5 - t, t - 1.5
+        ways = [across(left + rng.normal(0, 2e-3), 1.5), across(right, 1.5 + apart_m)]
+        if abs(left - right) < 0.25:
+            ways = ways[:1]
+        tracks = tracker.step(ways, CAMERA, t)
+        if k == 10:
+            first = {"left": max(tracks, key=_y).id, "right": min(tracks, key=_y).id}
+    assert {"left": min(tracks, key=_y).id, "right": max(tracks, key=_y).id} == first
+
+
+def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker) -> None:
+    """A man walks behind a woman; a third person appears half a metre from them."""
+    near, far = across(0.0, 1.0), across(0.02, 2.0)
+    for k in range(30):
+        tracks = tracker.step([near, far], CAMERA, k / 30)
+    after = tracker.step([near, across(0.5, 2.0)], CAMERA, 1.0)
+    assert max(after, key=_y).id not in {track.id for track in tracks}
+    # Nobody before him, and the same jump is his own.
+    tracker = Tracker(TrackerParams())
+    for k in range(30):
+        (alone,) = tracker.step([far], CAMERA, k / 30)
+    assert tracker.step([across(0.5, 2.0)], CAMERA, 1.0)[0].id == alone.id
+
+
+def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker: Tracker) -> None:
+    """A patch whose middle jumps by half a metre keeps the number that the detector gave it."""
+    near, far = across(0.0, 1.9, "thing"), across(0.05, 2.0, "thing")
+    near.mark, far.mark = 1, 2
+    for k in range(10):
+        tracks = tracker.step([near, far], CAMERA, k / 30)
+    jumped = replace(far, p_world_m=(2.0, 0.5, 0.2))
+    after = tracker.step([near, jumped], CAMERA, 10 / 30)
+    assert [track.id for track in after] == [track.id for track in tracks]
+
+
+def _y(track: BodyTrack) -> float:
+    return track.p_world_m[1]
+
+
+def test_pairs_are_the_likeliest_as_a_whole(tracker: Tracker) -> None:
+    """Both have moved 0.2 m to the left: the nearest pair alone would swap them."""
+    first = tracker.step([face(1.0, 0.0), face(1.0, 0.3)], CAMERA, 0.0)
+    after = tracker.step([face(1.0, 0.5), face(1.0, 0.2)], CAMERA, 0.033)
+    ids = [track.id for track in first]
+    assert [track.id for track in sorted(after, key=_y)] == ids
+
+
+def test_whoever_could_be_anywhere_does_not_take_over_from_who_is_followed(
+    tracker: Tracker,
+) -> None:
+    """Seen once and lost, somebody may be near every place; that is no reason to be there."""
+    tracker.step([across(-0.5, 1.0), across(0.5, 1.0)], CAMERA, 0.0)
+    for k in range(1, 30):
+        (followed, *_) = tracker.step([across(-0.5 + 0.8 * k / 30, 1.0)], CAMERA, k / 30)
+    (now,) = tracker.step([across(0.42, 1.0)], CAMERA, 1.0)
+    assert now.id == followed.id
+
+
+def test_a_distance_known_badly_is_no_reason_to_be_somebody_else(tracker: Tracker) -> None:
+    (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
+    (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
+    assert same.id == one.id
+    exact = LocalisedDetection("thing", (3.0, 0.0, 0.2), None, 0.1, 0.0, 0.9, along_sd_m=0.01)
+    tracker = Tracker(TrackerParams(gate_m=0.1))
+    (one,) = tracker.step([exact], CAMERA, 0.0)
+    moved = replace(exact, p_world_m=(4.2, 0.0, 0.2))
+    assert {track.id for track in tracker.step([moved], CAMERA, 0.033)} != {one.id}
+
+
+def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
+    """Quiet while nothing happens, lively when something does."""
+    rng, tracker = np.random.default_rng(1), Tracker(TrackerParams())
+    lag, speeds = [], []
+    for k in range(180):
+        t = k / 30
+        y = 0.5 * min(1.0, max(0.0, (t - 4.0) / 0.5))
+        (track,) = tracker.step([across(y + rng.normal(0.0, 1e-3), 1.0)], CAMERA, t)
+        lag.append(abs(track.p_world_m[1] - y))
+        if 1.0 < t < 4.0:
+            speeds.append(track.v_world_m_s[1])
+    assert np.std(speeds) < 0.01
+    assert max(lag) < 0.02
+
+
+def cov_of(track: BodyTrack) -> np.ndarray:
+    f = track.filter
+    return np.array(covariance(f.view, f.across, f.along)).reshape(6, 6)
+
+
+def test_the_covariance_tells_how_far_off_the_track_is() -> None:
+    """Normalised errors squared of a still person average to about the 3 dimensions."""
+    errors = []
+    for seed in range(40):
+        rng, tracker = np.random.default_rng(seed), Tracker(TrackerParams())
+        for k in range(40):
+            noisy = across(rng.normal(0.0, 2e-3), 1.0 + rng.normal(0.0, 0.1))
+            noisy.p_world_m = (*noisy.p_world_m[:2], 0.2 + rng.normal(0.0, 2e-3))
+            (track,) = tracker.step([noisy], CAMERA, k / 30)
+        off = np.subtract(track.p_world_m, (1.0, 0.0, 0.2))
+        errors.append(off @ np.linalg.solve(cov_of(track)[:3, :3], off))
+    assert 1.0 < np.mean(errors) < 5.0
+
+
+def test_a_velocity_that_was_measured_is_taken_over_at_once() -> None:
+    blob = across(0.0, 2.0, "thing")
+    blob.v_world_m_s, blob.across_sd_m_s, blob.along_sd_m_s = (0.0, 1.0, 0.0), 0.05, 0.3
+    (track,) = Tracker(TrackerParams()).step([blob], CAMERA, 0.0)
+    assert track.v_world_m_s == pytest.approx((0.0, 1.0, 0.0), abs=0.02)
+
+
+def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker: Tracker) -> None:
+    """A child's face looks 20 % farther than it is; through a hole it stays where it is."""
+    by_depth = replace(across(0.0, 1.0), depth_measured=True, along_sd_m=0.01, size_depth=1.25)
+    for k in range(20):
+        (track,) = tracker.step([by_depth], CAMERA, k / 30)
+    assert track.depth_from == "camera" and track.face_size == pytest.approx(0.8)
+    by_size = across(0.0, 1.25)
+    for k in range(20, 40):
+        (track,) = tracker.step([by_size], CAMERA, k / 30)
+    assert track.depth_from == "face size"
+    assert track.p_world_m[0] == pytest.approx(1.0, abs=0.01)
+
+
+@given(
+    st.lists(
+        st.lists(
+            st.tuples(
+                st.floats(0.3, 5.0), st.floats(-3.0, 3.0), st.sampled_from(["face", "thing"])
+            ),
+            max_size=6,
+        ),
+        max_size=12,
+    ),
+    st.floats(0.001, 0.5),
+)
+def test_nothing_makes_it_give_what_is_no_number(
+    pictures: list[list[tuple[float, float, str]]], dt_s: float
+) -> None:
+    tracker, t_s = Tracker(TrackerParams()), 0.0
+    for picture in pictures:
+        t_s += dt_s
+        tracks = tracker.step([face(x, y, kind) for x, y, kind in picture], CAMERA, t_s)
+        assert len({track.id for track in tracks}) == len(tracks) >= len(picture)
+        for track in tracks:
+            assert np.isfinite((track.p_world_m, track.v_world_m_s)).all()
+            assert np.linalg.eigvalsh(cov_of(track)).min() > -1e-9
+
+
+def dressed(found: LocalisedDetection, *bins: int) -> LocalisedDetection:
+    """Return the same in clothes of one colour or of several in equal parts."""
+    colours = tuple(len(bins) ** -0.5 * (k in bins) for k in range(24))
+    return replace(found, clothing=Clothing(colours, 1.0))
+
+
+@pytest.mark.parametrize(("worn", "same"), [(3, True), (7, False)])
+def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
+    tracker: Tracker, worn: int, same: bool
+) -> None:
+    for k in range(15):
+        (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
+    tracker.step([], CAMERA, 6.0)
+    (back,) = tracker.step([dressed(across(-0.9, 2.0), worn)], CAMERA, 6.03)
+    assert (back.id == gone.id) is same
+
+
+def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
+    tracker = Tracker(TrackerParams(remember_face_s=5.0, remember_person_s=60.0))
+    for k in range(15):
+        (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
+    tracker.step([], CAMERA, 6.0)
+    for t_s, same in ((50.0, True), (150.0, False)):
+        (back,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, t_s)
+        assert (back.id == gone.id) is same
+        tracker.step([], CAMERA, t_s + 2.0)
+
+
+def visit(tracker: Tracker, start_s: float, *found: LocalisedDetection) -> list[int]:
+    """Show a person in consecutive frames, then no one for 2 s; return the numbers."""
+    tracker.step([], CAMERA, start_s - 1.0)
+    shown = [
+        tracker.step([one], CAMERA, start_s + k / 30)[0].id for k, one in enumerate(found)
+    ]  # fmt: skip
+    tracker.step([], CAMERA, start_s + len(found) / 30 + 2.0)
+    return shown
+
+
+def test_people_and_things_count_separately(tracker: Tracker) -> None:
+    found = [across(0.5, kind="thing"), across(-0.5), across(0.0, kind="hand")]
+    ids = [track.id for track in tracker.step(found, CAMERA, 0.0)]
+    assert ids == [FIRST_THING, 1, FIRST_THING + 1]
+    assert [body_name("hand", i) for i in ids] == ["hand 1", "hand 1", "hand 2"]
+
+
+def test_a_person_who_comes_back_at_the_other_side_keeps_the_number(tracker: Tracker) -> None:
+    assert {*visit(tracker, 0.0, *[across(0.5)] * 15)} == {1}
+    assert {*visit(tracker, 40.0, *[across(-0.9)] * 15)} == {1}
+    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.6))
+    assert {*visit(tracker, 80.0, *[taller] * 15)} == {2}
+
+
+def test_nobody_is_faster_than_a_walker(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[across(0.0, 3.0)] * 15)
+    far = replace(across(0.0), p_world_m=(1.5, 20.0, 0.2))
+    assert {*visit(tracker, 4.0, *[far] * 15)} == {2}
+
+
+def test_a_false_detection_gives_its_number_back(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[across(0.5)] * 3)
+    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.9))
+    assert {*visit(tracker, 10.0, *[taller] * 15)} == {1}
+
+
+def test_a_false_detection_does_not_keep_the_number_of_a_person_who_left(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[across(0.5)] * 15)
+    assert visit(tracker, 30.0, across(-0.5)) == [1]
+    assert {*visit(tracker, 60.0, *[across(-0.9)] * 15)} == {1}
+
+
+def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[dressed(across(0.5), 3)] * 15)
+    stranger = visit(tracker, 30.0, across(0.4), *[dressed(across(0.4), 7)] * 15)
+    assert stranger[0] == 1 and stranger[-1] == 2
+    low = replace(across(0.4), p_world_m=(1.5, 0.4, 0.0))
+    known = visit(tracker, 60.0, low, *[dressed(low, 3)] * 15)
+    assert known[0] != 1 and known[-1] == 1
+
+
+def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes(
+    tracker: Tracker,
+) -> None:
+    for k in range(30):
+        both = [dressed(across(-0.3, 2.0), 3), dressed(across(0.3, 2.0), 7)]
+        tracks = tracker.step(both, CAMERA, k / 30)
+    left, right = (track.id for track in sorted(tracks, key=_y))
+    for k in range(30, 60):  # they have changed sides behind something
+        tracker.step([], CAMERA, k / 30)
+    for k in range(60, 90):
+        both = [across(-0.3, 2.0), across(0.3, 2.0)]
+        if k > 65:
+            both = [dressed(both[0], 7), dressed(both[1], 3)]
+        tracks = tracker.step(both, CAMERA, k / 30)
+    assert [track.id for track in sorted(tracks, key=_y)] == [right, left]
+
+
+def test_people_always_in_sight_keep_their_numbers_whatever_they_put_on(tracker: Tracker) -> None:
+    for k in range(120):
+        worn = (3, 7) if k < 40 else (7, 3)
+        both = [dressed(across(y, 2.0), w) for y, w in zip((-0.4, 0.4), worn, strict=True)]
+        tracks = tracker.step(both, CAMERA, k / 30)
+        if k == 0:
+            ids = [track.id for track in sorted(tracks, key=_y)]
+    assert [track.id for track in sorted(tracks, key=_y)] == ids
+
+
+def test_a_face_six_metres_farther_away_is_another_person(tracker: Tracker) -> None:
+    for k in range(10):
+        (near,) = tracker.step([replace(across(0.0, 3.0), along_sd_m=0.2)], CAMERA, k / 30)
+    far = replace(across(0.0, 9.0), along_sd_m=1.2)
+    assert near.id not in {t.id for t in tracker.step([far], CAMERA, 0.36) if t.seen_s == t.at_s}
+
+
+def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tracker) -> None:
+    for k in range(12):
+        up = replace(across(0.0, 2.0), p_world_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
+        (one,) = tracker.step([up], CAMERA, k / 30)
+    assert np.linalg.norm(one.v_world_m_s) <= 4.0
+    before = one.p_world_m[2]
+    for k in range(12, 18):
+        tracker.step([], CAMERA, k / 30)
+    assert one.p_world_m[2] == pytest.approx(before, abs=0.05)
+
+
+def _seen_with_a_hand(jumps: float, from_frame: int) -> tuple[float, int]:
+    """Return by what part a face 2 m away is misplaced at most, and how often it is covered.
+
+    jumps: standard deviation of its lower half, as a part
+    from_frame: from when on a hand is before the mouth, and the face looks 1.3 times as far away
+    """
+    rng, tracker, off, covered = np.random.default_rng(0), Tracker(TrackerParams()), 0.0, 0
+    for k in range(180):
+        lower, farther = (0.7, 1.3) if k >= from_frame else (1.0, 1.0)
+        found = replace(across(0.0, 2.0 * farther), along_sd_m=0.2, box_m=0.13 * farther)
+        found = replace(found, lower_face=lower * (1.0 + rng.normal(0.0, jumps)))
+        (one,) = tracker.step([found], CAMERA, k / 30)
+        off, covered = (
+            max(off, abs(one.filter.range_m / 2.0 - 1.0)),
+            covered + (one.covered_frames > 0),
+        )
+    return off, covered
+
+
+def test_a_hand_before_the_mouth_moves_nobody_and_points_that_jump_are_no_hand() -> None:
+    off, covered = _seen_with_a_hand(0.02, 150)
+    assert off < 0.05 and covered == 30
+    assert _seen_with_a_hand(0.15, 180)[1] == 0
+
+
+def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker: Tracker) -> None:
+    moving = replace(face(2.0, 0.9, "thing"), mark=7)
+    (thing,) = tracker.step([moving], CAMERA, 0.0)
+    hand = replace(moving, kind="hand", p_world_m=(0.6, 0.27, 0.2))
+    other = replace(face(1.0, -0.5, "hand"), mark=8)
+    found = {track.detection.mark: track for track in tracker.step([hand, other], CAMERA, 0.03)}
+    assert found[7].id == thing.id != found[8].id
+    assert found[7].p_world_m == pytest.approx(hand.p_world_m)
