@@ -654,9 +654,12 @@ def test_the_best_point_is_yaml_that_a_run_takes(tmp_path: Path) -> None:
 
 def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path: Path) -> None:
     out, key, jerky = tmp_path / "fit", "gaze.saccade.profile", tmp_path / "jerky.yaml"
-    jerky.write_text("gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50}}\n")
+    jerky.write_text(  # and so many shifts that a few seconds judge most measures
+        "gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50},\n"
+        "  scanpath: {rate_scale: 4, min_dwell_ms: 40}, aversion: {silent_mutual_s: 0}}\n"
+    )
     words = (
-        *("sweep", "--fit", "--out", str(out), "--seconds", "16", "--bus", "ideal", "--jobs", "1"),
+        *("sweep", "--fit", "--out", str(out), "--seconds", "7", "--bus", "ideal", "--jobs", "1"),
         *("--set", f"{key}=literal_frame,min_jerk", "--seeds", "1", "--samples", "16"),
         *("--character", str(jerky)),
     )
