@@ -109,6 +109,8 @@ class TargetPrediction:
         self._id = ("", -1)
         self._at_s, self._p, self._v = 0.0, _STILL, _STILL
         self._past: deque[_Seen] = deque()
+        # Times and speeds of the fastest frame, of the fastest one after it, and so on.
+        self._fastest_past: deque[tuple[float, float]] = deque()
         self._bend, self._share = _STILL, 1.0
         self._fastest_m_s = self._most_m_s = 0.0
         self.sine: Sine | None = None
@@ -122,6 +124,7 @@ class TargetPrediction:
         self._left = {k: s for k, s in self._left.items() if at_s - s.at_s < _REMEMBERED_S}
         self._id, self.sine = identity, self._left.pop(identity, None)
         self._past.clear()
+        self._fastest_past.clear()
         self._bend = _STILL
 
     def record_target(self, target: Target, eye: Vec3, fastest_rad_s: float) -> None:
@@ -150,8 +153,13 @@ class TargetPrediction:
         while past[0][0] < at_s - _WINDOWS_S[-1]:
             past.popleft()
         self._bend = self._past_slope()
-        recent = (seen[4:] for seen in reversed(past) if seen[0] > at_s - _FASTEST_IN_S)
-        self._most_m_s = max(map(norm, recent))
+        fastest = self._fastest_past
+        while fastest and fastest[-1][1] <= self._most_m_s:
+            fastest.pop()
+        fastest.append((at_s, self._most_m_s))
+        while fastest[0][0] <= at_s - _FASTEST_IN_S:
+            fastest.popleft()
+        self._most_m_s = fastest[0][1]
         self.sine = sine = self._recognise(p, at_s)
         if sine is not None:
             most_m_s = fastest_rad_s * norm(sub(sine.middle, eye))

@@ -101,10 +101,19 @@ class Sway:
         return yaw, pitch, roll
 
     def _wander(self, sizes: Angles3, rng: np.random.Generator) -> Angles3:
-        yaw, pitch, roll = (
-            size * sum([octave.value_at(self._t_s, rng) for octave in octaves])
-            for size, octaves in zip(sizes, self._axes, strict=True)
-        )
+        """Return the sum of all octaves; in one loop, as it is computed in every tick."""
+        t_s = self._t_s
+        angles = []
+        for size, octaves in zip(sizes, self._axes, strict=True):
+            total = 0.0
+            for octave in octaves:
+                if t_s >= octave.end_s:
+                    octave.move_on(t_s, rng)
+                s = (t_s - octave.begin_s) / (octave.end_s - octave.begin_s)
+                share = s * s * s * (10.0 + s * (6.0 * s - 15.0))  # eq 2, as in min_jerk
+                total += octave.start + share * (octave.goal - octave.start)
+            angles.append(size * total)
+        yaw, pitch, roll = angles
         return (yaw, pitch, roll)
 
 
@@ -113,14 +122,12 @@ class _Octave:
 
     def __init__(self, period_s: float, t_s: float) -> None:
         self._period_s = period_s
-        self._from = self._to = 0.0
-        self._begin_s = self._end_s = t_s
+        self.start = self.goal = 0.0
+        self.begin_s = self.end_s = t_s
 
-    def value_at(self, t_s: float, rng: np.random.Generator) -> float:
-        """Return the value at a time; times must not decrease."""
-        while t_s >= self._end_s:
-            self._from, self._to = self._to, float(rng.uniform(-1.0, 1.0))
-            self._begin_s = self._end_s
-            self._end_s += self._period_s * float(rng.uniform(0.5, 1.5))
-        share = min_jerk((t_s - self._begin_s) / (self._end_s - self._begin_s))
-        return self._from + share * (self._to - self._from)
+    def move_on(self, t_s: float, rng: np.random.Generator) -> None:
+        """Begin the movement at a time; times must not decrease."""
+        while t_s >= self.end_s:
+            self.start, self.goal = self.goal, float(rng.uniform(-1.0, 1.0))
+            self.begin_s = self.end_s
+            self.end_s += self._period_s * float(rng.uniform(0.5, 1.5))
