@@ -146,9 +146,8 @@ class DynamixelModel(NamedTuple):
 
 # fmt: off
 MODELS: dict[str, DynamixelModel] = {m.name: m for m in (
-    # Gains: ROBOTIS-GIT/docs (2026) and the e-Manual since its correction "Modify XL330-M077"
-    # have D 400, I 0. Older e-Manual pages have D 0, I 400, which would be the only I gain of the
-    # series; D and I were exchanged there.
+    # Gains: ROBOTIS-GIT/docs (2026) has D 400, I 0, older e-Manual pages D 0, I 400. That these
+    # exchanged D and I is inferred: it would be the only I gain of the series.
     DynamixelModel("xl330-m077", 1190, "x330", 70, 70, 35, 1750, 1620, 53,
           (400, 40, 400, 0, 400), 0.215, 5.0, 1.47, 383.0),
     DynamixelModel("xl330-m288", 1200, "x330", 70, 70, 35, 1750, 445, 53,

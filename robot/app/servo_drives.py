@@ -105,6 +105,7 @@ def _shaft_drive(motor: Motor, physics: Physics, loop: Loop) -> ServoDrive:
         force_nm=stall_nm * loop.u_max / sag,
         back_emf_nm_s=stall_nm * built.rate * STEPS_PER_RAD * MS_S / sag,
         smoothing_s=-MS_S / log(1.0 - SMOOTHING),
+        slew_nm_s=stall_nm * loop.slew / MS_S,
     )
 
 
@@ -123,6 +124,7 @@ def _at_joint(shafts: Mapping[str, ServoDrive], turns: Sequence[tuple[str, float
                 one.force_nm * abs(turn),
                 one.back_emf_nm_s * square,
                 one.smoothing_s / len(turns),
+                one.slew_nm_s * abs(turn),
             )
         )
     return ServoDrive(*map(sum, zip(*parts, strict=True)))

@@ -6,7 +6,7 @@ are parallel to it while every joint is at 0.
 """
 
 from collections.abc import Mapping, Sequence
-from math import cos, sin
+from math import cos, inf, sin
 from typing import Literal, NamedTuple
 
 from gazerig.gaze.angles import add, compose, rotate
@@ -74,6 +74,7 @@ class ServoDrive(NamedTuple):
     back_emf_nm_s: loss of torque due to the motor's induced voltage, per rad/s; none while it is
         switched off
     smoothing_s: time constant with which its controller adopts the speed of a goal
+    slew_nm_s: largest change of its controller's torque per second; inf: not limited
     """
 
     armature_kg_m2: float
@@ -84,6 +85,7 @@ class ServoDrive(NamedTuple):
     force_nm: float
     back_emf_nm_s: float
     smoothing_s: float
+    slew_nm_s: float = inf
 
 
 class LinkJoint(NamedTuple):

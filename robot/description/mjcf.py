@@ -5,7 +5,7 @@ world is the rig's base. Lids collide with lids, other parts with everything but
 """
 
 import xml.etree.ElementTree as ET
-from math import atan, degrees, tan
+from math import atan, degrees, isfinite, tan
 from typing import NamedTuple
 
 from gazerig.gaze.angles import compose
@@ -53,8 +53,7 @@ def mjcf(
         description = description.without_looks()
     root = ET.Element("mujoco", model=prefix + description.name)
     compiler = ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    # The time step of the servos' control loops; their gains are too high for larger ones.
-    ET.SubElement(root, "option", timestep="0.001", integrator="implicitfast")
+    ET.SubElement(root, "option", timestep=numbers((_STEP_S,)), integrator="implicitfast")
     if folder:
         compiler.set("meshdir", folder)
         compiler.set("texturedir", folder)
@@ -171,11 +170,21 @@ def _add_linkages(parent: ET.Element, description: Description, prefix: str) -> 
             )  # fmt: skip
 
 
+_STEP_S = 0.001
+"""Time step, that of the servos' control loops; their gains are too high for larger ones."""
+_LAG_S = 1e-4
+"""Time constant of the torque of a servo with a limited change: much less than a time step."""
+_TINY = 1e-6
+"""Its motor constant and resistance: so small that they induce no voltage, as that of the real
+motor would limit the change of the current, where the servo limits that of the duty."""
+
+
 def _add_servos(root: ET.Element, description: Description, prefix: str) -> None:
     """Add a servo to each joint, or a motor if the data of its servo are unknown.
 
     The two gains of a servo act on a tendon that turns with its joint and limits the torque of
-    both together. The induced voltage brakes the joint in addition.
+    both together; a servo with a limited change of torque is a dcmotor with both gains. The induced
+    voltage brakes the joint in addition.
     """
     tendons, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
     speeds: list[dict[str, str]] = []
@@ -188,6 +197,25 @@ def _add_servos(root: ET.Element, description: Description, prefix: str) -> None
             torque = numbers((-joint.max_torque_nm, joint.max_torque_nm))
             ET.SubElement(actuators, "motor", name=name, joint=name, ctrlrange=torque)
             continue
+        brakes.append({
+            "name": f"{name}.back_emf", "joint": name, "gainprm": "0", "biastype": "affine",
+            "biasprm": f"0 0 {numbers((-drive.back_emf_nm_s,))}",
+        })  # fmt: skip
+        speed = joint.max_speed_rad_s
+        if isfinite(drive.slew_nm_s):
+            # A dcmotor has one range for both of its goals.
+            most = max(speed, -joint.low_rad, joint.high_rad)
+            # In a time step MuJoCo changes the current by its rate times the time constant.
+            rate = drive.slew_nm_s * _STEP_S / _LAG_S / _TINY
+            gains = (drive.kp_nm_rad, 0.0, drive.kv_nm_s, 0.0, 0.0, drive.force_nm)
+            ET.SubElement(
+                actuators, "dcmotor", name=name, joint=name, input="pos vel",
+                ctrlrange=numbers((-most, most)),
+                motorconst=numbers((_TINY, _TINY)), resistance=numbers((_TINY,)),
+                inductance=numbers((0.0, _LAG_S)), saturation=numbers((0.0, 0.0, rate)),
+                controller=numbers(gains),
+            )  # fmt: skip
+            continue
         force = numbers((-drive.force_nm, drive.force_nm))
         shaft = ET.SubElement(tendons, "fixed", name=name, actuatorfrcrange=force)
         ET.SubElement(shaft, "joint", joint=name, coef="1")
@@ -195,16 +223,11 @@ def _add_servos(root: ET.Element, description: Description, prefix: str) -> None
             actuators, "position", name=name, tendon=name, kp=numbers((drive.kp_nm_rad,)),
             ctrlrange=numbers((joint.low_rad, joint.high_rad)),
         )  # fmt: skip
-        speed = joint.max_speed_rad_s
         kv = numbers((drive.kv_nm_s,))
         speeds.append({
             "name": f"{name}.speed", "tendon": name, "gainprm": kv, "biastype": "affine",
             "biasprm": f"0 0 -{kv}", "ctrlrange": numbers((-speed, speed)),
             "dyntype": "filterexact", "dynprm": numbers((drive.smoothing_s,)), "actearly": "true",
-        })  # fmt: skip
-        brakes.append({
-            "name": f"{name}.back_emf", "joint": name, "gainprm": "0", "biastype": "affine",
-            "biasprm": f"0 0 {numbers((-drive.back_emf_nm_s,))}",
         })  # fmt: skip
     for one in (*speeds, *brakes):
         ET.SubElement(actuators, "general", one)

@@ -22,6 +22,7 @@ from gazerig.robot.description.links import (
     turn_about,
 )
 from gazerig.robot.description.mass import in_parent_frame, join_inertias
+from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION, STALL_RISE_C
 from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
@@ -29,12 +30,8 @@ from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 GRAVITY_M_S2 = 9.81
 NECK_JOINTS = (*LOWER_NECK, *NECK)
 """Joints that carry the head."""
-GEAR_FRICTION = 0.03
-"""Dry friction of a servo as a fraction of its stall torque, as in the emulated servos [A]."""
 STRONG_SHARE = 1.0 / 3.0
 """Fraction of the stall torque above which a servo becomes hot while it holds."""
-STALL_RISE_C, AMBIENT_C = 150.0, 30.0
-"""Final warming of a stalled servo, and air temperature in a head, as in emulated servos [A]."""
 _CELLS = 64
 
 

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from math import inf, pi
 from typing import NamedTuple, Protocol
 
+from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION, STALL_RISE_C
+
 
 class Physics(NamedTuple):
     """The body of a servo, the joint it carries, its supply and its surroundings.
@@ -47,7 +49,7 @@ class Physics(NamedTuple):
 
     rotor_s: float = 0.0373
     load_kg_m2: float = 0.0
-    coulomb_share: float = 0.03
+    coulomb_share: float = GEAR_FRICTION
     viscous_share: float = 0.02
     load_nm: float = 0.0
     gravity_nm: float = 0.0
@@ -61,8 +63,8 @@ class Physics(NamedTuple):
     play_deg: float = 0.25
     supply_v: float | None = None
     supply_ohm: float = 0.2
-    ambient_c: float = 30.0
-    stall_rise_c: float = 150.0
+    ambient_c: float = AMBIENT_C
+    stall_rise_c: float = STALL_RISE_C
     thermal_s: float = 240.0
     overload_share: float = 0.8
     overload_s: float = 2.0

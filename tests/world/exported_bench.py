@@ -19,6 +19,7 @@ from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.app.servo_drives import servo_drives
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.model.mass_params import LinkMassParams, MassParams
+from gazerig.sim_mock.smart_servo.integration import SMOOTHING
 from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN
 
 MoveKind = Literal["profile", "jump", "fall", "stall"]
@@ -165,9 +166,15 @@ class Both:
         if move.kind == "fall":
             model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         angles, torques = [], []
+        has_slew = len(data.actuator(move.joint).ctrl) > 1
+        smooth = 0.0
         for goal, speed in self._path:
-            data.actuator(move.joint).ctrl[0] = goal
-            data.actuator(f"{move.joint}.speed").ctrl[0] = speed
+            smooth += (speed - smooth) * SMOOTHING
+            if has_slew:
+                data.actuator(move.joint).ctrl[:] = goal, smooth
+            else:
+                data.actuator(move.joint).ctrl[0] = goal
+                data.actuator(f"{move.joint}.speed").ctrl[0] = speed
             mujoco.mj_step(model, data)
             angles.append(degrees(data.qpos[model.joint(move.joint).qposadr[0]]))
             torques.append(float(data.qfrc_actuator[at]))

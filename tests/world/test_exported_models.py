@@ -22,17 +22,12 @@ from gazerig.robot.description.urdf import urdf  # noqa: E402
 from gazerig.robot.model.coupling_params import CouplingParams  # noqa: E402
 
 SHARE = 0.05
-JUMP_SHARE = 0.065
-"""Of a goal that jumps, which no run writes: an X330 servo then needs 10 ms to full duty."""
-COMPARED = [
-    # A lid's profile asks an X330 for more torque than it has, in both directions within 40 ms.
-    move
-    for move in moves()
-    if not ("lid" in move.joint and move.kind == "profile")
-]
+JUMP_PEAK_SHARE = 0.25
+"""Of the peak speed when the goal of an X330 jumps, which no run writes: the emulated servo brakes
+by its speed at the end of a millisecond, the exported one at its start."""
 
 
-@pytest.mark.parametrize("move", COMPARED, ids=lambda one: f"{one.rig}-{one.joint}-{one.kind}")
+@pytest.mark.parametrize("move", [*moves()], ids=lambda one: f"{one.rig}-{one.joint}-{one.kind}")
 def test_an_exported_model_moves_as_the_running_world(move: Move) -> None:
     both = Both(move)
     world, plain = both.world, both.plain
@@ -42,10 +37,10 @@ def test_an_exported_model_moves_as_the_running_world(move: Move) -> None:
         return
     size = abs(float(world.angle_deg[-1] - world.angle_deg[0]))
     assert size > 15.0
-    most = JUMP_SHARE if move.kind == "jump" else SHARE
-    assert float(np.abs(world.angle_deg - plain.angle_deg).max()) < most * size
+    assert float(np.abs(world.angle_deg - plain.angle_deg).max()) < SHARE * size
     peaks = [float(np.abs(one.speed_deg_s).max()) for one in (world, plain)]
-    assert peaks[1] == pytest.approx(peaks[0], rel=SHARE)
+    jump = (move.rig, move.kind) == ("desk", "jump")
+    assert peaks[1] == pytest.approx(peaks[0], rel=JUMP_PEAK_SHARE if jump else SHARE)
 
 
 def test_an_exported_eye_has_the_inertia_of_the_emulated_one() -> None:

@@ -264,7 +264,7 @@ def _run_header(
     """Return a run's description with the style of its gaze."""
     from gazerig.features.lab.report.face import rig_walk
     from gazerig.features.lab.report.page import RunHeader
-    from gazerig.robot.app.servo_saccades import eye_servo_text
+    from gazerig.features.lab.report.servo_saccades import eye_servo_text
 
     gaze = rig.gaze
     styles = (

@@ -1,4 +1,4 @@
-"""Saccades that each servo model can make, as Markdown: python tests/bench/bench_saccades.py
+"""Saccades that each servo model can make, as Markdown: python tests/lab/bench_saccades.py
 
 The servo turns an eye directly and gets the goals of the model of human saccades at 200 Hz, with
 the gains of a shipped rig and with those of its maker. Times until it stays within 1 deg.
@@ -9,7 +9,7 @@ from dataclasses import replace
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.robot.app.servo_saccades import AMPLITUDES_DEG, saccade_times
+from gazerig.features.lab.report.servo_saccades import AMPLITUDES_DEG, saccade_times
 from gazerig.robot.model.joint import JointParams
 
 TUNED: dict[str, tuple[tuple[int, int, int], str]] = {

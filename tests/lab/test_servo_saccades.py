@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from described_rigs import shipped
 
-from gazerig.robot.app.servo_saccades import eye_joint, eye_servo_text, saccade_times
+from gazerig.features.lab.report.servo_saccades import eye_joint, eye_servo_text, saccade_times
 
 
 def test_an_xl330_makes_saccades_of_human_speed_and_a_slow_servo_none() -> None:
