@@ -45,7 +45,7 @@ def main() -> None:
 def stamped(head: LocalHead) -> dict[float, float]:
     """Have the time noted at which the goals after an order were sent, by its point's x."""
     assert head._composed is not None
-    robot = head._composed.made.robot
+    robot = head._composed.assembly.robot
     write, update = robot.body.write, head._feed.update
     sent_s = 0.0
     obeyed: dict[float, float] = {}
@@ -61,7 +61,7 @@ def stamped(head: LocalHead) -> dict[float, float]:
                 obeyed[command.p_world_m[0]] = sent_s
         update(tick)
 
-    robot.body.write = timed_write  # type: ignore[method-assign]
+    robot.body.write = timed_write  # type: ignore[method-assign, assignment]
     head._feed.update = noted  # type: ignore[method-assign]
     return obeyed
 

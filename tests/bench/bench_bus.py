@@ -108,7 +108,7 @@ def line_alone() -> None:
             chain = build_dynamixel(SPECS, lambda now=now: now[0])  # type: ignore[misc]
             port = InProcessPort(
                 chain,
-                sleep_until=lambda t, now=now: now.__setitem__(0, max(now[0], t)),
+                sleep_until=lambda t, now=now: now.__setitem__(0, max(now[0], t)),  # type: ignore[misc]
                 wire_time=True,
             )
             bus = SmartServoBus(
@@ -211,7 +211,8 @@ def dice(cycles: int) -> None:
     bus.open()
     bus.enable_torque()
     dice = random.Random(7)
-    injected = stale = values = missing = longest = 0
+    injected = stale = values = missing = 0
+    longest = 0.0
     for k in range(cycles):
         if dice.random() < 0.1:
             i, j = dice.sample(IDS, 2)

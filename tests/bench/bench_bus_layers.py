@@ -26,7 +26,7 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
     """Return cycles, each a layer deeper than the one before; the bus is open, its torque on."""
     reader, line, port = bus._reader, bus._line, bus._port
     ids, turns = bus._poll_list.group, reader._together
-    groups = [reader._group(ids, turns.next()) for _ in range(8)]
+    groups = [reader._group(ids, turns.next_window()) for _ in range(8)]
     groups = [group for group in groups if "acceleration" not in group.window.fields][:2]
     expected = bus._feedback._expected
     packet = bus._goals.packet(GOALS, bus._speeds)
@@ -53,7 +53,7 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
     def checked(k: int) -> int:
         group = groups[k & 1]
         raw, _ = line.exchange(group.request, group.reply_length)
-        values = group.whole(raw, expected)
+        values = group.parse_whole(raw, expected)
         line.send(packet)
         return len(IDS) * (values is not None)
 

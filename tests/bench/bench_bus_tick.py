@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from math import sin
 from statistics import median
 from typing import Any, NamedTuple
@@ -125,7 +126,7 @@ def rusty(kind: str) -> Iterator[Client]:
 
 def clients() -> dict[str, Callable[[], Any]]:
     """Return all that tick, by name."""
-    found: dict[str, Callable[[], Any]] = {kind: (lambda kind=kind: ours(kind)) for kind in MODELS}
+    found: dict[str, Callable[[], Any]] = {kind: partial(ours, kind) for kind in MODELS}
     found["rustypot, dynamixel"] = lambda: rusty("dynamixel")
     found["rustypot, feetech"] = lambda: rusty("feetech")
     return found
@@ -203,8 +204,11 @@ def main() -> None:
         table.add_column(head)
     figures = []
     for (name, cold), ticks in spans.items():
-        columns = [tick.read for tick in ticks], [tick.write for tick in ticks]
-        columns = *columns, [sum(tick) for tick in ticks]
+        columns = [
+            [tick.read for tick in ticks],
+            [tick.write for tick in ticks],
+            [sum(tick) for tick in ticks],
+        ]
         pairs = [(round(min(column), 1), round(median(column), 1)) for column in columns]
         when = "200 Hz" if cold else "warm"
         number = "" if cold else f"{counts[name]:.1f}"

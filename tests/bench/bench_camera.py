@@ -60,7 +60,7 @@ def first_pictures(film: Path, count: int) -> list[np.ndarray]:
 def flat_out(pictures: list[np.ndarray], path: Path) -> Path:
     """Write them as a film so fast that the detector never waits."""
     height, width = pictures[0].shape[:2]
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 100.0, (width, height))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 100.0, (width, height))
     for picture in pictures:
         writer.write(picture)
     writer.release()
@@ -136,7 +136,7 @@ def recording(pictures: list[np.ndarray], folder: Path) -> None:
         colour = cv2.resize(picture, (640, 400))
         smooth = cv2.resize(rng.uniform(0.5, 4.0, (10, 16)).astype(np.float32), (640, 400))
         depth = (np.round(smooth * 1e3) / 1e3).astype(np.float32)
-        shots.append(Shot(k / 30.0, k + 1, colour, depth))
+        shots.append(Shot(k / 30.0, k + 1, colour.astype(np.uint8), depth))
     print("\nrecording 640x400 with depth, per picture")
     for name, quality in (("png", None), ("jpeg 90", 90)):
         path = folder / f"{name}.mcap"

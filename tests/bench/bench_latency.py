@@ -120,10 +120,10 @@ def show_bare(film: Path) -> None:
     before, faces, flows = None, [], []
     for _ in range(BARE):
         good, picture = capture.read()
-        if not good:
+        if not good or picture is None:
             break
         began = time.perf_counter()
-        detector.find(picture)
+        detector.find(picture.astype(np.uint8, copy=False))
         faces.append(1e3 * (time.perf_counter() - began))
         grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         if before is not None:

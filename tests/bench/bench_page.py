@@ -77,7 +77,7 @@ class Bench:
         asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         self.made = made = assemble(load_rig("desk"), asked, substitutes)
         robot = made.robot
-        tuning = ParamStore(made.live, robot.command, "desk")
+        tuning = ParamStore(made.live_params, robot.command, "desk")
         options = RunOptions(page="127.0.0.1:8700" if page else None)
         quiet = lambda _: None  # noqa: E731
         self.audience = RunObservers(made, options, quiet, quiet, tuning, recorder)
@@ -162,7 +162,7 @@ def flat_out(seconds: float) -> None:
     """Print the jitter with everything at once: five browsers, a recording, a busy camera."""
     busy = subprocess.Popen([sys.executable, "-c", BUSY])
     with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(page=True, recorder=recorder_at(Path(folder) / "run.mcap"))
+        bench = Bench(page=True, recorder=recorder_at(Path(folder) / "run.mcap", fast=False))
         spectators = watched(bench.url(), 5)
         time.sleep(3)
         show("everything", bench.measure(seconds))

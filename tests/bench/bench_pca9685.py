@@ -78,7 +78,7 @@ def ours():
 def adafruits():
     names = dict.fromkeys(("I2C", "ReadableBuffer", "WriteableBuffer", "I2CDeviceDriver"), object)
     for module in ("busio", "circuitpython_typing", "circuitpython_typing.device_drivers"):
-        sys.modules[module] = SimpleNamespace(**names)
+        sys.modules[module] = SimpleNamespace(**names)  # type: ignore[assignment]
     import adafruit_pca9685
 
     bench = Bench()

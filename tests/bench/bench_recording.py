@@ -121,8 +121,8 @@ def volume(path: Path, seconds: float) -> None:
     start_s = time.monotonic()
     again = rerun(found)
     print(
-        f"run again in {time.monotonic() - start_s:.1f} s: {again.agreeing} of {again.ticks} ticks "
-        f"and the bus bytes {'the same' if again.tx_same else 'differ'}"
+        f"run again in {time.monotonic() - start_s:.1f} s: {again.agreeing_ticks} of {again.ticks} ticks "
+        f"and the bus bytes {'the same' if again.sent_bytes_same else 'differ'}"
     )
 
 

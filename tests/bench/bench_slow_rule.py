@@ -45,7 +45,9 @@ def lateness_s(rule: str, seconds: float) -> tuple[list[float], int, list[str]]:
     if rule:
         rig = apply_changes(rig, {"gaze.chooser": "slow"})
     made = assemble(rig, RunOptions(mock=True, seed=0, scene="visitor"))
-    period_s, late, said, missed = 1.0 / rig.loop.rate_hz, [], [], 0
+    period_s, missed = 1.0 / rig.loop.rate_hz, 0
+    late: list[float] = []
+    said: list[str] = []
     made.robot.start(made.clock)
     start_s, slot, last_s = made.clock.now_s(), 0, made.clock.now_s()
     try:

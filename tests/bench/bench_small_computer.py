@@ -169,9 +169,11 @@ def row(load: int, args: argparse.Namespace) -> str:
         run.wait(30.0)
         figures = json.loads(summary.read_text())
     finally:
-        for one in (*busy, run):
-            one.kill()
-            one.wait()
+        run.kill()
+        run.wait()
+        for process in busy:
+            process.kill()
+            process.wait()
     said = [line for line in lines if re.search("busy[ ,;:]|late[ :]|faults", line)]
     ticks, late = figures["ticks"], figures["overruns"]
     slots, cores = ticks + late, " ".join(f"{role} {cpu:.2f}" for role, cpu in spent.items())

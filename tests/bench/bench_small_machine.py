@@ -174,7 +174,7 @@ def looping(asked: dict[str, Any]) -> dict[str, Any]:
         elsewhere(os.getpid(), "gazerig.sim_mock.pty.server")
         run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
         begun_s: list[float] = []
-        with run.powered() as loop:
+        with run.power_on() as loop:
             page: Any = run._run_observers._page
             client = None
             start_s, warm = time.monotonic(), True

@@ -163,11 +163,11 @@ def measure(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
     lines: list[str] = []
     noted = Noted()
     kind = "feetech" if args.rig == "feetech" else "dynamixel"
-    rate_hz = composed.made.loop.rate_hz
+    rate_hz = composed.assembly.loop.rate_hz
     beside = peers(kind, rate_hz, PEERS_S)
     run = session.Session(composed, lambda: None, lines.append, summarised=False)
     try:
-        with run.powered() as loop:
+        with run.power_on() as loop:
             timers = Timers(loop)
             with in_thread_of_its_own(loop, run, args.browsers) as who:
                 follow(loop, timers, Noted(), WARM_S)
@@ -179,7 +179,7 @@ def measure(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 own_ns = timers.own_ns()
             run.stopped_by = "seconds"
     finally:
-        composed.made.close()
+        composed.assembly.close()
     for name, spent in peers(kind, rate_hz, PEERS_S).items():
         beside[name] += spent
     figures = summed(noted, timers, own_ns)
@@ -253,16 +253,16 @@ def simulated(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
     for _ in range(3):
         composed = session.compose(options_of(args, folder))
         run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
-        with run.powered() as loop:
+        with run.power_on() as loop:
             gc.collect()
             began = time.monotonic(), time.process_time()
-            for _ in range(round(args.seconds * composed.made.loop.rate_hz)):
+            for _ in range(round(args.seconds * composed.assembly.loop.rate_hz)):
                 if (reason := loop.step()) is not None:
                     raise SystemExit(f"the run ended: {reason}")
             wall.append(args.seconds / (time.monotonic() - began[0]))
             cpu.append(args.seconds / (time.process_time() - began[1]))
             run.stopped_by = "seconds"
-        composed.made.close()
+        composed.assembly.close()
         for file in folder.iterdir():
             file.unlink()
     return {

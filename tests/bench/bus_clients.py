@@ -58,7 +58,7 @@ def driver(
 
 def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextManager[Cycle]:
     """Return our driver, its torque on."""
-    bus = driver(kind, BlockingPort(path), baud, **chosen)
+    bus = driver(kind, BlockingPort(path), baud, **chosen)  # type: ignore[arg-type]
     return driven(bus, [2048] * len(IDS), time.monotonic)
 
 

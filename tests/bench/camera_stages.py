@@ -144,7 +144,7 @@ def one_round(case: Case, taken: list[Shot]) -> np.ndarray:
     for shot in taken:
         columns.update(dict.fromkeys(columns, 0.0))
         began = time.thread_time_ns()
-        looks.look(shot)
+        looks.analyze(shot)
         rows.append([*columns.values(), (time.thread_time_ns() - began) / 1e6])
     return np.array(rows)
 
@@ -155,12 +155,12 @@ def rate_hz(case: Case, seconds: float) -> float:
     most_hz = camera_hz(case)
     looks, taken = analyzer(case), shots(frames(case), most_hz)
     for shot in taken[:8]:
-        looks.look(shot)
+        looks.analyze(shot)
     count, began = 0, time.monotonic()
     while time.monotonic() - began < seconds:
         # Forward and backward without a gap: the order of the shots ends at its start.
         shot = taken[(8 + count) % len(taken)]
-        looks.look(shot._replace(captured_s=(8 + count) / most_hz, number=9 + count))
+        looks.analyze(shot._replace(captured_s=(8 + count) / most_hz, number=9 + count))
         count += 1
     return count / (time.monotonic() - began)
 

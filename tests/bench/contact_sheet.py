@@ -60,6 +60,8 @@ def tile(made: Assembly, tick: Tick, found: Detections, image: ImageArray) -> Im
         for x, y in face.landmarks_px:
             cv2.circle(small, (round(x * shrink), round(y * shrink)), 2, GREEN, -1)
     for blob in found.blobs:
+        if blob.centre_px is None:
+            continue
         x, y = blob.centre_px
         cv2.circle(small, (round(x * shrink), round(y * shrink)), 5, BLUE, 1)
     x, y = in_picture(made, gaze_point(tick), found.width_px, found.height_px)

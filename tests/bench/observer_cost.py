@@ -98,7 +98,7 @@ def show(seconds: float) -> None:
         substitutes = Substitutes(body=recorder.wrap_body)
         asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         made = assemble(load_rig("desk"), asked, substitutes)
-        tuning = ParamStore(made.live, made.robot.command, "desk")
+        tuning = ParamStore(made.live_params, made.robot.command, "desk")
         options = RunOptions(page="127.0.0.1:8760")
         observers = RunObservers(made, options, _drop, None, tuning, recorder)
         observers.open_files()

@@ -41,7 +41,9 @@ def main() -> None:
     people = saccade_times(eye_rig("xl330-m077", None), "eyes_pan")
     print(f"| people | | {' | '.join(str(one.model_ms) for one in people)} |")
     for model in SERVOS:
-        choices = [(None, "" if model == "hobby" else "the maker's")]
+        choices: list[tuple[tuple[int, int, int] | None, str]] = [
+            (None, "" if model == "hobby" else "the maker's")
+        ]
         if model in TUNED:
             gains, rig = TUNED[model]
             choices.append((gains, f"{', '.join(map(str, gains))} ({rig})"))
