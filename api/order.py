@@ -13,7 +13,7 @@ class OrderHost(Protocol):
     """A head that accepts orders."""
 
     def _progress(self) -> Progress:
-        """Return the owner of gaze and joints, and the newest track."""
+        """Return the owner of gaze and joints, and the tracks."""
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         """Wait by the head's clock until a condition is true, at most ``seconds``."""
@@ -124,7 +124,7 @@ class Order:
         self.end()
 
     def _update_outcome(self, now: Progress) -> bool:
-        """Update from the newest owner and track; return whether the order has ended."""
+        """Update from the newest owner and tracks; return whether the order has ended."""
         reply = self._accepted_reply()
         if reply is not None and self._outcome is None and (end := command_outcome(reply, now)):
             outcome, self._why = end

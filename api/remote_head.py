@@ -79,7 +79,7 @@ class RemoteHead(Head):
 
     def _progress(self) -> Progress:
         state = self.state
-        return Progress(state.client_control, state.track, state.controlled_by)
+        return Progress(state.client_control, state.tracks, state.controlled_by)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self._clock.now_s() + seconds

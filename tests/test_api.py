@@ -170,7 +170,7 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead) -> None:
     began_s = head.time_s
     assert nod.wait() == "arrived"
     assert head.time_s - began_s == pytest.approx(nod.reply.track.duration_s, abs=0.02)
-    first = head.play("shake")
+    first = head.play("nod")
     second = head.play("nod")
     assert first.wait() == "taken over" and "another track: nod" in first.why
     head.stop("a hand")

@@ -550,7 +550,7 @@ def test_the_lines_for_node_work(rig: Rig, tmp_path: Path) -> None:
     try:
         assert process.stdout is not None
         said = ""
-        while '"track":{"name":"nod"' not in said:
+        while '"name":"nod"' not in said:
             assert (line := process.stdout.readline())
             said += line
         assert '"version":1' in said

@@ -63,7 +63,7 @@ def some_changes(
             yield {key: {**size, "fx_px": 500.0, "fy_px": 500.0}}
         case "text":
             yield {
-                key: {"behaviour": "attack", "look_at": "hand", "track": "nod"}.get(
+                key: {"behaviour": "attack", "look_at": "hand", "gesture": "nod"}.get(
                     key.split(".")[-1], walk
                 )
             }

@@ -74,7 +74,7 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
         "guard_result", "events", "commands", "stopped", "controlled_by", "client_control",
-            "track", "parking",
+            "tracks", "parking",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299
@@ -391,12 +391,12 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
 
 
 def test_leads_and_tracks_come_back(recorded: Recorded) -> None:
-    track = TrackState(2, "nod", "", "somebody", 3.5)
+    track = TrackState(2, "nod", 0.5, 1.0, owns=("jaw",), who="somebody", since_s=3.5)
     lead = ControlState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
-    tick = recorded.ticks[-1]._replace(client_control=lead, track=track, percept=None)
+    tick = recorded.ticks[-1]._replace(client_control=lead, tracks=(track,), percept=None)
     data = msgspec.json.decode(msgspec.json.encode(moments.as_json(handed_over(tick)[1])))
     back = moments.from_json(data, {}).tick
-    assert (back.client_control, back.track) == (lead, track)
+    assert (back.client_control, back.tracks) == (lead, (track,))
 
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])

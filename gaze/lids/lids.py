@@ -46,6 +46,16 @@ class LidOpenings(NamedTuple):
     lower_left: float
     lower_right: float
 
+    @property
+    def openings(self) -> tuple[float, float, float, float]:
+        """Return the openings in the order of the factors of ``scale``."""
+        return self.left, self.right, self.lower_left, self.lower_right
+
+    def replace(self, openings: tuple[float, float, float, float]) -> "LidOpenings":
+        """Return other openings with the same blink."""
+        left, right, lower_left, lower_right = openings
+        return LidOpenings(left, right, self.blink, lower_left, lower_right)
+
     def scale(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
         """Return the openings times factors, slowing down towards fully open.
 

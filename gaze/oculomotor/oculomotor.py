@@ -193,16 +193,21 @@ class Oculomotor:
                 _add_offset(wanted[0], offset.eyes_rad),
                 _add_offset(wanted[1], offset.eyes_rad),
             )
+        if (owned := offset.owned) is not None:
+            wanted = owned.mix_eye(wanted[0]), owned.mix_eye(wanted[1])
         left, right = eyes = self._clip_eyes(wanted)
         limited = () if eyes == wanted else self._limited_angles(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        if lids.blink and (turns := self._lids.eye_turn_rad(t_s)) is not None:
+        if lids.blink and owned is None and (turns := self._lids.eye_turn_rad(t_s)) is not None:
             left, right = self._clip_eyes(
                 (_add_offset(left, turns[0]), _add_offset(right, turns[1]))
             )
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scale(offset.lids)
         head = self._add_sway(head, offset.head_rad, t_s)
+        if owned is not None:
+            head = self._head.clip_to_range(owned.mix_head(head))
+            lids = lids.replace(owned.mix_lids(lids.openings))
         phase: Phase = (
             "saccade" if place.is_in_saccade
             else "pursue" if norm(velocity) > MOVING_M_S

@@ -11,7 +11,10 @@ from gazerig.gaze.track.expression import Expressions
 from gazerig.gaze.track.level import LevelRange, Levels
 from gazerig.gaze.track.pose_offset import NO_OFFSET as NO_OFFSET
 from gazerig.gaze.track.pose_offset import PoseOffset as PoseOffset
+from gazerig.gaze.track.track import POSE_CHANNELS
 from gazerig.gaze.track.track_player import TrackPlayer
+
+_FIRST_JOINT = len(POSE_CHANNELS)
 
 
 class AnimationTables(NamedTuple):
@@ -43,7 +46,7 @@ class Animation:
         """
         self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))
         self.levels = Levels(tables.levels, len(joints))
-        self.tracks = TrackPlayer(len(joints))
+        self.tracks = TrackPlayer(len(joints), self.expressions)
         self._sum = NO_OFFSET
 
     def reset(self, t_s: float) -> None:
@@ -63,4 +66,10 @@ class Animation:
         if expressions.moves or levels.moves or tracks.moves:
             face = expressions.step(t_s).combine(levels.step(t_s))
             self._sum = face.combine(tracks.step(t_s))
+            if tracks.owned.layers:
+                joints = [
+                    tracks.owned.mix(_FIRST_JOINT + i, a)
+                    for i, a in enumerate(self._sum.joints_rad)
+                ]
+                self._sum = self._sum._replace(joints_rad=tuple(joints), owned=tracks.owned)
         return self._sum

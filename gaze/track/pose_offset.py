@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from gazerig.gaze.track.owned_pose import OwnedPose
 from gazerig.gaze.types import Angles2, Angles3
 
 
@@ -12,12 +13,14 @@ class PoseOffset(NamedTuple):
     eyes_rad: added to both eyes' (yaw, pitch) in the head
     lids: factors on the openings of the left and right upper and the left and right lower lid
     joints_rad: angles of the joints that gaze does not move, in their order
+    owned: angles that tracks give instead of gaze, None without such a track
     """
 
     head_rad: Angles3 = (0.0, 0.0, 0.0)
     eyes_rad: Angles2 = (0.0, 0.0)
     lids: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     joints_rad: tuple[float, ...] = ()
+    owned: OwnedPose | None = None
 
     def combine(self, other: "PoseOffset") -> "PoseOffset":
         """Return both combined: angles are added, factors of the lids multiplied."""

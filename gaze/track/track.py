@@ -18,8 +18,12 @@ MIN_SPEED, MAX_SPEED = 0.1, 4.0
 """Range of factors on the original speed of a track."""
 MAX_COUNT = 20
 """Largest number of repetitions of a track by one command."""
-MAX_FRAMES = 2000
-"""Largest number of frames of a track: 33 per second for a minute."""
+MAX_FRAMES = 200_000
+"""Largest number of frames of a track."""
+MAX_DURATION_S = 4 * 3600.0
+"""Longest track."""
+MAX_TRACKS = 8
+"""Largest number of tracks that play at once."""
 HEAD_CHANNELS = ("head_yaw", "head_pitch", "head_roll")
 EYE_CHANNELS = ("eyes_yaw", "eyes_pitch")
 LID_CHANNELS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
@@ -36,12 +40,27 @@ LID_GROUPS: Mapping[str, tuple[str, ...]] = {
 """Lids that a frame may name, groups before single lids."""
 
 
+KEEP = ""
+"""Value of ``look_at`` in a frame that does not change the gaze."""
+_FAR_M = 1000.0
+
+
+def is_look(look: object) -> bool:
+    """Return whether a value is a valid ``look_at``."""
+    if isinstance(look, tuple | list):
+        numbers = [isinstance(x, int | float) and not isinstance(x, bool) for x in look]
+        return len(look) == 3 and all(numbers) and all(-_FAR_M <= x <= _FAR_M for x in look)
+    if isinstance(look, int) and not isinstance(look, bool):
+        return look >= 0
+    return look is None or look in (KEEP, "person")
+
+
 @dataclass(frozen=True)
 class KeyFrame:
     """Positions at one time of a track; anything that is not named does not move."""
 
     # fmt: off
-    time_s: Annotated[float, Bounds(0.02, 60), "time since the start of the track"]
+    time_s: Annotated[float, Bounds(0.02, MAX_DURATION_S), "time since the start of the track"]
     head_yaw_deg: Annotated[float | None, Bounds(-90, 90), "head turn to the left, added to the gaze"] = None
     head_pitch_deg: Annotated[float | None, Bounds(-90, 90), "head turn upwards, added to the gaze"] = None
     head_roll_deg: Annotated[float | None, Bounds(-90, 90), "head tilt towards the right shoulder"] = None
@@ -56,18 +75,30 @@ class KeyFrame:
     joints_deg: Annotated[Mapping[str, float], Bounds(-180, 180), "offsets of further joints by name"] = field(
         default_factory=dict
     )
+    look_at: Annotated[object, "gaze from this time on: a point [x, y, z] in the world, m; person: the nearest; "
+        "the number of a person; null: gaze chooses again"] = KEEP
+    express: Annotated[str, "expression of the rig's table from this time on"] = ""
+    strength: Annotated[float, Bounds(0, 1), "strength of the expression"] = 1.0
+    levels: Annotated[Mapping[str, float], Bounds(0, 1), "levels of the rig's table, e.g. the opening of a jaw"] = field(
+        default_factory=dict
+    )
     # fmt: on
 
     def __post_init__(self) -> None:
         """Check that the frame has valid contents.
 
         Raises:
-            ValueError: it names nothing, or lids out of range.
+            ValueError: it names nothing, unknown lids or an invalid point.
         """
+        if not is_look(self.look_at):
+            raise ValueError(
+                f"look_at {self.look_at!r:.60}: give [x, y, z] in m within +-{_FAR_M:g}, person, "
+                "the number of a person, or null"
+            )
         unknown = [name for name in self.lids if name not in LID_GROUPS]
         if unknown:
             raise ValueError(f"unknown lids {unknown[0]!r}; available: {', '.join(LID_GROUPS)}")
-        if not self.values():
+        if not (self.values() or self.levels or self.express or self.look_at != KEEP):
             raise ValueError("names no motion; give e.g. head_pitch_deg")
 
     def values(self) -> dict[str, float]:
@@ -84,11 +115,11 @@ class KeyFrame:
 
 @dataclass(frozen=True)
 class Track:
-    """One track."""
+    """Motion, gaze, face and sound on one clock."""
 
     # fmt: off
     description: Annotated[str, "meaning of the track"]
-    frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; everything returns to rest after the last one"]
+    frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; everything returns to rest after the last one"] = ()
     space: Annotated[Literal["gaze", "joint"],
         "gaze: the eyes stay on their target while the head moves; joint: they move with the head"] = "gaze"
     fit: Annotated[Literal["slow", "refuse"],
@@ -100,6 +131,17 @@ class Track:
     optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the track"] = ()
     frames_without_neck: Annotated[tuple[KeyFrame, ...],
         "alternative frames for rigs that lack a non-optional neck joint of the track"] = ()
+    owns: Annotated[tuple[str, ...],
+        "neck, eyes, lids or joints whose angles, from the neutral pose, the track gives; gaze does not move them"] = ()
+    sound: Annotated[str, "sound file, relative to this file"] = ""
+    volume: Annotated[float, Bounds(0, 1), "volume of the sound"] = 1.0
+    cues: Annotated[Mapping[str, float], Bounds(0, MAX_DURATION_S), "named times, reported when they are passed"] = field(
+        default_factory=dict
+    )
+    loop: Annotated[bool, "repeat the track until it is ended"] = False
+    blend_in_s: Annotated[float, Bounds(0.05, 10), "shortest time in which the track takes over the joints that it owns"] = 0.4
+    blend_out_s: Annotated[float | None, Bounds(0.05, 10),
+        "shortest time in which it returns them to gaze, or ends early; null: gaze.tracks.blend_out_ms"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -108,8 +150,8 @@ class Track:
         Raises:
             ValueError: there are no frames, or too many.
         """
-        if not self.frames:
-            raise ValueError("a track needs at least one frame")
+        if not self.frames and not self.sound:
+            raise ValueError("a track needs at least one frame, or a sound")
         most = max(len(self.frames), len(self.frames_without_neck))
         if most > MAX_FRAMES:
             raise ValueError(f"{most} frames: a track has at most {MAX_FRAMES}; omit some")
@@ -183,6 +225,8 @@ def _repeat_loop(
     frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
 ) -> list[tuple[float, dict[str, float]]]:
     """Return the times and the values of all frames, with those of the loop repeated."""
+    if not frames:
+        return []
     begin_s, end_s = loop_s or (0.0, frames[-1].time_s)
     keys = [(frame.time_s, frame.values()) for frame in frames]
     before = [key for key in keys if key[0] <= begin_s]

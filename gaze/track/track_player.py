@@ -1,31 +1,64 @@
-"""Player of tracks, one at a time, without jumps at a start, an end or an interruption.
+"""Player of several tracks, without steps at a start, an end, a seek or an interruption.
 
-A track begins from rest and returns to rest. When another one replaces it, or it ends early, its
-offset returns to rest on a fifth-order polynomial that begins with the present offset, speed and
-acceleration, and the next track is added to that.
+The offsets of a track begin from rest and return to rest. When another one replaces it, or it ends
+early, its offset returns to rest on a fifth-order polynomial that begins with the present offset,
+speed and acceleration, and the next track is added to that. A seek continues from the present
+motion in the same manner. A pause and a new speed change the speed of the track's clock smoothly.
+Channels that a track owns blend from gaze to the track and back. Each of these transitions takes as
+long as the limits of the joints require.
 """
 
+import contextlib
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.minimum_jerk import Quintic
+from gazerig.gaze.minimum_jerk import Quintic, min_jerk
+from gazerig.gaze.track.expression import Expressions
+from gazerig.gaze.track.owned_pose import OwnedPose
 from gazerig.gaze.track.pose_offset import PoseOffset
-from gazerig.gaze.track.track import POSE_CHANNELS, rest_value
+from gazerig.gaze.track.track import HEAD_CHANNELS, KEEP, POSE_CHANNELS, rest_value
+from gazerig.gaze.track.track_clock import TrackClock
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.types import Floats
+
+SYNC_S = 0.25
+"""A larger error of the position is corrected by a seek."""
+_SYNC_SHARE = 0.05
+"""Largest change of the speed that corrects a smaller one."""
+_SYNCED_S = 0.005
+_CORRECTED_IN_S = 1.0
+_CHANGE_S = 0.2
+"""Shortest time of a change of speed."""
+_SAMPLES = 41
+_HEAD = len(HEAD_CHANNELS)
+_LONGER = 1.25
+
+
+def _unlimited(speed: Floats, acceleration: Floats) -> float:
+    return 1.0
 
 
 class PlayedTrack(NamedTuple):
     """A track with its speed and sizes of play.
 
     speed: factor on its original speed; sizes: factor of every channel
+    stretch: returns for (n, channels) speeds and accelerations the factor by which the motion must
+        take longer to keep the limits, at most 1 if it keeps them
+    blend_s: shortest times in which it takes over owned channels, and returns them or seeks
+    present: values of the channels before it, from which owned channels begin
+    lead_s: time by which its motion is ahead of its position, because servos are late
     """
 
     name: str
     motion: TrackMotion
     speed: float
     sizes: tuple[float, ...]
+    stretch: Callable[[Floats, Floats], float] = _unlimited
+    blend_s: tuple[float, float] = (0.4, 0.25)
+    present: tuple[float, ...] = ()
+    lead_s: float = 0.0
 
     @property
     def duration_s(self) -> float:
@@ -41,80 +74,447 @@ class OffsetState(NamedTuple):
     acceleration: Floats
 
 
+class Fade:
+    """Return of an offset to rest by fifth-order polynomials, one for each moving channel."""
+
+    def __init__(self, state: OffsetState, from_s: float, fade_s: float) -> None:
+        self.channels = [
+            (i, Quintic((float(p), float(v), float(a)), 0.0, fade_s))
+            for i, (p, v, a) in enumerate(zip(*state, strict=True))
+            if p or v or a
+        ]
+        self.from_s, self.until_s = from_s, from_s + fade_s
+
+    def add_to(self, flat: list[float], t_s: float) -> None:
+        """Add the offset at a time to a flat PoseOffset."""
+        for i, fade in self.channels:
+            flat[i] += fade.position(t_s - self.from_s)
+
+    def add_state(self, columns: Sequence[Floats], t_s: float) -> None:
+        """Add value, speed and acceleration at a time to (channels,) each."""
+        for i, fade in self.channels:
+            for column, number in zip(columns, fade.state_at(t_s - self.from_s), strict=True):
+                column[i] += number
+
+
+class Voice:
+    """One track that plays.
+
+    clock: position by the time of the loop; wanted: speed without pause and correction
+    ends: whether it has ended and only blends out
+    passed: names of the cues that it has passed since they were taken
+    """
+
+    def __init__(self, number: int, played: PlayedTrack, clock: TrackClock, loop: bool) -> None:
+        self.number, self.played, self.clock, self.loop = number, played, clock, loop
+        self.wanted, self.paused, self.ends = played.speed, False, False
+        self.passed: list[str] = []
+        self._fade: Fade | None = None
+        self._corrected_s: float | None = None
+        self._cue = 0
+        self._entry_s = self._in_s = 0.0
+        self._exits: dict[int, tuple[float, float]] = {}
+
+    @property
+    def motion(self) -> TrackMotion:
+        """Return its curves."""
+        return self.played.motion
+
+    def position_s(self, t_s: float) -> float:
+        """Return the position of the motion in the track."""
+        return self.clock.state_at(t_s)[0]
+
+    @property
+    def ahead_s(self) -> float:
+        """Return the distance of the motion from the position of the sound, in the track."""
+        return self.played.lead_s * self.wanted
+
+    def advance(self, t_s: float) -> bool:
+        """Pass cues, repeat and end corrections; return whether its end is reached."""
+        if self._corrected_s is not None and t_s >= self._corrected_s:
+            self._corrected_s = None
+            self.clock = self.clock.change_speed(t_s, self.wanted, _CHANGE_S)
+        position_s, duration_s = self.position_s(t_s), self.motion.duration_s
+        cues = self.motion.events.cues
+        while self._cue < len(cues) and cues[self._cue][0] <= position_s - self.ahead_s:
+            self.passed.append(cues[self._cue][1])
+            self._cue += 1
+        if position_s - self.ahead_s < duration_s or self.ends:
+            return False
+        if self.loop and duration_s > 0.0:
+            self.clock = self.clock._replace(position_s=self.clock.position_s - duration_s)
+            self._cue = 0
+            return False
+        return True
+
+    def add_to(self, flat: list[float], t_s: float) -> None:
+        """Add the motion at a time to a flat PoseOffset."""
+        if self._fade is not None:
+            if t_s < self._fade.until_s:
+                self._fade.add_to(flat, t_s)
+            else:
+                self._fade = None
+        self.motion.add_to(flat, self.position_s(t_s), self.played.sizes)
+
+    def state(self, t_s: float) -> OffsetState:
+        """Return the offset at a time, with its speed and acceleration."""
+        return self._state_of(self.clock, self._fade, t_s)
+
+    def _state_of(self, clock: TrackClock, fade: Fade | None, t_s: float) -> OffsetState:
+        position_s, rate, change = clock.state_at(t_s)
+        value, speed, acceleration = map(np.array, self.motion.state_at(max(0.0, position_s)))
+        size = np.array(self.played.sizes)
+        total = OffsetState(
+            value * size,
+            speed * size * rate,
+            acceleration * (size * rate * rate) + speed * (size * change),
+        )
+        if fade is not None:
+            fade.add_state(total, t_s)
+        return total
+
+    def _sample(
+        self, clock: TrackClock, fade: Fade | None, t_s: float, time_s: float
+    ) -> OffsetState:
+        """Return (n, channels) states over a time to come."""
+        times = t_s + np.linspace(0.0, time_s, _SAMPLES)
+        position, rate, change = (column[:, None] for column in clock.sample_at(times))
+        found = self.motion.sample_at(np.maximum(position[:, 0], 0.0))
+        size = np.array(self.played.sizes)
+        total = OffsetState(
+            found.value * size,
+            found.speed * size * rate,
+            found.acceleration * size * rate * rate + found.speed * size * change,
+        )
+        if fade is not None:
+            for row, time in enumerate(times.tolist()):
+                fade.add_state([column[row] for column in total], time)
+        return total
+
+    def _excess(self, clock: TrackClock, fade: Fade | None, t_s: float, time_s: float) -> float:
+        _, speed, acceleration = self._sample(clock, fade, t_s, time_s)
+        return self.played.stretch(speed, acceleration)
+
+    def set_speed(self, t_s: float, speed: float) -> None:
+        """Change the speed; of a paused track for its next start."""
+        self.wanted = speed
+        if not self.paused:
+            self._change_speed(t_s, speed)
+
+    def _change_speed(self, t_s: float, speed: float) -> None:
+        """Change the speed of the clock, along the track, as fast as the limits permit."""
+        self._corrected_s, time_s = None, _CHANGE_S
+        for _ in range(16):
+            clock = self.clock.change_speed(t_s, speed, time_s)
+            if self._excess(clock, self._fade, t_s, time_s) <= 1.0:
+                break
+            time_s *= _LONGER
+        self.clock = clock
+
+    def pause(self, t_s: float) -> None:
+        """Come to rest on the track."""
+        self.paused = True
+        self._change_speed(t_s, 0.0)
+
+    def resume(self, t_s: float) -> None:
+        """Continue at the speed before the pause."""
+        self.paused = False
+        self._change_speed(t_s, self.wanted)
+
+    def seek(self, t_s: float, position_s: float) -> None:
+        """Continue at another position, from the present motion.
+
+        The track runs on meanwhile; if the sum would be too fast, it starts there from rest.
+        """
+        now = self.state(t_s)
+        position_s = min(position_s, self.motion.duration_s) + self.ahead_s
+        self._corrected_s = None
+        rate = 0.0 if self.paused else self.wanted
+        runs = TrackClock(t_s, position_s, rate)
+        rests = TrackClock(t_s, position_s, 0.0)
+        least_s = self.played.blend_s[1]
+        away = self._away(rests, now, t_s, least_s)
+        _, speed, acceleration = self._sample_fade(away, t_s, least_s)
+        least_s *= max(1.0, self.played.stretch(speed, acceleration))
+        for from_rest in (False, True) if rate else (True,):
+            time_s = least_s
+            for _ in range(12 if from_rest else 4):
+                clock = rests.change_speed(t_s, rate, time_s) if from_rest else runs
+                fade = self._away(clock, now, t_s, time_s)
+                if self._excess(clock, fade, t_s, time_s) <= 1.0:
+                    self._begin(clock, fade, position_s)
+                    return
+                time_s *= _LONGER
+        self._begin(clock, fade, position_s)
+
+    def _away(self, clock: TrackClock, now: OffsetState, t_s: float, time_s: float) -> Fade:
+        """Return the fade from the present motion to that of a clock."""
+        there = self._state_of(clock, None, t_s)
+        gap = OffsetState(*(a - b for a, b in zip(now, there, strict=True)))
+        return Fade(gap, t_s, time_s)
+
+    def _sample_fade(self, fade: Fade, t_s: float, time_s: float) -> OffsetState:
+        total = OffsetState(*(np.zeros((_SAMPLES, len(self.motion.rest))) for _ in range(3)))
+        for row, time in enumerate((t_s + np.linspace(0.0, time_s, _SAMPLES)).tolist()):
+            fade.add_state([column[row] for column in total], time)
+        return total
+
+    def _begin(self, clock: TrackClock, fade: Fade, position_s: float) -> None:
+        self.clock, self._fade = clock, fade if fade.channels else None
+        self._skip_cues(position_s)
+
+    def _skip_cues(self, position_s: float) -> None:
+        """Let the cues before a position count as passed; one at the position is still to come."""
+        cues = self.motion.events.cues
+        self._cue = sum([time < position_s - self.ahead_s for time, _ in cues])
+
+    def sync(self, t_s: float, position_s: float) -> None:
+        """Correct the position by another clock, slowly, or by a seek."""
+        off_s = position_s + self.ahead_s - self.position_s(t_s)
+        if abs(off_s) >= SYNC_S:
+            self.seek(t_s, max(0.0, position_s))
+        elif abs(off_s) >= _SYNCED_S and not self.paused:
+            share = min(max(off_s / _CORRECTED_IN_S, -_SYNC_SHARE), _SYNC_SHARE)
+            self.clock = self.clock.change_speed(t_s, self.wanted * (1.0 + share), _CHANGE_S)
+            self._corrected_s = t_s + off_s / (share * self.wanted)
+
+    def enter(self, t_s: float) -> float:
+        """Begin to take over the owned channels; return the time that it takes."""
+        owned = sorted(self.motion.owned)
+        time_s = self.played.blend_s[0]
+        present = np.array(self.played.present) if self.played.present else self.motion.rest * 0.0
+        mask = np.zeros(len(self.motion.rest))
+        mask[owned] = 1.0
+        for _ in range(12):
+            w, dw, ddw = _blend_rates(time_s)
+            value, speed, acceleration = self._sample(self.clock, self._fade, t_s, time_s)
+            gap = value - present
+            blended = w * speed + dw * gap
+            if (
+                self.played.stretch(
+                    blended * mask, (w * acceleration + 2.0 * dw * speed + ddw * gap) * mask
+                )
+                <= 1.0
+            ):
+                break
+            time_s *= _LONGER
+        self._entry_s, self._in_s = t_s, time_s
+        return time_s
+
+    def leave(self, t_s: float, gaze: OwnedPose, covered: frozenset[int], covered_s: float) -> None:
+        """Begin to return the owned channels to gaze.
+
+        Args:
+            t_s: present time.
+            gaze: the angles by gaze.
+            covered: channels that a newer track takes over; they end when it has.
+            covered_s: time that it takes.
+        """
+        self.ends = True
+        gap = np.zeros(len(self.motion.rest))
+        value = self.state(t_s).value + self.motion.rest
+        for i in self.motion.owned - covered:
+            gap[i] = value[i] - gaze.gaze.get(i, 0.0)
+        time_s = self.played.blend_s[1]
+        _, dw, ddw = _blend_rates(time_s)
+        time_s *= max(1.0, self.played.stretch(dw * gap, ddw * gap))
+        for i in self.motion.owned:
+            self._exits[i] = (t_s + covered_s, 0.0) if i in covered else (t_s, time_s)
+
+    def has_left(self, t_s: float) -> bool:
+        """Return whether it has ended and no longer owns a channel."""
+        return self.ends and all([t_s >= begin + time for begin, time in self._exits.values()])
+
+    def weight(self, channel: int, t_s: float) -> float:
+        """Return the share of the track in a channel that it owns, 0..1."""
+        entered = min_jerk((t_s - self._entry_s) / self._in_s) if self._in_s else 1.0
+        if channel not in self._exits:
+            return entered
+        begin_s, time_s = self._exits[channel]
+        if time_s == 0.0:
+            return entered if t_s < begin_s else 0.0
+        return entered * (1.0 - min_jerk((t_s - begin_s) / time_s))
+
+
 class TrackPlayer:
-    """Player of the present track.
+    """Player of tracks.
 
     moves: whether ``step`` may return another offset than last time
+    replaces_gaze: whether a track gives a gaze point or the head's angles
+    look: gaze point of the newest track that has one (``KeyFrame.look_at``), else ``KEEP``
 
     Args:
         joints: number of joints that gaze does not move.
+        expressions: the expression, which tracks may change while they play.
     """
 
-    def __init__(self, joints: int) -> None:
+    def __init__(self, joints: int, expressions: Expressions | None = None) -> None:
         self._rest_flat = (*map(rest_value, POSE_CHANNELS), *(0.0,) * joints)
         self._rest = PoseOffset.from_flat(self._rest_flat)
+        self._expressions = expressions
+        self.owned = OwnedPose()
         self.reset()
 
     def reset(self) -> None:
         """Rest immediately, for a head whose joints are hand-guided or switched off."""
-        self._played: PlayedTrack | None = None
-        self._begins_s = 0.0
-        self._fades: list[tuple[int, Quintic]] = []
-        self._fades_from_s = self._faded_s = 0.0
+        self.voices: list[Voice] = []
+        self._leaving: list[Voice] = []
+        self._fade: Fade | None = None
+        # Of each track that has changed the expression: its newest key, and the one before.
+        self._expressed: dict[int, tuple[int, tuple[str, float]]] = {}
+        self.look: object = KEEP
+        self.replaces_gaze = False
+        self.owned.layers = {}
         self.moves = True
 
     @property
     def playing(self) -> str:
-        """Return the name of the present track, "" without one."""
-        return self._played.name if self._played is not None else ""
+        """Return the name of the newest track, "" without one."""
+        return self.voices[-1].played.name if self.voices else ""
 
-    def play(self, played: PlayedTrack | None, t_s: float, fade_s: float, wait_s: float) -> None:
-        """Begin a track, or none; the present one returns to rest meanwhile.
+    def overlapping(self, motion: TrackMotion) -> list[Voice]:
+        """Return the tracks that move or own a channel which another one moves, or also look."""
+        return [
+            one
+            for one in self.voices
+            if one.motion.channels & motion.channels
+            or (one.motion.events.looks and motion.events.looks)
+            or (one.motion.events.expressions and motion.events.expressions)
+        ]
+
+    def end(
+        self, voices: Iterable[Voice], t_s: float, fade_s: float, by: TrackMotion | None = None,
+        taken_s: float = 0.0,
+    ) -> None:  # fmt: skip
+        """End tracks: their offsets return to rest, their owned channels to gaze.
 
         Args:
-            played: the next track; None: no track.
+            voices: the tracks.
             t_s: present time, seconds.
-            fade_s: time in which the present track returns to rest.
-            wait_s: time until the next begins.
+            fade_s: time in which offsets return to rest, with those of earlier tracks.
+            by: track that replaces them.
+            taken_s: time in which it takes over its owned channels.
         """
-        states = zip(*self.state(t_s), strict=True)
-        self._fades = [
-            (i, Quintic((float(p), float(v), float(a)), 0.0, fade_s))
-            for i, (p, v, a) in enumerate(states)
-            if p or v or a
-        ]
-        self._fades_from_s, self._faded_s = t_s, t_s + fade_s
-        self._played, self._begins_s = played, t_s + wait_s
+        ended = list(voices)
+        fade = Fade(self.state(t_s, ended), t_s, fade_s)
+        self._fade = fade if fade.channels else None
+        for voice in ended:
+            self.voices.remove(voice)
+            if voice.motion.owned:
+                covered = voice.motion.owned & by.owned if by is not None else frozenset()
+                voice.leave(t_s, self.owned, frozenset(covered), taken_s)
+                self._leaving.append(voice)
+            self._restore_expression(voice)
         self.moves = True
 
-    def state(self, t_s: float) -> OffsetState:
-        """Return the offset at a time, with its speed and acceleration."""
-        total = [np.zeros(len(self._rest_flat)) for _ in range(3)]
-        for i, fade in self._fades:
-            for column, number in zip(total, fade.state_at(t_s - self._fades_from_s), strict=True):
-                column[i] += number
-        if self._played is not None:
-            _, motion, speed, sizes = self._played
-            found = motion.state_at(max(0.0, t_s - self._begins_s) * speed)
-            size = np.array(sizes)
-            rates = size, size * speed, size * speed * speed
-            for column, now, rate in zip(total, found, rates, strict=True):
-                column += np.array(now) * rate
-        return OffsetState(*total)
+    def play(
+        self, played: PlayedTrack, number: int, t_s: float, fade_s: float, wait_s: float,
+        from_s: float = 0.0, loop: bool = False,
+    ) -> Voice:  # fmt: skip
+        """Begin a track; those which it replaces return to rest meanwhile.
+
+        Args:
+            played: the track.
+            number: its number.
+            t_s: present time, seconds.
+            fade_s: time in which the replaced tracks return to rest.
+            wait_s: time until it begins.
+            from_s: position at which it begins.
+            loop: whether it repeats until it is ended.
+        """
+        voice = Voice(number, played, TrackClock(t_s + wait_s, 0.0, played.speed), loop)
+        if from_s > 0.0:
+            voice.seek(t_s + wait_s, from_s)
+        taken_s = voice.enter(t_s) if played.motion.owned else 0.0
+        self.end(self.overlapping(played.motion), t_s, fade_s, played.motion, taken_s)
+        self.voices.append(voice)
+        return voice
+
+    def state(self, t_s: float, voices: Sequence[Voice] | None = None) -> OffsetState:
+        """Return the sum of offsets of tracks (default all) and of those that have ended.
+
+        Owned channels have no offset.
+        """
+        total = OffsetState(*(np.zeros(len(self._rest_flat)) for _ in range(3)))
+        if self._fade is not None:
+            self._fade.add_state(total, t_s)
+        for voice in self.voices if voices is None else voices:
+            found = voice.state(t_s)
+            owned = list(voice.motion.owned)
+            for column, more in zip(total, found, strict=True):
+                more[owned] = 0.0
+                column += more
+        return total
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset at a time; at rest it is always the same object."""
-        if self._fades and t_s >= self._faded_s:
-            self._fades = []
-        if self._played is not None and t_s >= self._begins_s + self._played.duration_s:
-            self._played = None
-        if self._played is None and not self._fades:
+        if self._fade is not None and t_s >= self._fade.until_s:
+            self._fade = None
+        for voice in [one for one in self.voices if one.advance(t_s)]:
+            self.voices.remove(voice)
+            self._restore_expression(voice)
+            if voice.motion.owned:
+                voice.leave(t_s, self.owned, frozenset(), 0.0)
+                self._leaving.append(voice)
+        self._leaving = [one for one in self._leaving if not one.has_left(t_s)]
+        self._apply_events(t_s)
+        self.owned.layers = {}
+        self.replaces_gaze = isinstance(self.look, tuple)
+        if not (self.voices or self._fade or self._leaving):
             self.moves = False
             return self._rest
         flat = list(self._rest_flat)
-        for i, fade in self._fades:
-            flat[i] += fade.position(t_s - self._fades_from_s)
-        if self._played is not None:
-            _, motion, speed, sizes = self._played
-            motion.add_to(flat, max(0.0, t_s - self._begins_s) * speed, sizes)
+        if self._fade is not None:
+            self._fade.add_to(flat, t_s)
+        for voice in self.voices:
+            if not voice.motion.owned:
+                voice.add_to(flat, t_s)
+        for voice in sorted(
+            (one for one in (*self._leaving, *self.voices) if one.motion.owned),
+            key=lambda one: one.number,
+        ):
+            own = list(self._rest_flat)
+            voice.add_to(own, t_s)
+            for i, value in enumerate(own):
+                if i in voice.motion.owned:
+                    self.owned.layers.setdefault(i, []).append((value, voice.weight(i, t_s)))
+                    self.replaces_gaze |= i < _HEAD
+                elif not voice.ends:
+                    flat[i] += value - self._rest_flat[i]
         return PoseOffset.from_flat(tuple(flat))
+
+    def _apply_events(self, t_s: float) -> None:
+        """Set the gaze point and the expression of the tracks' present positions."""
+        self.look = KEEP
+        for voice in self.voices:
+            looks, expressions, _ = voice.motion.events
+            if looks and (at := voice.motion.event_at(0, voice.position_s(t_s))) >= 0:
+                self.look = looks[at][1]
+            if expressions and self._expressions is not None:
+                at = voice.motion.event_at(1, voice.position_s(t_s))
+                newest, before = self._expressed.get(
+                    voice.number, (-1, (self._expressions.name, self._expressions.strength))
+                )
+                if at >= 0 and at != newest:
+                    self._expressed[voice.number] = at, before
+                    self._express(expressions[at][1])
+
+    def _restore_expression(self, voice: Voice) -> None:
+        """Return to the expression before a track that has changed it."""
+        if voice.number in self._expressed:
+            self._express(self._expressed.pop(voice.number)[1])
+
+    def _express(self, expression: tuple[str, float]) -> None:
+        if self._expressions is not None:
+            with contextlib.suppress(ValueError):  # the table has changed since the check
+                self._expressions.express(*expression)
+
+
+def _blend_rates(time_s: float) -> tuple[Floats, Floats, Floats]:
+    """Return (n, 1) samples of a blend 0..1 in a time, with its rate and acceleration."""
+    s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
+    return (
+        s**3 * (10.0 + s * (6.0 * s - 15.0)),
+        30.0 * (s * (1.0 - s)) ** 2 / time_s,
+        60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / time_s**2,
+    )

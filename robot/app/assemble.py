@@ -315,6 +315,8 @@ def _build_components(
             rig.gaze.tracks,
             rig.names,
             lid_spans(rig),
+            animation_tables(rig),
+            rig.gaze.oculomotor.eye_lag_ms / 1e3,
         ),
     )
 

@@ -181,10 +181,10 @@ class LiveParams:
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
         if now.head != was.head or (bounds and head_limits(new) != head_limits(before)):
             parts.head.retune(now.head, *head_limits(new))
-        if (tables := animation_tables(new)) != animation_tables(before):
+        tables = animation_tables(new)
+        if tables != animation_tables(before):
             parts.animation.retune(tables)
-        if now.tracks != was.tracks or new.lid_joints != before.lid_joints:
-            parts.tracks.retune(now.tracks, lid_spans(new))
+        parts.tracks.retune(now.tracks, lid_spans(new), tables, now.oculomotor.eye_lag_ms / 1e3)
         self._walk = walk
         said = self._apply_to_machine(before, new)
         return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)

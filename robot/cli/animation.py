@@ -9,11 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_TRACK
+from gazerig.robot.model.commands import NO_TRACK, TrackAction
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -76,7 +76,7 @@ def level(
 @app.command()
 def play(
     track: Annotated[
-        str | None, typer.Argument(help="A track, e.g. nod; none ends the present one.")
+        str | None, typer.Argument(help="A track, e.g. nod; none ends all tracks.")
     ] = None,
     speed: Annotated[
         float,
@@ -93,16 +93,34 @@ def play(
             help="Number of repetitions; 0: as the track defines.",
         ),
     ] = 0,
+    from_s: Annotated[
+        float, typer.Option("--from", min=0.0, max=MAX_DURATION_S, help="Start at S seconds.")
+    ] = 0.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Repeat it until it is ended.")] = False,
+    pause: Annotated[bool, typer.Option("--pause", help="Pause the tracks that play.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue paused tracks.")] = False,
+    seek: Annotated[
+        str | None, typer.Option(metavar="S|CUE", help="Continue at a time or a cue.")
+    ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the tracks.")] = False,
     pid: PidOption = None,
 ) -> None:
     """Play a track on the running head, or list all tracks with their fit to this rig."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
+        action: TrackAction | None = (
+            "pause" if pause else "resume" if resume else "seek" if seek is not None else None
+        )
+        if action is not None:
+            value = seek if seek is not None else 0.0
+            with contextlib.suppress(ValueError):
+                value = float(value)
+            say(rig.control_track(action, track or "", value).text() or "done")
+            return
         if track is None or listed:
             for one in rig.tracks():
                 say(_track_line(one))
             return
-        say(rig.play("" if track == NO_TRACK else track, speed, count).text())
+        say(rig.play("" if track == NO_TRACK else track, speed, count, from_s, loop).text())
 
 
 def _track_line(track: Mapping[str, Any]) -> str:

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.track.animation import Animation
+from gazerig.gaze.track.track import KEEP
 from gazerig.gaze.track.track_trigger import TrackTrigger
-from gazerig.gaze.types import Target
+from gazerig.gaze.types import GazeState, Percept, Target
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import Menus
@@ -19,6 +20,7 @@ from gazerig.robot.model.commands import (
     Ask,
     Command,
     ControlCommand,
+    ControlTrack,
     Express,
     Jog,
     LookAtPerson,
@@ -28,6 +30,7 @@ from gazerig.robot.model.commands import (
     Resume,
     SetLevel,
     Stop,
+    SyncTrack,
     Tune,
 )
 from gazerig.robot.model.kinematics import Kinematics
@@ -126,6 +129,10 @@ class CommandExecutor:
                 if self._stop.stop_reason:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 return self._play(command, t_s)
+            case ControlTrack():
+                return self._tracks.control(command, t_s, self._guard.limits)
+            case SyncTrack():
+                self._tracks.sync(command, t_s)
             case Express(name, strength):
                 return _call_or_refuse(lambda: self._animation.expressions.express(name, strength))
             case SetLevel(name, value):
@@ -138,7 +145,7 @@ class CommandExecutor:
                     return CommandReply(f"{command.who or 'you'} no longer control the head")
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
-                self._tracks.drop_present()
+                self._tracks.drop_present(t_s)
                 self._stop.halt(command, self._body, t_s)
             case Resume():
                 return self._resume(command, t_s)
@@ -167,8 +174,8 @@ class CommandExecutor:
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Move the given joints and hold the others; without any, free the joints."""
         names = self._body.names
-        if command.angles_rad and (name := self._tracks.drop_present()):
-            self._messages.append(f"track {name} ends: a client controls the joints")
+        if command.angles_rad and (dropped := self._tracks.drop_present(t_s)):
+            self._messages.append(f"track {dropped} ends: a client controls the joints")
         self._change_control(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
             # A slider may jump from end to end.
@@ -185,11 +192,17 @@ class CommandExecutor:
             self._messages.append(f"track{by}: {reply.text()}")
         return reply
 
-    def play_rule_track(self, target: Target, t_s: float) -> None:
-        """Play the track of the present rule when the gaze reaches the rule's target.
+    def direct_by_track(
+        self, target: Target, percept: Percept | None, pose: GazeState, t_s: float
+    ) -> Target:
+        """Return the gaze target of a track, or else attention's.
+
+        The track of the present rule is played when the gaze reaches the rule's target.
 
         Args:
-            target: Target of the gaze.
+            target: Target that attention has chosen.
+            percept: Visible people.
+            pose: Measured poses of head and eyes.
             t_s: Present time.
         """
         top_down = self._attention.top_down
@@ -200,6 +213,9 @@ class CommandExecutor:
             reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
             if reply.refused:
                 self._messages.append(f"track for rule {top_down.behaviour} {reply.text()}")
+        if self._animation.tracks.look is KEEP:
+            return target
+        return self._tracks.target(target, percept, pose.p_world_head_m, t_s)
 
     def _change_control(self, change: Callable[[], None]) -> None:
         """Change the client in control; the models start slowly if they take over joints."""

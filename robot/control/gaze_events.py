@@ -1,15 +1,17 @@
 """Events of gaze, people and tracks, found in consecutive ticks."""
 
+from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple, get_args
 
 from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import target_name
 from gazerig.robot.model.client_control import GONE_S
+from gazerig.robot.model.control_source import FINISHED, TrackState
 
 EventKind = Literal[
     "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
-    "person_left", "track_finished",
+    "person_left", "track_finished", "cue",
 ]  # fmt: skip
 """message: of the bus, the camera or a program's request; all others are found in the ticks."""
 EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
@@ -21,7 +23,7 @@ class GazeChange(NamedTuple):
     Attributes:
         text: Description in one line.
         kind: Kind of event.
-        subject: Number of the person, name of the target or of the track.
+        subject: Number of the person, name of the target, of the track or of the cue.
     """
 
     text: str
@@ -53,11 +55,8 @@ class GazeEvents:
             found.append(_target_change("saccade to", "saccade_start", target))
         if gaze.blink and not last.gaze.blink:
             found.append(GazeChange("blink", "blink", ""))
-        was, now = last.track, tick.track
-        if was.name and (was.number, was.name) != (now.number, now.name):
-            ended = now.end_reason if now.number == was.number else "another track"
-            text = f"{was.name} has finished" if not ended else f"{was.name} ended: {ended}"
-            found.append(GazeChange(text, "track_finished", was.name))
+        if tick.tracks is not last.tracks:
+            found += _track_changes(last.tracks, tick.tracks)
         return found + self._people(tick)
 
     def _people(self, tick: Tick) -> list[GazeChange]:
@@ -72,6 +71,23 @@ class GazeEvents:
                 del self._seen_s[person]
                 found.append(GazeChange(f"person {person} has left", "person_left", person))
         return found
+
+
+def _track_changes(
+    last: Sequence[TrackState], tracks: Sequence[TrackState]
+) -> Iterator[GazeChange]:
+    """Yield the cues that tracks have passed, and the ends of tracks."""
+    before = {track.number: track for track in last}
+    for now in tracks:
+        was = before.get(now.number)
+        if now.cues > (was.cues if was is not None else 0):
+            yield GazeChange(f"{now.name} passes the cue {now.cue}", "cue", now.cue)
+        if not now.is_playing and was is not None and was.is_playing:
+            reason = now.end_reason
+            text = (
+                f"{now.name} has finished" if reason == FINISHED else f"{now.name} ended: {reason}"
+            )
+            yield GazeChange(text, "track_finished", now.name)
 
 
 def _identity(target: Target) -> tuple[str, int, str | None]:

@@ -17,7 +17,6 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, target_name, tick_control_source
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
-    NO_TRACK,
     ControlSource,
     ControlState,
     TrackState,
@@ -149,9 +148,9 @@ class HeadEvent:
         t_s: The rig's own time.
         text: Description in one line.
         kind: "message" (of the bus, the camera or a program's request), "saccade_start",
-            "saccade_landing", "blink", "target", "person_arrived", "person_left" or
-            "track_finished".
-        subject: Number of the person, name of the target or of the track, "" for none.
+            "saccade_landing", "blink", "target", "person_arrived", "person_left", "track_finished"
+            or "cue".
+        subject: Number of the person, name of the target, of the track or of the cue, "" for none.
     """
 
     number: int
@@ -175,7 +174,7 @@ class HeadState:
         stopped: Reason for a stop, "" while the head moves.
         controlled_by: Client in control and its command, "" while the head chooses.
         client_control: State of the newest client's control.
-        track: The newest track.
+        tracks: Tracks that play, and the last ones that have ended.
         control_source: Present source of control: gaze models, a client, a track, a stop.
         headline: Present activity of the head in one sentence.
         frame_s: Time of the newest camera frame, None before the first.
@@ -190,7 +189,7 @@ class HeadState:
     stopped: str
     controlled_by: str
     client_control: ControlState = field(default=NO_CLIENT_CONTROL)
-    track: TrackState = field(default=NO_TRACK)
+    tracks: tuple[TrackState, ...] = ()
     frame_s: float | None = None
     control_source: ControlSource = field(default=ControlSource())
     headline: str = ""
@@ -211,7 +210,7 @@ def head_state(tick: Tick) -> HeadState:
         tick.stopped,
         tick.controlled_by,
         tick.client_control,
-        tick.track,
+        tick.tracks,
         percept.captured_s if percept is not None else None,
         tick_control_source(tick),
         head_activity(tick).headline,
@@ -222,10 +221,11 @@ def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
     named: dict[str, Any] = {
         "client_control": state.client_control,
-        "track": state.track,
         "control_source": state.control_source,
     }
-    return {**asdict(state), **{name: value._asdict() for name, value in named.items()}}
+    tracks = [track._asdict() for track in state.tracks]
+    plain = {name: value._asdict() for name, value in named.items()}
+    return {**asdict(state), **plain, "tracks": tracks}
 
 
 def from_json(data: Mapping[str, Any]) -> HeadState:
@@ -248,12 +248,17 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
         for one in data["people"]
     )
     made["client_control"] = ControlState(**_known_fields(ControlState, data["client_control"]))
-    made["track"] = TrackState(**_known_fields(TrackState, data["track"]))
+    made["tracks"] = tracks_from_json(data)
     if "control_source" in data:
         made["control_source"] = ControlSource(
             **_known_fields(ControlSource, data["control_source"])
         )
     return HeadState(**made)
+
+
+def tracks_from_json(data: Mapping[str, Any]) -> tuple[TrackState, ...]:
+    """Return the tracks in the result of ``as_json``."""
+    return tuple(TrackState(**_known_fields(TrackState, one)) for one in data["tracks"])
 
 
 def _known_fields(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:

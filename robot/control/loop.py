@@ -238,7 +238,7 @@ class Robot:
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         chosen = self.attention.choose(percept, pose, t_s)
-        self._executor.play_rule_track(chosen, t_s)
+        chosen = self._executor.direct_by_track(chosen, percept, pose, t_s)
         target = self._lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
         target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active, rests_s)
@@ -262,7 +262,7 @@ class Robot:
         self._messages.clear()
         tick = tuple.__new__(Tick, (
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            stopped, self._lead.controlled_by, lead, self._tracks.state, False,
+            stopped, self._lead.controlled_by, lead, self._tracks.states(t_s), False,
         ))  # fmt: skip
         self._looks.newest = tick
         return tick
@@ -323,7 +323,7 @@ class Robot:
         """Execute and return the queued commands, and end a control that was not renewed."""
         taken = []
         for waiting in self._commands.take() if self._commands else ():
-            command = self._looks.resolve_pixel(waiting.command)
+            command = self._tracks.set_lead(self._looks.resolve_pixel(waiting.command))
             taken.append(command)
             waiting.ticket.answer(self._executor.execute(command, t_s))
         self._executor.end_expired(t_s)
@@ -332,9 +332,9 @@ class Robot:
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
         """Return the age of the frame that the gaze depends on.
 
-        A target chosen by a client does not depend on the camera.
+        A target chosen by a client, and a neck or a point of a track, do not depend on the camera.
         """
-        if not self._lead.needs_camera:
+        if not self._lead.needs_camera or self._animation.tracks.replaces_gaze:
             return 0.0
         return t_s - percept.captured_s if percept is not None else inf
 

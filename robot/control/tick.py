@@ -7,7 +7,6 @@ from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
-    NO_TRACK,
     ControlState,
     TrackState,
 )
@@ -23,7 +22,7 @@ class Tick(NamedTuple):
         stopped: Reason for a stop, "" while the robot moves.
         controlled_by: Client that controls gaze or joints, and its command; "" without one.
         client_control: State of the newest client's control, with arrival at its target.
-        track: The newest track and its state.
+        tracks: Tracks that play, and the last ones that have ended, in the order of their numbers.
         parking: The run is over and the head moves to its parking pose; such ticks are only
             displayed.
     """
@@ -42,7 +41,7 @@ class Tick(NamedTuple):
     stopped: str = ""
     controlled_by: str = ""
     client_control: ControlState = NO_CLIENT_CONTROL
-    track: TrackState = NO_TRACK
+    tracks: tuple[TrackState, ...] = ()
     parking: bool = False
 
     def parking_tick(

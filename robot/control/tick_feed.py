@@ -53,10 +53,10 @@ class TickFeed:
         self._joining.append(follower)
 
     def progress(self) -> Progress:
-        """Return the states of control and track in the newest tick."""
+        """Return the states of control and tracks in the newest tick."""
         tick = self.newest
         return (
-            Progress(tick.client_control, tick.track, tick.controlled_by)
+            Progress(tick.client_control, tick.tracks, tick.controlled_by)
             if tick is not None
             else Progress()
         )

@@ -75,7 +75,7 @@ class TickRow(NamedTuple):
     stopped: str
     controlled_by: str
     client_control: ControlState
-    track: TrackState
+    tracks: tuple[TrackState, ...]
     parking: bool
     before: list[Any]
 
@@ -169,7 +169,7 @@ class TickStream:
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
                 [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.controlled_by,
-                tick.client_control, tick.track, tick.parking, before,
+                tick.client_control, tick.tracks, tick.parking, before,
             ))  # fmt: skip
         return encode((percepts, rows))
 

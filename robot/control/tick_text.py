@@ -74,7 +74,7 @@ class Activity(NamedTuple):
 
 def tick_control_source(tick: Tick) -> ControlSource:
     """Return the source of control of the head."""
-    return control_source(tick.stopped, tick.parking, tick.client_control, tick.track)
+    return control_source(tick.stopped, tick.parking, tick.client_control, tick.tracks)
 
 
 def head_activity(tick: Tick) -> Activity:

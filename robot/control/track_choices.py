@@ -1,14 +1,18 @@
-"""Tracks of a robot: the available ones, their fit to this rig, and their start."""
+"""Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.track.track import Track, TrackParams
-from gazerig.gaze.track.track_player import TrackPlayer
-from gazerig.robot.model.commands import Play
-from gazerig.robot.model.control_source import NO_TRACK, TrackState
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
+from gazerig.gaze.track.expression import NEUTRAL
+from gazerig.gaze.track.track import KEEP, MAX_TRACKS, Track, TrackParams
+from gazerig.gaze.track.track_player import TrackPlayer, Voice
+from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
+from gazerig.robot.model.commands import Command, ControlTrack, Play, SyncTrack
+from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, TrackReply
 from gazerig.robot.model.track_fit import (
@@ -33,6 +37,9 @@ class TrackInfo(NamedTuple):
         duration_s: Duration in s, 0 if it is refused.
         slowed_by: Factor by which it takes longer than defined.
         refused: Reason why this rig cannot do it, "" if it can.
+        owns: Joints that gaze does not move meanwhile.
+        sound: Path of its sound, "" without one.
+        cues: Its cues.
     """
 
     name: str
@@ -40,6 +47,9 @@ class TrackInfo(NamedTuple):
     duration_s: float = 0.0
     slowed_by: float = 1.0
     refused: str = ""
+    owns: tuple[str, ...] = ()
+    sound: str = ""
+    cues: tuple[str, ...] = ()
 
 
 class TrackChoices:
@@ -51,6 +61,9 @@ class TrackChoices:
         params: Share of the joints' limits that they may use.
         joints: Joints of the rig, in the order of all sequences of joints.
         lid_spans_rad: Range of each lid from shut to open, by joint.
+        tables: Expressions and levels of the rig.
+        lead_s: Time by which motion with sound must be early: the latency of the servos.
+        sound_s: Returns the duration of a track's sound.
     """
 
     def __init__(
@@ -60,17 +73,34 @@ class TrackChoices:
         params: TrackParams,
         joints: tuple[str, ...],
         lid_spans_rad: Mapping[str, float],
+        tables: AnimationTables = NO_TABLES,
+        lead_s: float = 0.0,
+        sound_s: Callable[[str], float] = lambda path: 0.0,
     ) -> None:
-        self._tracks, self._player, self._joints = tracks, player, joints
-        self._state = NO_TRACK
+        self._tracks, self._player, self._joints = dict(tracks), player, joints
+        self._tables, self._sound_s = tables, sound_s
+        self._states: tuple[TrackState, ...] = ()
+        self._playing: dict[int, TrackState] = {}
+        self._ended: dict[int, tuple[TrackState, float]] = {}
+        self._number = self._shifts = 0
+        self._look: object = KEEP
+        self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
-        self.retune(params, lid_spans_rad)
+        self.retune(params, lid_spans_rad, tables, lead_s)
         for name in tracks:
             self._motions(name, 0)
 
-    def retune(self, params: TrackParams, lid_spans_rad: Mapping[str, float]) -> None:
-        """Change the share of limits and the lids' ranges for the next track."""
-        self._params = params
+    def retune(
+        self,
+        params: TrackParams,
+        lid_spans_rad: Mapping[str, float],
+        tables: AnimationTables,
+        lead_s: float,
+    ) -> None:
+        """Change the parameters of the next track."""
+        if tables != self._tables:
+            self._tables, self._cache = tables, {}
+        self._params, self._lead_s = params, lead_s
         self._fit = TrackFit(self._joints, lid_spans_rad)
 
     @property
@@ -82,15 +112,37 @@ class TrackChoices:
 
     @property
     def playing(self) -> str:
-        """Return the present track, "" if there is none."""
+        """Return the newest track, "" if there is none."""
         return self._player.playing
 
-    @property
-    def state(self) -> TrackState:
-        """Return the newest track and its state."""
-        if self._state.name and not self._player.playing:
-            self._state = self._state._replace(name="")
-        return self._state
+    def states(self, t_s: float) -> tuple[TrackState, ...]:
+        """Return the tracks that play, and the last ones that have ended, by their numbers."""
+        if not self._playing and not self._ended:
+            return self._states
+        voices = {voice.number: voice for voice in self._player.voices}
+        for number in [number for number in self._playing if number not in voices]:
+            self._end_state(number, FINISHED, t_s)
+        for number, voice in voices.items():
+            state, passed = self._playing[number], voice.passed
+            self._playing[number] = state._replace(
+                position_s=voice.position_s(t_s) - voice.ahead_s,
+                speed=voice.wanted,
+                paused=voice.paused,
+                cue=passed[-1] if passed else state.cue,
+                cues=state.cues + len(passed),
+            )
+            passed.clear()
+        newest = self._number
+        self._ended = {
+            number: one
+            for number, one in self._ended.items()
+            if number == newest or t_s < one[1] + SHOWN_S
+        }
+        found = {number: state for number, (state, _) in self._ended.items()} | self._playing
+        self._states = tuple([found[number] for number in sorted(found)])
+        if not self._playing and len(self._ended) == 1:
+            self._ended = {} if self._states[0].number == newest else self._ended
+        return self._states
 
     def require(self, command: Play) -> None:
         """Check that a track exists, and compute its curves. Thread-safe.
@@ -106,6 +158,17 @@ class TrackChoices:
         made = self._motions(command.track, command.times)
         if isinstance(made, TrackRefused):
             raise ValueError(f"{command.track}: {made}")
+        if command.from_s > made.motion.duration_s:
+            raise ValueError(
+                f"{command.track} lasts {made.motion.duration_s:.2f} s: from_s must be less"
+            )
+
+    def set_lead(self, command: Command) -> Command:
+        """Return a command with the lead of a track with sound, which a recording needs."""
+        if not isinstance(command, Play) or command.lead_s is not None or not command.track:
+            return command
+        track = self._tracks.get(command.track)
+        return command._replace(lead_s=self._lead_s) if track and track.sound else command
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig.
@@ -118,15 +181,19 @@ class TrackChoices:
     def _info(self, name: str, track: Track, limits: Sequence[JointLimit]) -> TrackInfo:
         middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
         try:
-            fitted = self._fit_track(name, 0, 1.0, middle, limits)
+            fitted = self._fit_track(Play(name), middle, limits)
         except TrackRefused as refused:
             return TrackInfo(name, track.description, refused=str(refused))
-        return TrackInfo(name, track.description, fitted.track.duration_s, fitted.slowed_by)
+        made = self._require_motions(name, 0)
+        return TrackInfo(
+            name, track.description, fitted.track.duration_s, fitted.slowed_by, "", made.owns,
+            track.sound, tuple(track.cues),
+        )  # fmt: skip
 
     def play(
         self, command: Play, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
     ) -> CommandReply:
-        """Start a track from the joints' present angles, or end the present one.
+        """Start a track from the joints' present angles, or end all tracks.
 
         Args:
             command: Track, speed and count.
@@ -134,60 +201,175 @@ class TrackChoices:
             commanded_rad: Joint angles last sent.
             limits: Present limits of the joints.
         """
-        share, state = self._params.limit_share, self._player.state(t_s)
-        fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
-        by = command.who or "a user"
         if not command.track:
-            self._player.play(None, t_s, fade_s, 0.0)
-            if self.state.name:
-                self._state = self._state._replace(name="", end_reason=f"{by} has ended it")
-            return CommandReply(track=TrackReply("", fade_s))
-        base = self._fit.subtract_offset(commanded_rad, state)
+            return self._end(self._player.voices, t_s, limits, command.who)
+        made = self._require_motions(command.track, command.times)
+        replaced = self._player.overlapping(made.motion)
+        if len(self._player.voices) - len(replaced) >= MAX_TRACKS:
+            return CommandReply(f"{MAX_TRACKS} tracks are playing: end one of them first")
+        share, state = self._params.limit_share, self._player.state(t_s, replaced)
+        fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
+        base = self._fit.subtract_offset(commanded_rad, self._player.state(t_s))
         try:
-            fitted = self._fit_track(command.track, command.times, command.speed, base, limits)
+            fitted = self._fit_track(command, base, limits)
         except TrackRefused as refused:
             return CommandReply(f"{command.track}: {refused}")
         wait_s = self._fit.wait_s(state, fade_s, fitted.track, limits, share)
-        self._player.play(fitted.track, t_s, fade_s, wait_s)
-        number = self._state.number + 1
-        self._state = TrackState(number, command.track, who=command.who, since_s=t_s)
-        left_out = self._require_motions(command.track, command.times).left_out
-        return CommandReply(
-            track=TrackReply(
-                command.track,
-                wait_s + fitted.track.duration_s,
-                fitted.slowed_by,
-                fitted.slow_joint,
-                fitted.reduced_joints,
-                left_out,
-                self._state.number,
-            )
+        self._number += 1
+        track, loop = self._tracks[command.track], command.loop or made.track.loop
+        for voice in replaced:
+            self._end_state(voice.number, f"another track: {command.track}", t_s)
+        self._player.play(fitted.track, self._number, t_s, fade_s, wait_s, command.from_s, loop)
+        reply = TrackReply(
+            command.track,
+            wait_s + fitted.track.duration_s,
+            fitted.slowed_by,
+            fitted.slow_joint,
+            fitted.reduced_joints,
+            made.left_out,
+            self._number,
         )
+        limited = reply.text().partition("; ")[2]
+        self._playing[self._number] = TrackState(
+            self._number, command.track, 0.0, made.motion.duration_s, fitted.track.speed,
+            loop=loop, owns=made.owns, who=command.who, sound=track.sound, limited=limited,
+            since_s=t_s, volume=track.volume,
+        )  # fmt: skip
+        return CommandReply(track=reply)
 
-    def drop_present(self) -> str:
-        """Drop the present track, as a client holds its joints or the torque is off.
+    def control(
+        self, command: ControlTrack, t_s: float, limits: Sequence[JointLimit]
+    ) -> CommandReply:
+        """Pause, resume, seek, speed up, slow down or end tracks that play."""
+        voices = [
+            voice for voice in self._player.voices if command.track in ("", voice.played.name)
+        ]
+        if not voices and command.track:
+            there = ", ".join(voice.played.name for voice in self._player.voices) or "none"
+            return CommandReply(f"{command.track} is not playing; playing: {there}")
+        if command.action == "end":
+            return self._end(voices, t_s, limits, command.who)
+        try:
+            changes = [self._change(voice, command, limits) for voice in voices]
+        except ValueError as refused:
+            return CommandReply(str(refused))
+        for voice, value in zip(voices, changes, strict=True):
+            match command.action:
+                case "pause":
+                    voice.pause(t_s)
+                case "resume":
+                    voice.resume(t_s)
+                case "seek":
+                    voice.seek(t_s, value)
+                case "speed":
+                    voice.set_speed(t_s, value)
+        return CommandReply()
+
+    def _change(self, voice: Voice, command: ControlTrack, limits: Sequence[JointLimit]) -> float:
+        """Return the position or the speed that a track can take.
+
+        Raises:
+            ValueError: It has no such position, or the speed is too high.
+        """
+        name, value = voice.played.name, command.value
+        if command.action == "seek":
+            cues = self._tracks[name].cues
+            if isinstance(value, str):
+                if value not in cues:
+                    there = ", ".join(cues) or "none"
+                    raise ValueError(f"{name} has no cue {value!r}; available: {there}")
+                value = cues[value]
+            if value > voice.motion.duration_s:
+                raise ValueError(f"{name} lasts {voice.motion.duration_s:.2f} s, not {value:g}")
+        elif command.action == "speed":
+            share, speed = self._params.limit_share, float(value)
+            value, joint = self._fit.fit_speed(
+                self._tracks[name], voice.played, speed, limits, share
+            )
+            limited = f"slower by {speed / value:.2f} for {joint}" if joint else ""
+            self._playing[voice.number] = self._playing[voice.number]._replace(limited=limited)
+        return float(value)
+
+    def sync(self, command: SyncTrack, t_s: float) -> None:
+        """Correct the position of a track by another clock; an ended track is ignored."""
+        for voice in self._player.voices:
+            if voice.number == command.number:
+                voice.sync(t_s, command.position_s)
+                state = self._playing[voice.number]
+                self._playing[voice.number] = state._replace(clock=command.clock)
+
+    def _end(
+        self, voices: Sequence[Voice], t_s: float, limits: Sequence[JointLimit], who: str
+    ) -> CommandReply:
+        """End tracks early, with a blend."""
+        ended = list(voices)
+        least_s = max([voice.played.blend_s[1] for voice in ended], default=0.0)
+        fade_s = self._fit.fade_s(
+            self._player.state(t_s, ended), limits, self._params.limit_share,
+            least_s or self._params.blend_out_ms / 1e3,
+        )  # fmt: skip
+        for voice in ended:
+            self._end_state(voice.number, f"{who or 'a user'} has ended it", t_s)
+        self._player.end(ended, t_s, fade_s)
+        return CommandReply(track=TrackReply("", fade_s))
+
+    def _end_state(self, number: int, reason: str, t_s: float) -> None:
+        self._ended[number] = self._playing.pop(number)._replace(end_reason=reason), t_s
+
+    def drop_present(self, t_s: float) -> str:
+        """Drop all tracks, as a client holds their joints or the torque is off.
 
         Returns:
-            The name of the track, "" if there was none.
+            The names of the tracks, "" if there were none.
         """
-        name = self._player.playing
+        names = ", ".join(voice.played.name for voice in self._player.voices)
         self._player.reset()
-        if name:
-            self._state = self._state._replace(
-                name="", end_reason="its joints are controlled by a client or switched off"
-            )
-        return name
+        for number in tuple(self._playing):
+            self._end_state(number, "its joints are controlled by a client or switched off", t_s)
+        return names
+
+    def target(self, chosen: Target, percept: Percept | None, p_head_m: Vec3, t_s: float) -> Target:
+        """Return the gaze target of a track instead of attention's, if there is one."""
+        look = self._player.look
+        if look != self._look:
+            self._look, self._nearest = look, None
+            self._shifts += 1
+        if isinstance(look, tuple):
+            x, y, z = look
+            return Target(
+                (float(x), float(y), float(z)), (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None,
+                chosen.shift + self._shifts, "a track looks there", saliences=chosen.saliences,
+            )  # fmt: skip
+        if look is KEEP or look is None or percept is None:
+            return chosen
+        faces = {face.id: face for face in percept.faces}
+        if look != "person":
+            self._nearest = look if isinstance(look, int) else None
+        elif self._nearest not in faces:
+            near = min(faces.values(), key=lambda f: norm(sub(f.p_world_m, p_head_m)), default=None)
+            self._shifts += near is not None
+            self._nearest = near.id if near is not None else None
+        face = faces.get(self._nearest) if self._nearest is not None else None
+        if face is None:
+            return chosen
+        return Target(
+            face.p_world_m, face.v_world_m_s, percept.captured_s, "face", face.id, 1.0, True, None,
+            chosen.shift + self._shifts, f"face {face.id}: a track looks at it",
+            saliences=chosen.saliences,
+        )  # fmt: skip
 
     def _fit_track(
         self,
-        name: str,
-        count: int,
-        speed: float,
+        command: Play,
         base_rad: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
         limits: Sequence[JointLimit],
     ) -> FittedTrack:
-        made = self._require_motions(name, count)
-        return self._fit.fit(name, made, speed, base_rad, limits, self._params.limit_share)
+        name, made = command.track, self._require_motions(command.track, command.times)
+        out_s = made.track.blend_out_s or self._params.blend_out_ms / 1e3
+        return self._fit.fit(
+            name, made, command.speed, base_rad, limits, self._params.limit_share,
+            (made.track.blend_in_s, out_s), command.lead_s or 0.0,
+        )  # fmt: skip
 
     def _require_motions(self, name: str, count: int) -> TrackMotions:
         made = self._motions(name, count)
@@ -202,7 +384,18 @@ class TrackChoices:
             if len(self._cache) >= len(self._tracks) + _MOST_KEPT:
                 self._cache = {kept: made for kept, made in self._cache.items() if kept[1] == 0}
             try:
-                self._cache[key] = track_motions(self._tracks[name], self._joints, count)
+                self._cache[key] = self._make_motions(self._tracks[name], count)
             except TrackRefused as refused:
                 self._cache[key] = refused
         return self._cache[key]
+
+    def _make_motions(self, track: Track, count: int) -> TrackMotions:
+        expressions = (NEUTRAL, *self._tables.expressions)
+        for frame in (*track.frames, *track.frames_without_neck):
+            if frame.express and frame.express not in expressions:
+                there = ", ".join(expressions)
+                raise TrackRefused(
+                    f"at {frame.time_s:g} s: no expression {frame.express!r}; available: {there}"
+                )
+        sound_s = self._sound_s(track.sound) if track.sound else 0.0
+        return track_motions(track, self._joints, count, self._tables.levels, sound_s)

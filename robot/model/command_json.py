@@ -4,14 +4,16 @@ Every receiver of commands calls these checks first.
 """
 
 from math import pi
+from typing import get_args
 
-from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
 from gazerig.robot.model.commands import (
     COMMANDS,
     OPPONENT_BOX_M,
     Ask,
     Command,
     ControlCommand,
+    ControlTrack,
     Express,
     Jog,
     Look,
@@ -26,6 +28,8 @@ from gazerig.robot.model.commands import (
     Resume,
     SetLevel,
     Stop,
+    SyncTrack,
+    TrackAction,
     Tune,
 )
 from gazerig.robot.model.types import JOINT_NAME
@@ -79,16 +83,30 @@ def check_command(command: Command) -> None:
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
             _check_share("a level", "value", level, value)
-        case Play(track, speed, times, who):
-            if not isinstance(track, str) or len(track) > MAX_WORDS:
-                raise ValueError("a track must be given by its name")
-            if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:
-                raise ValueError(
-                    f"the speed of a track must be a number {MIN_SPEED:g}..{MAX_SPEED:g}"
-                )
+        case Play(track, speed, times, who, from_s, loop, lead_s):
+            _check_track(track, speed)
+            _check_position(from_s)
+            if not isinstance(loop, bool):
+                raise ValueError("loop must be true or false")
+            if lead_s is not None and not _is_within(lead_s, 1.0):
+                raise ValueError("lead_s must be null or at most 1 s")
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
                 raise ValueError(f"the times of a track must be a whole number 0..{MAX_COUNT}")
             _check_who(who)
+        case ControlTrack(action, track, value, who):
+            if action not in get_args(TrackAction):
+                actions = ", ".join(get_args(TrackAction))
+                raise ValueError(f"action {action!r:.40}: expected one of {actions}")
+            _check_track(track, value if action == "speed" else 1.0)
+            if action == "seek" and not (isinstance(value, str) and len(value) <= MAX_WORDS):
+                _check_position(value)
+            _check_who(who)
+        case SyncTrack(number, position_s, clock):
+            if type(number) is not int or number < 1:
+                raise ValueError("number must be that of a track that plays, from 1 on")
+            _check_position(position_s)
+            if clock not in ("sound", "external"):
+                raise ValueError(f"clock {clock!r:.40}: expected sound or external")
         case MoveOpponent(p):
             if not _are_numbers(p, 3, MAX_COORDINATE_M) or any(
                 not least <= one <= most
@@ -114,6 +132,21 @@ def check_command(command: Command) -> None:
             )
             if not pairs:
                 raise ValueError("changes must be pairs of a dotted key and a value")
+
+
+def _check_track(track: object, speed: object) -> None:
+    if not isinstance(track, str) or len(track) > MAX_WORDS:
+        raise ValueError("a track must be given by its name")
+    if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:  # type: ignore[operator]
+        raise ValueError(f"the speed of a track must be a number {MIN_SPEED:g}..{MAX_SPEED:g}")
+
+
+def _check_position(position_s: object) -> None:
+    if not _is_within(position_s, MAX_DURATION_S) or position_s < 0.0:  # type: ignore[operator]
+        raise ValueError(
+            f"a position in a track must be a number of seconds 0..{MAX_DURATION_S:g}, or for a "
+            "seek the name of a cue"
+        )
 
 
 def _check_look(command: Look) -> None:
@@ -247,7 +280,7 @@ def from_recorded_json(data: dict[str, object]) -> Command:
 
 def set_client(command: Command, who: str) -> Command:
     """Return a command with its client's name; commands without that field stay unchanged."""
-    if isinstance(command, ControlCommand | Play | Renew | Stop | Resume):
+    if isinstance(command, ControlCommand | Play | ControlTrack | Renew | Stop | Resume):
         return command._replace(who=who[:MAX_WORDS])
     return command
 

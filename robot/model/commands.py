@@ -154,19 +154,59 @@ NO_TRACK = "none"
 
 
 class Play(NamedTuple):
-    """Play a track; "" ends the present one.
+    """Play a track; "" ends all tracks.
 
     Attributes:
         track: Name of the track.
         speed: Factor on its defined speed.
         times: Number of repetitions, 0 for the track's own.
         who: Name of the client.
+        from_s: Position in the track at which it begins.
+        loop: Repeat it until it is ended, as a track with ``loop: true`` does.
+        lead_s: Time by which the motion of a track with sound is early, because servos are late;
+            set on execution for the recording.
     """
 
     track: str
     speed: float = 1.0
     times: int = 0
     who: str = ""
+    from_s: float = 0.0
+    loop: bool = False
+    lead_s: float | None = None
+
+
+TrackAction = Literal["pause", "resume", "seek", "speed", "end"]
+
+
+class ControlTrack(NamedTuple):
+    """Control tracks that are playing.
+
+    Attributes:
+        action: Action on them.
+        track: Name of the track, "" for all.
+        value: Position in s or name of a cue for seek, factor for speed.
+        who: Name of the client.
+    """
+
+    action: TrackAction
+    track: str = ""
+    value: float | str = 0.0
+    who: str = ""
+
+
+class SyncTrack(NamedTuple):
+    """Position of a track by another clock, at most some ten times per second.
+
+    Attributes:
+        number: ``TrackState.number``.
+        position_s: Position at which the track should be now.
+        clock: Source of the position.
+    """
+
+    number: int
+    position_s: float
+    clock: Literal["sound", "external"] = "external"
 
 
 OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))
@@ -225,17 +265,28 @@ Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
 ControlCommand = Look | Jog
 """Commands that take control of gaze or joints."""
 Command = (
-    Ask | ControlCommand | Express | SetLevel | Play | MoveOpponent | Renew | Stop | Resume | Tune
+    Ask
+    | ControlCommand
+    | Express
+    | SetLevel
+    | Play
+    | ControlTrack
+    | SyncTrack
+    | MoveOpponent
+    | Renew
+    | Stop
+    | Resume
+    | Tune
 )
 
-REPEATED = (Renew, SetLevel, MoveOpponent)
+REPEATED = (Renew, SetLevel, SyncTrack, MoveOpponent)
 """Commands that programs send many times per second; they create no message and no mark."""
 
 COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
     "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
     "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
-    "play": Play, "opponent": MoveOpponent,
+    "play": Play, "control_track": ControlTrack, "sync_track": SyncTrack, "opponent": MoveOpponent,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 

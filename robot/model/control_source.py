@@ -3,6 +3,7 @@
 The page, the status line, other programs and Python all use these texts.
 """
 
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 ControlKind = Literal[
@@ -45,26 +46,65 @@ class ControlState(NamedTuple):
     since_s: float = 0.0
 
 
+FINISHED = "finished"
+"""End reason of a track that was played to its end."""
+
+
 class TrackState(NamedTuple):
-    """The newest track, after a tick.
+    """One track after a tick; an ended one is shown for ``SHOWN_S``, the newest one always.
 
     Attributes:
-        number: Number of the track since the start, 0 before the first.
-        name: Name of the present track, "" if there is none.
-        end_reason: Reason for its end, "" if it is playing or has finished.
+        number: Number of the track since the start, from 1.
+        name: Its name.
+        position_s: Position in the track; below 0 while the motion begins before the sound.
+        duration_s: Its duration at its own speed.
+        speed: Factor on that speed, also while it is paused.
+        paused: Whether it is paused.
+        loop: Whether it repeats until it is ended.
+        owns: Joints that gaze does not move meanwhile.
         who: Name of the client, "" if unknown.
+        sound: Path of the sound, "" without one.
+        clock: Clock that the position follows.
+        end_reason: Reason for its end, ``FINISHED`` at its own end, "" while it plays.
+        limited: What the rig's limits changed, "" if nothing.
         since_s: Time of its start.
+        volume: Volume of the sound, 0..1.
+        cue: Name of the cue that it has passed last, "" before the first.
+        cues: Number of cues that it has passed.
     """
 
-    number: int = 0
-    name: str = ""
-    end_reason: str = ""
+    number: int
+    name: str
+    position_s: float = 0.0
+    duration_s: float = 0.0
+    speed: float = 1.0
+    paused: bool = False
+    loop: bool = False
+    owns: tuple[str, ...] = ()
     who: str = ""
+    sound: str = ""
+    clock: Literal["loop", "sound", "external"] = "loop"
+    end_reason: str = ""
+    limited: str = ""
     since_s: float = 0.0
+    volume: float = 1.0
+    cue: str = ""
+    cues: int = 0
+
+    @property
+    def is_playing(self) -> bool:
+        """Return whether it has not ended."""
+        return not self.end_reason
 
 
+SHOWN_S = 2.0
+"""Time for which an ended track is shown."""
 NO_CLIENT_CONTROL = ControlState()
-NO_TRACK = TrackState()
+
+
+def playing(tracks: Sequence[TrackState]) -> TrackState | None:
+    """Return the newest track that plays, None without one."""
+    return next((track for track in reversed(tracks) if track.is_playing), None)
 
 
 class ControlSource(NamedTuple):
@@ -91,7 +131,7 @@ class ControlSource(NamedTuple):
 
 
 def control_source(
-    stopped: str, parking: bool, lead: ControlState, track: TrackState
+    stopped: str, parking: bool, lead: ControlState, tracks: Sequence[TrackState]
 ) -> ControlSource:
     """Return the source of control.
 
@@ -99,7 +139,7 @@ def control_source(
         stopped: Reason for a stop, "" while the robot moves.
         parking: Whether the run is over and the head moves to its parking pose.
         lead: The newest control by a client.
-        track: The newest track.
+        tracks: The tracks.
     """
     if stopped:
         return ControlSource("stopped", "", stopped)
@@ -108,7 +148,7 @@ def control_source(
     if lead.active:
         who = lead.who or "a client"
         return ControlSource(lead.kind, who, lead.description, lead.joints, lead.since_s)
-    if track.name:
+    if (track := playing(tracks)) is not None:
         return ControlSource("track", track.who, track.name, (), track.since_s)
     return ControlSource()
 

@@ -4,8 +4,8 @@ from typing import Literal, NamedTuple
 
 from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.control_source import (
+    FINISHED,
     NO_CLIENT_CONTROL,
-    NO_TRACK,
     ControlState,
     TrackState,
 )
@@ -27,15 +27,16 @@ timed out: none of these within the given time
 
 
 class Progress(NamedTuple):
-    """The progress of a client's command and of a track.
+    """The progress of a client's command and of tracks.
 
     Attributes:
-        client_control, track: The newest ones.
+        client_control: The newest one.
+        tracks: Those that play and the last ones that have ended.
         controlled_by: Client that controls gaze or joints, and its command; "" without one.
     """
 
     client_control: ControlState = NO_CLIENT_CONTROL
-    track: TrackState = NO_TRACK
+    tracks: tuple[TrackState, ...] = ()
     controlled_by: str = ""
 
 
@@ -45,12 +46,15 @@ def command_outcome(reply: CommandReply, now: Progress) -> tuple[Outcome, str] |
     if reply.refused:
         return "refused", reply.refused
     if played:
-        newest = now.track
-        if newest.number > played:
-            return "taken over", f"another track: {newest.name or newest.end_reason}"
-        if newest.number < played or newest.name and not newest.end_reason:
+        if not now.tracks or now.tracks[-1].number < played:
             return None
-        return ("taken over", newest.end_reason) if newest.end_reason else ("arrived", "")
+        track = next((one for one in now.tracks if one.number == played), None)
+        if track is None:
+            return "taken over", f"another track: {now.tracks[-1].name}"
+        if track.is_playing:
+            return None
+        finished = track.end_reason == FINISHED
+        return ("arrived", "") if finished else ("taken over", track.end_reason)
     if reply.control_number == 0:  # it takes no control: done as soon as accepted
         return "arrived", ""
     if reply.error_rad > ARRIVED_RAD:

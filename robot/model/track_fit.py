@@ -5,27 +5,32 @@ Keys are placed at its turning points, and at further points until the curve thr
 deviates by less than a tolerance.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import degrees
 from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.gaze.track.animation import NO_TABLES
+from gazerig.gaze.track.level import LevelRange
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.track.track import (
     EYE_CHANNELS,
     HEAD_CHANNELS,
+    KEEP,
     LID_CHANNELS,
     POSE_CHANNELS,
+    ChannelKeys,
     KeyFrame,
     Track,
     channel_keys,
 )
-from gazerig.gaze.track.track_motion import MotionSamples, TrackMotion
+from gazerig.gaze.track.track_motion import LevelCurve, MotionSamples, TrackEvents, TrackMotion
 from gazerig.gaze.track.track_player import OffsetState, PlayedTrack
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import further_joints
+from gazerig.robot.model.kinematics import NECK
+from gazerig.robot.model.types import GAZE_JOINTS, further_joints
 
 _SMALLEST = 0.2
 """Smallest share of a track that a range may leave; less is hardly visible and is not played."""
@@ -55,33 +60,114 @@ class FittedTrack(NamedTuple):
 
 
 class TrackMotions(NamedTuple):
-    """A track's curves on one rig, and the joints that the rig lacks."""
+    """A track's curves on one rig, the joints that the rig lacks, and those that it owns."""
 
     track: Track
     motion: TrackMotion
     left_out: tuple[str, ...]
+    owns: tuple[str, ...] = ()
 
 
-def track_motions(track: Track, joints: Sequence[str], count: int = 0) -> TrackMotions:
+def track_motions(
+    track: Track, joints: Sequence[str], count: int = 0,
+    levels: Mapping[str, LevelRange] = NO_TABLES.levels, least_s: float = 0.0,
+) -> TrackMotions:  # fmt: skip
     """Return a track as curves of a rig's joints.
 
     Args:
         track: The track.
         joints: Joints of the rig.
         count: Number of repetitions, 0 for the track's own.
+        levels: Offsets of the rig's levels.
+        least_s: Duration of its sound.
 
     Raises:
-        TrackRefused: It needs a joint that the rig lacks.
+        TrackRefused: It needs a joint or a level that the rig lacks.
     """
     frames, left_out = _frames_for(track, joints)
     channels = channel_keys(track, frames, count or track.count)
     there = {*joints, *EYE_CHANNELS} - {*HEAD_CHANNELS}
     there |= {channel for channel in HEAD_CHANNELS if _neck(channel) in joints}
     kept = {name: keys for name, keys in channels.items() if name in there}
-    if not kept:
+    owns = _owned_joints(track, joints)
+    owned = dict.fromkeys(channel_of_joint(name) for name in owns)
+    curves, events = _level_curves(track, frames, levels), _events(track, frames)
+    if not (kept or curves or any(events) or track.sound):
         raise TrackRefused(f"this rig has none of the joints that it moves: {', '.join(channels)}")
-    motion = TrackMotion(kept, further_joints(joints), track.space == "joint")
-    return TrackMotions(track, motion, left_out)
+    motion = TrackMotion(
+        kept, further_joints(joints), track.space == "joint", tuple(owned), curves, events, least_s
+    )
+    whole = tuple(name for name in joints if channel_of_joint(name) in owned)
+    return TrackMotions(track, motion, left_out, whole)
+
+
+_GROUPS: dict[str, Callable[[str], bool]] = {
+    "neck": lambda name: name in NECK,
+    "eyes": lambda name: name in GAZE_JOINTS and "eye" in name,
+    "lids": lambda name: name in LID_CHANNELS,
+}
+
+
+def channel_of_joint(joint: str) -> str:
+    """Return the channel of a joint: both eyes have one."""
+    if joint in NECK:
+        return joint.replace("neck", "head")
+    if joint in GAZE_JOINTS and joint.endswith("_pan"):
+        return "eyes_yaw"
+    return "eyes_pitch" if joint in GAZE_JOINTS and joint.endswith("_tilt") else joint
+
+
+def _owned_joints(track: Track, joints: Sequence[str]) -> list[str]:
+    """Return the joints of the rig that a track names as its own."""
+    found: dict[str, None] = {}
+    for name in track.owns:
+        is_member = _GROUPS.get(name, name.__eq__)
+        members = [joint for joint in joints if is_member(joint)]
+        if not members and name not in track.optional:
+            raise TrackRefused(
+                f"it owns {name}, which this rig lacks; available: "
+                f"{', '.join((*_GROUPS, *joints))}; list what it does not need under optional"
+            )
+        found |= dict.fromkeys(members)
+    return list(found)
+
+
+def _level_curves(
+    track: Track, frames: Sequence[KeyFrame], levels: Mapping[str, LevelRange]
+) -> list[LevelCurve]:
+    """Return the curves of the levels that a track sets."""
+    keys: dict[str, list[tuple[float, float]]] = {}
+    for frame in frames:
+        for name, value in frame.levels.items():
+            keys.setdefault(name, []).append((frame.time_s, value))
+    curves = []
+    for name, found in keys.items():
+        if name not in levels:
+            if name in track.optional:
+                continue
+            there = ", ".join(levels) or "none: add a table levels to the rig"
+            raise TrackRefused(
+                f"it sets the level {name}, which this rig lacks; available: {there}"
+            )
+        if found[-1][1] > 0.0:
+            found.append((found[-1][0] + track.return_s, 0.0))
+        low, high = levels[name].low.to_flat(), levels[name].high.to_flat()
+        gain = tuple([b - a for a, b in zip(low, high, strict=True)])
+        times, values = zip(*found, strict=True)
+        curves.append(LevelCurve(ChannelKeys(times, values), gain))
+    return curves
+
+
+def _events(track: Track, frames: Sequence[KeyFrame]) -> TrackEvents:
+    """Return the gaze points, the expressions and the cues of a track."""
+    looks = [
+        (f.time_s, tuple(f.look_at) if isinstance(f.look_at, list) else f.look_at)
+        for f in frames
+        if f.look_at != KEEP
+    ]
+    faces = [(f.time_s, (f.express, f.strength)) for f in frames if f.express]
+    cues = sorted((time_s, name) for name, time_s in track.cues.items())
+    return TrackEvents(tuple(looks), tuple(faces), tuple(cues))
 
 
 def _frames_for(
@@ -145,6 +231,8 @@ class TrackFit:
         # openings, and eyes that compensate for the head move as far as they can.
         self._own = np.where(self._matrix > 0.0, self._matrix, 0.0)
         self._own[[channels.index(lid) for lid in LID_CHANNELS]] = 0.0
+        self._eyes = [channels.index(name) for name in EYE_CHANNELS]
+        self._channels = channels
 
     def subtract_offset(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
         """Return commanded joint angles without the offset's part."""
@@ -159,6 +247,8 @@ class TrackFit:
         base_rad: Floats,
         limits: Sequence[JointLimit],
         share: float,
+        blend_s: tuple[float, float] = (0.4, 0.25),
+        lead_s: float = 0.0,
     ) -> FittedTrack:
         """Fit a track to the rig at its present angles.
 
@@ -169,11 +259,17 @@ class TrackFit:
             base_rad: Joint angles to which it is added.
             limits: Limits of the joints.
             share: Share of speed and acceleration limits for tracks; the rest is for gaze.
+            blend_s: Shortest times in which it takes over its joints, and returns them.
+            lead_s: Time by which its motion is early.
 
         Raises:
             TrackRefused: It cannot be done, or only with changes that it does not allow.
         """
         slow, motion = made.track.fit == "slow", made.motion
+        matrix, present = self._matrix_of(motion), self._present(base_rad)
+        if motion.owned:  # of these joints it gives the angles from the neutral pose
+            base_rad = np.array(base_rad)
+            base_rad[[self.joints.index(name) for name in made.owns]] = 0.0
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
         if smaller and not slow:
             raise TrackRefused(self._beyond_range(motion.samples, base_rad, limits))
@@ -181,10 +277,13 @@ class TrackFit:
             joint = min(smaller, key=lambda one: one[1])[0]
             raise TrackRefused(f"{joint} is at the end of its range")
         samples = motion.samples.scale(sizes, speed)
-        factor, joint, text = self._too_fast(samples, limits, share)
+        factor, joint, text = self._too_fast(samples, limits, share, matrix)
         if factor > 1.0 + _ROUNDING and not slow:
             raise TrackRefused(text)
-        played = PlayedTrack(name, motion, speed / factor, tuple(sizes.tolist()))
+        stretch = _stretch(matrix, limits, share)
+        played = PlayedTrack(
+            name, motion, speed / factor, tuple(sizes.tolist()), stretch, blend_s, present, lead_s
+        )
         return FittedTrack(played, factor, joint if factor > 1.0 + _ROUNDING else "", smaller)
 
     def _sizes(
@@ -217,8 +316,46 @@ class TrackFit:
             f"{degrees(angles[:, j].max() if angles[row, j] > high[j] else angles[:, j].min()):.1f}"
         )
 
+    def fit_speed(
+        self, track: Track, played: PlayedTrack, speed: float, limits: Sequence[JointLimit],
+        share: float,
+    ) -> tuple[float, str]:  # fmt: skip
+        """Return another speed for a track that plays, and the joint that reduces it.
+
+        Raises:
+            TrackRefused: The speed is too high, and the track must not be slowed.
+        """
+        samples = played.motion.samples.scale(np.array(played.sizes), speed)
+        matrix = self._matrix_of(played.motion)
+        factor, joint, text = self._too_fast(samples, limits, share, matrix)
+        if factor <= 1.0 + _ROUNDING:
+            return speed, ""
+        if track.fit != "slow":
+            raise TrackRefused(text)
+        return speed / factor, joint
+
+    def _matrix_of(self, motion: TrackMotion) -> Floats:
+        """Return joint angles per offset: eyes that a track owns do not compensate the head."""
+        owned = [i for i in self._eyes if i in motion.owned]
+        if not owned:
+            return self._matrix
+        matrix = self._matrix.copy()
+        for i in owned:
+            matrix[self._eyes.index(i), self._matrix[i] != 0.0] = 0.0
+        return matrix
+
+    def _present(self, base_rad: Floats) -> tuple[float, ...]:
+        """Return the values of the channels at joint angles; of lids those furthest away."""
+        angles: dict[str, list[float]] = {}
+        for joint, angle in zip(self.joints, base_rad.tolist(), strict=True):
+            angles.setdefault(channel_of_joint(joint), []).append(angle)
+        means = {name: sum(found) / len(found) for name, found in angles.items()}
+        return tuple(
+            [-1.0 if name in LID_CHANNELS else means.get(name, 0.0) for name in self._channels]
+        )
+
     def _too_fast(
-        self, samples: MotionSamples, limits: Sequence[JointLimit], share: float
+        self, samples: MotionSamples, limits: Sequence[JointLimit], share: float, matrix: Floats
     ) -> tuple[float, str, str]:
         """Return the time factor that keeps all limits, its joint and a text with the reason."""
         found = (1.0, "", "")
@@ -227,7 +364,7 @@ class TrackFit:
             (samples.acceleration, 0.5, 3, "deg/s2"),
         ):
             most = share * np.array([limit[at] for limit in limits])
-            ratio = np.abs(column @ self._matrix) / most
+            ratio = np.abs(column @ matrix) / most
             row, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             factor = float(ratio[row, j]) ** power
             if factor > found[0]:
@@ -285,6 +422,20 @@ class TrackFit:
             bool((np.abs(column @ self._matrix) <= limit).all())
             for column, limit in zip(samples[2:], most, strict=True)
         )
+
+
+def _stretch(
+    matrix: Floats, limits: Sequence[JointLimit], share: float
+) -> Callable[[Floats, Floats], float]:
+    """Return the function ``PlayedTrack.stretch`` for limits."""
+    speeds, accelerations = (share * np.array([limit[at] for limit in limits]) for at in (2, 3))
+
+    def stretch(speed: Floats, acceleration: Floats) -> float:
+        fastest = float((np.abs(speed @ matrix) / speeds).max())
+        hardest = float((np.abs(acceleration @ matrix) / accelerations).max())
+        return float(max(fastest, np.sqrt(hardest))) / (1.0 + _ROUNDING)
+
+    return stretch
 
 
 def _fade_samples(state: OffsetState, time_s: float) -> MotionSamples:

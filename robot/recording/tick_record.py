@@ -26,7 +26,6 @@ from gazerig.robot.control.tick_stream import TickRow
 from gazerig.robot.model.command_json import from_recorded_json as command_from_json
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
-    NO_TRACK,
     ControlState,
     TrackState,
 )
@@ -80,9 +79,9 @@ _BODY_RECORDS: dict[str, type[BodyRecord]] = {
 _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
 _NESTED: dict[str, Any] = {
     "joints": JointState, "pose": GazeState, "target": Target, "gaze": GazeCommand,
-    "guard_result": GuardResult, "client_control": ControlState, "track": TrackState,
+    "guard_result": GuardResult, "client_control": ControlState,
 }  # fmt: skip
-_NOTHING = {"client_control": list(NO_CLIENT_CONTROL), "track": list(NO_TRACK)}
+_NOTHING = {"client_control": list(NO_CLIENT_CONTROL)}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
@@ -92,7 +91,7 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     """Return a tick from ``tick_stream.decode_plain`` as JSON.
 
     Fields without information are omitted: ``guard_result.desired_rad`` if it equals the tick's
-    (null), ``client_control`` and ``track`` before the first, ``target.plan`` without a planner,
+    (null), ``client_control`` and ``tracks`` before the first, ``target.plan`` without a planner,
     ``target.is_lost`` of a visible target.
 
     Args:
@@ -116,6 +115,9 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     for name, nothing in _NOTHING.items():
         if list(data[name].values()) == nothing:
             del data[name]
+    data["tracks"] = [_name_fields(TrackState, one) for one in data["tracks"]]
+    if not data["tracks"]:
+        del data["tracks"]
     del data["parking"]
     before = [
         {"what": what, **_name_fields(_BODY_RECORDS[what], one)} for what, one in data["before"]
@@ -168,7 +170,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         _build(ControlState, data["client_control"])
         if "client_control" in data
         else NO_CLIENT_CONTROL,
-        _build(TrackState, data["track"]) if "track" in data else NO_TRACK,
+        tuple([_build(TrackState, one) for one in data.get("tracks", ())]),
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)

@@ -25,6 +25,7 @@ from gazerig.robot.model.commands import (
     Ask,
     Command,
     ControlCommand,
+    ControlTrack,
     Express,
     Jog,
     LookAt,
@@ -33,6 +34,8 @@ from gazerig.robot.model.commands import (
     Resume,
     SetLevel,
     Stop,
+    SyncTrack,
+    TrackAction,
     Value,
 )
 from gazerig.robot.model.parameter import JsonValue, ParamChange, Parameter, SavedFile
@@ -376,13 +379,18 @@ class RobotClient:
         """
         self._command(SetLevel(level, value))
 
-    def play(self, track: str, speed: float = 1.0, times: int = 0) -> CommandReply:
-        """Play a track over gaze; "" ends the present one.
+    def play(
+        self, track: str, speed: float = 1.0, times: int = 0, from_s: float = 0.0,
+        loop: bool = False,
+    ) -> CommandReply:  # fmt: skip
+        """Play a track; "" ends all tracks.
 
         Args:
             track: Name of the track.
             speed: Factor on the track's own speed.
             times: Number of repetitions; 0: as the track defines.
+            from_s: Position at which it begins.
+            loop: Whether it repeats until it is ended.
 
         Returns:
             Reply whose ``track`` has the duration and the reductions by the rig's limits.
@@ -391,7 +399,26 @@ class RobotClient:
             RequestRejected: there is no such track, this rig cannot do it, the joints are under
                 manual control or the rig is stopped.
         """
-        return self._command(Play(track, speed, times, self.who))
+        return self._command(Play(track, speed, times, self.who, from_s, loop))
+
+    def control_track(
+        self, action: TrackAction, track: str = "", value: float | str = 0.0
+    ) -> CommandReply:
+        """Pause, resume, seek, change the speed of or end tracks that play.
+
+        Args:
+            action: Action on them.
+            track: Name of the track; "" for all.
+            value: Position in s or cue for seek; factor for speed.
+
+        Raises:
+            RequestRejected: no such track plays, or it has no such position, cue or speed.
+        """
+        return self._command(ControlTrack(action, track, value, self.who))
+
+    def sync_track(self, number: int, position_s: float) -> None:
+        """Give the position of a track by another clock, at most some ten times per second."""
+        self._command(SyncTrack(number, position_s))
 
     def tracks(self) -> tuple[dict[str, Any], ...]:
         """Return all tracks: name, description, duration_s, slowed_by, refused (if it is)."""

@@ -14,7 +14,7 @@ from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import control_text, head_activity, tick_control_source
 from gazerig.robot.description.build import RigShape
-from gazerig.robot.model.control_source import control_sentence
+from gazerig.robot.model.control_source import control_sentence, playing
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint import JointLimit
@@ -131,7 +131,7 @@ class SnapshotBuilder:
                 worst = tick.guard_result.level
         if self._newest is None:
             return None
-        t_s = self._newest.t_s
+        t_s, track = self._newest.t_s, playing(self._newest.tracks)
         if t_s - self._figures_s >= _TIMING_S:
             self._figures, self._figures_s = self._timing.figures(), t_s
         timing = said.timing if said.timing is not None else self._figures
@@ -158,7 +158,7 @@ class SnapshotBuilder:
             trail=tuple(trail),
             events=tuple(events),
             others=said.others,
-            expressed=(self._newest.track.name, said.expression),
+            expressed=(track.name if track is not None else "", said.expression),
         )
 
 

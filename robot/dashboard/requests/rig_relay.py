@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.robot.control.command_handler import CHANGES
-from gazerig.robot.model.control_source import ControlState, TrackState
+from gazerig.robot.control.head_state import tracks_from_json
+from gazerig.robot.model.control_source import ControlState
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import CONNECT_S
 from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, connect_to_socket
@@ -161,7 +162,7 @@ class StateFeed:
                 return None
         progress = Progress(
             ControlState(**state["client_control"]),
-            TrackState(**state["track"]),
+            tracks_from_json(state),
             state["controlled_by"],
         )
         lines = tuple(_line({"event": event}) for event in events)
