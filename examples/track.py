@@ -1,8 +1,8 @@
 """Tracks: two that come with gazerig, and one of one's own in bow.yaml.
 
 Shows: ``play``, what a track does to the joints, and how a rig gets further tracks.
-Run:   python examples/gesture.py          emulated servos
-       python examples/gesture.py my.yaml  your own head
+Run:   python examples/track.py          emulated servos
+       python examples/track.py my.yaml  your own head
 """
 
 import sys
