@@ -9,7 +9,6 @@ import gazerig.robot.control.loop as loop
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.real_time import freeze_objects
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

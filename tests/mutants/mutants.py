@@ -25,7 +25,7 @@ MUTANTS = (
     Mutant("gaze/attention/bottom_up.py", "- max(loom - _FAST, 0.0) + spin", "- max(loom - _FAST, 0.0)",
            "eq 1 without its third term, spin", ("attention", "attention_choice")),
     Mutant("gaze/attention/bottom_up.py", "worth * (exempt - expm1", "worth * (-expm1",
-           "what comes nearer fast saturates like other motion", ("behaviours",)),
+           "what comes nearer fast saturates like other motion", ("attention",)),
     Mutant("gaze/attention/face_memory.py", 'unseen_s if "face" in bodies.kinds else inf', "inf",
            "a remembered face competes with visible ones", ("face_memory",)),
     Mutant("gaze/attention/persons.py", "            self.parts[id] = owner\n", "            pass\n",
