@@ -74,6 +74,8 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "reboot": "gazerig.features.bringup.commands:REBOOT",
         "record-track": "gazerig.features.bringup.commands:RECORD_TRACK",
         "fit-scanpath": "gazerig.features.lab.commands:FIT_SCANPATH",
+        "import": "gazerig.features.animation.commands:IMPORT",
+        "export-track": "gazerig.features.animation.commands:EXPORT_TRACK",
     },
     SCHEMA: {
         "rig": "gazerig.config.schema:Rig",

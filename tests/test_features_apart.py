@@ -14,6 +14,7 @@ from gazerig.robot.recording.run_format import WORLD
 from gazerig.robot.recording.run_info import WorldInfo
 
 COMMANDS = {
+    "animation": ("import", "export-track"),
     "study": ("study",),
     "lab": ("report", "compare", "sweep", "fit-scanpath"),
     "world": (),

@@ -1,14 +1,9 @@
 """Conversion of joint angles over time to a track's YAML file, which the rig's loader reads.
 
-Such angles come from recordings, or from CSV tables of animation programs, one row per frame or
-key. Wide: a column of times and one of angles for each joint. Long: columns time, joint, angle, one
-row for each key. Times are in seconds (time, time_s) or numbers of frames (frame), angles in
-degrees. Separators are commas, semicolons or tabs.
+Such angles come from recordings and from animation programs.
 """
 
-import csv
-from collections.abc import Iterator, Mapping, Sequence
-from math import isfinite
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +12,6 @@ from gazerig.config.rig import Rig
 from gazerig.config.save_text import format_value
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.files.file_input import read_limited
 from gazerig.drivers.files.file_output import write_file
 from gazerig.gaze.track.track import HEAD_CHANNELS, Track
 from gazerig.gaze.types import Floats
@@ -29,6 +23,7 @@ from gazerig.robot.model.track_fit import (
     TrackFit,
     TrackRefused,
     fit_keys,
+    resample,
     smooth,
     track_motions,
 )
@@ -46,7 +41,9 @@ Series = tuple[Floats, Floats]
 Keys = dict[str, list[tuple[float, float]]]
 
 
-def track_text(rig: Rig, series: Mapping[str, Series], description: str) -> str:
+def track_text(
+    rig: Rig, series: Mapping[str, Series], description: str, tolerance_deg: float | None = None
+) -> str:
     """Return a track as YAML.
 
     Args:
@@ -54,6 +51,8 @@ def track_text(rig: Rig, series: Mapping[str, Series], description: str) -> str:
         series: times in seconds and angles in degrees, by joint of the rig; the track is the
             motion relative to the first angle.
         description: meaning of the track.
+        tolerance_deg: distance of the curve from dense samples; None: samples of a hand, whose
+            jitter is smoothed first.
 
     Raises:
         SetupError: a joint does not exist in the rig, the track is too long, or nothing moves.
@@ -71,12 +70,12 @@ def track_text(rig: Rig, series: Mapping[str, Series], description: str) -> str:
             f"it takes {end_s - start_s:.1f} s: a track takes at most {_LARGEST_S:g} s"
         )
     keys: Keys = {}
-    for name, (times, angles) in series.items():
-        for time_s, value in _joint_keys(rig, name, times, angles, start_s):
-            keys.setdefault(_channel_of_joint(name), []).append((time_s, value))
-    keys = {channel: _average_keys(found) for channel, found in keys.items() if found}
+    for name, (times, angles) in _average_eyes(series).items():
+        found = _joint_keys(rig, name, times - start_s, angles, tolerance_deg)
+        if found:
+            keys[_channel_of_joint(name)] = found
     if not keys:
-        raise SetupError(f"nothing moves; movements below {TOLERANCE_DEG:g} deg count as jitter")
+        raise SetupError(f"nothing moves by more than {tolerance_deg or TOLERANCE_DEG:g} deg")
     frames: dict[float, dict[str, float]] = {}
     for channel, found in keys.items():
         for time_s, value in found:
@@ -129,19 +128,33 @@ def _channel_of_joint(joint: str) -> str:
     return "eyes_pitch" if joint.endswith(("eye_tilt", "eyes_tilt")) else joint
 
 
+def _average_eyes(series: Mapping[str, Series]) -> dict[str, Series]:
+    """Return the series with one of both eyes for each axis, their mean."""
+    found: dict[str, Series] = {}
+    for name, (times, angles) in series.items():
+        same = [one for one in found if _channel_of_joint(one) == _channel_of_joint(name)]
+        if same:
+            there_s, there = found.pop(same[0])
+            both_s = np.union1d(there_s, times)
+            first, second = np.interp(both_s, there_s, there), np.interp(both_s, times, angles)
+            times, angles = both_s, 0.5 * (first + second)
+        found[name] = times, angles
+    return found
+
+
 def _joint_keys(
-    rig: Rig, joint: str, times_s: Floats, angles_deg: Floats, start_s: float
+    rig: Rig, joint: str, times_s: Floats, angles_deg: Floats, tolerance_deg: float | None
 ) -> list[tuple[float, float]]:
     """Return the keys of one joint; for a lid, factors of its first opening."""
     dense = len(times_s) > 4 and float(np.median(np.diff(times_s))) < _DENSE_S
     values = angles_deg - angles_deg[0]
     if np.abs(values).max() <= _STILL_DEG:
         return []
+    times = times_s
     if dense:
-        times, values = fit_keys(*smooth(times_s, values), TOLERANCE_DEG)
-        times = times + float(times_s[0]) - start_s
-    else:
-        times = times_s - start_s
+        samples = (smooth if tolerance_deg is None else resample)(times_s, values)
+        times, values = fit_keys(*samples, tolerance_deg or TOLERANCE_DEG)
+        times = times + float(times_s[0])
     if joint in LIDS:
         first_deg = float(angles_deg[0])
         shut, wide = rig.lid_joints.ends_deg(joint)
@@ -153,14 +166,6 @@ def _joint_keys(
         values = np.clip(1.0 + values / (wide - shut) / opening, 0.0, 3.0)
     pairs = {round(float(t) / GRID_S): float(v) for t, v in zip(times, values, strict=True)}
     return [(round(k * GRID_S, 3), round(v, 3)) for k, v in pairs.items() if k > 0]
-
-
-def _average_keys(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return keys in the order of their times; two joints of one channel are averaged."""
-    at: dict[float, list[float]] = {}
-    for time_s, value in sorted(keys):
-        at.setdefault(time_s, []).append(value)
-    return [(time_s, round(sum(them) / len(them), 3)) for time_s, them in at.items()]
 
 
 def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:
@@ -182,112 +187,3 @@ def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:
         *([f"lids: {{{', '.join(lids)}}}"] if lids else []),
         *([f"joints_deg: {{{', '.join(others)}}}"] if others else []),
     ]
-
-
-_TIMES = ("time", "time_s", "t", "seconds", "frame")
-_JOINTS = ("joint", "bone", "effector", "servo", "motor", "name")
-_ANGLES = ("angle", "angle_deg", "value", "degrees", "deg")
-_LARGEST = 5_000_000
-_MOST_FAULTS = 10
-
-
-def read_table(path: Path, fps: float | None) -> dict[str, Series]:
-    """Return the keys of every joint of a CSV file.
-
-    Args:
-        path: Path of the file.
-        fps: frames per second, for a column of frame numbers.
-
-    Raises:
-        SetupError: the file cannot be read or has bad rows, each with its line.
-    """
-    try:
-        text = read_limited(path, _LARGEST).decode("utf-8-sig")
-    except OSError as error:
-        raise SetupError(f"{path} cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise SetupError(f"{path} is not UTF-8 text: export it as CSV") from None
-    separator = max(",;\t", key=text.partition("\n")[0].count)
-    rows = list(csv.reader(text.splitlines(), delimiter=separator))
-    head = [name.strip().lower() for name in rows[0]] if rows else []
-    time = next((i for i, name in enumerate(head) if name in _TIMES), None)
-    if time is None:
-        raise SetupError(
-            f"{path}:1: no column of times: the first row must name the columns, one of them "
-            f"{', '.join(_TIMES)}"
-        )
-    if head[time] == "frame" and fps is None:
-        raise SetupError(f"{path}:1: times are frame numbers: give --fps, e.g. 24 or 30")
-    table = _Table(path, head, time, 1.0 / fps if head[time] == "frame" and fps else 1.0)
-    found = table.read_keys(rows)
-    if table.faults:
-        more = len(table.faults) - _MOST_FAULTS
-        shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
-        raise SetupError("\n".join(shown))
-    if not found:
-        raise SetupError(f"{path}: no rows below the column names")
-    return found
-
-
-class _Table:
-    """Rows of one file; faults: the invalid lines with their errors."""
-
-    def __init__(self, path: Path, head: Sequence[str], time: int, unit_s: float) -> None:
-        self.faults: list[str] = []
-        self._path, self._head, self._time, self._unit_s = path, head, time, unit_s
-        self._joint = next((i for i, name in enumerate(head) if name in _JOINTS), None)
-        self._angle = next((i for i, name in enumerate(head) if name in _ANGLES), None)
-
-    def read_keys(self, rows: Sequence[Sequence[str]]) -> dict[str, Series]:
-        """Return the keys by joint, in the order of their times."""
-        found: dict[str, dict[float, float]] = {}
-        last_s: dict[str, float] = {}
-        for line, row in enumerate(rows[1:], start=2):
-            if not any(cell.strip() for cell in row):
-                continue
-            for joint, time_s, angle in self._row_keys(line, row):
-                if time_s <= last_s.get(joint, -1.0):
-                    self._add_error(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
-                last_s[joint] = time_s
-                found.setdefault(joint, {})[time_s] = angle
-        return {
-            name: (np.array(list(keys)), np.array(list(keys.values())))
-            for name, keys in found.items()
-        }
-
-    def _row_keys(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
-        """Yield the keys of one row; an empty cell of a wide table is not a key."""
-        if len(row) != len(self._head):
-            self._add_error(
-                line, f"has {len(row)} columns, but the first row has {len(self._head)}"
-            )
-            return
-        time = self._read_number(line, self._head[self._time], row[self._time])
-        if time is None:
-            return
-        if time < 0.0:
-            self._add_error(line, f"{self._head[self._time]} {time:g} is before 0")
-            return
-        if self._joint is not None and self._angle is not None:
-            pairs = [(row[self._joint].strip(), row[self._angle])]
-        else:
-            pairs = [
-                (n, row[i]) for i, n in enumerate(self._head) if i != self._time and row[i].strip()
-            ]
-        for joint, cell in pairs:
-            angle = self._read_number(line, joint, cell)
-            if angle is not None:
-                yield joint, time * self._unit_s, angle
-
-    def _read_number(self, line: int, what: str, cell: str) -> float | None:
-        try:
-            value = float(cell)
-        except ValueError:
-            value = float("nan")
-        if isfinite(value):
-            return value
-        self._add_error(line, f"{what}: {cell.strip()!r:.40} is not a number")
-        return None
-
-    def _add_error(self, line: int, text: str) -> None:
-        self.faults.append(f"{self._path}:{line}: {text}")

@@ -97,10 +97,6 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         "record-camera": CommandEntry(
             "record", "Record the frames of a camera, for gazerig run --camera-recording FILE."
         ),
-        "import-track": CommandEntry(
-            "tracks",
-            "Import key frames of an animation program as a track in YAML.",
-        ),
     },
 }
 """Panel of the help -> the core's commands in it, by the name of their module in this folder."""

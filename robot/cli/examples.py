@@ -41,9 +41,6 @@ EXAMPLES: dict[str, Examples] = {
         ("models fetch yunet", "only this one"),
         ("models fetch people --from ~/downloads", "offline, from downloaded files"),
     ),
-    "import-track": (
-        ("import-track my.yaml wave.csv wave --fps 24", "key frames from an animation program"),
-    ),
     "record-camera": (
         ("record-camera seen.mcap --oak", "record frames, depth and times of a camera"),
     ),

@@ -1,5 +1,6 @@
 """Optional first argument RIG of commands with several arguments."""
 
+from pathlib import Path
 from typing import Any
 
 from typer.core import TyperCommand, TyperOption
@@ -28,11 +29,12 @@ class RigCommand(TyperCommand):
         parser = TyperCommand(self.name, params=list(options)).make_parser(ctx)
         _, given, _ = parser.parse_args(list(args))
         first = given[0] if given else ""
-        named = first in shipped_names("rigs") or "/" in first or first.endswith((".yaml", ".yml"))
+        folder = "/" in first and not Path(first).suffix
+        named = first in shipped_names("rigs") or folder or first.endswith((".yaml", ".yml"))
         if not all(one.nargs == 1 for one in positional):
             return named
         missing = positional[1 + len(given) - named :]
         if missing and given and missing[0].required and not ctx.resilient_parsing:
             needed = [f"{one.metavar} ({(one.help or '').rstrip('.')})" for one in positional[1:]]
             ctx.fail(f"needs {', '.join(needed)}: {missing[0].metavar} is missing")
-        return len(given) >= len(positional)
+        return named or len(given) >= len(positional)

@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 from trimesh.exchange.gltf import export_glb
+from trimesh.transformations import quaternion_from_matrix
 from trimesh.visual.material import PBRMaterial
 
 from gazerig.gaze.angles import compose
@@ -40,6 +41,7 @@ def gltf(description: Description) -> bytes:
     names = {_ROOT, *(link.name for link in description.links)}
     names |= {f"{look.name}_mesh" for link in description.links for look in link.visuals}
     joints: dict[str, dict[str, Any]] = {}
+    poses: dict[str, dict[str, list[float]]] = {}
     for link in description.links:
         parent = link.parent or _ROOT
         R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
@@ -49,6 +51,8 @@ def gltf(description: Description) -> bytes:
                 node += "_"
             R = compose(R, turn_about(link.joint.axis, link.joint.awake_rad))
             scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
+            w, x, y, z = quaternion_from_matrix(_matrix(R, p)).tolist()  # type: ignore[no-untyped-call]
+            poses[node] = {"rotation": [x, y, z, w], "translation": list(p)}
             joints[node] = {
                 "joint": link.joint.name,
                 "axis": list(link.joint.axis),
@@ -70,6 +74,9 @@ def gltf(description: Description) -> bytes:
         for node in tree["nodes"]:
             if node["name"] in joints:
                 node["extras"] = joints[node["name"]]
+                # Only a node without a matrix can be animated (glTF 2.0, 3.5.3).
+                node.pop("matrix", None)
+                node.update(poses[node["name"]])
         # A camera of glTF looks along -z with y up; the optical frame looks along z with y down.
         camera = description.camera
         share = camera.width_px / camera.height_px

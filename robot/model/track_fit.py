@@ -6,6 +6,7 @@ deviates by less than a tolerance.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from math import degrees
 from typing import NamedTuple
 
@@ -239,6 +240,11 @@ class TrackFit:
         angles: Floats = np.array(commanded_rad) - state.value @ self._matrix
         return angles
 
+    def joint_angles(self, base_rad: Floats, samples: MotionSamples) -> Floats:
+        """Return the (n, joints) angles of a motion that is added to base angles."""
+        angles: Floats = base_rad + samples.value @ self._matrix
+        return angles
+
     def fit(
         self,
         name: str,
@@ -459,6 +465,10 @@ GRID_S = 0.02
 """Grid of the keys' times."""
 _SMOOTHED_OVER_S = 0.15
 _MOST_KEYS = 60
+"""Keys between two reversals, in a minute."""
+_WINDOW = round(60.0 / GRID_S)
+_STILL, _HOLD = 1e-4, round(0.1 / GRID_S)
+"""Change between samples of a constant value, and the shortest number of them."""
 
 
 def smooth(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -482,8 +492,25 @@ def smooth(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     return even, np.convolve(np.pad(found, half, mode="edge"), weights, mode="valid")
 
 
+def resample(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return samples at even times, as ``smooth``, on a cubic curve through the given ones."""
+    even = np.arange(0.0, times_s[-1] - times_s[0] + 1e-9, GRID_S)
+    i = np.clip(np.searchsorted(times_s - times_s[0], even, side="right") - 1, 0, len(times_s) - 2)
+    rate = np.gradient(values, times_s)
+    span = times_s[i + 1] - times_s[i]
+    s = np.minimum((even - times_s[i] + times_s[0]) / span, 1.0)
+    return even, (
+        values[i] * (1.0 + 2.0 * s) * (1.0 - s) ** 2
+        + values[i + 1] * s * s * (3.0 - 2.0 * s)
+        + span * s * (1.0 - s) * (rate[i] * (1.0 - s) - rate[i + 1] * s)
+    )
+
+
 def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats, Floats]:
     """Return times and values of keys whose curve stays within a tolerance of the samples.
+
+    The curve stops where the samples reverse or hold, so the parts between two stops are
+    independent: the time needed grows with the length of the samples, not with its square.
 
     Args:
         times_s: (n,) Times in steps of ``GRID_S`` from 0.
@@ -495,8 +522,26 @@ def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats,
     """
     if np.abs(values - values[0]).max() <= tolerance:
         return np.zeros(0), np.zeros(0)
-    chosen = _reversals(values, tolerance)
-    while len(chosen) < _MOST_KEYS:
+    chosen: list[int] = []
+    stops = {0, *_reversals(values, tolerance), *_hold_ends(values)}
+    for first, last in pairwise(sorted(stops)):
+        part = slice(first, last + 1)
+        inner = _inner_keys(times_s[part] - times_s[first], values[part], tolerance)
+        chosen += [first + i for i in inner]
+    return times_s[chosen], values[chosen]
+
+
+def _hold_ends(values: Floats) -> list[int]:
+    """Return the first and last indices of parts at a constant value."""
+    still = np.abs(np.diff(values)) < _STILL
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False])).astype(int)))
+    return [int(i) for a, b in edges.reshape(-1, 2) if b - a >= _HOLD for i in (a, b)]
+
+
+def _inner_keys(times_s: Floats, values: Floats, tolerance: float) -> list[int]:
+    """Return the indices of the keys between two stops, and the last."""
+    chosen = [len(values) - 1]
+    for _ in range(_MOST_KEYS):
         curve = MinimumJerkCurve(
             float(values[0]), times_s[chosen].tolist(), values[chosen].tolist()
         )
@@ -504,8 +549,11 @@ def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats,
         if error.max() <= tolerance:
             break
         error[[0, *chosen]] = 0.0
-        chosen = sorted({*chosen, int(error.argmax())})
-    return times_s[chosen], values[chosen]
+        # One key in each window of a minute that needs one.
+        windows = range(0, len(error), _WINDOW)
+        worst = [first + int(error[first : first + _WINDOW].argmax()) for first in windows]
+        chosen = sorted({*chosen, *(i for i in worst if error[i] > tolerance)})
+    return chosen
 
 
 def _reversals(values: Floats, tolerance: float) -> list[int]:

@@ -1,0 +1,204 @@
+"""Animation files of other programs as joint angles over time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import msgspec
+import numpy as np
+
+from gazerig.config.rig import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.gaze.types import Floats
+from gazerig.robot.model.joint import JointLimit
+
+Series = tuple[Floats, Floats]
+"""Times in seconds and angles in degrees of one joint."""
+MOST_KEYS = 5_000_000
+"""Keys of one file: twelve joints, 30 frames a second, for four hours."""
+SAMPLE_S = 0.02
+"""Interval of the samples of a curve with handles."""
+LARGEST = 200_000_000
+
+T = TypeVar("T")
+
+
+class Animation(NamedTuple):
+    """An animation on one rig.
+
+    series: times and angles by joint
+    notes: parts of the file that were left out or changed
+    """
+
+    series: dict[str, Series]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass
+class JointMap:
+    """Joints of a rig by the names in a file.
+
+    joints: joints of the rig
+    given: joints by the names of the file, where they differ; a joint with "-" before it turns the
+        other direction
+    """
+
+    joints: Sequence[str]
+    given: Mapping[str, str] = field(default_factory=dict)
+
+    def find(self, name: str) -> tuple[str, int] | None:
+        """Return the joint of a name and the sign of its angles; None if it is no joint."""
+        wanted = self.given.get(name, name)
+        joint, sign = wanted.removeprefix("-"), -1 if wanted.startswith("-") else 1
+        return (joint, sign) if joint in self.joints else None
+
+    def hint(self) -> str:
+        """Return the remedy for an unknown name."""
+        return f"rename it or add --map NAME=JOINT; joints of the rig: {', '.join(self.joints)}"
+
+
+def joint_map(rig: Rig, given: Sequence[str]) -> JointMap:
+    """Return the map of a rig's joints from words like ``3=neck_yaw`` or ``tilt=-neck_pitch``.
+
+    Raises:
+        SetupError: a word has another form, or the rig lacks a joint.
+    """
+    found = {}
+    for word in given:
+        name, equal, joint = word.partition("=")
+        if not equal or joint.removeprefix("-") not in rig.names:
+            raise SetupError(
+                f"--map {word}: give NAME=JOINT or NAME=-JOINT; joints of {rig.name}: "
+                f"{', '.join(rig.names)}"
+            )
+        found[name] = joint
+    return JointMap(rig.names, found)
+
+
+def read_animation(
+    path: Path,
+    rig: Rig,
+    names: JointMap,
+    *,
+    fps: float | None = None,
+    clip: str = "",
+    centre_deg: float | None = None,
+) -> Animation:
+    """Return the animation of a file, by its kind.
+
+    Args:
+        path: path of the file.
+        rig: rig that it moves.
+        names: joints by the names in the file.
+        fps: frames per second, for tables with frame numbers.
+        clip: name of the animation, for files with several.
+        centre_deg: position straight ahead, for servo positions in degrees; None for the servo's
+            own unit.
+
+    Raises:
+        SetupError: the file cannot be read or has no motion for this rig.
+    """
+    from gazerig.features.animation import bottango, gltf_reader, servo_positions, table
+
+    try:
+        data = read_limited(path, LARGEST)
+    except OSError as error:
+        raise SetupError(f"{path} cannot be read: {error.strerror}") from None
+    if data[:4] == b"glTF" or path.suffix.lower() == ".gltf":
+        found = gltf_reader.read(path, data, rig, names, clip)
+    elif data.lstrip()[:1] == b"[":
+        found = bottango.read(path, data, rig, names, clip)
+    elif data.lstrip()[:1] == b"{":
+        found = servo_positions.read(path, data, rig, names, centre_deg)
+    elif path.suffix.lower() in (".glb", ".json", ".fbx", ".bvh", ".blend"):
+        raise SetupError(
+            f"{path}: its first bytes are neither glTF nor JSON: export glTF (.glb), the JSON of "
+            "Bottango or of Blender's add-on Servo Animation, or CSV"
+        )
+    else:
+        found = Animation(table.read_table(path, data, fps, names))
+    if not found.series:
+        raise SetupError(
+            f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"
+        )
+    return found
+
+
+def decode(path: Path, data: bytes, kind: type[T], what: str, where: str = "") -> T:
+    """Return JSON as a checked value.
+
+    Args:
+        path: path of the file, for messages.
+        data: the JSON text.
+        kind: its structure.
+        what: name of the format.
+        where: part of the file.
+
+    Raises:
+        SetupError: it is not JSON, or has another structure; with the place.
+    """
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise SetupError(
+            f"{path}{where}: {error}: it is truncated or not {what}; export it again"
+        ) from None
+
+
+def check_keys(where: str, times_s: Floats, values: np.ndarray[Any, Any]) -> None:
+    """Refuse keys that are not numbers or not in the order of their times.
+
+    Args:
+        where: file and joint, for the message.
+        times_s: (n,) times.
+        values: (n, ...) values.
+
+    Raises:
+        SetupError: names the first such key.
+    """
+    finite = np.isfinite(times_s) & np.isfinite(values.reshape(len(times_s), -1)).all(axis=1)
+    if not finite.all():
+        raise SetupError(f"{where}: key {int(finite.argmin())} is not a number: export it again")
+    steps = np.diff(times_s)
+    if len(times_s) and times_s[0] < 0.0:
+        raise SetupError(f"{where}: key 0 is at {times_s[0]:g} s, before 0: begin at frame 0")
+    if (steps <= 0.0).any():
+        i = int((steps <= 0.0).argmax())
+        raise SetupError(
+            f"{where}: key {i + 1} at {times_s[i + 1]:g} s is not after {times_s[i]:g} s: "
+            "export it again"
+        )
+
+
+def check_count(where: str, count: int) -> None:
+    """Refuse more keys than a track can be made of.
+
+    Raises:
+        SetupError: states the number and the remedy.
+    """
+    if count > MOST_KEYS:
+        raise SetupError(
+            f"{where}: {count:,} keys; at most {MOST_KEYS:,} are read: export fewer frames a "
+            "second, or in parts"
+        )
+
+
+def hold_steps(times_s: Floats, angles_deg: Floats, limit: JointLimit) -> Series:
+    """Return keys that hold each value until the latest time at which the joint can leave it.
+
+    A servo cannot step. Each step becomes a curve of least jerk that ends at the step's time and
+    uses 80 % of the joint's speed and acceleration.
+    """
+    size = np.abs(np.radians(np.diff(angles_deg)))
+    # Peaks of a minimum-jerk curve: 1.875 d / T and 5.774 d / T^2 (Flash and Hogan 1985).
+    needed = np.maximum(
+        1.875 * size / limit.speed_rad_s, np.sqrt(5.774 * size / limit.accel_rad_s2)
+    )
+    leave_s = np.maximum(times_s[1:] - np.maximum(needed / 0.8, SAMPLE_S), times_s[:-1])
+    held = leave_s > times_s[:-1] + SAMPLE_S
+    times = np.concatenate((times_s, leave_s[held]))
+    angles = np.concatenate((angles_deg, angles_deg[:-1][held]))
+    order = np.argsort(times, kind="stable")
+    return times[order], angles[order]

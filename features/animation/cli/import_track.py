@@ -1,0 +1,75 @@
+"""The command import: an animation of another program becomes a track in YAML."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gazerig.config.schema import load_rig
+from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
+from gazerig.robot.cli.tracks import FolderOption, print_track_fit
+
+app = typer.Typer()
+
+
+@app.command("import", cls=RigCommand)
+def import_track(
+    rig: RigArgument = "desk",
+    *,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="glTF, JSON of Blender's add-on Servo Animation or of Bottango, or CSV.",
+        ),
+    ],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Name of the track; default: that of the file.")
+    ] = "",
+    clip: Annotated[
+        str, typer.Option("--clip", metavar="NAME", help="Animation, of a file with several.")
+    ] = "",
+    joints: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="NAME=JOINT",
+            help="Joint of a name in the file; NAME=-JOINT turns it round. Repeatable.",
+        ),
+    ] = None,
+    degrees: Annotated[
+        float | None,
+        typer.Option(
+            metavar="CENTRE",
+            help="Servo positions are degrees, straight ahead is CENTRE; default: steps or us.",
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(min=1.0, max=1000.0, help="Frames per second, for tables of frame numbers."),
+    ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG", min=0.01, max=10.0, help="Distance of the curve from dense samples."
+        ),
+    ] = 0.3,
+    folder: FolderOption = Path("."),
+    force: ForceOption = False,
+) -> None:
+    """Import an animation of another program as a track in YAML."""
+    with clear_errors(rig):
+        from gazerig.features.animation.animation import joint_map, read_animation
+        from gazerig.robot.app.track_file import track_text, write_track
+
+        loaded = load_rig(rig)
+        found = read_animation(
+            file, loaded, joint_map(loaded, joints or []), fps=fps, clip=clip, centre_deg=degrees
+        )
+        for note in found.notes:
+            say(f"{file}: {note}")
+        text = track_text(loaded, found.series, f"from {file.name}", tolerance)
+        called = name or re.sub(r"[^a-z0-9]+", "_", file.stem.lower()).strip("_")
+        print_track_fit(loaded.name, *write_track(loaded, called, text, folder, force))

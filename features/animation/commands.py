@@ -1,0 +1,24 @@
+"""The entries of this feature in the list of commands; light, as every command imports them."""
+
+from gazerig.robot.cli.command_list import SPECIALIST, CommandEntry
+
+IMPORT = CommandEntry(
+    "gazerig.features.animation.cli.import_track",
+    "Import an animation of another program as a track in YAML.",
+    SPECIALIST,
+    examples={
+        "import": (
+            ("import my.yaml greeting.glb", "a model of gazerig describe, animated in Blender"),
+            ("import wave.csv wave --fps 24", "a table of angles"),
+            ("import show.json --map 3=neck_yaw", "Bottango; the servo at pin 3 turns the neck"),
+        )
+    },
+)
+EXPORT_TRACK = CommandEntry(
+    "gazerig.features.animation.cli.export_track",
+    "Export a track as an animation of the rig's glTF model, for Blender and browsers.",
+    SPECIALIST,
+    examples={
+        "export-track": (("export-track my.yaml nod nod.glb", "to edit it in Blender"),),
+    },
+)

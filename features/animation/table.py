@@ -1,0 +1,130 @@
+"""CSV tables of animation programs: one row per frame or key.
+
+Wide: a column of times and one of angles for each joint. Long: columns time, joint, angle, one row
+for each key. Times are in seconds (time, time_s) or numbers of frames (frame), angles in degrees.
+Separators are commas, semicolons or tabs.
+"""
+
+import csv
+from collections.abc import Iterator, Sequence
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.animation.animation import JointMap, Series, check_count
+
+_TIMES = ("time", "time_s", "t", "seconds", "frame")
+_JOINTS = ("joint", "bone", "effector", "servo", "motor", "name")
+_ANGLES = ("angle", "angle_deg", "value", "degrees", "deg")
+_MOST_FAULTS = 10
+
+
+def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> dict[str, Series]:
+    """Return the keys of every joint of a CSV file.
+
+    Args:
+        path: path of the file, for messages.
+        data: its content.
+        fps: frames per second, for a column of frame numbers.
+        names: joints by the names of the columns.
+
+    Raises:
+        SetupError: the file is no table, has bad rows, each with its line, or names no joint.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise SetupError(f"{path} is not UTF-8 text: export it as CSV") from None
+    separator = max(",;\t", key=text.partition("\n")[0].count)
+    check_count(str(path), data.count(b"\n"))
+    rows = list(csv.reader(text.splitlines(), delimiter=separator))
+    head = [name.strip().lower() for name in rows[0]] if rows else []
+    time = next((i for i, name in enumerate(head) if name in _TIMES), None)
+    if time is None:
+        raise SetupError(
+            f"{path}:1: no column of times: the first row must name the columns, one of them "
+            f"{', '.join(_TIMES)}"
+        )
+    if head[time] == "frame" and fps is None:
+        raise SetupError(f"{path}:1: times are frame numbers: give --fps, e.g. 24 or 30")
+    table = _Table(path, head, time, 1.0 / fps if head[time] == "frame" and fps else 1.0)
+    found = table.read_keys(rows)
+    if table.faults:
+        more = len(table.faults) - _MOST_FAULTS
+        shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
+        raise SetupError("\n".join(shown))
+    if not found:
+        raise SetupError(f"{path}: no rows below the column names")
+    series = {}
+    for name, keys in found.items():
+        joint = names.find(name)
+        if joint is None:
+            raise SetupError(f"{path}: no joint {name!r}: {names.hint()}")
+        series[joint[0]] = keys[0], joint[1] * keys[1]
+    return series
+
+
+class _Table:
+    """Rows of one file; faults: the invalid lines with their errors."""
+
+    def __init__(self, path: Path, head: Sequence[str], time: int, unit_s: float) -> None:
+        self.faults: list[str] = []
+        self._path, self._head, self._time, self._unit_s = path, head, time, unit_s
+        self._joint = next((i for i, name in enumerate(head) if name in _JOINTS), None)
+        self._angle = next((i for i, name in enumerate(head) if name in _ANGLES), None)
+
+    def read_keys(self, rows: Sequence[Sequence[str]]) -> dict[str, Series]:
+        """Return the keys by joint, in the order of their times."""
+        found: dict[str, dict[float, float]] = {}
+        last_s: dict[str, float] = {}
+        for line, row in enumerate(rows[1:], start=2):
+            if not any(cell.strip() for cell in row):
+                continue
+            for joint, time_s, angle in self._row_keys(line, row):
+                if time_s <= last_s.get(joint, -1.0):
+                    self._add_error(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
+                last_s[joint] = time_s
+                found.setdefault(joint, {})[time_s] = angle
+        return {
+            name: (np.array(list(keys)), np.array(list(keys.values())))
+            for name, keys in found.items()
+        }
+
+    def _row_keys(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
+        """Yield the keys of one row; an empty cell of a wide table is not a key."""
+        if len(row) != len(self._head):
+            self._add_error(
+                line, f"has {len(row)} columns, but the first row has {len(self._head)}"
+            )
+            return
+        time = self._read_number(line, self._head[self._time], row[self._time])
+        if time is None:
+            return
+        if time < 0.0:
+            self._add_error(line, f"{self._head[self._time]} {time:g} is before 0")
+            return
+        if self._joint is not None and self._angle is not None:
+            pairs = [(row[self._joint].strip(), row[self._angle])]
+        else:
+            pairs = [
+                (n, row[i]) for i, n in enumerate(self._head) if i != self._time and row[i].strip()
+            ]
+        for joint, cell in pairs:
+            angle = self._read_number(line, joint, cell)
+            if angle is not None:
+                yield joint, time * self._unit_s, angle
+
+    def _read_number(self, line: int, what: str, cell: str) -> float | None:
+        try:
+            value = float(cell)
+        except ValueError:
+            value = float("nan")
+        if isfinite(value):
+            return value
+        self._add_error(line, f"{what}: {cell.strip()!r:.40} is not a number")
+        return None
+
+    def _add_error(self, line: int, text: str) -> None:
+        self.faults.append(f"{self._path}:{line}: {text}")

@@ -1,0 +1,345 @@
+"""Tracks from files of animation programs."""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from gazerig.config.schema import load_rig
+from gazerig.config.tracks import load_track, shipped_tracks
+from gazerig.drivers.errors import SetupError
+from gazerig.features.animation.animation import Series, joint_map, read_animation
+from gazerig.features.animation.cli.export_track import app as export_app
+from gazerig.features.animation.cli.import_track import app
+from gazerig.robot.app.track_file import track_text, write_track
+from gazerig.robot.model.track_fit import track_motions
+
+DESK = load_rig("desk")
+
+
+def table(folder: Path, text: str) -> Path:
+    path = folder / "table.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def read(path: Path, fps: float | None = None) -> dict[str, Series]:
+    return read_animation(path, DESK, joint_map(DESK, []), fps=fps).series
+
+
+WIDE = "time,neck_pitch,neck_yaw\n0,0,5\n0.5,-8,\n1.0,0,9\n"
+LONG = "joint;time_s;angle\nneck_pitch;0;0\nneck_yaw;0;5\nneck_pitch;.5;-8\nneck_yaw;1;9\nneck_pitch;1;0\n"
+FRAMES = "frame\tneck_pitch\tneck_yaw\n0\t0\t5\n12\t-8\t\n24\t0\t9\n"
+
+
+@pytest.mark.parametrize("text", [WIDE, LONG, FRAMES])
+def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
+    text: str, tmp_path: Path
+) -> None:
+    found = track_text(DESK, read(table(tmp_path, text), 24.0), "x")
+    path, fitted = write_track(DESK, "mine", found, tmp_path, False)
+    assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
+        (0.5, -8.0, None),
+        (1.0, 0.0, 4.0),
+    ]
+    assert fitted.slowed_by == 1.0 and fitted.track.duration_s == pytest.approx(1.4)
+
+
+BAD = {
+    "": ":1: no column of times",
+    "when,neck_yaw\n0,1\n": ":1: no column of times",
+    "frame,neck_yaw\n0,1\n": "give --fps",
+    "time,neck_yaw\n0,1\n0.5\n": ":3: has 1 columns, but the first row has 2",
+    "time,neck_yaw\n0,1\n0.5,left\n": ":3: neck_yaw: 'left' is not a number",
+    "time,neck_yaw\n0,1\n0.5,nan\n": ":3: neck_yaw: 'nan' is not a number",
+    "time,neck_yaw\n0,1\n0.5,2\n0.4,3\n": ":4: neck_yaw: 0.4 s is not after 0.5 s",
+    "time,neck_yaw\n-1,1\n": ":2: time -1 is before 0",
+    "time,neck_yaw\n": "no rows",
+    "time,tail\n0,1\n1,5\n": "no joint 'tail': rename it or add --map NAME=JOINT; joints of the rig: left_eye_pan",
+    "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
+    "time,neck_yaw\n0,1\n99,5\n": "a track takes at most 60 s",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_bad_rows_are_named_with_their_line(text: str, tmp_path: Path) -> None:
+    with pytest.raises(SetupError) as caught:
+        track_text(DESK, read(table(tmp_path, text)), "x")
+    assert BAD[text] in str(caught.value)
+
+
+def test_all_bad_rows_are_named_at_once(tmp_path: Path) -> None:
+    rows = "\n".join(f"{t},x" for t in range(15))
+    with pytest.raises(SetupError) as caught:
+        read(table(tmp_path, f"time,neck_yaw\n{rows}\n"))
+    assert str(caught.value).count("is not a number") == 10 and "and 5 more" in str(caught.value)
+
+
+def test_the_command_imports_a_table_for_a_rig(tmp_path: Path) -> None:
+    path = table(tmp_path, WIDE)
+    words = ["desk", str(path), "greet", "--folder", str(tmp_path)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0 and "greet.yaml: 1.4 s on desk" in done.stderr
+    minus = [*words[:-1], str(tmp_path), "--force", "--map", "neck_yaw=-neck_yaw"]
+    assert CliRunner().invoke(app, minus).exit_code == 0
+    assert "head_yaw_deg: -4.0" in (tmp_path / "greet.yaml").read_text()
+    again = CliRunner().invoke(app, words)
+    assert again.exit_code != 0 and "--force" in again.stderr
+    wrong = CliRunner().invoke(app, [*words[:2], "Greet!", "--folder", str(tmp_path)])
+    assert wrong.exit_code != 0 and "lower-case letters" in wrong.stderr
+
+
+def glb(tree: dict[str, Any], binary: bytes = b"", version: int = 2) -> bytes:
+    """Return a binary glTF file, written by nothing of ours."""
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<I4s", len(text), b"JSON") + text
+    body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", version, 12 + len(body)) + body
+
+
+def clip(
+    times: list[float],
+    rotations: np.ndarray[Any, Any],
+    interpolation: str = "LINEAR",
+    node: str = "neck_yaw",
+    path: str = "rotation",
+) -> bytes:
+    """Return a file with one node and its rotations x, y, z, w."""
+    clock, values = np.array(times, "<f4").tobytes(), rotations.astype("<f4").tobytes()
+    views = [(0, len(clock)), (len(clock), len(values))]
+    return glb(
+        {
+            "asset": {"version": "2.0"},
+            "nodes": [{"name": node}],
+            "buffers": [{"byteLength": len(clock + values)}],
+            "bufferViews": [{"buffer": 0, "byteOffset": a, "byteLength": n} for a, n in views],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": len(times), "type": "SCALAR"},
+                {"bufferView": 1, "componentType": 5126, "count": len(rotations), "type": "VEC4"},
+            ],
+            "animations": [
+                {
+                    "name": "wave",
+                    "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
+                    "samplers": [{"input": 0, "output": 1, "interpolation": interpolation}],
+                }
+            ],
+        },
+        clock + values,
+    )
+
+
+def turned(axis: str, degrees: list[float]) -> Rotation:
+    return Rotation.from_rotvec(np.outer(degrees, np.eye(3)["xyz".index(axis)]), degrees=True)
+
+
+def about(axis: str, degrees: list[float]) -> np.ndarray[Any, Any]:
+    return np.asarray(turned(axis, degrees).as_quat())
+
+
+def read_bytes(data: bytes, folder: Path, name: str = "wave.glb", **options: Any) -> Any:
+    (folder / name).write_bytes(data)
+    return read_animation(folder / name, DESK, joint_map(DESK, options.pop("given", [])), **options)
+
+
+def test_gltf_rotations_become_joint_angles(tmp_path: Path) -> None:
+    times = [0.0, 0.5, 1.0]
+    angles = [0.0, 150.0, 250.0]
+    yaw = read_bytes(clip(times, about("z", angles)), tmp_path).series["neck_yaw"]
+    assert yaw[1] == pytest.approx(angles, abs=1e-4) and yaw[0] == pytest.approx(times)
+    # Pitch is positive upwards: about -y. Blender adds .001 to a name in use.
+    pitch = clip(times, about("y", [0.0, 8.0, 0.0]), node="neck_pitch.001")
+    assert read_bytes(pitch, tmp_path).series["neck_pitch"][1][1] == pytest.approx(-8.0, abs=1e-4)
+    both = turned("z", [0.0, 20.0, 0.0]) * turned("x", [0.0, 5.0, 0.0])
+    found = read_bytes(clip(times, np.asarray(both.as_quat())), tmp_path)
+    assert found.series["neck_yaw"][1][1] == pytest.approx(20.0, abs=1e-3)
+    assert "5.0 deg about other axes (at 0.50 s)" in found.notes[0]
+
+
+def test_gltf_steps_and_splines_are_read(tmp_path: Path) -> None:
+    times, angles = [0.0, 1.0, 2.0], [0.0, 20.0, 0.0]
+    at, held = read_bytes(clip(times, about("z", angles), "STEP"), tmp_path).series["neck_yaw"]
+    limit = DESK.joints["neck_yaw"].limit()
+    leave = at[(at > 0.0) & (at < 1.0)]
+    assert len(leave) == 1 and np.interp(leave, at, held) == pytest.approx([0.0], abs=1e-6)
+    took, size = 1.0 - leave[0], np.radians(20.0)
+    assert 1.875 * size / took <= limit.speed_rad_s and 5.774 * size / took**2 <= limit.accel_rad_s2
+    keys = about("z", angles)
+    tangents = np.zeros((3, 3, 4))
+    tangents[:, 1] = keys
+    at, curve = read_bytes(clip(times, tangents.reshape(-1, 4), "CUBICSPLINE"), tmp_path).series[
+        "neck_yaw"
+    ]
+    # Without tangents it is the smooth step of Hermite, 3 s^2 - 2 s^3, of the quaternions.
+    s = 0.25
+    mixed = keys[0] + (3.0 * s**2 - 2.0 * s**3) * (keys[1] - keys[0])
+    expected = Rotation.from_quat(mixed).as_euler("ZYX", degrees=True)[0]
+    assert np.interp(0.25, at, curve) == pytest.approx(expected, abs=0.05) and len(at) > 90
+
+
+GOOD = clip([0.0, 0.5, 1.0], about("z", [0.0, 5.0, 0.0]))
+NAN = about("z", [0.0, 5.0, 0.0]) * [[1.0], [np.nan], [1.0]]
+EMPTY = {"asset": {"version": "2.0"}}
+BAD_FILES: dict[str, tuple[bytes, str]] = {
+    "header.glb": (GOOD[:16], "is truncated: 16 bytes"),
+    "short.glb": (GOOD[:-8], f"its header states {len(GOOD)} bytes, it has {len(GOOD) - 8}"),
+    "old.glb": (glb(EMPTY, version=1), "is glTF 1: export it as glTF 2.0"),
+    "text.glb": (b"hello", "neither glTF nor JSON"),
+    "old.gltf": (b'{"asset": {"version": "1.0"}}', "is glTF 1.0: export"),
+    "half.gltf": (b'{"asset": {"vers', "Input data was truncated: it is truncated or not glTF"),
+    "still.gltf": (json.dumps(EMPTY).encode(), "no animation: bake constraints"),
+    "nan.glb": (clip([0.0, 0.5, 1.0], NAN), "wave, neck_yaw: key 1 is not a number"),
+    "back.glb": (clip([0.0, 0.5, 0.4], NAN[[0, 0, 0]]), "key 2 at 0.4 s is not after 0.5 s"),
+    "tail.glb": (
+        clip([0.0, 1.0], NAN[[0, 0]], node="tail"),
+        "moves no joint of desk: left out: tail rotation (no joint): rename it",
+    ),
+    "lerp.glb": (clip([0.0, 1.0], NAN[[0, 0]], "SMOOTH"), "interpolation 'SMOOTH' is unknown"),
+    "many.glb": (
+        GOOD.replace(b'"count": 3', b'"count": 10000000 ')[:8]
+        + struct.pack("<I", len(GOOD) + 16)
+        + struct.pack("<I", struct.unpack_from("<I", GOOD, 12)[0] + 16)
+        + GOOD.replace(b'"count": 3', b'"count": 10000000 ')[16:],
+        "wave, neck_yaw: 10,000,000 keys; at most 5,000,000",
+    ),
+    "clipped.glb": (
+        GOOD.replace(b'"byteOffset": 12', b'"byteOffset": 92'),
+        "the file is truncated",
+    ),
+    "half.json": (b'{"fps": 30, "servos": {', "half.json: Input data was truncated"),
+    "old.json": (b'{"fps": 30, "positions": []}', "no servos: it is not a file of Blender's"),
+    "fps.json": (b'{"fps": 0, "servos": {}}', "fps is 0; it must be within"),
+    "bone.json": (
+        b'{"fps": 30, "servos": {"4": {"name": "Tail", "positions": [1]}}}',
+        "servos.4: no joint 'Tail': rename it",
+    ),
+    "word.json": (
+        b'{"fps": 30, "servos": {"4": {"name": "Tail", "positions": [1, "x"]}}}',
+        "at `$.servos[...].positions[1]`",
+    ),
+    "none.json": (b"[]", "no animations"),
+    "pin.json": (
+        b'[{"Animations": [{"Animation Name": "a", "Animation Commands": "sC,3,0,9,1,1,0,1,1,0"}]}]',
+        "effector '3' is no joint: rename it or add --map NAME=JOINT; joints of the rig: left_eye",
+    ),
+    "words.json": (
+        b'[{"Animations": [{"Animation Name": "a", "Animation Commands": "sC,3,0,9,1,x"}]}]',
+        "a, command 1: 'sC,3,0,9,1,x' is not sC,effector and eight numbers",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_bad_file_is_one_message_with_place_and_remedy(name: str, tmp_path: Path) -> None:
+    data, message = BAD_FILES[name]
+    with pytest.raises(SetupError) as caught:
+        read_bytes(data, tmp_path, name)
+    text = str(caught.value)
+    assert text.startswith(f"{tmp_path / name}") and message in text and "\n" not in text
+
+
+def test_morphs_and_moved_nodes_are_left_out_with_a_note(tmp_path: Path) -> None:
+    data = clip([0.0, 1.0], np.zeros((2, 4)), path="weights", node="face")
+    with pytest.raises(SetupError, match="moves no joint of desk: left out: face weights"):
+        read_bytes(data, tmp_path)
+    done = CliRunner().invoke(app, ["desk", str(tmp_path / "absent.glb"), "x"])
+    assert done.exit_code != 0 and "absent.glb cannot be read" in done.stderr
+
+
+def test_positions_of_the_blender_add_on_are_those_of_the_servos(tmp_path: Path) -> None:
+    joint = DESK.joints["neck_yaw"]
+    steps = [joint.steps(np.radians(angle)) for angle in (0.0, 12.0, -7.0)]
+    file = {"fps": 24, "frames": 3, "servos": {"7": {"name": "neck_yaw", "positions": steps}}}
+    times, angles = read_bytes(json.dumps(file).encode(), tmp_path, "a.json").series["neck_yaw"]
+    assert times == pytest.approx([0.0, 1 / 24, 2 / 24])
+    assert angles == pytest.approx([0.0, 12.0, -7.0])
+    file["servos"] = {"7": {"name": "Bone", "positions": [90, 100, 80]}}
+    found = read_bytes(
+        json.dumps(file).encode(), tmp_path, "a.json", given=["Bone=-neck_yaw"], centre_deg=90.0
+    )
+    assert found.series["neck_yaw"][1] == pytest.approx([0.0, -10.0, 10.0])
+
+
+def test_curves_of_bottango_have_the_handles_of_its_driver(tmp_path: Path) -> None:
+    # github.com/EvanBottango/Bottango, BezierCurve.py, evaluated here by bisection in time.
+    curves = [(0, 800, 4096, 300, 0, 6144, -200, 500), (800, 600, 6144, 100, 0, 2048, -300, 0)]
+
+    def movement(t_ms: float) -> float:
+        start, span, y0, x1, y1, y3, x2, y2 = curves[int(t_ms > 800)]
+        p = np.array(
+            [[start, y0], [start + x1, y0 + y1], [start + span + x2, y3 + y2], [start + span, y3]]
+        )
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            u = 0.5 * (low + high)
+            q = p
+            while len(q) > 1:  # de Casteljau
+                q = q[:-1] + u * (q[1:] - q[:-1])
+            low, high = (u, high) if q[0, 0] < t_ms else (low, u)
+        return float(q[0, 1]) / 8192
+
+    lines = "".join(f"sC,neck_yaw,{','.join(map(str, c))},h99\n" for c in curves)
+    file = [{"Animations": [{"Animation Name": n, "Animation Commands": lines} for n in "ab"]}]
+    with pytest.raises(SetupError, match="several animations: add --clip NAME with one of: a, b"):
+        read_bytes(json.dumps(file).encode(), tmp_path, "b.json")
+    found = read_bytes(json.dumps(file).encode(), tmp_path, "b.json", clip="b")
+    times, angles = found.series["neck_yaw"]
+    joint = DESK.joints["neck_yaw"]
+    for t in np.linspace(20, 1380, 35):
+        expected = joint.min_deg + movement(t) * (joint.max_deg - joint.min_deg)
+        assert np.interp(t / 1e3, times, angles) == pytest.approx(expected, abs=0.2)
+
+
+@pytest.mark.parametrize("name", ["nod", "look_around"])
+def test_a_track_goes_to_gltf_and_back(name: str, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    done = CliRunner().invoke(export_app, ["desk", name, str(out)])
+    assert done.exit_code == 0, done.stderr
+    # The judge reads the file as the specification has it, and composes rotations with SciPy.
+    data = out.read_bytes()
+    size = struct.unpack_from("<I", data, 12)[0]
+    tree, binary = json.loads(data[20 : 20 + size]), data[28 + size :]
+
+    def numbers(index: int) -> np.ndarray[Any, Any]:
+        accessor = tree["accessors"][index]
+        view = tree["bufferViews"][accessor["bufferView"]]
+        width = {"SCALAR": 1, "VEC4": 4}[accessor["type"]]
+        flat = np.frombuffer(binary, "<f4", accessor["count"] * width, view["byteOffset"])
+        return flat.reshape(-1, width)
+
+    (animation,) = tree["animations"]
+    motions = track_motions(shipped_tracks()[name], DESK.names)
+    seen = set()
+    for channel in animation["channels"]:
+        sampler = animation["samplers"][channel["sampler"]]
+        node = tree["nodes"][channel["target"]["node"]]
+        times, turned = numbers(sampler["input"])[:, 0], numbers(sampler["output"])
+        rest = Rotation.from_quat(node["rotation"])
+        vector = (rest.inv() * Rotation.from_quat(turned)).as_rotvec(degrees=True)
+        judged = vector @ node["extras"]["axis"]
+        samples = motions.motion.sample_at(times.astype(float))
+        own = {"neck_yaw": 0, "neck_pitch": 1, "neck_roll": 2}.get(node["name"])
+        if own is not None:
+            assert np.abs(judged - np.degrees(samples.value[:, own])).max() < 0.01
+            seen.add(own)
+        found = read_animation(out, DESK, joint_map(DESK, [])).series[node["name"]]
+        assert np.abs(found[1] - judged).max() < 0.1
+    assert seen
+
+
+def test_an_imported_track_has_few_keys_and_the_same_curve(tmp_path: Path) -> None:
+    out = tmp_path / "nod.glb"
+    assert CliRunner().invoke(export_app, ["desk", "nod", str(out)]).exit_code == 0
+    words = ["desk", str(out), "--folder", str(tmp_path), "--tolerance", "0.1"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    again, first = load_track(tmp_path / "nod.yaml"), shipped_tracks()["nod"]
+    assert len(again.frames) == len(first.frames)
+    at = np.linspace(0.0, 1.0, 200)
+    curves = [track_motions(one, DESK.names).motion.sample_at(at) for one in (again, first)]
+    assert np.degrees(np.abs(curves[0].value - curves[1].value)[:, :3].max()) < 0.1
