@@ -6,7 +6,7 @@ import pytest
 from ticked_rig import Outbox, TickedRig, connected, gazerig
 
 from gazerig.robot.cli import animation
-from gazerig.robot.dashboard.panels.controls import AnimationPanel
+from gazerig.robot.dashboard.panels.controls import ExpressionPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Express, SetLevel
@@ -44,7 +44,7 @@ def test_levels_come_from_standard_input(rig: TickedRig) -> None:
 
 def test_buttons_and_strength_on_the_page() -> None:
     outbox = Outbox()
-    panel = AnimationPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
+    panel = ExpressionPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
     panel.offer(["sad", "neutral", "happy"])
     panel.offer(["happy", "neutral", "sad"])
     expressions, strength = panel.expressions, panel.strength

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
-from ticked_rig import Outbox, TickedRig, connected, gazerig
+from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import apply_changes
@@ -13,8 +13,6 @@ from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.dashboard.panels.controls import AnimationPanel
-from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.command_json import (
     as_json,
     as_recorded_json,
@@ -93,19 +91,6 @@ def test_the_command_is_data() -> None:
     ):
         with pytest.raises(ValueError, match="track"):
             check_command(wrong)
-
-
-def test_buttons_and_speed_on_the_page() -> None:
-    outbox = Outbox()
-    panel = AnimationPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
-    panel.offer_tracks(["tilt", "none", "nod"])
-    tracks, speed = panel.tracks, panel.speed
-    assert tracks is not None and speed is not None
-    assert tracks.options == ("none", "nod", "tilt")
-    speed.receive_input(1.5, "5")
-    for chosen in ("nod", "none"):
-        tracks.receive_input(chosen, "5")
-    assert outbox.asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
 
 
 def looked_at(kind: str, number: int = 1) -> Target:

@@ -156,6 +156,25 @@ class Track:
         if most > MAX_FRAMES:
             raise ValueError(f"{most} frames: a track has at most {MAX_FRAMES}; omit some")
 
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Return what its frames move: head, eyes, lids, gaze, expression, levels and joints."""
+        found: dict[str, None] = {}
+        for frame in self.frames:
+            for channel in frame.values():
+                kind = (
+                    channel.partition("_")[0]
+                    if channel in (*HEAD_CHANNELS, *EYE_CHANNELS)
+                    else channel
+                )
+                found["lids" if channel in LID_CHANNELS else kind] = None
+            found |= dict.fromkeys(frame.levels)
+            if frame.look_at != KEEP:
+                found["gaze"] = None
+            if frame.express:
+                found["expression"] = None
+        return tuple(found)
+
 
 @dataclass(frozen=True)
 class TrackParams:

@@ -272,6 +272,8 @@ class RunObservers:
                 self._page.open()
                 steps = None if self._steer is None else {STEER: self._steer.keys}
                 self._page.offer(steps or self._made.robot.menus())
+                infos = [] if steps else self._made.robot.tracks()
+                self._page.offer_tracks([info._asdict() for info in infos])
 
     @contextlib.contextmanager
     def _report_errors(self, name: str) -> Iterator[None]:

@@ -39,7 +39,8 @@ class TrackInfo(NamedTuple):
         refused: Reason why this rig cannot do it, "" if it can.
         owns: Joints that gaze does not move meanwhile.
         sound: Path of its sound, "" without one.
-        cues: Its cues.
+        cues: Names and times in s of its cues.
+        layers: What it moves: head, eyes, lids, gaze, expression, levels and joints by name.
     """
 
     name: str
@@ -49,7 +50,8 @@ class TrackInfo(NamedTuple):
     refused: str = ""
     owns: tuple[str, ...] = ()
     sound: str = ""
-    cues: tuple[str, ...] = ()
+    cues: tuple[tuple[str, float], ...] = ()
+    layers: tuple[str, ...] = ()
 
 
 class TrackChoices:
@@ -187,7 +189,7 @@ class TrackChoices:
         made = self._require_motions(name, 0)
         return TrackInfo(
             name, track.description, fitted.track.duration_s, fitted.slowed_by, "", made.owns,
-            track.sound, tuple(track.cues),
+            track.sound, tuple(track.cues.items()), track.layers,
         )  # fmt: skip
 
     def play(

@@ -14,6 +14,7 @@ from gazerig.robot.dashboard.feed.page_process import (
     MESSAGE,
     PARAMS,
     REPLAY,
+    TRACKS,
     VALUES,
 )
 from gazerig.robot.dashboard.panels.controls import Controls, refused_moves
@@ -144,6 +145,8 @@ class PageView:
                 )
         elif kind == PARAMS and isinstance(data, list):
             self._controls.add_params(data)
+        elif kind == TRACKS and isinstance(data, list):
+            self._controls.add_tracks(data)
         elif isinstance(data, dict):
             if kind == CHOICES:
                 self._menus = data

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from gazerig.gaze.angles import Mat3, Vec3
-from gazerig.robot.model.control_source import ControlSource
+from gazerig.robot.model.control_source import ControlSource, TrackState
 
 if TYPE_CHECKING:
     from gazerig.gaze.types import Salience
@@ -345,6 +345,7 @@ class Snapshot:
             control.
         others: The other heads of the same world.
         expressed: Names of the present track and expression, "" for none.
+        tracks: Tracks that play, and the last ones that have ended.
     """
 
     t_s: float
@@ -396,3 +397,4 @@ class Snapshot:
     plan: str = ""
     others: tuple[OtherHead, ...] = ()
     expressed: tuple[str, ...] = ()
+    tracks: tuple[TrackState, ...] = ()

@@ -39,6 +39,7 @@ from gazerig.robot.dashboard.feed.page_process import (
     PARAMS,
     REPLAY,
     SNAPSHOT,
+    TRACKS,
     VALUES,
     decode_snapshot,
 )
@@ -490,7 +491,7 @@ def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
             live.shown_s = snapshots[-1].t_s
         elif kind == FRAME:
             jpeg = body
-        elif kind in (CHOICES, PARAMS, VALUES, MESSAGE, REPLAY):
+        elif kind in (CHOICES, TRACKS, PARAMS, VALUES, MESSAGE, REPLAY):
             others.append((kind, json.loads(body)))
         else:
             live.handle_message(message, fd)

@@ -15,7 +15,7 @@ import subprocess
 import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from math import nan
 from operator import attrgetter
@@ -42,6 +42,7 @@ from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 # recording, menus, the parameters, their values, a reply or a message to all users, the position
 # of a replay; the messages of a running rig are in live_feed.py.
 SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
+TRACKS = b"l"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
 TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
@@ -147,6 +148,7 @@ class PageProcess:
         self._inbox: Inbox | None = None
         self._stops: StopListener | None = None
         self._choices: Mapping[str, tuple[str, ...]] = {}
+        self._tracks: Sequence[Mapping[str, object]] = ()
         self._over = threading.Event()
         self._beginning = threading.Lock()
         self._clock = RealClock()
@@ -241,6 +243,11 @@ class PageProcess:
         self._choices = choices
         self.send(CHOICES + json.dumps(choices).encode())
 
+    def offer_tracks(self, infos: Sequence[Mapping[str, object]]) -> None:
+        """Describe the rig's tracks to the page."""
+        self._tracks = infos
+        self.send(TRACKS + json.dumps(infos).encode())
+
     def say(self, text: str) -> None:
         """Show a message to all users of the page."""
         self._answer(ALL_USERS, text)
@@ -289,6 +296,7 @@ class PageProcess:
             self.started += 1
             if self.started > 1 and self._choices:
                 self.offer(self._choices)
+                self.offer_tracks(self._tracks)
             if self._mourned and not self._welcomed:
                 self._welcomed = True
                 self._notices.append(f"the page is there again, at {url}")

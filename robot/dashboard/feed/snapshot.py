@@ -229,6 +229,7 @@ def snapshot(
             else ()
         ),
         lower_lids=_lower_lids(pose, joints),
+        tracks=tick.tracks,
         p_world_pivot_m=pivot,
     )
 

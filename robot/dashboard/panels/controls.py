@@ -1,4 +1,4 @@
-"""Controls of the rig: the drawers Steer (gaze, behaviours, face, joints) and Tune."""
+"""Controls of the rig: the drawers Steer (gaze, behaviours, face, joints), Play and Tune."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -8,11 +8,12 @@ import viser
 
 from gazerig.gaze.track.expression import NEUTRAL
 from gazerig.robot.dashboard.panels.param_panel import ParamPanels
+from gazerig.robot.dashboard.panels.play_panel import PlayPanel
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
-from gazerig.robot.model.commands import NO_TRACK, Ask, Express, Jog, LookAt, Play
+from gazerig.robot.model.commands import Ask, Express, Jog, LookAt
 from gazerig.robot.model.types import Snapshot, order_joints
 
 STEER = "steer"
@@ -24,21 +25,23 @@ _DRAG, _FREE, _AHEAD = "drag a target", "look freely", "look straight ahead"
 
 
 class Controls:
-    """Drawers Steer (gaze, behaviours, face, joints) and Tune (parameters)."""
+    """Drawers Steer (gaze, behaviours, face, joints), Play (tracks) and Tune (parameters)."""
 
     def __init__(self, widgets: Widgets, scene: viser.SceneApi, outbox: Outbox) -> None:
+        self._widgets = widgets
         self._steer, self._tune = widgets.panel("steer"), widgets.panel("tune")
         self._jog = JogPanel(self._steer.section("joints", order=40), outbox)
         self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.forget_jogged)
         self._tuning = ParamPanels(widgets, self._tune, outbox)
-        self._face = AnimationPanel(self._steer, outbox)
+        self._face = ExpressionPanel(self._steer, outbox)
+        self._play = PlayPanel(widgets.panel("play"), outbox)
         self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
     def remove_controls(self) -> None:
         """Remove all controls: a recording cannot be controlled."""
         self._lead.remove_target()
         self._tuning.remove_params()
-        for place in (self._steer, self._tune):
+        for place in (self._steer, self._tune, self._widgets.panel("play")):
             place.clear()
             place.html(note("A recording: there is no rig to move or to tune."))
 
@@ -48,10 +51,14 @@ class Controls:
             if name == EXPRESSION:
                 self._face.offer(choices)
             elif name == TRACK:
-                self._face.offer_tracks(choices)
+                self._play.offer(choices)
             else:
                 self._lead.offer(name, choices)
                 self._first.offer(name, choices)
+
+    def add_tracks(self, infos: Sequence[Mapping[str, object]]) -> None:
+        """Add what the rig reports of its tracks."""
+        self._play.add_infos(infos)
 
     def add_params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned, as the rig describes them."""
@@ -71,6 +78,7 @@ class Controls:
         self._lead.show(snapshot)
         self._first.show(self._lead.menus)
         self._jog.show(snapshot)
+        self._play.show(snapshot)
 
     def record_answer(self, who: str) -> None:
         """Record the rig's answer to a browser's change."""
@@ -229,20 +237,15 @@ class FirstMenus:
 EXPRESSION = "expression"
 TRACK = "track"
 """Names of the menus that are shown here."""
-_SPEEDS, _SPEED_STEP = (0.5, 2.0), 0.1
-"""Slowest and fastest speed of tracks, and its step."""
 
 
-class AnimationPanel:
-    """Section of the controls; it appears when the rig offers expressions or tracks."""
+class ExpressionPanel:
+    """Section of the controls; it appears when the rig offers expressions."""
 
     def __init__(self, place: Container, outbox: Outbox) -> None:
         self._place, self._outbox = place, outbox
-        self._section: Container | None = None
         self.expressions: Buttons | None = None
         self.strength: Slider | None = None
-        self.tracks: Buttons | None = None
-        self.speed: Slider | None = None
 
     def offer(self, names: Sequence[str]) -> None:
         """Show a button for each expression, instead of the previous ones."""
@@ -250,7 +253,7 @@ class AnimationPanel:
         if self.expressions is not None:
             self.expressions.options = options
             return
-        section = self._open_section()
+        section = self._place.section("face", order=20)
         self.expressions = section.buttons(EXPRESSION, options, order=1)
         strength = self.strength = section.slider("strength", (0.0, 1.0), 0.05, 1.0, order=2)
 
@@ -258,32 +261,6 @@ class AnimationPanel:
             self._outbox.command(Express(name, float(strength.value)), client)
 
         self.expressions.on_press(express)
-
-    def offer_tracks(self, names: Sequence[str]) -> None:
-        """Show a button for each track, instead of the previous ones; the first ends a track.
-
-        Args:
-            names: Tracks that the rig can play, and the name that ends the present one.
-        """
-        options = tuple(sorted(names, key=lambda name: (name != NO_TRACK, name)))
-        if self.tracks is not None:
-            self.tracks.options = options
-            return
-        section = self._open_section()
-        self.tracks = section.buttons(TRACK, options, order=3)
-        speed = self.speed = section.slider("speed", _SPEEDS, _SPEED_STEP, 1.0, order=4)
-
-        def play(name: str, client: str) -> None:
-            track = "" if name == NO_TRACK else name
-            self._outbox.command(Play(track, float(speed.value)), client)
-
-        self.tracks.on_press(play)
-
-    def _open_section(self) -> Container:
-        """Return the section; create it at the first call."""
-        if self._section is None:
-            self._section = self._place.section("face", order=20)
-        return self._section
 
 
 TRACKS = ("nod", "shake", "surprised", "sleepy")
