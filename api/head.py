@@ -1,7 +1,7 @@
 """The interface of a head, whether it runs in this program or in another."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from functools import partial
 from math import radians
 from pathlib import Path
@@ -36,6 +36,7 @@ from gazerig.robot.model.commands import (
     SetLevel,
     Stop,
     SyncTrack,
+    Talk,
     Value,
 )
 from gazerig.robot.model.outcome import Progress
@@ -280,6 +281,61 @@ class Head(ABC):
             Refused: the mode is unknown.
         """
         return self._send(Ask("conversation", mode))
+
+    # Conversation
+
+    def listening(self, person: int | None = None) -> Order:
+        """Look as a listener does, from now on; report it when the partner begins to speak.
+
+        The state of conversation lasts until the next one. It ends with the program.
+
+        Args:
+            person: ``Person.id`` of the partner; None: the same as before, or unknown.
+
+        Raises:
+            Refused: a value is invalid.
+        """
+        return self._send(Talk("listening", person, who=self._who, stay=self._stay))
+
+    def thinking(self, person: int | None = None) -> Order:
+        """Look away as a person who thinks; report it when the partner has finished.
+
+        Args:
+            person: as in ``listening``.
+        """
+        return self._send(Talk("thinking", person, who=self._who, stay=self._stay))
+
+    def speaking(
+        self, person: int | None = None, *, seconds: float | None = None, text: str = "",
+        words: Iterable[tuple[str, float]] = (), sound: Path | str = "",
+    ) -> Order:  # fmt: skip
+        """Look as a speaker does, from now on; report it when the sound begins.
+
+        A long turn begins averted, and the gaze returns to the partner before the planned end.
+        Report it again to correct the plan.
+
+        Args:
+            person: as in ``listening``: the addressee.
+            seconds: time until the planned end; None: from ``words``, or estimated from ``text``.
+            text: what is spoken.
+            words: (word, start in seconds from now) pairs.
+            sound: path of the sound file that is spoken.
+
+        Raises:
+            Refused: a value is invalid.
+        """
+        pairs = tuple((word, start_s) for word, start_s in words)
+        return self._send(
+            Talk("speaking", person, seconds, text, pairs, str(sound), self._who, self._stay)
+        )
+
+    def interrupt(self) -> Order:
+        """Return to the face at once and listen: the partner has interrupted speech or thought."""
+        return self._send(Talk("interrupt", who=self._who, stay=self._stay))
+
+    def idle(self) -> Order:
+        """End the conversation; the head looks as without one."""
+        return self._send(Talk("idle", who=self._who, stay=self._stay))
 
     def behave(self, behaviour: str) -> Order:
         """Choose a behaviour of the rig's rules.

@@ -21,7 +21,7 @@ from branch import Branch
 from remote_rig import BLINKS, RATE, Beat, Broken, SecondTuning, hung_up, server_closed
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.model import client_control, commands
+from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.remote import client
@@ -587,7 +587,7 @@ def test_who_was_quiet_longest_makes_room(rig: RobotClient, folder: Path) -> Non
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(client_control, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(lease, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
     monkeypatch.setattr(client, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         reply = show.look_at(-1.0, 0.0, 0.3)

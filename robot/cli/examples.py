@@ -92,6 +92,11 @@ EXAMPLES: dict[str, Examples] = {
         ("ctl play --list", "the tracks, and whether this rig can play them"),
         ("ctl play none", "end the present one"),
     ),
+    "talk": (
+        ("ctl talk listening --person 1", "look as a listener, until the next state"),
+        ('ctl talk speaking --text "Good morning"', "look as a speaker; the end is estimated"),
+        ("ctl talk idle", "end the conversation"),
+    ),
     "status": (
         ("ctl status", "target and its reason, guard, joints of the running rig"),
         ("ctl status --json", "the same for programs"),

@@ -31,8 +31,10 @@ from gazerig.robot.model.commands import (
     SetLevel,
     Stop,
     SyncTrack,
+    Talk,
     Tune,
 )
+from gazerig.robot.model.conversation import Conversation
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.moved_opponent import TickClockOpponent
 from gazerig.robot.model.reply import CommandReply
@@ -61,6 +63,7 @@ class CommandExecutor:
         tune: Changes parameters and returns messages about it.
         messages: Receives a line about each event.
         looks: Finds the points and faces in commands.
+        conversation: State that a voice agent reports.
     """
 
     def __init__(
@@ -78,11 +81,13 @@ class CommandExecutor:
         tune: Callable[[Tune, float], tuple[str, ...]],
         messages: list[str],
         looks: LookPoints,
+        conversation: Conversation,
     ) -> None:
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
         self._animation, self._tracks = animation, tracks
         self._guard, self._tune, self._messages, self._looks = guard, tune, messages, looks
+        self._conversation = conversation
         self._taken_over = False
         self._trigger = TrackTrigger()
         self.commanded_rad: JointAngles = ()
@@ -107,6 +112,13 @@ class CommandExecutor:
                 f"{lead.controlled_by}: {why}, so the gaze models are in control again"
             )
             self._change_control(lambda: lead.end(why))
+        if talk := self._conversation.expiry_reason(t_s):
+            state = self._conversation.state
+            self._messages.append(
+                f"conversation: {state.state} of {state.who or 'a client'} ends: {talk}"
+            )
+            self._conversation.end(talk, t_s)
+            self._menus.converse(self._conversation.state, t_s)
         if t_s >= levels.lapses_s:
             for name in levels.drop_lapsed(t_s):
                 self._messages.append(f"level {name}: not set any more, so it returns to 0")
@@ -140,8 +152,11 @@ class CommandExecutor:
             case MoveOpponent(p):
                 if self.opponent is not None:  # a repeated run has no world
                     self.opponent.move(p, t_s)
+            case Talk():
+                return self._talk(command, t_s)
             case Renew():
-                if not self._lead.renew(command, t_s):
+                talks = self._conversation.renew(command.who, t_s)
+                if not self._lead.renew(command, t_s) and not talks:
                     return CommandReply(f"{command.who or 'you'} no longer control the head")
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
@@ -159,7 +174,7 @@ class CommandExecutor:
             return self._jog(command, t_s)
         try:
             if isinstance(command, LookAtPerson):
-                face, captured_s = self._looks.face(command)
+                face, captured_s = self._looks.face(command.id)
                 self._change_control(lambda: self._lead.follow(command, face, captured_s, t_s))
             else:
                 point = self._looks.point(command)
@@ -181,6 +196,19 @@ class CommandExecutor:
             # A slider may jump from end to end.
             self._guard.start_gently()
         return jog_reply(command, names, self._guard.limits)
+
+    def _talk(self, command: Talk, t_s: float) -> CommandReply:
+        """Enter the state of conversation that a client reports."""
+        try:
+            if command.person is not None:
+                self._looks.face(command.person)
+            message = self._conversation.report(command, t_s)
+        except ValueError as error:
+            return CommandReply(str(error))
+        if message:
+            self._messages.append(message)
+        self._menus.converse(self._conversation.state, t_s)
+        return CommandReply()
 
     def _play(self, command: Play, t_s: float) -> CommandReply:
         """Play a track on top of the gaze, unless a client holds the joints."""

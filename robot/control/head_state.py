@@ -21,6 +21,7 @@ from gazerig.robot.model.control_source import (
     ControlState,
     TrackState,
 )
+from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +178,7 @@ class HeadState:
         tracks: Tracks that play, and the last ones that have ended.
         control_source: Present source of control: gaze models, a client, a track, a stop.
         headline: Present activity of the head in one sentence.
+        conversation: State of the conversation that a voice agent reports.
         frame_s: Time of the newest camera frame, None before the first.
     """
 
@@ -193,6 +195,7 @@ class HeadState:
     frame_s: float | None = None
     control_source: ControlSource = field(default=ControlSource())
     headline: str = ""
+    conversation: ConversationState = field(default=NO_CONVERSATION)
 
 
 def head_state(tick: Tick) -> HeadState:
@@ -214,6 +217,7 @@ def head_state(tick: Tick) -> HeadState:
         percept.captured_s if percept is not None else None,
         tick_control_source(tick),
         head_activity(tick).headline,
+        tick.conversation,
     )
 
 
@@ -222,6 +226,7 @@ def as_json(state: HeadState) -> dict[str, Any]:
     named: dict[str, Any] = {
         "client_control": state.client_control,
         "control_source": state.control_source,
+        "conversation": state.conversation,
     }
     tracks = [track._asdict() for track in state.tracks]
     plain = {name: value._asdict() for name, value in named.items()}
@@ -252,6 +257,10 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
     if "control_source" in data:
         made["control_source"] = ControlSource(
             **_known_fields(ControlSource, data["control_source"])
+        )
+    if "conversation" in data:
+        made["conversation"] = ConversationState(
+            **_known_fields(ConversationState, data["conversation"])
         )
     return HeadState(**made)
 

@@ -12,7 +12,6 @@ from gazerig.robot.model.commands import (
     LookAt,
     LookAtDirection,
     LookAtInHead,
-    LookAtPerson,
     LookAtPixel,
 )
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -73,7 +72,7 @@ class LookPoints:
                 return add(pose.p_world_head_m, ahead)
         raise ValueError("the head has not been measured yet")
 
-    def face(self, command: LookAtPerson) -> tuple[Face, float]:
+    def face(self, id: int) -> tuple[Face, float]:
         """Return the face of a person and the time of its frame.
 
         Raises:
@@ -82,8 +81,8 @@ class LookPoints:
         percept = self.newest.percept
         faces = percept.faces if percept is not None else ()
         for face in faces:
-            if face.id == command.id and percept is not None:
+            if face.id == id and percept is not None:
                 return face, percept.captured_s
         there = ", ".join(str(face.id) for face in faces)
         seen = f"visible: {there}" if there else "nobody is visible"
-        raise ValueError(f"person {command.id} is not visible; {seen}")
+        raise ValueError(f"person {id} is not visible; {seen}")

@@ -32,6 +32,7 @@ from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import check_command
 from gazerig.robot.model.commands import Ask, Command, Jog, MoveOpponent, Tune
+from gazerig.robot.model.conversation import Conversation
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
@@ -108,12 +109,13 @@ class Robot:
         self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
         self._lead = ClientControl()
+        self._conversation = Conversation()
         self._messages: list[str] = messages if messages is not None else []
         self._stop = StopControl(self._messages)
         self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(
             body, self._lead, self._stop, self._menus, attention, oculomotor, animation, tracks,
-            kinematics, guard, tune, self._messages, self._looks,
+            kinematics, guard, tune, self._messages, self._looks, self._conversation,
         )  # fmt: skip
 
     @property
@@ -263,6 +265,7 @@ class Robot:
         tick = tuple.__new__(Tick, (
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             stopped, self._lead.controlled_by, lead, self._tracks.states(t_s), False,
+            self._conversation.state,
         ))  # fmt: skip
         self._looks.newest = tick
         return tick

@@ -10,6 +10,7 @@ from gazerig.robot.model.control_source import (
     ControlState,
     TrackState,
 )
+from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
@@ -23,6 +24,7 @@ class Tick(NamedTuple):
         controlled_by: Client that controls gaze or joints, and its command; "" without one.
         client_control: State of the newest client's control, with arrival at its target.
         tracks: Tracks that play, and the last ones that have ended, in the order of their numbers.
+        conversation: State of the conversation.
         parking: The run is over and the head moves to its parking pose; such ticks are only
             displayed.
     """
@@ -43,6 +45,7 @@ class Tick(NamedTuple):
     client_control: ControlState = NO_CLIENT_CONTROL
     tracks: tuple[TrackState, ...] = ()
     parking: bool = False
+    conversation: ConversationState = NO_CONVERSATION
 
     def parking_tick(
         self,

@@ -19,6 +19,7 @@ from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import as_recorded_json
 from gazerig.robot.model.control_source import ControlState, TrackState
+from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
@@ -77,6 +78,7 @@ class TickRow(NamedTuple):
     client_control: ControlState
     tracks: tuple[TrackState, ...]
     parking: bool
+    conversation: ConversationState
     before: list[Any]
 
 
@@ -169,7 +171,7 @@ class TickStream:
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
                 [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.controlled_by,
-                tick.client_control, tick.tracks, tick.parking, before,
+                tick.client_control, tick.tracks, tick.parking, tick.conversation, before,
             ))  # fmt: skip
         return encode((percepts, rows))
 

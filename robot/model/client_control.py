@@ -10,7 +10,6 @@ from typing import Literal
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import (
-    HEARTBEAT_S,
     ControlCommand,
     Jog,
     Look,
@@ -22,6 +21,7 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlState
 from gazerig.robot.model.kinematics import gaze_error
+from gazerig.robot.model.lease import Lease
 from gazerig.robot.model.types import JointAngles
 
 ARRIVED_RAD = radians(1.0)
@@ -51,10 +51,10 @@ class ClientControl:
         self._jogged: dict[str, float] = {}
         self._jogged_at: tuple[int, ...] = ()
         self._what = ""
-        self._who = ""
-        self._stay = self._pointer = False
+        self._lease = Lease()
+        self._pointer = False
         self._leads = "", ""
-        self._since_s = self._renewed_s = 0.0
+        self._since_s = 0.0
         self._until_s: float | None = None
         self._face: Face | None = None
         self._seen_s = 0.0
@@ -108,7 +108,7 @@ class ClientControl:
                 arrived = self.state.arrived
                 self.state = self._new_state(self.state.number, t_s)._replace(arrived=arrived)
             return
-        if command.who != self._who:
+        if command.who != self._lease.who:
             self.point = self.person = None
         angles = dict(zip(names, self.pose_rad or now_rad, strict=True))
         angles.update(command.angles_rad)
@@ -119,10 +119,7 @@ class ClientControl:
 
     def renew(self, command: Renew, t_s: float) -> bool:
         """Record a heartbeat; return whether it came from the client in control."""
-        mine = self.active and command.who == self._who
-        if mine:
-            self._renewed_s = t_s
-        return mine
+        return self.active and self._lease.renew(command.who, t_s)
 
     def expiry_reason(self, t_s: float) -> str:
         """Return the reason for the control to end now, "" if it continues or there is none."""
@@ -130,7 +127,7 @@ class ClientControl:
             return ""
         if self._until_s is not None and t_s >= self._until_s:
             return "its time is over"
-        if not self._stay and t_s - self._renewed_s > HEARTBEAT_S:
+        if self._lease.has_lapsed(t_s):
             return "not renewed"
         if self.person is not None and t_s - self._seen_s > GONE_S:
             return f"person {self.person} is gone"
@@ -199,7 +196,7 @@ class ClientControl:
         return self.state
 
     def _start(self, command: ControlCommand, t_s: float) -> None:
-        self._who, self._stay, self._renewed_s = command.who, command.stay, t_s
+        self._lease.start(command.who, command.stay, t_s)
         self._until_s = None if command.for_s is None else t_s + command.for_s
         if isinstance(command, LookAt):
             self._pointer = command.pointer
@@ -217,8 +214,8 @@ class ClientControl:
         by: Literal["person", "pointer", "joint"] = (
             "joint" if joints else "pointer" if self._pointer else "person"
         )
-        if (by, self._who) != self._leads:
-            self._leads, self._since_s = (by, self._who), t_s
+        if (by, self._lease.who) != self._leads:
+            self._leads, self._since_s = (by, self._lease.who), t_s
         what = self._what
         if joints:
             angles = (f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
@@ -227,7 +224,7 @@ class ClientControl:
             number,
             True,
             kind=by,
-            who=self._who,
+            who=self._lease.who,
             description=what,
             joints=joints,
             since_s=self._since_s,
@@ -251,7 +248,7 @@ class ClientControl:
         else:
             self.controlled_by = ""
             return
-        self.controlled_by = f"{self._who or 'a client'}: {what}"
+        self.controlled_by = f"{self._lease.who or 'a client'}: {what}"
 
 
 def _target_text(command: Look) -> str:

@@ -29,6 +29,8 @@ from gazerig.robot.model.commands import (
     SetLevel,
     Stop,
     SyncTrack,
+    Talk,
+    TalkOrder,
     TrackAction,
     Tune,
 )
@@ -44,6 +46,12 @@ MAX_WORDS = 200
 """Longest name or reason in a command, in characters."""
 MAX_CONTROL_S = 86400.0
 """Longest duration of a client's control."""
+MAX_TALK_S = 600.0
+"""Latest planned end of speaking."""
+MAX_TALK_CHARACTERS = 10_000
+"""Longest text of speech, and longest path of its sound."""
+MAX_TALK_WORDS = 2000
+"""Largest number of words with times."""
 MAX_PIXEL = 20000.0
 """Largest coordinate of a pixel."""
 _MAX_TIME_S = 1e12
@@ -107,6 +115,8 @@ def check_command(command: Command) -> None:
             _check_position(position_s)
             if clock not in ("sound", "external"):
                 raise ValueError(f"clock {clock!r:.40}: expected sound or external")
+        case Talk():
+            _check_talk(command)
         case MoveOpponent(p):
             if not _are_numbers(p, 3, MAX_COORDINATE_M) or any(
                 not least <= one <= most
@@ -168,10 +178,7 @@ def _check_look(command: Look) -> None:
                 raise ValueError(f"frame {frame!r:.40}: expected world or head")
             _check_distance(distance)
         case LookAtPerson(person):
-            if isinstance(person, bool) or not isinstance(person, int) or person < 0:
-                raise ValueError(
-                    f"a person must be given by a whole number from 0 on, not {person!r:.40}"
-                )
+            _check_person(person)
         case LookAtPixel(pixel, distance, captured_s, p):
             if not _are_numbers(pixel, 2, MAX_PIXEL):
                 raise ValueError("a pixel must be two finite numbers, x right and y down")
@@ -181,6 +188,51 @@ def _check_look(command: Look) -> None:
                 raise ValueError("captured_s must be the time of a frame in seconds")
             if p is not None:
                 _check_point(p)
+
+
+def _check_talk(command: Talk) -> None:
+    """Check the state of a voice agent, and the plan of its speech."""
+    orders = get_args(TalkOrder)
+    if command.state not in orders:
+        raise ValueError(
+            f"state {command.state!r:.40}: expected {', '.join(orders[:-1])} or {orders[-1]}"
+        )
+    if command.person is not None:
+        _check_person(command.person)
+    seconds, words = command.seconds, command.words
+    if seconds is not None and not (_is_within(seconds, MAX_TALK_S) and seconds > 0.0):
+        raise ValueError(
+            f"seconds {seconds!r:.40}: the planned end of speaking must be above 0 and at most "
+            f"{MAX_TALK_S:g} s from now; omit it if the end is unknown"
+        )
+    for name, text in (("text", command.text), ("sound", command.sound)):
+        if not isinstance(text, str) or len(text) > MAX_TALK_CHARACTERS:
+            raise ValueError(f"{name} must be text of at most {MAX_TALK_CHARACTERS} characters")
+    pairs = isinstance(words, tuple) and len(words) <= MAX_TALK_WORDS
+    last_s = 0.0
+    for pair in words if pairs else ():
+        pairs = pairs and isinstance(pair, tuple) and len(pair) == 2
+        pairs = pairs and isinstance(pair[0], str) and len(pair[0]) <= MAX_WORDS
+        pairs = pairs and _is_within(pair[1], MAX_TALK_S) and pair[1] >= last_s
+        if not pairs:
+            break
+        last_s = pair[1]
+    if not pairs:
+        raise ValueError(
+            f"words must be at most {MAX_TALK_WORDS} pairs of a word and its start in s after the "
+            f"command, from 0 to {MAX_TALK_S:g} in the order of time"
+        )
+    plan = (seconds is not None, command.text, words, command.sound)
+    if command.state != "speaking" and any(plan):
+        raise ValueError(
+            f"seconds, text, words and sound belong to speaking: omit them for {command.state}"
+        )
+    _check_who(command.who, command.stay)
+
+
+def _check_person(person: object) -> None:
+    if isinstance(person, bool) or not isinstance(person, int) or person < 0:
+        raise ValueError(f"a person must be given by a whole number from 0 on, not {person!r:.40}")
 
 
 def _check_point(p: object) -> None:
@@ -280,7 +332,7 @@ def from_recorded_json(data: dict[str, object]) -> Command:
 
 def set_client(command: Command, who: str) -> Command:
     """Return a command with its client's name; commands without that field stay unchanged."""
-    if isinstance(command, ControlCommand | Play | ControlTrack | Renew | Stop | Resume):
+    if isinstance(command, ControlCommand | Play | ControlTrack | Talk | Renew | Stop | Resume):
         return command._replace(who=who[:MAX_WORDS])
     return command
 

@@ -17,7 +17,7 @@ Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Va
 
 Frame = Literal["world", "head"]
 HEARTBEAT_S = 1.0
-"""A control without ``stay`` ends if it is not renewed for this time."""
+"""A control or conversation without ``stay`` ends if it is not renewed for this time."""
 FAR_M = 100.0
 """Distance beyond which the eyes are practically parallel."""
 
@@ -209,6 +209,34 @@ class SyncTrack(NamedTuple):
     clock: Literal["sound", "external"] = "external"
 
 
+TalkOrder = Literal["listening", "thinking", "speaking", "idle", "interrupt"]
+"""What a voice agent does now; interrupt: the other person has interrupted it."""
+
+
+class Talk(NamedTuple):
+    """Report what a voice agent does, so that the gaze is that of a partner in conversation.
+
+    Attributes:
+        state: Present activity; "idle" ends the conversation.
+        person: Perception's number of the partner, None if unknown.
+        seconds: Time until the planned end of speaking, s; None: estimated from words or text.
+        text: What is spoken.
+        words: (word, start in s after this command) pairs of the speech.
+        sound: Path of the sound file that is spoken.
+        who: Name of the client.
+        stay: As in LookAt.
+    """
+
+    state: TalkOrder
+    person: int | None = None
+    seconds: float | None = None
+    text: str = ""
+    words: tuple[tuple[str, float], ...] = ()
+    sound: str = ""
+    who: str = ""
+    stay: bool = False
+
+
 OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))
 """Least and greatest x, y and z to which the opponent's fist can be moved."""
 
@@ -224,7 +252,7 @@ class MoveOpponent(NamedTuple):
 
 
 class Renew(NamedTuple):
-    """Heartbeat of the client in control of gaze or joints; those of others have no effect."""
+    """Heartbeat of the client in control of gaze, joints or talk; others' have no effect."""
 
     who: str = ""
 
@@ -272,6 +300,7 @@ Command = (
     | Play
     | ControlTrack
     | SyncTrack
+    | Talk
     | MoveOpponent
     | Renew
     | Stop
@@ -286,7 +315,8 @@ COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
     "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
     "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
-    "play": Play, "control_track": ControlTrack, "sync_track": SyncTrack, "opponent": MoveOpponent,
+    "play": Play, "control_track": ControlTrack, "sync_track": SyncTrack,
+    "talk": Talk, "opponent": MoveOpponent,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 

@@ -76,6 +76,7 @@ _DESCRIPTIONS = {
     "controlled_by": "client that controls gaze or joints, and its command",
     "client_control": "the newest command of a client; omitted before the first",
     "tracks": "tracks that play, and the last ones that have ended; omitted before the first",
+    "conversation": "state that a voice agent reports; omitted before the first",
     "plan": "choice of the action planner and its reason; omitted without a planner",
     "is_lost": "it is not visible and the gaze is on its last position; omitted if visible",
     "before": "further reports of the machine since the previous tick",

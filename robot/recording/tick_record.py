@@ -29,6 +29,7 @@ from gazerig.robot.model.control_source import (
     ControlState,
     TrackState,
 )
+from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
@@ -80,8 +81,11 @@ _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
 _NESTED: dict[str, Any] = {
     "joints": JointState, "pose": GazeState, "target": Target, "gaze": GazeCommand,
     "guard_result": GuardResult, "client_control": ControlState,
+    "conversation": ConversationState,
 }  # fmt: skip
-_NOTHING = {"client_control": list(NO_CLIENT_CONTROL)}
+_NOTHING = {
+    "client_control": list(NO_CLIENT_CONTROL), "conversation": list(NO_CONVERSATION),
+}  # fmt: skip
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
@@ -91,8 +95,8 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     """Return a tick from ``tick_stream.decode_plain`` as JSON.
 
     Fields without information are omitted: ``guard_result.desired_rad`` if it equals the tick's
-    (null), ``client_control`` and ``tracks`` before the first, ``target.plan`` without a planner,
-    ``target.is_lost`` of a visible target.
+    (null), ``client_control``, ``tracks`` and ``conversation`` before the first, ``target.plan``
+    without a planner, ``target.is_lost`` of a visible target.
 
     Args:
         row: The fields of a ``TickRow``.
@@ -171,6 +175,9 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         if "client_control" in data
         else NO_CLIENT_CONTROL,
         tuple([_build(TrackState, one) for one in data.get("tracks", ())]),
+        conversation=_build(ConversationState, data["conversation"])
+        if "conversation" in data
+        else NO_CONVERSATION,
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)

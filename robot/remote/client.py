@@ -35,6 +35,7 @@ from gazerig.robot.model.commands import (
     SetLevel,
     Stop,
     SyncTrack,
+    Talk,
     TrackAction,
     Value,
 )
@@ -220,6 +221,7 @@ class RobotClient:
         self.who = who
         self._dial = dial
         self._heartbeat: ControlHeartbeat | None = None
+        self._talks = False
         self.pid = pid
 
     @classmethod
@@ -482,19 +484,25 @@ class RobotClient:
         return self._heartbeat is not None and self._heartbeat.in_control
 
     def send(self, command: Command) -> CommandReply:
-        """Send any command; manual control without ``stay`` is renewed from now on.
+        """Send any command; control and conversation without ``stay`` are renewed from now on.
 
         Raises:
             RequestRejected: the command is not valid, or the head refuses it.
         """
-        if command == LookAt(None, self.who):
+        if command == LookAt(None, self.who) and not self._talks:
             self._end_heartbeat()
         reply = self._command(command)
-        if not isinstance(command, ControlCommand) or not reply.control_number:
+        if isinstance(command, Talk):
+            # After idle the heartbeat ends by itself, unless the client controls the gaze too.
+            self._talks = command.state != "idle" and not command.stay
+            if not self._talks or self._dial is None:
+                return reply
+        elif not isinstance(command, ControlCommand) or not reply.control_number:
             return reply
-        if command.stay or self._dial is None:
+        elif (command.stay and not self._talks) or self._dial is None:
             self._end_heartbeat()
-        elif not self.in_control:
+            return reply
+        if not self.in_control:
             self._end_heartbeat()
             try:
                 self._heartbeat = ControlHeartbeat(self._dial, self.who)

@@ -111,6 +111,7 @@ class LoopMonitor:
             "stopped": tick.stopped,
             "controlled_by": tick.controlled_by,
             "control_text": control_text(tick),
+            "conversation": tick.conversation._asdict(),
             "control_kind": leads.kind,
             "control_sentence": control_sentence(leads, tick.t_s),
             "headline": does.headline,

@@ -118,7 +118,8 @@ class ProgramSocket:
 
     Attributes:
         news: set when a message waits; alive: set when the program has answered a ping.
-        controls_as: name under which the program controls the head, "" if it does not.
+        held: what the program controls: "gaze" (or joints), "talk" (the conversation).
+        who: name under which it does.
     """
 
     def __init__(self, rate_hz: float, events: bool) -> None:
@@ -129,7 +130,8 @@ class ProgramSocket:
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
         self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
         self.news, self.alive = asyncio.Event(), asyncio.Event()
-        self.controls_as = ""
+        self.held: set[str] = set()
+        self.who = ""
 
     def wanted_hz(self) -> float:
         """Return the rate at which the program needs the state of the head."""
@@ -152,6 +154,15 @@ class ProgramSocket:
                 self._open.append((tag, reply))
             else:
                 self.queue_message({"outcome": end[0], "why": end[1], "tag": tag})
+
+    def hold(self, message: Mapping[str, object], reply: CommandReply) -> None:
+        """Record what an accepted message controls until it is no longer renewed."""
+        talks = message["do"] == "talk"
+        if talks or takes_control(message):
+            starts = message.get("state") != "idle" if talks else bool(reply.control_number)
+            change = self.held.add if starts and not message.get("stay") else self.held.discard
+            change("talk" if talks else "gaze")
+            self.who = str(message["who"])
 
     def follow(self, tag: object, reply: CommandReply) -> None:
         """Send the outcome of an order when it is known."""
@@ -238,7 +249,8 @@ class ProgramRoutes:
         message = _add_client(parse_message(data), request)
         if message.get("do") != "stop" and not self._is_within_rate():
             raise MessageRefused(BUSY, 429)
-        if takes_control(message) and message.get("for_s") is not None:
+        ends = "seconds" if message.get("do") == "talk" else "for_s"
+        if (ends == "seconds" or takes_control(message)) and message.get(ends) is not None:
             # The order ends after its duration; a request has no connection that could be lost.
             message["stay"] = True
         return await self._forward_request(message, wait_s)
@@ -385,9 +397,7 @@ class ProgramRoutes:
             match answer:
                 case {"ok": {"reply": dict(reply)}}:
                     found = CommandReply.from_json(reply)
-                    if takes_control(message):
-                        held = found.control_number and not message.get("stay")
-                        program.controls_as = message["who"] if held else ""
+                    program.hold(message, found)
                     if "tag" in message and message["do"] not in _NO_OUTCOME:
                         program.follow(message["tag"], found)
                         self.feed.wake()
@@ -400,15 +410,15 @@ class ProgramRoutes:
         """
         while True:
             await asyncio.sleep(0.25 * HEARTBEAT_S)
-            if not (who := program.controls_as):
+            if not program.held:
                 continue
             program.alive.clear()
             async with asyncio.timeout(TAKES_S):
                 await socket.ping()
                 await program.alive.wait()
-            answer = await self._relay.ask({"do": "renew", "who": who})
+            answer = await self._relay.ask({"do": "renew", "who": program.who})
             if "refused" in answer and BUSY_WORDS not in answer["refused"]:
-                program.controls_as = ""  # another client, or no client, is in control
+                program.held.clear()  # another client, or no client, is in control
 
     # --- the rig ------------------------------------------------------------------------
 

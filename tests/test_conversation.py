@@ -1,0 +1,211 @@
+"""Conversation: the state that a voice agent reports, its end, and what the gaze makes of it."""
+
+import json
+from collections.abc import Callable, Iterator
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commanded_robot import Running, running_desk
+
+import gazerig
+from gazerig.errors import Refused
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.session import compose
+from gazerig.robot.app.session import run as run_session
+from gazerig.robot.control.head_state import as_json as state_as_json
+from gazerig.robot.control.head_state import from_json as state_from_json
+from gazerig.robot.control.head_state import head_state
+from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.commands import LookAt, Renew, Talk
+from gazerig.robot.model.conversation import NO_CONVERSATION
+from gazerig.robot.recording.read import RunRecording
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+
+@pytest.fixture
+def rig() -> Iterator[Running]:
+    with running_desk() as running:
+        yield running
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Talk("listening", 3),
+        Talk("speaking", 1, 2.5, "Good morning.", (("Good", 0.0), ("morning", 0.4)), "/a.wav", "b"),
+        Talk("interrupt", stay=True),
+    ],
+    ids=str,
+)
+def test_reports_cross_processes_as_json(command: Talk) -> None:
+    assert from_json(json.loads(json.dumps(as_json(command)))) == command
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"state": "talking"}, "expected listening, thinking, speaking, idle or interrupt"),
+        ({"state": None}, "expected listening"),
+        ({"state": ["idle"]}, "expected listening"),
+        ({}, "talk has the fields state"),
+        ({"state": "listening", "person": -1}, "whole number"),
+        ({"state": "listening", "person": 1.5}, "whole number"),
+        ({"state": "speaking", "seconds": 0}, "above 0 and at most 600 s from now; omit it"),
+        ({"state": "speaking", "seconds": -3.0}, "above 0 and at most 600 s"),
+        ({"state": "speaking", "seconds": 3600}, "above 0 and at most 600 s"),
+        ({"state": "speaking", "seconds": nan}, "above 0 and at most 600 s"),
+        ({"state": "speaking", "seconds": 10**400}, "above 0 and at most 600 s"),
+        ({"state": "speaking", "seconds": "3"}, "above 0 and at most 600 s"),
+        ({"state": "speaking", "text": None}, "text must be text"),
+        ({"state": "speaking", "sound": 3}, "sound must be text"),
+        ({"state": "speaking", "words": "hello"}, "pairs of a word and its start"),
+        ({"state": "speaking", "words": [["a", 1.0], ["b", 0.5]]}, "in the order of time"),
+        ({"state": "speaking", "words": [["a", nan]]}, "pairs of a word and its start"),
+        ({"state": "listening", "seconds": 2.0}, "belong to speaking: omit them for listening"),
+        ({"state": "idle", "who": None}, "who must be text"),
+        ({"state": "idle", "stay": 1}, "must be true or false"),
+    ],
+)
+def test_an_impossible_report_is_refused_with_the_rule(fields: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        from_json({"do": "talk", **fields})
+
+
+def test_states_follow_each_other_and_are_in_tick_and_state(rig: Running) -> None:
+    person = rig.do(Talk("listening", 1, who="a", stay=True))[1][-1].conversation
+    assert person[:4] == (1, "listening", 1, person.since_s) and person.who == "a"
+    assert rig.do(Talk("thinking", who="a", stay=True))[1][-1].conversation.partner == 1
+    spoken = rig.do(Talk("speaking", seconds=2.0, who="a", stay=True))[1][-1].conversation
+    assert spoken.ends_s == spoken.since_s + 2.0 and spoken.confidence > 0.8
+    rig.go(1.0)
+    longer = rig.do(Talk("speaking", text="x" * 30, who="a", stay=True))[1][-1]
+    changed = longer.conversation  # the plan is corrected, the state continues
+    assert (changed.number, changed.since_s) == (spoken.number, spoken.since_s)
+    assert changed.ends_s == pytest.approx(longer.t_s + 2.0, abs=0.01)
+    assert changed.confidence < 0.5
+    words = Talk("speaking", words=(("a", 0.0), ("b", 3.0)), who="a", stay=True)
+    timed = rig.do(words)[1][-1].conversation
+    assert timed.ends_s == pytest.approx(rig.ticks[-1].t_s + 3.4, abs=0.01)
+    state = head_state(rig.ticks[-1])
+    assert state.conversation == timed
+    assert state_from_json(json.loads(json.dumps(state_as_json(state)))) == state
+    assert rig.do(Talk("interrupt", who="a", stay=True))[1][-1].conversation.state == "interrupted"
+    assert rig.do(Talk("idle", who="a"))[1][-1].conversation.state == "idle"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (Talk("interrupt"), "nothing to interrupt: the state is idle"),
+        (Talk("listening", 99), "person 99 is not visible; visible: "),
+    ],
+)
+def test_a_refused_report_changes_nothing(rig: Running, given: Talk, words: str) -> None:
+    reply, ticks = rig.do(given, 0.5)
+    assert words in reply.refused and ticks[-1].conversation == NO_CONVERSATION
+    assert ticks[-1].target.kind == "face"
+
+
+@pytest.mark.parametrize(
+    ("given", "lasts_s", "reason"),
+    [
+        (Talk("speaking", seconds=9.0, who="a"), 1.0, "not renewed"),  # the program has died
+        (Talk("listening", who="a"), 1.0, "not renewed"),
+        (Talk("speaking", seconds=2.0, stay=True), 8.0, "report idle when the speech ends"),
+        (Talk("thinking", stay=True), 60.0, "no report for 60 s"),
+    ],
+)
+def test_a_state_ends_without_its_program(
+    rig: Running, given: Talk, lasts_s: float, reason: str
+) -> None:
+    start_s = rig.do(given)[1][0].t_s
+    ticks = rig.go(lasts_s + 0.5)
+    ended = next(tick for tick in ticks if tick.conversation.state == "idle")
+    assert ended.t_s - start_s == pytest.approx(lasts_s, abs=0.03)
+    assert reason in ended.conversation.end_reason
+    assert sum(text.startswith("conversation: ") for one in ticks for text in one.events) == 1
+    assert ticks[-1].target.kind in ("face", "away")
+
+
+def test_one_heartbeat_renews_gaze_and_conversation_of_one_client(rig: Running) -> None:
+    rig.do(LookAt((1.0, 0.0, 0.3), "a"))
+    rig.do(Talk("listening", who="a"))
+    for _ in range(4):
+        rig.go(0.5)
+        assert not rig.do(Renew("a"))[0].refused
+        assert rig.do(Renew("b"))[0].refused
+    assert rig.ticks[-1].controlled_by and rig.ticks[-1].conversation.state == "listening"
+    rig.do(LookAt(None, "a"))
+    assert not rig.do(Renew("a"))[0].refused  # it still has the conversation
+
+
+def test_the_newer_of_two_agents_has_the_conversation(rig: Running) -> None:
+    rig.do(Talk("speaking", seconds=5.0, who="a"))
+    ticks = rig.do(Talk("listening", who="b"))[1]
+    assert [text for one in ticks for text in one.events] == ["conversation: b takes over from a"]
+    assert rig.do(Renew("a"))[0].refused == "a no longer control the head"
+    rig.go(0.9)
+    rig.do(Renew("b"))
+    assert rig.go(0.5)[-1].conversation.who == "b"
+
+
+def test_the_python_orders_report_states() -> None:
+    with gazerig.open("desk", fast=True, scene="face-to-face") as head:
+        head.step(0.5)
+        orders: list[tuple[Callable[[], Any], str]] = [
+            (lambda: head.listening(1), "listening"),
+            (head.thinking, "thinking"),
+            (lambda: head.speaking(text="Good morning.", words=[("Good", 0.1)]), "speaking"),
+            (head.interrupt, "interrupted"),
+            (head.idle, "idle"),
+        ]
+        for order, state in orders:
+            assert order().wait() == "arrived"
+            assert head.state.conversation.state == state
+        with pytest.raises(Refused, match="above 0 and at most 600"):
+            head.speaking(seconds=nan)
+
+
+def test_reports_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+    file = tmp_path / "talk.mcap"
+    composed = compose(
+        RunOptions(
+            mock=True,
+            fast=True,
+            seed=5,
+            scene="face-to-face",
+            seconds=9.0,
+            record=file,
+            bus="emulated",
+        )  # fmt: skip
+    )
+    asked = {
+        300: Talk("listening", 1, stay=True),
+        500: Talk("thinking", stay=True),
+        700: Talk("speaking", seconds=6.0, text="Good morning.", stay=True),
+        1200: Talk("interrupt", stay=True),
+        1400: Talk("speaking", text="Yes.", who="a"),  # lost after a second
+    }
+    count = iter(range(10_000))
+    see = composed.assembly.robot.perception.see
+
+    def see_and_ask(found: Any, poses: Any) -> Any:
+        if (command := asked.get(next(count))) is not None:
+            composed.assembly.robot.command(command)
+        return see(found, poses)
+
+    watched: Any = see_and_ask
+    composed.assembly.robot.perception.see = watched  # type: ignore[method-assign]
+    run_session(composed, lambda: None, lambda line: None)
+    recording = RunRecording(file)
+    ticks = [one.tick for one in recording.moments()]
+    assert [one for tick in ticks for one in tick.commands] == list(asked.values())
+    states = list(dict.fromkeys(tick.conversation.state for tick in ticks))
+    assert states == ["idle", "listening", "thinking", "speaking", "interrupted"]
+    assert ticks[-1].conversation.end_reason == "not renewed"
+    again = rerun(recording)
+    assert again.is_same and again.sent_bytes_same and not again.notes
