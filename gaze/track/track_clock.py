@@ -40,6 +40,12 @@ class TrackClock(NamedTuple):
             c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
         )
 
+    def has_reached(self, position_s: float, t_s: float) -> bool:
+        """Return whether it is at a position or behind it at a time of the loop."""
+        if self.rate or self.speed == 0.0:
+            return self.state_at(t_s)[0] >= position_s
+        return t_s >= self.from_s + (position_s - self.position_s) / self.speed
+
     def sample_at(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (n,) positions, speeds and accelerations at (n,) times of the loop."""
         position, rate, change = np.array([self.state_at(t) for t in times_s.tolist()]).T

@@ -139,7 +139,7 @@ class Voice:
         while self._cue < len(cues) and cues[self._cue][0] <= position_s - self.ahead_s:
             self.passed.append(cues[self._cue][1])
             self._cue += 1
-        if position_s - self.ahead_s < duration_s or self.ends:
+        if self.ends or not self.clock.has_reached(duration_s + self.ahead_s, t_s):
             return False
         if self.loop and duration_s > 0.0:
             self.clock = self.clock._replace(position_s=self.clock.position_s - duration_s)
