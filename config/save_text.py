@@ -9,6 +9,7 @@ import operator
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -264,6 +265,8 @@ def tracks_text(files: Sequence[str]) -> str:
         gazerig.config.load.ConfigError: one has a fault.
     """
     found = {track_name(file): load_track(track_path(file)) for file in files}
+    # A rerun plays no sound, and its track is another file.
+    found = {name: replace(one, sound=Path(one.sound).name) for name, one in found.items()}
     return "".join(_lines(to_plain(TrackSet(found)))) if found else ""
 
 

@@ -1,8 +1,9 @@
 """Tracks by name: shipped ones, and those of a rig's own files; all are checked."""
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,7 @@ from gazerig.config.load import (
     shipped_names,
     shipped_path,
 )
-from gazerig.gaze.track.track import Track, frame_faults, loop_fault
+from gazerig.gaze.track.track import MAX_DURATION_S, Track, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 _HEAD_KEYS = {
@@ -30,7 +31,15 @@ def load_track(path: Path) -> Track:
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    return load(path, Track, checks=CHECKS)
+    track = load(path, Track, checks=(*CHECKS, partial(_sound_file, path)))
+    return replace(track, sound=str(path.parent / track.sound)) if track.sound else track
+
+
+def _sound_file(path: Path, track: Track) -> Iterable[tuple[str, str]]:
+    folder = os.path.realpath(path.parent)
+    found = os.path.realpath(os.path.join(folder, track.sound))
+    if "\0" in track.sound or not found.startswith(folder.rstrip("/") + "/") and track.sound:
+        yield "sound", f"must be in {folder} or below; put the sound next to the track's file"
 
 
 def shipped_tracks() -> Mapping[str, Track]:
@@ -101,6 +110,15 @@ def _frame_times(track: Track) -> Iterable[tuple[str, str]]:
             yield f"{key}.{i}.time_s", rule
     if rule := loop_fault(track):
         yield "loop_s", rule
+    last_s = max([frame.time_s for frame in track.frames], default=MAX_DURATION_S)
+    for cue, time_s in track.cues.items():
+        if not JOINT_NAME.fullmatch(cue):
+            yield f"cues.{cue}", "not a name; use lower-case letters, digits and _"
+        elif time_s > last_s and not track.sound:
+            yield f"cues.{cue}", f"is after the last frame, which is at {last_s:g} s"
+    for i, name in enumerate(track.owns):
+        if not JOINT_NAME.fullmatch(name):
+            yield f"owns.{i}", "not the name of a joint; write neck, eyes, lids or a joint"
 
 
 def _joint_names(track: Track) -> Iterable[tuple[str, str]]:

@@ -75,7 +75,6 @@ class TrackMotion:
         owned: names of the channels that it owns.
         levels: curves of levels.
         events: gaze points, expressions and cues.
-        least_s: shortest duration, for a sound.
     """
 
     def __init__(
@@ -86,7 +85,6 @@ class TrackMotion:
         owned: Sequence[str] = (),
         levels: Sequence[LevelCurve] = (),
         events: TrackEvents = NO_EVENTS,
-        least_s: float = 0.0,
     ) -> None:
         channels = (*POSE_CHANNELS, *joints)
         self._rests = [rest_value(name) for name in channels]
@@ -118,7 +116,6 @@ class TrackMotion:
         self.duration_s = max(
             [curve.duration_s for _, curve, *_ in self._curves] + ends, default=0.0
         )
-        self.duration_s = max(self.duration_s, least_s)
         self.samples = self._sample_evenly()
 
     def _sample_evenly(self) -> MotionSamples:

@@ -49,6 +49,7 @@ class PlayedTrack(NamedTuple):
     blend_s: shortest times in which it takes over owned channels, and returns them or seeks
     present: values of the channels before it, from which owned channels begin
     lead_s: time by which its motion is ahead of its position, because servos are late
+    sound_s: duration of its sound, 0 without one
     """
 
     name: str
@@ -59,11 +60,17 @@ class PlayedTrack(NamedTuple):
     blend_s: tuple[float, float] = (0.4, 0.25)
     present: tuple[float, ...] = ()
     lead_s: float = 0.0
+    sound_s: float = 0.0
+
+    @property
+    def length_s(self) -> float:
+        """Return its duration at its original speed."""
+        return max(self.motion.duration_s, self.sound_s)
 
     @property
     def duration_s(self) -> float:
         """Return the time from its start until everything is at rest again."""
-        return self.motion.duration_s / self.speed
+        return self.length_s / self.speed
 
 
 class OffsetState(NamedTuple):
@@ -134,7 +141,7 @@ class Voice:
         if self._corrected_s is not None and t_s >= self._corrected_s:
             self._corrected_s = None
             self.clock = self.clock.change_speed(t_s, self.wanted, _CHANGE_S)
-        position_s, duration_s = self.position_s(t_s), self.motion.duration_s
+        position_s, duration_s = self.position_s(t_s), self.played.length_s
         cues = self.motion.events.cues
         while self._cue < len(cues) and cues[self._cue][0] <= position_s - self.ahead_s:
             self.passed.append(cues[self._cue][1])
@@ -227,7 +234,7 @@ class Voice:
         The track runs on meanwhile; if the sum would be too fast, it starts there from rest.
         """
         now = self.state(t_s)
-        position_s = min(position_s, self.motion.duration_s) + self.ahead_s
+        position_s = min(position_s, self.played.length_s) + self.ahead_s
         self._corrected_s = None
         rate = 0.0 if self.paused else self.wanted
         runs = TrackClock(t_s, position_s, rate)

@@ -238,7 +238,9 @@ class CommandExecutor:
             top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
         )
         if name and not self._stop.stop_reason and not self._lead.active:
-            reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
+            reply = self._play(
+                self._tracks.measure_sound(Play(name, who=f"rule {top_down.behaviour}")), t_s
+            )
             if reply.refused:
                 self._messages.append(f"track for rule {top_down.behaviour} {reply.text()}")
         if self._animation.tracks.look is KEEP:

@@ -7,11 +7,10 @@ import numpy as np
 
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
-from gazerig.gaze.track.expression import NEUTRAL
 from gazerig.gaze.track.track import KEEP, MAX_TRACKS, Track, TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
-from gazerig.robot.model.commands import Command, ControlTrack, Play, SyncTrack
+from gazerig.robot.model.commands import ControlTrack, Play, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, TrackReply
@@ -86,6 +85,7 @@ class TrackChoices:
         self._ended: dict[int, tuple[TrackState, float]] = {}
         self._number = self._shifts = 0
         self._look: object = KEEP
+        self._sounds: dict[str, float] = {}
         self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
         self.retune(params, lid_spans_rad, tables, lead_s)
@@ -160,17 +160,16 @@ class TrackChoices:
         made = self._motions(command.track, command.times)
         if isinstance(made, TrackRefused):
             raise ValueError(f"{command.track}: {made}")
-        if command.from_s > made.motion.duration_s:
-            raise ValueError(
-                f"{command.track} lasts {made.motion.duration_s:.2f} s: from_s must be less"
-            )
+        length_s = max(made.motion.duration_s, self._sounds.get(made.track.sound, 0.0))
+        if command.from_s > length_s:
+            raise ValueError(f"{command.track} lasts {length_s:.2f} s: from_s must be less")
 
-    def set_lead(self, command: Command) -> Command:
-        """Return a command with the lead of a track with sound, which a recording needs."""
-        if not isinstance(command, Play) or command.lead_s is not None or not command.track:
-            return command
+    def measure_sound(self, command: Play) -> Play:
+        """Return a command with lead and duration of a sound, which a recording needs."""
         track = self._tracks.get(command.track)
-        return command._replace(lead_s=self._lead_s) if track and track.sound else command
+        if track is None or not track.sound or command.lead_s is not None:
+            return command
+        return command._replace(lead_s=self._lead_s, sound_s=self._sounds.get(track.sound, 0.0))
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig.
@@ -233,7 +232,7 @@ class TrackChoices:
         )
         limited = reply.text().partition("; ")[2]
         self._playing[self._number] = TrackState(
-            self._number, command.track, 0.0, made.motion.duration_s, fitted.track.speed,
+            self._number, command.track, 0.0, fitted.track.length_s, fitted.track.speed,
             loop=loop, owns=made.owns, who=command.who, sound=track.sound, limited=limited,
             since_s=t_s, volume=track.volume,
         )  # fmt: skip
@@ -281,8 +280,8 @@ class TrackChoices:
                     there = ", ".join(cues) or "none"
                     raise ValueError(f"{name} has no cue {value!r}; available: {there}")
                 value = cues[value]
-            if value > voice.motion.duration_s:
-                raise ValueError(f"{name} lasts {voice.motion.duration_s:.2f} s, not {value:g}")
+            if value > (length_s := voice.played.length_s):
+                raise ValueError(f"{name} lasts {length_s:.2f} s, not {value:g}")
         elif command.action == "speed":
             share, speed = self._params.limit_share, float(value)
             value, joint = self._fit.fit_speed(
@@ -370,7 +369,7 @@ class TrackChoices:
         out_s = made.track.blend_out_s or self._params.blend_out_ms / 1e3
         return self._fit.fit(
             name, made, command.speed, base_rad, limits, self._params.limit_share,
-            (made.track.blend_in_s, out_s), command.lead_s or 0.0,
+            (made.track.blend_in_s, out_s), command.lead_s or 0.0, command.sound_s,
         )  # fmt: skip
 
     def _require_motions(self, name: str, count: int) -> TrackMotions:
@@ -385,19 +384,11 @@ class TrackChoices:
         if key not in self._cache:
             if len(self._cache) >= len(self._tracks) + _MOST_KEPT:
                 self._cache = {kept: made for kept, made in self._cache.items() if kept[1] == 0}
+            track = self._tracks[name]
+            if track.sound and track.sound not in self._sounds:
+                self._sounds[track.sound] = self._sound_s(track.sound)
             try:
-                self._cache[key] = self._make_motions(self._tracks[name], count)
+                self._cache[key] = track_motions(track, self._joints, count, self._tables)
             except TrackRefused as refused:
                 self._cache[key] = refused
         return self._cache[key]
-
-    def _make_motions(self, track: Track, count: int) -> TrackMotions:
-        expressions = (NEUTRAL, *self._tables.expressions)
-        for frame in (*track.frames, *track.frames_without_neck):
-            if frame.express and frame.express not in expressions:
-                there = ", ".join(expressions)
-                raise TrackRefused(
-                    f"at {frame.time_s:g} s: no expression {frame.express!r}; available: {there}"
-                )
-        sound_s = self._sound_s(track.sound) if track.sound else 0.0
-        return track_motions(track, self._joints, count, self._tables.levels, sound_s)

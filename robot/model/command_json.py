@@ -91,9 +91,10 @@ def check_command(command: Command) -> None:
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
             _check_share("a level", "value", level, value)
-        case Play(track, speed, times, who, from_s, loop, lead_s):
+        case Play(track, speed, times, who, from_s, loop, lead_s, sound_s):
             _check_track(track, speed)
             _check_position(from_s)
+            _check_position(sound_s)
             if not isinstance(loop, bool):
                 raise ValueError("loop must be true or false")
             if lead_s is not None and not _is_within(lead_s, 1.0):

@@ -165,6 +165,7 @@ class Play(NamedTuple):
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
         lead_s: Time by which the motion of a track with sound is early, because servos are late;
             set on execution for the recording.
+        sound_s: Duration of its sound, set on execution.
     """
 
     track: str
@@ -174,6 +175,7 @@ class Play(NamedTuple):
     from_s: float = 0.0
     loop: bool = False
     lead_s: float | None = None
+    sound_s: float = 0.0
 
 
 TrackAction = Literal["pause", "resume", "seek", "speed", "end"]

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.track.animation import NO_TABLES
+from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
+from gazerig.gaze.track.expression import NEUTRAL
 from gazerig.gaze.track.level import LevelRange
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.track.track import (
@@ -71,7 +72,7 @@ class TrackMotions(NamedTuple):
 
 def track_motions(
     track: Track, joints: Sequence[str], count: int = 0,
-    levels: Mapping[str, LevelRange] = NO_TABLES.levels, least_s: float = 0.0,
+    tables: AnimationTables = NO_TABLES,
 ) -> TrackMotions:  # fmt: skip
     """Return a track as curves of a rig's joints.
 
@@ -79,11 +80,10 @@ def track_motions(
         track: The track.
         joints: Joints of the rig.
         count: Number of repetitions, 0 for the track's own.
-        levels: Offsets of the rig's levels.
-        least_s: Duration of its sound.
+        tables: Expressions and levels of the rig.
 
     Raises:
-        TrackRefused: It needs a joint or a level that the rig lacks.
+        TrackRefused: It needs a joint, a level or an expression that the rig lacks.
     """
     frames, left_out = _frames_for(track, joints)
     channels = channel_keys(track, frames, count or track.count)
@@ -92,11 +92,15 @@ def track_motions(
     kept = {name: keys for name, keys in channels.items() if name in there}
     owns = _owned_joints(track, joints)
     owned = dict.fromkeys(channel_of_joint(name) for name in owns)
-    curves, events = _level_curves(track, frames, levels), _events(track, frames)
+    curves, events = _level_curves(track, frames, tables.levels), _events(track, frames)
+    for time_s, (face, _) in events.expressions:
+        if face not in (NEUTRAL, *tables.expressions):
+            known = ", ".join((NEUTRAL, *tables.expressions))
+            raise TrackRefused(f"at {time_s:g} s: no expression {face!r}; available: {known}")
     if not (kept or curves or any(events) or track.sound):
         raise TrackRefused(f"this rig has none of the joints that it moves: {', '.join(channels)}")
     motion = TrackMotion(
-        kept, further_joints(joints), track.space == "joint", tuple(owned), curves, events, least_s
+        kept, further_joints(joints), track.space == "joint", tuple(owned), curves, events
     )
     whole = tuple(name for name in joints if channel_of_joint(name) in owned)
     return TrackMotions(track, motion, left_out, whole)
@@ -255,6 +259,7 @@ class TrackFit:
         share: float,
         blend_s: tuple[float, float] = (0.4, 0.25),
         lead_s: float = 0.0,
+        sound_s: float = 0.0,
     ) -> FittedTrack:
         """Fit a track to the rig at its present angles.
 
@@ -267,6 +272,7 @@ class TrackFit:
             share: Share of speed and acceleration limits for tracks; the rest is for gaze.
             blend_s: Shortest times in which it takes over its joints, and returns them.
             lead_s: Time by which its motion is early.
+            sound_s: Duration of its sound.
 
         Raises:
             TrackRefused: It cannot be done, or only with changes that it does not allow.
@@ -288,7 +294,15 @@ class TrackFit:
             raise TrackRefused(text)
         stretch = _stretch(matrix, limits, share)
         played = PlayedTrack(
-            name, motion, speed / factor, tuple(sizes.tolist()), stretch, blend_s, present, lead_s
+            name,
+            motion,
+            speed / factor,
+            tuple(sizes.tolist()),
+            stretch,
+            blend_s,
+            present,
+            lead_s,
+            sound_s,
         )
         return FittedTrack(played, factor, joint if factor > 1.0 + _ROUNDING else "", smaller)
 
