@@ -22,7 +22,18 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import Resimulation, rerun
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Play, Resume, Stop, Tune
+from gazerig.robot.model.commands import (
+    Ask,
+    Command,
+    ControlTrack,
+    Jog,
+    LookAt,
+    Play,
+    Resume,
+    Stop,
+    SyncTrack,
+    Tune,
+)
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.playback_devices import PlaybackBody
 from gazerig.robot.recording.read import RunRecording
@@ -387,3 +398,48 @@ def test_tracks_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     assert "head_yaw_deg: 6" in recording.info.tracks_yaml
     again = rerun(recording, joints="emulated")
     assert again.is_same and again.sent_bytes_same is True
+
+
+SHOW = """\
+description: a show
+fit: slow
+owns: [neck, eyes]
+cues: {here: 0.8}
+frames:
+  - {time_s: 0.4, look_at: [1.0, 0.3, 0.2], levels: {mouth: 0.7}}
+  - {time_s: 0.8, head_yaw_deg: 8, eyes_yaw_deg: 3, express: surprised, strength: 0.5}
+  - {time_s: 1.4, head_yaw_deg: -6, look_at: person}
+  - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0, look_at: null}
+"""
+COMMANDS = {
+    100: Play("a_show", loop=True), 180: ControlTrack("seek", "a_show", "here"),
+    220: ControlTrack("pause"), 260: Play("wink_brow"), 300: ControlTrack("resume"),
+    340: SyncTrack(1, 1.2), 360: SyncTrack(1, 0.1), 420: ControlTrack("speed", "a_show", 0.6),
+    520: ControlTrack("end", "a_show"), 600: Play("a_show", from_s=1.0), 680: Stop("test", "me"),
+}  # fmt: skip
+
+
+def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+    files = {
+        "a_show": SHOW,
+        "wink_brow": "description: x\nframes: [{time_s: 1, joints_deg: {left_brow: 3}}]",
+    }
+    for name, text in files.items():
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    paths = tuple(str(tmp_path / f"{name}.yaml") for name in files)
+    rig = replace(load_rig("expressive"), track_files=paths)
+
+    def ask(number: int, made: Assembly) -> None:
+        if (command := COMMANDS.get(number)) is not None:
+            made.robot.command(command)
+
+    ticks = record(tmp_path / "run.mcap", rig, 3.7, VISIT, ask)
+    states = [tick.tracks for tick in ticks]
+    assert max(len([one for one in them if one.is_playing]) for them in states) == 2
+    assert {one.cue for them in states for one in them} == {"", "here"}
+    assert {one.name for one in states[-1] if one.is_playing} == set()
+    assert "switched off" in states[-1][-1].end_reason
+    for name in files:
+        (tmp_path / f"{name}.yaml").unlink()
+    again = rerun(RunRecording(tmp_path / "run.mcap"), joints="emulated")
+    assert again.is_same and again.sent_bytes_same is True, again

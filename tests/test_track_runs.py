@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import degrees
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -94,3 +95,39 @@ def test_eyes_that_did_not_compensate_would_be_found() -> None:
         assert degrees(max(pitch) - min(pitch)) > 7.0
     finally:
         made.close()
+
+
+OWNED = """\
+description: own neck and jaw
+owns: [neck, jaw]
+frames:
+  - {time_s: 1.0, head_yaw_deg: 10, joints_deg: {jaw: 4}}
+  - {time_s: 2.0, head_yaw_deg: -8, head_pitch_deg: -5, levels: {mouth: 0.5}}
+  - {time_s: 3.0, head_yaw_deg: 0, head_pitch_deg: 0, joints_deg: {jaw: 0}}
+"""
+
+
+def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    file.write_text(OWNED, encoding="utf-8")
+    rig = replace(steady("expressive"), track_files=(str(file),))
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    made.robot.start(made.clock)
+    made.robot.command(LookAt(POINT, stay=True))
+    ticks(made, 400)
+    _, found = played(made, "own")
+    yaw, jaw = rig.names.index("neck_yaw"), rig.names.index("jaw")
+    at_s = [tick.t_s - found[0].t_s for tick in found]
+    angles = np.degrees([tick.guard_result.command_rad for tick in found])
+    at_2s = int(np.searchsorted(at_s, 2.0))
+    assert angles[at_2s, yaw] == pytest.approx(-8.0, abs=0.1)
+    assert angles[:, jaw].max() > 3.9
+    errors = [degrees(gaze_error(POINT, tick.pose).whole) for tick in found]
+    assert max(errors) < errors[0] + 0.7
+    bounds = limits(rig.joints)
+    step = np.abs(np.diff(np.radians(angles), axis=0)).max(axis=0) / DT
+    assert (step <= [one.speed_rad_s for one in bounds]).all()
+    assert found[at_2s].tracks[-1].owns == ("neck_yaw", "neck_pitch", "jaw")
+    assert found[-1].tracks[-1].end_reason == "finished"
+    made.robot.stop()
+    made.close()
