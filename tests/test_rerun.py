@@ -411,7 +411,7 @@ frames:
   - {time_s: 1.4, head_yaw_deg: -6, look_at: person}
   - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0, look_at: null}
 """
-COMMANDS = {
+COMMANDS: dict[int, Command] = {
     100: Play("a_show", loop=True), 180: ControlTrack("seek", "a_show", "here"),
     220: ControlTrack("pause"), 260: Play("wink_brow"), 300: ControlTrack("resume"),
     340: SyncTrack(1, 1.2), 360: SyncTrack(1, 0.1), 420: ControlTrack("speed", "a_show", 0.6),

@@ -133,7 +133,7 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     frames = (KeyFrame(1.0, head_pitch_deg=3.0), KeyFrame(2.0, head_pitch_deg=0.0))
     it = show(hello=Track("h", frames, fit="slow", cues={"top": 1.0, "end": 1.9}, loop=True))
     number = it.play("hello", 0.0)
-    t, cues = 0.0, []
+    t, cues = 0.0, list[tuple[int, str]]()
     for _ in range(1004):
         t += 0.005
         it.player.step(t)
