@@ -254,7 +254,7 @@ SAID = {
     # values, files and columns of a sweep
     *("LOW:HIGH:STEPS", "LOW:HIGH", "sweep-my-visitor", "report.KEY", "verdict.KEY"),
     *("table.csv", "table.parquet", "response.png", "runs.jsonl", "arguments.json", "results.json"),
-    "dcmotor",  # of MuJoCo
+    *("dcmotor", "filterexact"),  # of MuJoCo
     # formats, bytes, and what is typed elsewhere
     *("{all: 0.5}", "{jaw: 8, left_brow: 10}", "refuse", "slow", "joint", "time", "angle", "frame"),
     *("time,x,y", "start,duration,part", "N: [x0, y0, x1, y1]", "start + k * period"),

@@ -14,7 +14,8 @@ from gazerig.sim_mock.scenes.scene import Event, Scene, Thing, there_and_back
 from gazerig.sim_mock.scenes.timeline import HALF_FIELD_RAD
 
 NAMES = (
-    "boxing", "face-to-face", "sits-still", "steps-aside", "three-people", "two-people", "visitor",
+    "boxing", "face-to-face", "interview", "sits-still", "steps-aside", "table", "three-people",
+    "two-people", "visitor",
     "walks-past",
 )  # fmt: skip
 DT_S = 0.01

@@ -30,7 +30,7 @@ class WorldScene:
 
     def __init__(self, name: str, figures: Figures) -> None:
         script = figures.script
-        self.name, self.round_s = name, script.round_s
+        self.name, self.round_s, self.agent = name, script.round_s, script.agent
         boxes = any(person.gloves for person in script.people.values())
         self.behaviours: tuple[str, ...] = ("wait", "guard", "attack") if boxes else ()
         self.figures = figures

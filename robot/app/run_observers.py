@@ -18,8 +18,10 @@ from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.computer import level_text, slower_rate
+from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
@@ -90,6 +92,10 @@ class RunObservers:
     ) -> None:
         self._steer, self._lent = steer, False
         self._made, self._fast, self._say = assembly, options.fast, say
+        self._agent = MockAgent(
+            assembly.robot.command,
+            assembly.scene if isinstance(assembly.scene, AgentScene) else None,
+        )
         self._states = 0
         self._figures: LoopFigures | None = None
         self._timing = LoopTiming(assembly.loop.rate_hz)
@@ -156,6 +162,7 @@ class RunObservers:
             refusals=(ConfigError,) if self._tuning is not None else (),
             saved=self._live.saved if self._live is not None else None,
             depth=self._show_depth,
+            talk=self._play_talk,
             paths=self._tuning.confined if self._tuning is not None else None,
         )
         camera = self._made.robot.camera
@@ -217,6 +224,8 @@ class RunObservers:
             observers.add("the recording", self._recorder.record)
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)
+        if self._emulated:
+            observers.add("the simulated voice agent", self._report_talk)
         if not self._fast:
             observers.add("the loop's time", self._record_time)
             if self._measured and self._tuning is not None:
@@ -318,6 +327,19 @@ class RunObservers:
     def _show_depth(self, on: bool) -> None:
         if self._publisher is not None:
             self._publisher.depth = on
+
+    def _report_talk(self, tick: Tick) -> None:
+        """Let the simulated voice agent report its turns."""
+        room = self._made.room
+        start_s = room.start_s() if room is not None else scene_start_s(self._made.robot.camera)
+        self._agent.update(tick, start_s)
+
+    def _play_talk(self) -> str:
+        """Play a minute of conversation with the nearest person; return a message."""
+        if not self._emulated:
+            return "refused: only a head with emulated servos plays a conversation"
+        self._agent.play(load_scene("interview").agent)
+        return "the head listens, thinks, answers and is interrupted, for a minute"
 
     def _record_time(self, tick: Tick) -> None:
         """Record the time of a tick; a tuned loop has its own slots."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from gazerig.gaze.angles import Mat3, Vec3
 from gazerig.robot.model.control_source import ControlSource, TrackState
+from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 
 if TYPE_CHECKING:
     from gazerig.gaze.types import Salience
@@ -346,6 +347,7 @@ class Snapshot:
         others: The other heads of the same world.
         expressed: Names of the present track and expression, "" for none.
         tracks: Tracks that play, and the last ones that have ended.
+        talk: State of the conversation, as a voice agent reports it.
     """
 
     t_s: float
@@ -398,3 +400,4 @@ class Snapshot:
     others: tuple[OtherHead, ...] = ()
     expressed: tuple[str, ...] = ()
     tracks: tuple[TrackState, ...] = ()
+    talk: ConversationState = NO_CONVERSATION

@@ -75,7 +75,7 @@ class FacesScene:
     """The people and things of a script without a room."""
 
     def __init__(self, name: str, script: SceneScript, seed: int = 0) -> None:
-        self.name, self.round_s = name, script.round_s
+        self.name, self.round_s, self.agent = name, script.round_s, script.agent
         boxes = any(person.gloves for person in script.people.values())
         self.behaviours: tuple[str, ...] = ("wait", "guard", "attack") if boxes else ()
         self._script = script

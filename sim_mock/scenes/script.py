@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from gazerig.params import Bounds
+from gazerig.robot.model.commands import TalkOrder
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,19 @@ class HeadScript:
 
 
 @dataclass(frozen=True)
+class AgentAct:
+    """One report of a simulated voice agent, as a real one sends it to the head."""
+
+    # fmt: off
+    at_s: Annotated[float, Bounds(0, 600), "time of the report, from the start of the round"]
+    state: Annotated[TalkOrder, "what the agent does from then on; interrupt: a person has interrupted it"]
+    person: Annotated[str, "its partner, a person of the script; empty: the same as before"] = ""
+    seconds: Annotated[float | None, Bounds(0.1, 600), "planned duration of its speech; null: estimated from the text"] = None
+    text: Annotated[str, "what it says"] = ""
+    # fmt: on
+
+
+@dataclass(frozen=True)
 class LightParams:
     """Brightness of the room."""
 
@@ -220,6 +234,7 @@ class SceneScript:
     description: Annotated[str, "short description of the scene"] = ""
     places: Annotated[Mapping[str, PlaceScript], "additional places besides the room's"] = field(default_factory=dict)
     things: Annotated[Mapping[str, ThingScript], "things, for example objects that people hand to each other"] = field(default_factory=dict)
+    agent: Annotated[tuple[AgentAct, ...], "reports of the robot's simulated voice agent, in the order of time"] = ()
     heads: Annotated[Mapping[str, HeadScript], "other heads beside the first, by name"] = field(default_factory=dict)
     light: Annotated[LightParams, "brightness of the room"] = field(default_factory=LightParams)
     camera: Annotated[WorldCameraParams, "pictures of the robot's camera"] = field(default_factory=WorldCameraParams)

@@ -118,6 +118,13 @@ def name_faults(
         for i, act in enumerate(person.acts):
             for rule_key, rule in _act_faults(script, name, act, places, targets):
                 yield f"{key}.acts.{i}{rule_key}", rule
+    before_s = 0.0
+    for i, report in enumerate(script.agent):
+        if report.person and report.person not in script.people:
+            yield f"agent.{i}.person", f"no person of the script; there are {people}"
+        if not before_s <= report.at_s < script.round_s:
+            yield f"agent.{i}.at_s", "reports are in the order of time, within the round"
+        before_s = report.at_s
     for i, look in enumerate(script.expected or ()):
         if look.at not in places:
             yield f"expected.{i}.at", f"{script.room} has no place {look.at!r}; it has {seats}"

@@ -230,6 +230,7 @@ def snapshot(
         ),
         lower_lids=_lower_lids(pose, joints),
         tracks=tick.tracks,
+        talk=tick.conversation,
         p_world_pivot_m=pivot,
     )
 

@@ -14,6 +14,7 @@ from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.commands import Ask, Express, Jog, LookAt
+from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot, order_joints
 
 STEER = "steer"
@@ -21,6 +22,7 @@ STEER = "steer"
 BEHAVIOUR, CONVERSATION, CHARACTER = "behaviour", "conversation", "character"
 
 _TARGET_SCALE = 0.12
+_DEMO = "play a minute of conversation"
 _DRAG, _FREE, _AHEAD = "drag a target", "look freely", "look straight ahead"
 
 
@@ -35,6 +37,7 @@ class Controls:
         self._tuning = ParamPanels(widgets, self._tune, outbox)
         self._face = ExpressionPanel(self._steer, outbox)
         self._play = PlayPanel(widgets.panel("play"), outbox)
+        self._talk = TalkPanel(self._steer, outbox)
         self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
     def remove_controls(self) -> None:
@@ -79,10 +82,43 @@ class Controls:
         self._first.show(self._lead.menus)
         self._jog.show(snapshot)
         self._play.show(snapshot)
+        self._talk.show(snapshot)
 
     def record_answer(self, who: str) -> None:
         """Record the rig's answer to a browser's change."""
         self._tuning.record_answer(who)
+
+
+class TalkPanel:
+    """State of a conversation, as a voice agent reports it, and a conversation to watch."""
+
+    def __init__(self, place: Container, outbox: Outbox) -> None:
+        section = place.section("voice agent", is_open=False, order=15)
+        self.state = section.html(order=1)
+        self.demo = section.buttons(
+            "",
+            (_DEMO,),
+            hint="a simulated agent listens, thinks, speaks and is interrupted",
+            order=2,
+        )
+        self.demo.on_press(lambda _, who: outbox.ask({"play_talk": True}, who))
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Show what the agent does."""
+        self.state.content = note(talk_text(snapshot.talk, snapshot.t_s))
+
+
+def talk_text(talk: ConversationState, t_s: float) -> str:
+    """Return the state of a conversation in one line."""
+    if talk.state == "idle":
+        return f"no conversation; {talk.end_reason}" if talk.end_reason else "no conversation"
+    words: list[str] = [talk.state]
+    if talk.partner is not None:
+        words.append(f"with person {talk.partner}")
+    words.append(f"for {max(0.0, t_s - talk.since_s):.0f} s")
+    if talk.ends_s is not None:
+        words.append(f"{max(0.0, talk.ends_s - t_s):.0f} s to its planned end")
+    return f"{talk.who or 'a client'}: {', '.join(words)}"
 
 
 class GazeTargetPanel:

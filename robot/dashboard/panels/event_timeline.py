@@ -1,4 +1,4 @@
-"""Strip of the last half minute: targets, face parts, saccades, blinks, guard levels."""
+"""Strip of the last half minute: targets, face parts, saccades, blinks, guard levels, turns."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -24,8 +24,15 @@ STRIP_S = 30.0
 
 _LEFT_PX = 64.0
 _RIGHT_PX = LINE_PX - 4.0
-_ROWS_PX = {"target": 2.0, "part": 25.0, "saccades": 46.0, "blinks": 86.0, "guard": 105.0}
-_AXIS_PX = 124.0
+_ROWS_PX = {
+    "target": 2.0, "part": 25.0, "saccades": 46.0, "blinks": 86.0, "guard": 105.0, "head": 124.0,
+    "people": 145.0,
+}  # fmt: skip
+_AXIS_PX = 166.0
+_TURNS = {
+    "listening": "translation", "thinking": "looming", "speaking": "ok", "interrupted": "saccade",
+}  # fmt: skip
+"""Colours of the turns of the head in a conversation."""
 _SACCADE_PX, _LARGE_DEG = 34.0, 30.0
 _LETTER_PX = 7.4
 
@@ -49,7 +56,7 @@ class Timeline(PagePanel):
 
     def __init__(self) -> None:
         self._rows: dict[str, deque[_Interval]] = {
-            "target": deque(), "part": deque(), "guard": deque(),
+            "target": deque(), "part": deque(), "guard": deque(), "head": deque(), "people": deque(),
         }  # fmt: skip
         self._events: deque[SeenEvent] = deque()
         self._now_s: float | None = None
@@ -67,6 +74,11 @@ class Timeline(PagePanel):
         self._extend("part", t_s, snapshot.target_part or "", snapshot.target_part or "")
         level = "stopped" if snapshot.stopped else snapshot.worst
         self._extend("guard", t_s, level, level)
+        turn = snapshot.talk.state
+        self._extend("head", t_s, "" if turn == "idle" else turn, turn)
+        speaking = sorted(face.id for face in snapshot.faces if face.speaks)
+        names = ", ".join(map(str, speaking))
+        self._extend("people", t_s, f"speaks: {names}" if names else "", "face" if names else "")
         self._events += snapshot.events
         for stretches in self._rows.values():
             while stretches[0].end_s < t_s - STRIP_S:
@@ -83,7 +95,7 @@ class Timeline(PagePanel):
         stretches.append(_Interval(stretches[-1].end_s if stretches else t_s, t_s, what, kind))
 
     def intervals(self, row: str) -> tuple[tuple[float, float, str], ...]:
-        """Return start, end and value of each interval of a row: target, part or guard."""
+        """Return start, end and value of each interval of a row, such as target or head."""
         return tuple(stretch[:3] for stretch in self._rows[row])
 
     def drawing(self) -> str:
@@ -96,12 +108,14 @@ class Timeline(PagePanel):
         saccades = sum(isinstance(event, SeenSaccade) for event in self._events)
         blinks = sum(isinstance(event, SeenBlink) for event in self._events)
         levels = dict.fromkeys(stretch.kind for stretch in self._rows["guard"])
+        turns = dict.fromkeys(stretch.what for stretch in self._rows["head"] if stretch.what)
         return svg(
             _AXIS_PX + 18.0,
             parts,
             (
                 f"the last {STRIP_S:.0f} seconds: looked at {', '.join(targets) or 'nothing'}; "
-                f"{saccades} saccades, {blinks} blinks; guard {', '.join(levels)}"
+                f"{saccades} saccades, {blinks} blinks; guard {', '.join(levels)}; turns "
+                f"{', '.join(turns) or 'none'}"
             ),
         )
 
@@ -114,6 +128,12 @@ class Timeline(PagePanel):
                 yield from _band("part", stretch, now_s, 18.0, f"part-{stretch.kind}", stretch.kind)
         for stretch in self._rows["guard"]:
             yield from _band("guard", stretch, now_s, 14.0, LEVELS[stretch.kind], "")
+        for stretch in self._rows["head"]:
+            if stretch.what:
+                yield from _band("head", stretch, now_s, 17.0, _TURNS[stretch.kind], stretch.what)
+        for stretch in self._rows["people"]:
+            if stretch.what:
+                yield from _band("people", stretch, now_s, 17.0, stretch.kind, stretch.what)
 
     def _marks(self, now_s: float) -> Iterable[str]:
         foot = _ROWS_PX["saccades"] + _SACCADE_PX

@@ -42,6 +42,7 @@ class PageRequestHandler:
         steer: handles a steering button; None: there are no buttons.
         replay: controls a replay; None: there is none.
         depth: switches the depth image on or off; None: there is none.
+        talk: plays a minute of conversation and returns a message; None: it cannot.
         refusals: exceptions besides ValueError that ``params`` raises for values that break a rule.
         saved: called with each written file.
         paths: permitted files; None: any.
@@ -55,6 +56,7 @@ class PageRequestHandler:
         steer: Callable[[str], str | None] | None = None,
         replay: Callable[[Mapping[str, object]], str | None] | None = None,
         depth: Callable[[bool], None] | None = None,
+        talk: Callable[[], str] | None = None,
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
         paths: PathGuard | None = None,
@@ -65,7 +67,7 @@ class PageRequestHandler:
         self._point = point
         self._steer = steer
         self._replay = replay
-        self._depth = depth
+        self._depth, self._talk = depth, talk
         self._clock = RealClock()
         self._limited_s = -_SAID_EVERY_S
 
@@ -113,6 +115,8 @@ class PageRequestHandler:
             case {"show": {"depth": bool(on)}} if self._depth is not None:
                 self._depth(on)
                 return None
+            case {"play_talk": True} if self._talk is not None:
+                return self._talk()
             case {"replay": dict(asked)} if self._replay is not None:
                 return self._replay(asked)
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} is not available here")
