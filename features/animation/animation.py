@@ -13,6 +13,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.track_fit import shortest_move_s
 
 Series = tuple[Floats, Floats]
 """Times in seconds and angles in degrees of one joint."""
@@ -30,10 +31,12 @@ class Animation(NamedTuple):
 
     series: times and angles by joint
     notes: parts of the file that were left out or changed
+    poses: whether its angles are meant as poses; those of tables are motions
     """
 
     series: dict[str, Series]
     notes: tuple[str, ...] = ()
+    poses: bool = True
 
 
 @dataclass
@@ -118,7 +121,7 @@ def read_animation(
             "Bottango or of Blender's add-on Servo Animation, or CSV"
         )
     else:
-        found = Animation(table.read_table(path, data, fps, names))
+        found = Animation(table.read_table(path, data, fps, names), poses=False)
     if not found.series:
         raise SetupError(
             f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"
@@ -191,12 +194,8 @@ def hold_steps(times_s: Floats, angles_deg: Floats, limit: JointLimit) -> Series
     A servo cannot step. Each step becomes a curve of least jerk that ends at the step's time and
     uses 80 % of the joint's speed and acceleration.
     """
-    size = np.abs(np.radians(np.diff(angles_deg)))
-    # Peaks of a minimum-jerk curve: 1.875 d / T and 5.774 d / T^2 (Flash and Hogan 1985).
-    needed = np.maximum(
-        1.875 * size / limit.speed_rad_s, np.sqrt(5.774 * size / limit.accel_rad_s2)
-    )
-    leave_s = np.maximum(times_s[1:] - np.maximum(needed / 0.8, SAMPLE_S), times_s[:-1])
+    needed = shortest_move_s(np.abs(np.radians(np.diff(angles_deg))), limit, 0.8)
+    leave_s = np.maximum(times_s[1:] - np.maximum(needed, SAMPLE_S), times_s[:-1])
     held = leave_s > times_s[:-1] + SAMPLE_S
     times = np.concatenate((times_s, leave_s[held]))
     angles = np.concatenate((angles_deg, angles_deg[:-1][held]))

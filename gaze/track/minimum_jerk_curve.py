@@ -42,6 +42,11 @@ class MinimumJerkCurve:
         self._starts: list[float] = knots[:-1].tolist()
         self.duration_s, self._last = float(knots[-1]), float(position[-1])
 
+    @property
+    def times_s(self) -> Floats:
+        """Return the times of its keys."""
+        return self._knots[1:]
+
     def value_at(self, t_s: float) -> float:
         """Return the value at a time since the start."""
         if t_s >= self.duration_s:

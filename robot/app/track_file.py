@@ -4,7 +4,9 @@ Such angles come from recordings and from animation programs.
 """
 
 from collections.abc import Mapping
+from math import ceil, radians
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,17 +15,20 @@ from gazerig.config.save_text import format_value
 from gazerig.config.tracks import load_track, track_name
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.gaze.track.track import HEAD_CHANNELS, Track
+from gazerig.gaze.track.track import HEAD_CHANNELS, MAX_DURATION_S, MAX_FRAMES, Track
 from gazerig.gaze.types import Floats
-from gazerig.robot.app.rig_limits import lid_spans, limits
+from gazerig.robot.app.rig_limits import animation_tables, lid_spans, limits
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.track_fit import (
     GRID_S,
     FittedTrack,
+    KeyExcess,
     TrackFit,
     TrackRefused,
+    channel_of_joint,
     fit_keys,
     resample,
+    shortest_move_s,
     smooth,
     track_motions,
 )
@@ -33,7 +38,8 @@ TOLERANCE_DEG = 0.7
 """Largest distance of the curve through fitted keys from the samples."""
 _DENSE_S = 0.09
 """Rows closer than this are samples of a motion, not keys of an animator."""
-_LARGEST_S = 60.0
+_RETURN_S = 0.4
+"""Default of return_s."""
 _STILL_DEG = 0.01
 
 Series = tuple[Floats, Floats]
@@ -41,131 +47,205 @@ Series = tuple[Floats, Floats]
 Keys = dict[str, list[tuple[float, float]]]
 
 
+class TrackText(NamedTuple):
+    """A track as YAML, and what differs from its source."""
+
+    text: str
+    notes: tuple[str, ...] = ()
+
+
 def track_text(
-    rig: Rig, series: Mapping[str, Series], description: str, tolerance_deg: float | None = None
-) -> str:
+    rig: Rig,
+    series: Mapping[str, Series],
+    description: str,
+    *,
+    tolerance_deg: float | None = None,
+    owned: bool = False,
+) -> TrackText:
     """Return a track as YAML.
 
     Args:
         rig: the rig whose joints it moves.
-        series: times in seconds and angles in degrees, by joint of the rig; the track is the
-            motion relative to the first angle.
+        series: times in seconds and angles in degrees, by joint of the rig.
         description: meaning of the track.
         tolerance_deg: distance of the curve from dense samples; None: samples of a hand, whose
             jitter is smoothed first.
+        owned: whether the track owns its joints and gives their angles; otherwise it is the
+            motion relative to the first angle, over gaze.
 
     Raises:
         SetupError: a joint does not exist in the rig, the track is too long, or nothing moves.
     """
-    channels = {_channel_of_joint(name) for name in rig.names}
-    unknown = [name for name in series if _channel_of_joint(name) not in channels]
+    channels = {channel_of_joint(name) for name in rig.names}
+    unknown = [name for name in series if channel_of_joint(name) not in channels]
     if unknown:
         raise SetupError(
             f"no joint {unknown[0]!r}; available: {', '.join(rig.names)}; rename the column"
         )
     start_s = min(float(times[0]) for times, _ in series.values())
     end_s = max(float(times[-1]) for times, _ in series.values())
-    if not GRID_S < end_s - start_s <= _LARGEST_S:
+    if not GRID_S < end_s - start_s <= MAX_DURATION_S:
         raise SetupError(
-            f"it takes {end_s - start_s:.1f} s: a track takes at most {_LARGEST_S:g} s"
+            f"it takes {end_s - start_s:.1f} s: a track takes at most {MAX_DURATION_S:g} s; split it"
         )
+    means, notes = _average_eyes(series)
     keys: Keys = {}
-    for name, (times, angles) in _average_eyes(series).items():
-        found = _joint_keys(rig, name, times - start_s, angles, tolerance_deg)
-        if found:
-            keys[_channel_of_joint(name)] = found
-    if not keys:
+    begins_s = ends_s = 0.0
+    for name, (times, angles) in means.items():
+        found = _joint_keys(name, times - start_s, angles, tolerance_deg)
+        if not owned and not found:
+            continue
+        rest = _rest_deg(rig, name) if owned else float(angles[0])
+        keys[name] = [(0.0, float(angles[0])), *found]
+        first, last = (_move_s(rig, name, keys[name][i][1] - rest) for i in (0, -1))
+        begins_s, ends_s = max(begins_s, first), max(ends_s, last)
+    if not any(len(found) > 1 for found in keys.values()):
         raise SetupError(f"nothing moves by more than {tolerance_deg or TOLERANCE_DEG:g} deg")
     frames: dict[float, dict[str, float]] = {}
-    for channel, found in keys.items():
-        for time_s, value in found:
-            frames.setdefault(time_s, {})[channel] = value
-    lines = [f"description: {format_value(description)}", "space: joint", "fit: slow", "frames:"]
+    begins_s = GRID_S * (ceil(begins_s / GRID_S) + 1) if begins_s > GRID_S else 0.0
+    for name, found in keys.items():
+        # Equal values at two keys are a rest, from which the motion begins as in its source.
+        rests = [(-GRID_S, found[0][1]), found[0]] if begins_s else []
+        for time_s, value in (*rests, *found[1:]):
+            at_s = round(time_s + begins_s, 3)
+            if at_s > 0.0:
+                value = _channel_value(rig, name, value, float(means[name][1][0]), owned)
+                frames.setdefault(at_s, {})[channel_of_joint(name)] = round(value, 3)
+    if begins_s:
+        notes += (f"begins with {begins_s:.2f} s from the neutral pose to its first one",)
+    if len(frames) > MAX_FRAMES:
+        raise SetupError(
+            f"{len(frames):,} frames; a track has at most {MAX_FRAMES:,}: import it with a larger "
+            "--tolerance, or in parts"
+        )
+    owns = ", ".join(name for name in rig.names if name in series)
+    lines = [f"description: {format_value(description)}", "fit: slow"]
+    lines += [f"owns: [{owns}]" if owned else "space: joint"]
+    lines += [f"return_s: {min(ends_s + 0.01, 10.0):.2f}"] if ends_s > _RETURN_S else []
+    lines += ["frames:"]
     lines += [f"  - {{{', '.join(_frame_lines(t, frames[t]))}}}" for t in sorted(frames)]
-    return "\n".join(lines) + "\n"
+    return TrackText("\n".join(lines) + "\n", notes)
 
 
-def write_track(
-    rig: Rig, name: str, text: str, folder: Path, force: bool
-) -> tuple[Path, FittedTrack]:
+class RigTrack(NamedTuple):
+    """A track on a rig, from the middle of its ranges.
+
+    fitted: the track as the rig plays it; None if it cannot
+    refused: the reason, "" if it can
+    excesses: every key that it cannot reach or follow as written
+    """
+
+    fitted: FittedTrack | None
+    refused: str
+    excesses: tuple[KeyExcess, ...]
+
+
+def write_track(rig: Rig, name: str, text: str, folder: Path, force: bool) -> tuple[Path, RigTrack]:
     """Write a track's file and check it against the rig.
 
     Returns:
-        The file, and the track fitted to the rig.
+        The file, and the track on the rig.
 
     Raises:
-        SetupError: the file cannot be written, or the rig cannot play it.
+        SetupError: the file cannot be written.
         gazerig.config.load.ConfigError: the name or the track breaks a rule.
     """
     path = folder / f"{name}.yaml"
     track_name(str(path))
     write_file(path, text, force)
-    try:
-        return path, fit_to_rig(rig, load_track(path))
-    except TrackRefused as refused:
-        raise SetupError(f"{path} is written, but {rig.name} cannot play it: {refused}") from None
+    return path, fit_to_rig(rig, load_track(path))
 
 
-def fit_to_rig(rig: Rig, track: Track) -> FittedTrack:
-    """Return a track fitted to a rig, from the middle of its ranges.
-
-    Raises:
-        gazerig.robot.model.track_fit.TrackRefused: the rig cannot play it.
-    """
+def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
+    """Return a track on a rig."""
     bounds = limits(rig.joints)
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
-    fit = TrackFit(rig.names, lid_spans(rig))
-    share = rig.gaze.tracks.limit_share
-    return fit.fit("", track_motions(track, rig.names), 1.0, middle, bounds, share)
+    fit, share = TrackFit(rig.names, lid_spans(rig)), rig.gaze.tracks.limit_share
+    try:
+        made = track_motions(track, rig.names, 0, animation_tables(rig).levels)
+    except TrackRefused as refused:
+        return RigTrack(None, str(refused), ())
+    excesses = fit.key_excesses(made, middle, bounds, share) if track.frames else ()
+    try:
+        return RigTrack(fit.fit("", made, 1.0, middle, bounds, share), "", excesses)
+    except TrackRefused as refused:
+        return RigTrack(None, str(refused), excesses)
 
 
-def _channel_of_joint(joint: str) -> str:
-    """Return the channel of a joint: both eyes have one."""
-    if joint.startswith("neck_"):
-        return joint.replace("neck", "head")
-    if joint.endswith(("eye_pan", "eyes_pan")):
-        return "eyes_yaw"
-    return "eyes_pitch" if joint.endswith(("eye_tilt", "eyes_tilt")) else joint
-
-
-def _average_eyes(series: Mapping[str, Series]) -> dict[str, Series]:
-    """Return the series with one of both eyes for each axis, their mean."""
+def _average_eyes(series: Mapping[str, Series]) -> tuple[dict[str, Series], tuple[str, ...]]:
+    """Return the series with one of both eyes for each axis, their mean, and large differences."""
     found: dict[str, Series] = {}
+    notes: list[str] = []
     for name, (times, angles) in series.items():
-        same = [one for one in found if _channel_of_joint(one) == _channel_of_joint(name)]
+        same = [one for one in found if channel_of_joint(one) == channel_of_joint(name)]
         if same:
             there_s, there = found.pop(same[0])
             both_s = np.union1d(there_s, times)
             first, second = np.interp(both_s, there_s, there), np.interp(both_s, times, angles)
+            worst = int(np.abs(first - second).argmax())
+            if abs(first[worst] - second[worst]) > TOLERANCE_DEG:
+                notes.append(
+                    f"{same[0]} and {name} differ by up to {abs(first[worst] - second[worst]):.1f} "
+                    f"deg (at {both_s[worst]:.2f} s): both get the mean"
+                )
             times, angles = both_s, 0.5 * (first + second)
         found[name] = times, angles
-    return found
+    return found, tuple(notes)
 
 
 def _joint_keys(
-    rig: Rig, joint: str, times_s: Floats, angles_deg: Floats, tolerance_deg: float | None
+    joint: str, times_s: Floats, angles_deg: Floats, tolerance_deg: float | None
 ) -> list[tuple[float, float]]:
-    """Return the keys of one joint; for a lid, factors of its first opening."""
+    """Return the keys of one joint after time 0, on the grid of times; none if it rests."""
     dense = len(times_s) > 4 and float(np.median(np.diff(times_s))) < _DENSE_S
-    values = angles_deg - angles_deg[0]
-    if np.abs(values).max() <= _STILL_DEG:
+    times, values = times_s, angles_deg
+    if np.abs(values - values[0]).max() <= _STILL_DEG:
         return []
-    times = times_s
     if dense:
         samples = (smooth if tolerance_deg is None else resample)(times_s, values)
         times, values = fit_keys(*samples, tolerance_deg or TOLERANCE_DEG)
         times = times + float(times_s[0])
-    if joint in LIDS:
-        first_deg = float(angles_deg[0])
-        shut, wide = rig.lid_joints.ends_deg(joint)
-        if shut is None or wide is None:
-            raise SetupError(f"{joint}: the rig does not define its shut and open angles")
-        opening = (first_deg - shut) / (wide - shut)
-        if opening < 0.2:
-            raise SetupError(f"{joint}: it begins nearly shut; begin with open lids")
-        values = np.clip(1.0 + values / (wide - shut) / opening, 0.0, 3.0)
     pairs = {round(float(t) / GRID_S): float(v) for t, v in zip(times, values, strict=True)}
-    return [(round(k * GRID_S, 3), round(v, 3)) for k, v in pairs.items() if k > 0]
+    return [(round(k * GRID_S, 3), v) for k, v in pairs.items() if k > 0]
+
+
+def _lid_ends(rig: Rig, joint: str) -> tuple[float, float]:
+    """Return the shut and the open angle of a lid in degrees."""
+    shut, wide = rig.lid_joints.ends_deg(joint)
+    if shut is None or wide is None:
+        raise SetupError(f"{joint}: the rig does not define its shut and open angles")
+    return shut, wide
+
+
+def _rest_deg(rig: Rig, joint: str) -> float:
+    """Return the angle of a joint in the neutral pose."""
+    return _lid_ends(rig, joint)[1] if joint in LIDS else 0.0
+
+
+def _channel_value(rig: Rig, joint: str, angle: float, first: float, owned: bool) -> float:
+    """Return an angle in the unit of the joint's channel: degrees; a lid's factor of its opening.
+
+    Args:
+        rig: the rig.
+        joint: the joint.
+        angle: its angle in degrees.
+        first: its first angle, which is its rest if the track does not own it.
+        owned: whether the track owns it.
+    """
+    if joint not in LIDS:
+        return angle if owned else angle - first
+    shut, wide = _lid_ends(rig, joint)
+    base = wide if owned else first
+    if (base - shut) / (wide - shut) < 0.2:
+        raise SetupError(f"{joint}: it begins nearly shut; begin with open lids")
+    return min(max((angle - shut) / (base - shut), 0.0), 3.0)
+
+
+def _move_s(rig: Rig, joint: str, size_deg: float) -> float:
+    """Return the shortest time in which tracks may move a joint of the rig so far."""
+    known = [name for name in rig.names if channel_of_joint(name) == channel_of_joint(joint)]
+    limit, share = rig.joints[known[0]].limit(), rig.gaze.tracks.limit_share
+    return float(shortest_move_s(radians(abs(size_deg)), limit, share))
 
 
 def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:

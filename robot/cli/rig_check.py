@@ -18,7 +18,7 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         say(check_line(rig))
-        for line in (*collision_lines(rig), *weight_lines(rig)):
+        for line in (*collision_lines(rig), *weight_lines(rig), *track_lines(rig)):
             say(line)
 
 
@@ -58,6 +58,27 @@ def weight_lines(rig: str) -> list[str]:
     from gazerig.robot.app.rig_weight import weight_findings
 
     return [f"{rig}: {finding}" for finding in weight_findings(load_rig(rig))]
+
+
+def track_lines(rig: str) -> list[str]:
+    """Return every key of a good rig's own tracks that it cannot reach or follow.
+
+    Raises:
+        ConfigError: the rig is not good.
+    """
+    from gazerig.config.schema import load_rig
+    from gazerig.config.tracks import load_track, track_path
+    from gazerig.robot.app.track_file import fit_to_rig
+    from gazerig.robot.cli.tracks import excess_lines
+
+    loaded = load_rig(rig)
+    return [
+        line
+        for file in loaded.track_files
+        for line in excess_lines(
+            loaded.name, file, fit_to_rig(loaded, load_track(track_path(file)))
+        )
+    ]
 
 
 @app.command()

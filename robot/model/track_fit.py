@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
 from gazerig.gaze.track.expression import NEUTRAL
 from gazerig.gaze.track.level import LevelRange
@@ -37,6 +38,9 @@ from gazerig.robot.model.types import GAZE_JOINTS, further_joints
 _SMALLEST = 0.2
 """Smallest share of a track that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
+_ALL_KEYS = "; gazerig check lists every such key"
+_BETWEEN = np.linspace(0.0, 1.0, 25)
+_KEYS_AT_ONCE = 2000
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -208,6 +212,30 @@ def _neck(channel: str) -> str:
     return channel.replace("head", "neck")
 
 
+class KeyExcess(NamedTuple):
+    """A key that a rig cannot reach, or not follow from the key before.
+
+    quantity: "range", "speed" or "acceleration"; asked, most: in deg, deg/s or deg/s^2
+    """
+
+    time_s: float
+    joint: str
+    quantity: str
+    asked: float
+    most: float
+
+    def text(self) -> str:
+        """Return joint, time and amount."""
+        at = f"{self.joint} at {self.time_s:.2f} s"
+        over = abs(self.asked) - abs(self.most)
+        if self.quantity == "range":
+            return (
+                f"{at}: {self.asked:.1f} deg is {over:.1f} deg beyond its range, {self.most:g} deg"
+            )
+        unit = "deg/s" if self.quantity == "speed" else "deg/s2"
+        return f"{at}: needs {self.asked:.0f} {unit}, {over:.0f} more than the {self.most:.0f} for tracks"
+
+
 class TrackFit:
     """The fit of tracks to the limits of one rig.
 
@@ -244,9 +272,10 @@ class TrackFit:
         angles: Floats = np.array(commanded_rad) - state.value @ self._matrix
         return angles
 
-    def joint_angles(self, base_rad: Floats, samples: MotionSamples) -> Floats:
-        """Return the (n, joints) angles of a motion that is added to base angles."""
-        angles: Floats = base_rad + samples.value @ self._matrix
+    def joint_angles(self, base_rad: Floats, motion: TrackMotion, times_s: Floats) -> Floats:
+        """Return the (n, joints) angles of a motion at times, from base angles."""
+        samples = motion.sample_at(times_s)
+        angles: Floats = base_rad + samples.value @ self._matrix_of(motion)
         return angles
 
     def fit(
@@ -284,14 +313,14 @@ class TrackFit:
             base_rad[[self.joints.index(name) for name in made.owns]] = 0.0
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
         if smaller and not slow:
-            raise TrackRefused(self._beyond_range(motion.samples, base_rad, limits))
+            raise TrackRefused(self._beyond_range(motion.samples, base_rad, limits) + _ALL_KEYS)
         if smaller and min(left for _, left in smaller) < _SMALLEST:
             joint = min(smaller, key=lambda one: one[1])[0]
             raise TrackRefused(f"{joint} is at the end of its range")
         samples = motion.samples.scale(sizes, speed)
         factor, joint, text = self._too_fast(samples, limits, share, matrix)
         if factor > 1.0 + _ROUNDING and not slow:
-            raise TrackRefused(text)
+            raise TrackRefused(text + _ALL_KEYS)
         stretch = _stretch(matrix, limits, share)
         played = PlayedTrack(
             name,
@@ -335,6 +364,65 @@ class TrackFit:
             f"{degrees(low[j]):g}..{degrees(high[j]):g} deg; it would go to "
             f"{degrees(angles[:, j].max() if angles[row, j] > high[j] else angles[:, j].min()):.1f}"
         )
+
+    def key_excesses(
+        self, made: TrackMotions, base_rad: Floats, limits: Sequence[JointLimit], share: float
+    ) -> tuple[KeyExcess, ...]:
+        """Return every key that the rig cannot reach or follow, in the order of times.
+
+        Args:
+            made: The track's curves on this rig.
+            base_rad: Joint angles to which it is added.
+            limits: Limits of the joints.
+            share: Share of speed and acceleration limits for tracks.
+        """
+        motion, matrix = made.motion, self._matrix_of(made.motion)
+        owned = [name in made.owns for name in self.joints]
+        base = np.where(owned, 0.0, base_rad)
+        low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
+        most = [share * np.array([limit[at] for limit in limits]) for at in (2, 3)]
+        reach_of = self._own  # without eyes that compensate for the head as far as they can
+        if made.track.space == "joint":
+            reach_of = matrix * (self._own != 0.0).any(axis=1, keepdims=True)
+        keys = motion.key_times_s
+        times = np.unique(np.concatenate([np.zeros(1), *keys.values()]))
+        blocks = []
+        for first in range(0, len(times) - 1, _KEYS_AT_ONCE):
+            ends = times[first : first + _KEYS_AT_ONCE + 1]
+            inner = ends[:-1, None] + np.diff(ends)[:, None] * _BETWEEN
+            samples = motion.sample_at(inner.ravel())
+            blocks.append(
+                [base + motion.sample_at(ends[1:]).value @ reach_of]
+                + [
+                    np.abs(column @ matrix).reshape(*inner.shape, -1).max(axis=1)
+                    for column in samples[2:]
+                ]
+            )
+        found: list[KeyExcess] = []
+        angles, *peaks = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        for j, joint in enumerate(self.joints):
+            own = [keys[int(c)] for c in np.flatnonzero(matrix[:, j]) if int(c) in keys]
+            rows = np.flatnonzero(np.isin(times[1:], np.concatenate([np.zeros(0), *own])))
+            if not len(rows):
+                continue
+            at_s = times[1:][rows]
+            reach = angles[rows, j]
+            beyond = np.maximum(reach - high[j], low[j] - reach) > _ROUNDING
+            found += [
+                KeyExcess(
+                    t, joint, "range", degrees(a), degrees(high[j] if a > high[j] else low[j])
+                )
+                for t, a in zip(at_s[beyond].tolist(), reach[beyond].tolist(), strict=True)
+            ]
+            starts = np.concatenate(([0], rows[:-1] + 1))  # the motion since the key before
+            for peak, limit, quantity in zip(peaks, most, ("speed", "acceleration"), strict=True):
+                worst = np.maximum.reduceat(peak[: rows[-1] + 1, j], starts)
+                fast = worst > limit[j] * (1.0 + _ROUNDING)
+                found += [
+                    KeyExcess(t, joint, quantity, degrees(v), degrees(limit[j]))
+                    for t, v in zip(at_s[fast].tolist(), worst[fast].tolist(), strict=True)
+                ]
+        return tuple(sorted(found))
 
     def fit_speed(
         self, track: Track, played: PlayedTrack, speed: float, limits: Sequence[JointLimit],
@@ -473,6 +561,15 @@ def _fade_samples(state: OffsetState, time_s: float) -> MotionSamples:
         (v + s * (a + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))) / time_s,
         (a + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))) / time_s**2,
     )
+
+
+def shortest_move_s(size_rad: Floats | float, limit: JointLimit, share: float) -> Floats:
+    """Return the times of moves with least jerk that use a share of a joint's limits."""
+    by_speed = PEAK_SPEED * np.asarray(size_rad) / (share * limit.speed_rad_s)
+    by_acceleration = np.sqrt(
+        PEAK_ACCELERATION * np.asarray(size_rad) / (share * limit.accel_rad_s2)
+    )
+    return np.maximum(by_speed, by_acceleration)
 
 
 GRID_S = 0.02

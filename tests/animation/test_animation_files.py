@@ -10,13 +10,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import Series, joint_map, read_animation
 from gazerig.features.animation.cli.export_track import app as export_app
 from gazerig.features.animation.cli.import_track import app
-from gazerig.robot.app.track_file import track_text, write_track
+from gazerig.robot.app.track_file import fit_to_rig, track_text, write_track
+from gazerig.robot.cli.rig_check import app as check_app
 from gazerig.robot.model.track_fit import track_motions
 
 DESK = load_rig("desk")
@@ -41,8 +43,10 @@ FRAMES = "frame\tneck_pitch\tneck_yaw\n0\t0\t5\n12\t-8\t\n24\t0\t9\n"
 def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
     text: str, tmp_path: Path
 ) -> None:
-    found = track_text(DESK, read(table(tmp_path, text), 24.0), "x")
-    path, fitted = write_track(DESK, "mine", found, tmp_path, False)
+    found = track_text(DESK, read(table(tmp_path, text), 24.0), "x").text
+    path, on_rig = write_track(DESK, "mine", found, tmp_path, False)
+    fitted = on_rig.fitted
+    assert fitted is not None
     assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
         (0.5, -8.0, None),
         (1.0, 0.0, 4.0),
@@ -62,7 +66,7 @@ BAD = {
     "time,neck_yaw\n": "no rows",
     "time,tail\n0,1\n1,5\n": "no joint 'tail': rename it or add --map NAME=JOINT; joints of the rig: left_eye_pan",
     "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
-    "time,neck_yaw\n0,1\n99,5\n": "a track takes at most 60 s",
+    "time,neck_yaw\n0,1\n20000,5\n": "a track takes at most 14400 s",
 }
 
 
@@ -336,10 +340,77 @@ def test_a_track_goes_to_gltf_and_back(name: str, tmp_path: Path) -> None:
 def test_an_imported_track_has_few_keys_and_the_same_curve(tmp_path: Path) -> None:
     out = tmp_path / "nod.glb"
     assert CliRunner().invoke(export_app, ["desk", "nod", str(out)]).exit_code == 0
-    words = ["desk", str(out), "--folder", str(tmp_path), "--tolerance", "0.1"]
+    words = ["desk", str(out), "--folder", str(tmp_path), "--tolerance", "0.1", "--over-gaze"]
     assert CliRunner().invoke(app, words).exit_code == 0
     again, first = load_track(tmp_path / "nod.yaml"), shipped_tracks()["nod"]
     assert len(again.frames) == len(first.frames)
     at = np.linspace(0.0, 1.0, 200)
     curves = [track_motions(one, DESK.names).motion.sample_at(at) for one in (again, first)]
     assert np.degrees(np.abs(curves[0].value - curves[1].value)[:, :3].max()) < 0.1
+
+
+def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(tmp_path: Path) -> None:
+    times = [0.0, 1.0, 2.0]
+    (tmp_path / "far.glb").write_bytes(clip(times, about("z", [40.0, -20.0, 30.0])))
+    done = CliRunner().invoke(app, ["desk", str(tmp_path / "far.glb"), "--folder", str(tmp_path)])
+    assert done.exit_code == 0 and "from the neutral pose to its first one" in done.stderr
+    assert "cannot reach" not in done.stderr
+    track = load_track(tmp_path / "far.yaml")
+    found = fit_to_rig(DESK, track)
+    assert track.owns == ("neck_yaw",) and found.fitted is not None and found.excesses == ()
+    motion = track_motions(track, DESK.names).motion
+    begins = track.frames[1].time_s
+    yaw = np.degrees(motion.sample_at(np.array(times) + begins).value[:, 0])
+    assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)
+    # Back to Blender: the angles of the file are those of the first one.
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(shipped_path("rigs", "desk").read_text() + "\ntrack_files: [far.yaml]\n")
+    words = [str(rig), "far", str(tmp_path / "back.glb"), "--fps", "200"]
+    assert CliRunner().invoke(export_app, words).exit_code == 0
+    back = read_animation(tmp_path / "back.glb", DESK, joint_map(DESK, [])).series["neck_yaw"]
+    assert np.interp(np.array(times) + begins, *back) == pytest.approx([40.0, -20.0, 30.0], abs=0.1)
+
+
+def test_every_key_beyond_the_limits_is_listed(tmp_path: Path) -> None:
+    frames = "".join(
+        f"  - {{time_s: {t}, head_yaw_deg: {yaw}, head_pitch_deg: {pitch}}}\n"
+        for t, yaw, pitch in (
+            (1.0, 30, 5), (1.1, -40, 4), (2.5, 88, 3), (3.5, 89, -2), (4.2, 10, 30), (4.3, 12, 31),
+            (4.35, 0, 0),
+        )
+    )  # fmt: skip
+    path = tmp_path / "wild.yaml"
+    path.write_text(f"description: x\nspace: joint\nfit: slow\nframes:\n{frames}")
+    track = load_track(path)
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(shipped_path("rigs", "desk").read_text() + "\ntrack_files: [wild.yaml]\n")
+    shown = CliRunner().invoke(check_app, ["check", str(rig)]).stderr
+    assert (
+        shown.count("  neck_yaw at ") > 3
+        and "2.50 s: 88.0 deg is 8.0 deg beyond its range, 80" in shown
+    )
+    listed = {
+        (one.time_s, one.joint, one.quantity): one for one in fit_to_rig(DESK, track).excesses
+    }
+    # Independently: curves sampled each half millisecond, against the limits of the file.
+    motion, share = track_motions(track, DESK.names).motion, DESK.gaze.tracks.limit_share
+    judged = {}
+    for column, joint in enumerate(("neck_yaw", "neck_pitch")):
+        params, name = DESK.joints[joint], ("head_yaw_deg", "head_pitch_deg")[column]
+        before = 0.0
+        for frame in track.frames:
+            angle = getattr(frame, name)
+            if not params.min_deg <= angle <= params.max_deg:
+                judged[frame.time_s, joint, "range"] = angle
+            at = np.arange(before, frame.time_s + 1e-9, 0.0005)
+            curve = np.degrees(motion.sample_at(at).value[:, column])
+            speed = np.abs(np.gradient(curve, at))
+            if speed.max() > share * params.max_speed_deg_s * 1.001:
+                judged[frame.time_s, joint, "speed"] = speed.max()
+            accel = np.abs(np.diff(curve, 2)).max() / 0.0005**2
+            if accel > share * params.max_accel_deg_s2 * 1.001:
+                judged[frame.time_s, joint, "acceleration"] = accel
+            before = frame.time_s
+    assert set(listed) == set(judged) and len(judged) > 6
+    for key, asked in judged.items():
+        assert listed[key].asked == pytest.approx(asked, rel=0.02), key

@@ -313,12 +313,11 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(tmp_path: Path) -
 
     found = record_hand_motion(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
     assert found.ended_by == "the time is over" and set(found.series) == set(DESK.names)
-    path, fitted = write_track(
-        DESK, "mine", track_text(DESK, found.series, "by hand"), tmp_path, False
-    )
+    text = track_text(DESK, found.series, "by hand").text
+    path, on_rig = write_track(DESK, "mine", text, tmp_path, False)
     track = load_track(path)
     assert track.space == "joint" and len(track.frames) < 40
-    assert fitted.slowed_by == 1.0
+    assert on_rig.fitted is not None and on_rig.fitted.slowed_by == 1.0
     motion = track_motions(track, DESK.names).motion
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at).value)

@@ -29,7 +29,7 @@ def export_track(
         from gazerig.config.tracks import tracks_of
         from gazerig.features.animation.gltf_writer import animated_gltf
         from gazerig.robot.app.rig_description import description_of
-        from gazerig.robot.app.rig_limits import lid_spans
+        from gazerig.robot.app.rig_limits import animation_tables, lid_spans
         from gazerig.robot.model.track_fit import TrackFit, TrackRefused, track_motions
 
         refuse_existing(out, force=force)
@@ -38,7 +38,7 @@ def export_track(
         if name not in known:
             raise SetupError(f"no track {name!r}; available: {', '.join(known)}")
         try:
-            made = track_motions(known[name], loaded.names)
+            made = track_motions(known[name], loaded.names, 0, animation_tables(loaded).levels)
         except TrackRefused as refused:
             raise SetupError(f"{name}: {refused}") from None
         description = description_of(loaded)
@@ -47,7 +47,7 @@ def export_track(
             np.arange(0.0, made.motion.duration_s - 0.5 / fps, 1.0 / fps), made.motion.duration_s
         )
         angles = TrackFit(loaded.names, lid_spans(loaded)).joint_angles(
-            np.array([awake[joint] for joint in loaded.names]), made.motion.sample_at(times_s)
+            np.array([awake[joint] for joint in loaded.names]), made.motion, times_s
         )
         moved = {
             joint: column

@@ -56,6 +56,13 @@ def import_track(
             metavar="DEG", min=0.01, max=10.0, help="Distance of the curve from dense samples."
         ),
     ] = 0.3,
+    owns: Annotated[
+        bool | None,
+        typer.Option(
+            "--owns/--over-gaze",
+            help="Give the angles of its joints (default, not of tables), or add motion to gaze.",
+        ),
+    ] = None,
     folder: FolderOption = Path("."),
     force: ForceOption = False,
 ) -> None:
@@ -68,8 +75,14 @@ def import_track(
         found = read_animation(
             file, loaded, joint_map(loaded, joints or []), fps=fps, clip=clip, centre_deg=degrees
         )
-        for note in found.notes:
+        made = track_text(
+            loaded,
+            found.series,
+            f"from {file.name}",
+            tolerance_deg=tolerance,
+            owned=found.poses if owns is None else owns,
+        )
+        for note in (*found.notes, *made.notes):
             say(f"{file}: {note}")
-        text = track_text(loaded, found.series, f"from {file.name}", tolerance)
         called = name or re.sub(r"[^a-z0-9]+", "_", file.stem.lower()).strip("_")
-        print_track_fit(loaded.name, *write_track(loaded, called, text, folder, force))
+        print_track_fit(loaded.name, *write_track(loaded, called, made.text, folder, force))

@@ -94,5 +94,5 @@ def record_track(
             raise typer.Exit(INTERRUPTED)
         for one in recorded.left_out:
             say(f"{one}: answered too seldom and is left out")
-        text = track_text(loaded, recorded.series, "recorded by hand")
-        print_track_fit(loaded.name, *write_track(loaded, name, text, folder, force))
+        made = track_text(loaded, recorded.series, "recorded by hand")
+        print_track_fit(loaded.name, *write_track(loaded, name, made.text, folder, force))
