@@ -162,7 +162,7 @@ def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
     fit, share = TrackFit(rig.names, lid_spans(rig)), rig.gaze.tracks.limit_share
     try:
-        made = track_motions(track, rig.names, 0, animation_tables(rig).levels)
+        made = track_motions(track, rig.names, 0, animation_tables(rig))
     except TrackRefused as refused:
         return RigTrack(None, str(refused), ())
     excesses = fit.key_excesses(made, middle, bounds, share) if track.frames else ()

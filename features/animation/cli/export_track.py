@@ -38,7 +38,7 @@ def export_track(
         if name not in known:
             raise SetupError(f"no track {name!r}; available: {', '.join(known)}")
         try:
-            made = track_motions(known[name], loaded.names, 0, animation_tables(loaded).levels)
+            made = track_motions(known[name], loaded.names, 0, animation_tables(loaded))
         except TrackRefused as refused:
             raise SetupError(f"{name}: {refused}") from None
         description = description_of(loaded)
