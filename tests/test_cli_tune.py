@@ -287,6 +287,9 @@ def test_a_rig_that_has_just_begun_or_is_held_up_says_so() -> None:
     with RobotClient.connect() as rig:
         now = rig.status()
     assert not any("held up" in line for line in state_lines({**now, "age_s": 0.1}))
+    talk = {"state": "speaking", "partner": 2, "who": "an agent"}
+    talks = state_lines({**now, "conversation": talk})
+    assert "conversation: speaking with person 2, reported by an agent" in talks
     assert "the loop is delayed: the following data are 2.5 s old" in state_lines(
         {**now, "age_s": 2.5}
     )

@@ -37,6 +37,8 @@ from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.dashboard.panels.servo_health import health_table
 from gazerig.robot.model.commands import Tune
+from gazerig.robot.model.control_source import TrackState
+from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot
 from gazerig.robot.remote.request_handler import LoopMonitor
 from gazerig.sim_mock.scenes.scene import ScenePicture
@@ -107,7 +109,12 @@ def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> Non
     page.comes_up()
     direct = SnapshotBuilder(200.0, ran.made.shown_rig())
     shots: list[Snapshot] = []
-    for tick in ran.ticks:
+    talk = ConversationState(3, "speaking", 1, 0.5, 6.0, 0.9, "Hello", "agent")
+    ticks = [
+        tick._replace(conversation=talk, tracks=(TrackState(2, "show", owns=("jaw",)),))
+        for tick in ran.ticks
+    ]
+    for tick in ticks:
         page.stream.update(tick)
         direct.update(tick)
         shots += page.shown()
@@ -116,7 +123,7 @@ def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> Non
     last = shots[-1]
     events = tuple(event for shot in shots for event in shot.events)
     trail = tuple(one for shot in shots for one in shot.trail)
-    tick = ran.ticks[-1]
+    tick = ticks[-1]
     perception = perception_text(
         tick, ran.made.robot.perception.residual()._replace(speed_deg_s=None)
     )

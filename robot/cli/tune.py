@@ -324,12 +324,22 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         *lines,
         *([f"controlled by {now['control_text']}"] if now["control_text"] else []),
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
+        *_talk_lines(now),
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         *(f"camera: {text}" for text in now.get("camera", ())),
         f"joints in deg: {joints}",
         f"not saved: {_count_text(unsaved)}; gazerig ctl save saves" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_SAID:]),
     ]
+
+
+def _talk_lines(now: Mapping[str, Any]) -> list[str]:
+    """Return a line with the state of the conversation, none without one."""
+    talk = now["conversation"]
+    if talk["state"] == "idle":
+        return []
+    partner = f" with person {talk['partner']}" if talk["partner"] is not None else ""
+    return [f"conversation: {talk['state']}{partner}, reported by {talk['who'] or 'a client'}"]
 
 
 def _table(

@@ -330,7 +330,7 @@ class LiveFeed:
             tick = Tick(
                 row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
                 row.desired_rad, row.guard_result, row.events, (), row.stopped, row.controlled_by, row.client_control,
-                row.tracks, row.parking,
+                row.tracks, row.parking, row.conversation,
             )  # fmt: skip
             self._builder.update(tick)
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)

@@ -22,11 +22,12 @@ _LEAST_FULL = 1.0
 
 def target_text(snapshot: Snapshot) -> str:
     """Return the target, the reason, and the present behaviour and plan as HTML."""
+    talk = snapshot.talk.state
     named = (
         ("behaviour", snapshot.behaviour),
         ("plan", snapshot.plan.partition(":")[0]),
         ("character", snapshot.character),
-        ("conversation", snapshot.conversation),
+        ("conversation", snapshot.conversation if talk == "idle" else talk),
     )
     chips = " ".join(chip(f"{what}: {name}") for what, name in named if name)
     return (
