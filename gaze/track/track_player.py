@@ -31,6 +31,7 @@ _SYNCED_S = 0.005
 _CORRECTED_IN_S = 1.0
 _CHANGE_S = 0.2
 """Shortest time of a change of speed."""
+_ATTEMPTS = 8
 _SAMPLES = 41
 _HEAD = len(HEAD_CHANNELS)
 _LONGER = 1.25
@@ -211,11 +212,12 @@ class Voice:
     def _change_speed(self, t_s: float, speed: float) -> None:
         """Change the speed of the clock, along the track, as fast as the limits permit."""
         self._corrected_s, time_s = None, _CHANGE_S
-        for _ in range(16):
+        for _ in range(_ATTEMPTS):
             clock = self.clock.change_speed(t_s, speed, time_s)
-            if self._excess(clock, self._fade, t_s, time_s) <= 1.0:
+            excess = self._excess(clock, self._fade, t_s, time_s)
+            if excess <= 1.0:
                 break
-            time_s *= _LONGER
+            time_s *= max(_LONGER, excess)
         self.clock = clock
 
     def pause(self, t_s: float) -> None:
@@ -245,13 +247,14 @@ class Voice:
         least_s *= max(1.0, self.played.stretch(speed, acceleration))
         for from_rest in (False, True) if rate else (True,):
             time_s = least_s
-            for _ in range(12 if from_rest else 4):
+            for _ in range(_ATTEMPTS if from_rest else 2):
                 clock = rests.change_speed(t_s, rate, time_s) if from_rest else runs
                 fade = self._away(clock, now, t_s, time_s)
-                if self._excess(clock, fade, t_s, time_s) <= 1.0:
+                excess = self._excess(clock, fade, t_s, time_s)
+                if excess <= 1.0:
                     self._begin(clock, fade, position_s)
                     return
-                time_s *= _LONGER
+                time_s *= max(_LONGER, excess)
         self._begin(clock, fade, position_s)
 
     def _away(self, clock: TrackClock, now: OffsetState, t_s: float, time_s: float) -> Fade:
