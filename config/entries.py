@@ -79,33 +79,44 @@ def read(
     file, text = str(path), ""
     try:
         text = read_limited(path, _LARGEST).decode("utf-8-sig")
-        node = compose_yaml(text)
     except OSError as error:
         faults.append(ConfigFault(file, None, "", "", _read_error(path, error)))
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         rule = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x}); save it as UTF-8"
         faults.append(ConfigFault(file, line, "", "", rule))
+    else:
+        return text, parse(file, text, faults, known)
+    return text, None
+
+
+def parse(
+    file: str, text: str, faults: list[ConfigFault], known: Collection[str] = ()
+) -> Entry | None:
+    """Return the top entry of a file's text, None if it is unusable; see ``read``."""
+    try:
+        node = compose_yaml(text)
     except RecursionError:
         faults.append(ConfigFault(file, None, "", "", _TOO_DEEP))
+        return None
     except (YAMLError, ValueError, ArithmeticError, LookupError) as error:
         # ruamel also raises these: characters above U+10FFFF, "%YAML 9.9".
         faults.append(_syntax_fault(file, text, error))
-    else:
-        if isinstance(node, MappingNode):
-            keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
-            # A key may be misspelt.
-            if known and not any(k in known or get_close_matches(k[:60], known, 1) for k in keys):
-                rule = f"is not such a configuration: it has none of the keys {', '.join(known)}"
-                faults.append(ConfigFault(file, _line(node), "", "", rule))
-                return text, None
-            root, found = _entries_of(file, text)
-            faults += found
-            return text, root
+        return None
+    if not isinstance(node, MappingNode):
         rule = "is empty" if node is None else "the top level is not a mapping"
         line = 1 if node is None else _line(node)
         faults.append(ConfigFault(file, line, "", "", f"{rule}; write 'key: value' lines"))
-    return text, None
+        return None
+    keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
+    # A key may be misspelt.
+    if known and not any(k in known or get_close_matches(k[:60], known, 1) for k in keys):
+        rule = f"is not such a configuration: it has none of the keys {', '.join(known)}"
+        faults.append(ConfigFault(file, _line(node), "", "", rule))
+        return None
+    root, found = _entries_of(file, text)
+    faults += found
+    return root
 
 
 class _TooMany(MarkedYAMLError):

@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Annotated
 
 from gazerig.config.load import (
+    Check,
     ConfigError,
     ConfigFault,
     load,
     package_file_path,
     shipped_names,
     shipped_path,
+    validate_entries,
 )
+from gazerig.config.long_track import read_long
 from gazerig.gaze.track.track import MAX_DURATION_S, Track, frame_faults, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
@@ -31,7 +34,15 @@ def load_track(path: Path) -> Track:
     Raises:
         gazerig.config.load.ConfigError: lists every fault.
     """
-    track = load(path, Track, checks=(*CHECKS, partial(_sound_file, path)))
+    checks: list[Check[Track]] = [*CHECKS, partial(_sound_file, path)]
+    if (long := read_long(path)) is None:
+        track = load(path, Track, checks=checks)
+    else:
+        outcome = validate_entries(Track, long, checks)
+        found, faults = outcome
+        if faults or found is None:
+            raise ConfigError(faults)
+        track = found
     return replace(track, sound=str(path.parent / track.sound)) if track.sound else track
 
 

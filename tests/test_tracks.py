@@ -114,6 +114,11 @@ def test_many_keys_give_the_curve_of_few_and_take_time_in_proportion(
         solved.append(len(span))
         return coefficients(span, *states)
 
+    random = np.cumsum(rng.normal(0.2, 1.0, 400))
+    passed = np.flatnonzero(np.diff(random)[:-1] * np.diff(random)[1:] > 0.0) + 1
+    span = rng.uniform(0.05, 2.0, 399)
+    at_once = minimum_jerk_curve._states_at_once(random, span, passed)
+    assert np.allclose(at_once, minimum_jerk_curve._states(random, span), atol=1e-9)
     monkeypatch.setattr(minimum_jerk_curve, "_coefficients", counted)
     for count in (500, 20_000):
         solved.clear()
@@ -199,6 +204,9 @@ def test_in_joint_space_the_eyes_go_along_with_the_head() -> None:
         assert np.allclose(eyes, follows * motion.samples.value[:, 1])
 
 
+LONG = "frames:\n" + "".join(
+    f"  - {{time_s: {i + 1}, head_yaw_deg: {i % 5}, look_at: person}}\n" for i in range(5000)
+)
 BAD = {
     "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names no motion"),
     "frames:\n  - {time_s: 0.2, head_pich_deg: 3}\n": ("frames.0.head_pich_deg", "head_pitch_deg"),
@@ -219,10 +227,34 @@ BAD = {
         "head_yaw_deg",
     ),
     "fit: maybe\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("fit", "slow"),
+    "frames:\n  - {time_s: 1, look_at: [1, .nan, 2]}\n": ("frames.0", "give [x, y, z]"),
+    "frames:\n  - {time_s: 1, look_at: nobody}\n": ("frames.0", "person, or null"),
+    "cues: {a: 1, a: 2}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "duplicate key"),
+    "cues: {a: 9}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "after the last frame"),
+    "owns: [Neck]\nframes: [{time_s: 2, look_at: 3}]\n": ("owns.0", "neck, eyes, lids"),
+    "sound: ../x.wav\n": ("sound", "or below"),
+    LONG.replace("time_s: 7,", "time_s: 3,"): ("frames.6.time_s", "which is at 6 s"),
+    LONG.replace("time_s: 7,", "time_s: .nan,"): ("frames.6", "each frame is one line"),
+    LONG.replace("time_s: 7, head", "time_s: 7, heat"): ("frames.6.heat_yaw_deg", "head_yaw_deg"),
 }
 
 
-@pytest.mark.parametrize("text", BAD)
+def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(tmp_path: Path) -> None:
+    file, rig = tmp_path / "long.yaml", load_rig("desk")
+    file.write_text(f"description: long\nfit: slow\n{LONG}cues: {{a: 4}}\n", encoding="utf-8")
+    track = load_track(file)
+    assert len(track.frames) == 5000 and track.frames[6].look_at == "person" and track.cues
+    motion = track_motions(track, rig.names).motion
+    assert motion.duration_s > 5000.0 and len(motion.samples.times_s) < 100
+    every = motion.sample_at(np.arange(0.0, 60.0, 0.005))
+    for part, whole in zip(every[1:], motion.samples[1:], strict=True):
+        assert part.max() <= whole.max() * 1.02 and part.min() >= whole.min() * 1.02
+    file.write_bytes(b"frames:\n" + b"  - {time_s: 1, look_at: 1}\n" * 750_000)
+    with pytest.raises(ConfigError, match="larger than 20 MB, or 200000 frames; split the track"):
+        load_track(file)
+
+
+@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
 def test_a_bad_file_is_answered_with_line_key_and_rule(text: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(f"description: mine\n{text}", encoding="utf-8")

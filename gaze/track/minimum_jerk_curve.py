@@ -11,8 +11,12 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
+
+_MANY = 2000
+"""Passed keys above which all runs of them are solved at once."""
 
 
 class MinimumJerkCurve:
@@ -93,6 +97,8 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
     step = np.diff(position)
     passed = np.flatnonzero(step[:-1] * step[1:] > 0.0) + 1
+    if len(passed) > _MANY:
+        return _states_at_once(position, span, passed)
     for run in np.split(passed, np.flatnonzero(np.diff(passed) > 1) + 1):
         if len(run):
             # From the stop before the passed keys to the stop after them.
@@ -122,8 +128,45 @@ def _states_between(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     return speed[1:-1], acceleration[1:-1]
 
 
-def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
-    """Return speed and acceleration at all keys such that jerk and snap are continuous."""
+def _states_at_once(
+    position: Floats, span: Floats, passed: NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """Return the result of ``_states`` for a long curve, by one system for all passed keys."""
+    stops = np.ones(len(position) - 2, bool)
+    stops[passed - 1] = False
+    speed, acceleration = _least_jerk(position, span, stops)
+    _, c1, c2, c3, c4, c5 = _coefficients(span, *_segment_ends(position, speed, acceleration)).T
+    forward = np.sign(np.diff(position))
+    lowest, highest = np.zeros((2, len(span) + 1))
+    for share in np.linspace(0.0, 1.0, 33):
+        s = share * span
+        rate = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
+        lowest[:-1] = np.minimum(lowest[:-1], rate * forward)
+        highest[:-1] = np.maximum(highest[:-1], np.abs(rate))
+    first = np.flatnonzero(np.diff(passed, prepend=-1) > 1)
+    last = np.append(first[1:], len(passed)) - 1
+    # The segments of each run of passed keys, from the stop before it to the stop after it.
+    ends = np.stack((passed[first] - 1, passed[last] + 1), 1).ravel()
+    swings = (
+        np.minimum.reduceat(lowest, ends)[::2] < -1e-6 * np.maximum.reduceat(highest, ends)[::2]
+    )
+    slow = passed[np.repeat(swings, last - first + 1)]
+    mean = np.diff(position) / span
+    speed[slow] = np.minimum(np.abs(mean[slow - 1]), np.abs(mean[slow])) * forward[slow]
+    acceleration[slow] = 0.0
+    return speed, acceleration
+
+
+def _least_jerk(
+    position: Floats, span: Floats, stops: NDArray[np.bool_] | None = None
+) -> tuple[Floats, Floats]:
+    """Return speed and acceleration at all keys such that jerk and snap are continuous.
+
+    Args:
+        position: (n,) values at the keys.
+        span: (n - 1,) times between them.
+        stops: (n - 2,) whether the curve rests at an inner key.
+    """
     count = len(position) - 2
     inner = slice(1, -1)
     speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
@@ -150,7 +193,10 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
                 gap = moved + offset
                 gap = gap[(gap >= 0) & (gap < count)]
                 block[gap, :, of] = jumps[:, gap].T
-    gaps(_solve(before, own, behind, -at_zero.reshape(2, count).T[..., None]).T.ravel())
+    right = -at_zero.reshape(2, count).T[..., None]
+    if stops is not None:
+        before[stops], own[stops], behind[stops], right[stops] = 0.0, np.eye(2), 0.0, 0.0
+    gaps(_solve(before, own, behind, right).T.ravel())
     return speed, acceleration
 
 
