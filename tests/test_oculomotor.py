@@ -26,6 +26,7 @@ from gazerig.gaze.angles import (
     yaw_pitch,
 )
 from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.oculomotor.head import HeadShare
 from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.track.breathing import Breathing, BreathingParams
@@ -63,6 +64,34 @@ def test_e15_head_start_rule(size: float, top_down: bool) -> None:
 def test_e16_every_target_is_reached_with_a_small_eye_range(size: float) -> None:
     trace = Rig(eye_deg=20.0).run(still(size, salience=0.2), 3.0)
     assert trace.error[-1] <= 0.5
+
+
+@pytest.mark.parametrize("distance_m", [0.22, 0.3, 0.4, 0.8])
+@pytest.mark.parametrize("model", ["stahl", "attention", "align"])
+def test_the_head_leaves_room_for_both_eyes_to_converge(model: str, distance_m: float) -> None:
+    """A head that stops short for one line of sight would hold an eye at its limit."""
+    head = HeadParams(
+        goal_model=model,  # type: ignore[arg-type]
+        align=0.0,
+        recentre_after_ms=60_000.0,
+        pursue_above_deg_s=0.0,
+    )
+    for yaw in (15.0, 18.0, 24.0, 27.0, 40.0, 60.0):
+        rig = Rig(eye_deg=25.0, geometry=DESK, head=head)
+        middle = rig.kinematics.forward(rig.joints).p_world_head_m
+        aside = add(middle, scale(direction((radians(yaw), 0.0)), distance_m))
+        there = still(0.0, salience=0.2)(0.2)._replace(p_world_m=aside)
+        last = rig.run(lambda t, there=there: there, 2.0).commands[-1]  # type: ignore[misc]
+        assert last.phase == "fixate" and last.limited == (), yaw
+
+
+def test_a_head_without_a_margin_leaves_no_room() -> None:
+    """The paper's trigger is the eyes' limit itself."""
+    exact = HeadShare(HeadParams(eye_margin_deg=0.0), radians(20.0))
+    assert exact.for_near_target(radians(15.0)) is exact
+    share = HeadShare(HeadParams(), radians(20.0))
+    assert share.for_near_target(radians(18.1)) is share
+    assert degrees(share.for_near_target(radians(15.0)).reach_rad) == pytest.approx(15.0)
 
 
 @pytest.mark.parametrize("profile", [SACCADE, HUMAN])

@@ -19,7 +19,7 @@ ends, the last plan brings the head to rest.
 During a look away the eyes rest on a place of the room, and the head goes on with the person.
 """
 
-from math import degrees, exp, hypot, radians
+from math import degrees, exp, hypot, inf, radians
 
 import numpy as np
 
@@ -61,7 +61,8 @@ class HeadShare:
     def __init__(self, params: HeadParams, eye_limit_rad: float) -> None:
         self._params = params
         printed = radians(params.max_offset_deg)
-        reachable = max(0.0, eye_limit_rad - radians(params.eye_margin_deg))
+        self._margin_rad = radians(params.eye_margin_deg)
+        self._reachable_rad = reachable = max(0.0, eye_limit_rad - self._margin_rad)
         self._half_range_rad = radians(params.eye_only_range_deg) / 2.0
         # If the head stopped short by more than the eye can cover, the gaze would never reach the
         # target; and a trigger beyond the eye's limit never fires.
@@ -71,6 +72,15 @@ class HeadShare:
         else:
             self.trigger_rad = printed if params.literal_reach else min(printed, reachable)
             self.reach_rad = self.trigger_rad
+
+    def for_near_target(self, limit_rad: float) -> "HeadShare":
+        """Return the share for a target on which both eyes converge up to an eccentricity.
+
+        It is the same without a margin: then the eyes' limit is the paper's trigger.
+        """
+        if limit_rad >= self._reachable_rad or self._margin_rad == 0.0:
+            return self
+        return HeadShare(self._params, limit_rad + self._margin_rad)
 
     def offset_rad(self, salience: float) -> float:
         """Return the angle by which the head stops short of the target (eq 7, sign corrected)."""
@@ -137,7 +147,7 @@ def _draw_bounded(rng: np.random.Generator, most: float) -> float:
 class HeadModel:
     """Start, goal and trajectory of the head's part of a gaze shift.
 
-    share: the present share of the head
+    share: the share of the head for distant targets
     foresees_s: time ahead for which pursuit needs the target's direction; 0: not needed
 
     Args:
@@ -170,7 +180,7 @@ class HeadModel:
         """Change constants and ranges; a movement in progress continues as planned."""
         self._params = params
         self._neck, self._roll = neck_limit_rad, roll_limit_rad
-        self.share = HeadShare(params, eye_limit_rad)
+        self.share = self._share = HeadShare(params, eye_limit_rad)
         self._comfort_rad = radians(params.comfort_deg)
         self._relief_rad = min(self._comfort_rad / 2.0, self.share.trigger_rad)
         self._search_rad = radians(params.search_deg)
@@ -222,23 +232,31 @@ class HeadModel:
         """Return the neck's ((yaw low, high), (pitch low, high))."""
         return self._neck
 
-    def destination_rad(self, target: Target, facing_rad: Angles2) -> Angles3:
+    def destination_rad(
+        self, target: Target, facing_rad: Angles2, both_eyes_rad: float = inf
+    ) -> Angles3:
         """Return the yaw, pitch and roll of the head at rest for a target, by its centre.
 
         facing_rad: neck angles that would point the face straight at it
+        both_eyes_rad: eccentricity up to which both eyes converge on it
         """
-        start = self._goal_direction
+        share, start = self.share.for_near_target(both_eyes_rad), self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
-        short_rad = self.share.undershoot_rad(target.salience, arc_rad)
+        short_rad = share.undershoot_rad(target.salience, arc_rad)
         if min(short_rad, arc_rad) > self._comfort_rad:
             short_rad = self._relief_rad
-        return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start)
+        return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start, share)
 
-    def draw_lead_s(self, target: Target, eccentricity_rad: float) -> float:
+    def draw_lead_s(
+        self, target: Target, eccentricity_rad: float, both_eyes_rad: float = inf
+    ) -> float:
         """Return the time for which the eyes wait because the head moves first.
 
         Called once for each new target: the onset of the head is drawn here.
+
+        both_eyes_rad: eccentricity up to which both eyes converge on the target
         """
+        self._share = self.share.for_near_target(both_eyes_rad)
         par = self._params
         self._lead_s = par.lead_ms / 1e3 if target.top_down else -par.start_delay_ms / 1e3
         if self._rng is not None and par.lead_spread_ms > 0.0:
@@ -259,6 +277,7 @@ class HeadModel:
         since_eye_onset_s: float,
         t_s: float,
         soon_rad: Angles2 | None = None,
+        both_eyes_rad: float = inf,
     ) -> Angles3:
         """Return the head's yaw, pitch and roll for this instant.
 
@@ -268,7 +287,9 @@ class HeadModel:
         since_eye_onset_s: time since the eyes started towards it, negative before
         soon_rad: neck angles that will point the face at the centre ``foresees_s`` later; None: it
             does not move
+        both_eyes_rad: eccentricity up to which both eyes converge on the target point
         """
+        self._share = self.share.for_near_target(both_eyes_rad)
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         soon_rad = facing_rad if soon_rad is None else soon_rad
         if self._pursues and target.kind == AWAY:
@@ -295,7 +316,7 @@ class HeadModel:
         t_s: float,
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest."""
-        par, share, trigger_rad = self._params, self.share, self._trigger_rad(target)
+        par, share, trigger_rad = self._params, self._share, self._trigger_rad(target)
         moving = t_s < self._ends_s
         if (target.kind, target.id) != self._target:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
@@ -335,8 +356,8 @@ class HeadModel:
     def _trigger_rad(self, target: Target) -> float:
         """Return the eccentricity of a target from which the head takes part."""
         if target.kind == SEARCH:
-            return min(self._search_rad, self.share.trigger_rad)
-        return self.share.trigger_rad
+            return min(self._search_rad, self._share.trigger_rad)
+        return self._share.trigger_rad
 
     def _draw_variation(self) -> None:
         """Draw the deviations of this shift from others, and the time and amount of recentring.
@@ -401,7 +422,7 @@ class HeadModel:
         way, to_centre = self._goal_direction, direction(facing)
         to_gaze = to_centre if gaze is facing else direction(gaze)
         near_enough = angle_between(way, to_centre) <= short_rad + _ROUNDING_RAD
-        in_reach = angle_between(way, to_gaze) <= self.share.reach_rad + _ROUNDING_RAD
+        in_reach = angle_between(way, to_gaze) <= self._share.reach_rad + _ROUNDING_RAD
         moving, start = t_s < self._ends_s, self._start
         arc_rad = angle_between(start, to_centre)
         if near_enough and in_reach and not (moving and angle_between(start, way) > arc_rad):
@@ -410,19 +431,26 @@ class HeadModel:
             # From the point where it can stop, unless that is past the target.
             stop = self._extrapolated_direction(t_s, _BRAKES_S)
             start = stop if angle_between(start, stop) <= arc_rad else to_centre
-        self._plan_to(self._reachable_goal(target, facing, gaze, short_rad, start), t_s)
+        goal = self._reachable_goal(target, facing, gaze, short_rad, start, self._share)
+        self._plan_to(goal, t_s)
 
     def _reachable_goal(
-        self, target: Target, facing: Angles2, gaze: Angles2, offset_rad: float, start: Vec3
+        self,
+        target: Target,
+        facing: Angles2,
+        gaze: Angles2,
+        offset_rad: float,
+        start: Vec3,
+        share: HeadShare,
     ) -> Angles3:
         """Return the goal for the centre; for the point itself if the eyes could not reach it."""
-        reach_rad = self.share.reach_rad
+        reach_rad = share.reach_rad
         goal = self.goal_rad(facing, offset_rad, start)
         if facing != gaze and not self._params.literal_reach:
             rest = angle_between(direction(goal), direction(gaze))
             goal = goal if rest <= reach_rad else self.goal_rad(gaze, reach_rad, start)
         low, high = self._roll
-        roll = self.share.roll_rad(target.salience, facing[0])
+        roll = share.roll_rad(target.salience, facing[0])
         return (*goal, min(max(roll, low), high))
 
     def _extrapolated_direction(self, t_s: float, ahead_s: float = 0.0) -> Vec3:

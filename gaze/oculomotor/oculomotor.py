@@ -45,7 +45,11 @@ from gazerig.gaze.types import (
 )
 
 _AT_END = "at the end of its range"
-
+_ORIGIN: Vec3 = (0.0, 0.0, 0.0)
+_LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_NEARER = 1.5
+"""Range of an eye that a near target takes, as a multiple of each eye's convergence: eyes ahead of
+the neck's axis see it farther aside, by half the convergence at 25 deg, whatever its distance."""
 
 _Seen = tuple[Vec3, Vec3, Vec3, Vec3, bool]
 """The target at this tick: its point and velocity, the goal point of the head, the vector from
@@ -126,6 +130,7 @@ class Oculomotor:
         """
         self._gaze.retune(params)
         self._eye_limits, self._lag_s = eye_limits, params.eye_lag_ms / 1e3
+        self._yaw_limit_rad = min(abs(end) for yaw, _ in eye_limits for end in yaw)
         self._prediction.retune(
             params.target_prediction,
             params.prediction_horizon_ms / 1e3,
@@ -171,16 +176,17 @@ class Oculomotor:
         ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
         aside_rad = angle_between(ahead, toward)
         place, eyes_on = self._gaze, self._geometry.eye_angles_to
+        both_rad = self._both_eyes_rad(norm(toward))
         if target.shift != place.shift:
             off_rad = angle_between(sub(place.point_m, p_head), toward)
-            self._record_shift(target, aside_rad, off_rad, t_s)
+            self._record_shift(target, aside_rad, off_rad, both_rad, t_s)
         jumps = place.is_in_saccade
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         soon = None
         if moves and (ahead_s := self._head.foresees_s) > 0.0:
             soon = self._geometry.neck_angles_to(add(centre_point, scale(velocity, ahead_s)), base)
         since_s = t_s - place.onset_s
-        head = self._head.step(target, centre, facing, aside_rad, since_s, t_s, soon)
+        head = self._head.step(target, centre, facing, aside_rad, since_s, t_s, soon, both_rad)
         wanted = eyes_on(place.point_m, R_world_head, p_head)
         if (controller := self._pursuit.controller) is not None:
             jumps = jumps or shift_rad is not None
@@ -226,7 +232,10 @@ class Oculomotor:
     def reachable_gaze(self, target: Target) -> ReachableGaze:
         """Return the final position of head and eyes for a fixed point."""
         facing = self._geometry.neck_angles_to(target.p_world_m, self._base_rad)
-        head = self._head.destination_rad(target, facing)
+        p_head = self._geometry.head_pose((*facing, 0.0), self._base_rad)[1]
+        point = self._gaze.keep_min_distance(target.p_world_m, p_head)
+        both_rad = self._both_eyes_rad(norm(sub(point, p_head)))
+        head = self._head.destination_rad(target, facing, both_rad)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
         exact = self._geometry.eye_angles_to(target.p_world_m, R_world_head, p_head)
         point = self._gaze.keep_min_distance(target.p_world_m, p_head)
@@ -245,14 +254,22 @@ class Oculomotor:
         """Return ((yaw low, high), (pitch low, high)) of left eye, right eye and head."""
         return (*self._eye_limits, self._head.range_rad)
 
-    def _record_shift(self, target: Target, aside_rad: float, off_rad: float, t_s: float) -> None:
+    def _both_eyes_rad(self, distance_m: float) -> float:
+        """Return the eccentricity up to which both eyes converge on a point at a distance."""
+        left, right = self._geometry.eye_angles_to((distance_m, 0.0, 0.0), _LEVEL, _ORIGIN)
+        return self._yaw_limit_rad - _NEARER * 0.5 * (right[0] - left[0])
+
+    def _record_shift(
+        self, target: Target, aside_rad: float, off_rad: float, both_rad: float, t_s: float
+    ) -> None:
         """Record a new target; the lids draw the blink that comes with its saccade, or its bend.
 
         aside_rad, off_rad: angles of the target from the head's facing direction, and from the gaze
+        both_rad: eccentricity up to which both eyes converge on it
         """
         gaze = self._gaze
         waits = gaze.is_saccade_due
-        wait_s = self._head.draw_lead_s(target, aside_rad)
+        wait_s = self._head.draw_lead_s(target, aside_rad, both_rad)
         gaze.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
         if waits:
             return

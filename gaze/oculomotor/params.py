@@ -111,7 +111,8 @@ class HeadParams:
     max_offset_deg: Annotated[float, Bounds(0, 90),
         "with the other two: angle by which the head stops short of the target at min_salience, and eccentricity beyond which it starts to "
         "move; both at most the eye's limit minus eye_margin_deg"] = 30.0
-    eye_margin_deg: Annotated[float, Bounds(0, 30), "distance that the eyes keep from their limit"] = 2.0
+    eye_margin_deg: Annotated[float, Bounds(0, 30),
+        "distance that the eyes keep from their limit, and more for a near target on which both converge; 0: none"] = 2.0
     min_salience: Annotated[float, Bounds(0, 10), "salience A1 of the least interest: the head turns and rolls least"] = 0.2
     max_salience: Annotated[float, Bounds(0, 10), "salience A2 of the highest interest: the head turns and rolls most"] = 1.0
     align: Annotated[float, Bounds(0, 1),

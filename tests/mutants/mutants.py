@@ -83,6 +83,8 @@ MUTANTS = (
            "motion at one speed is taken for a sine", ("target_prediction",)),
     Mutant("gaze/oculomotor/head.py", "if self._is_in_sustained_motion(facing_rad, soon_rad, since_eye_onset_s, t_s):", "if False:",
            "the head does not pursue", ("head_motion",)),
+    Mutant("gaze/oculomotor/oculomotor.py", "_NEARER * 0.5 *", "0.0 *",
+           "the head leaves no room for convergence", ("oculomotor",)),
     Mutant("gaze/oculomotor/head.py", "+ self._later * par.recentre_spread_ms", "",
            "eyes are brought back by the clock", ("head_motion",)),
     Mutant("gaze/oculomotor/head.py", "steeper = self._steeper * par.slope_spread", "steeper = 0.0",
