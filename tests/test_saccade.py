@@ -147,6 +147,7 @@ def test_human_peak_comes_earlier_in_large_saccades() -> None:
     # The shaft's peak is later than the law's: row 6 of tests/human has that.
     assert human_norms.acceleration_share(8.0) - 0.16 < small < human_norms.acceleration_share(8.0)
     assert large == pytest.approx(human_norms.acceleration_share(60.0), abs=0.05)
+    assert peak_at(20.0) < 0.85 * small  # in people .39 against .45, on the shaft
 
 
 def test_literal_frames_leave_a_fifth_at_each_and_do_not_know_the_tick() -> None:

@@ -86,6 +86,14 @@ def test_a_steady_motion_is_extrapolated_with_its_velocity_and_fades(model: str)
     assert y_of(prediction.displacement(end_s + 9.0)) == pytest.approx(0.2 * 0.42, rel=0.01)
 
 
+def test_a_motion_that_slows_down_is_extrapolated_along_its_curve() -> None:
+    prediction = shown(lambda t: 0.6 * t - 0.15 * t * t, 1.0)
+    assert prediction.sine is None
+    moved, speed = prediction.motion(prediction._at_s + AGE_S)
+    assert y_of(moved) == pytest.approx(0.3 * AGE_S - 0.15 * AGE_S**2, abs=1e-5)
+    assert y_of(speed) == pytest.approx(0.3 - 0.3 * AGE_S, abs=1e-4)
+
+
 def test_nothing_is_extrapolated_where_a_profile_wants_none() -> None:
     prediction = shown(lambda t: 0.2 * t, 2.0, "none")
     assert prediction.displacement(2.1) == (0.0, 0.0, 0.0)
