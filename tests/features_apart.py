@@ -88,7 +88,7 @@ def suite(feature: str) -> int:
             for folder in ("features", "tests", "docs"):
                 shutil.rmtree(clone / folder / name)
         return subprocess.run(
-            [sys.executable, "-m", "pytest", "--workers", "auto"],
+            [sys.executable, "-m", "pytest", "-n", "auto", "--dist", "loadfile"],
             cwd=clone,
             env={**os.environ, "PYTHONPATH": str(clone / ".links")},
         ).returncode

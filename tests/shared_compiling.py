@@ -6,7 +6,6 @@ and leaves out what another has written meanwhile, so that nearly all of it is d
 """
 
 import importlib.util
-import os
 import py_compile
 import random
 from collections.abc import Iterable
@@ -20,17 +19,6 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("api", "config", "drivers", "features", "gaze", "robot", "sim_mock")
 
 
-def compile_in_two(config: pytest.Config) -> None:
-    """Do compile_missing together with a fork."""
-    pid = os.fork()
-    try:
-        compile_missing("parent" if pid else "fork", config)
-    finally:
-        if pid == 0:
-            os._exit(0)
-    os.waitpid(pid, 0)
-
-
 def compile_missing(worker: str, config: pytest.Config) -> None:
     """Write the compiled files of pytest and Python for each module without them."""
     tests = ROOT.glob("tests/**/test_*.py")
@@ -42,7 +30,7 @@ def compile_missing(worker: str, config: pytest.Config) -> None:
     modules = (file for room in ROOMS for file in ROOT.glob(f"{room}/**/*.py"))
     for file in order_of(worker, modules):
         if not Path(importlib.util.cache_from_source(str(file))).exists():
-            # A fork may write the same one right now, under the same temporary name.
+            # Another worker may write the same one right now, under the same temporary name.
             with suppress(FileExistsError):
                 py_compile.compile(str(file))
 
