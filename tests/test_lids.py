@@ -191,7 +191,7 @@ def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_a
     )
     state = kinematics.forward(JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()))
     blinks_s, waits_s, counts, every = [], [], (0, 0), 400
-    for k in range(200 * every):
+    for k in range(120 * every):
         side = radians(20.0) * (1 if k // every % 2 else -1)
         at = (2.0 * cos(side), 2.0 * sin(side), 0.2)
         seen_s = k // 10 * 10 * DT  # twenty frames a second
@@ -204,7 +204,7 @@ def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_a
         counts = command.saccades, command.blinks
     first = dict(reversed(waits_s))
     apart = np.array([at - first[look] for look, at in blinks_s])
-    assert len(apart) >= 180  # 40 deg nearly always bring one, and one only
+    assert len(apart) >= 108  # 40 deg nearly always bring one, and one only
     assert len({look for look, _ in blinks_s}) == len(blinks_s)
     assert np.abs(apart).max() <= 0.066 and abs(np.median(apart)) <= 0.012
     assert 0.3 < (apart < -0.001).mean() < 0.7 and (np.abs(apart) < 0.001).mean() < 0.15

@@ -130,7 +130,7 @@ def reached(process: subprocess.Popen[Any]) -> RobotClient:
 def free(rig: Rig) -> Iterator[None]:
     """Leave each test with a head that moves and chooses its targets."""
     yield
-    time.sleep(0.5)  # the limits of rates fill again
+    time.sleep(0.1)  # the limits of rates fill again, by ten messages
     if rig.client.status()["stopped"]:
         time.sleep(2.1)
         rig.client.resume(confirmed=True)

@@ -27,7 +27,7 @@ def ticks() -> list[Tick]:
     return ticks_of(SECONDS, [(2.0, Ask("behaviour", "wait"))])
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def frames(ticks: list[Tick]) -> Iterator[SnapshotIndex]:
     start_s = ticks[0].t_s
     pictures = [(start_s + at_s, b"jpeg at %d" % at_s) for at_s in (1, 3, 5)]
