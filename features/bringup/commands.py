@@ -90,10 +90,14 @@ REBOOT = CommandEntry(
 )
 RECORD_TRACK = CommandEntry(
     "gazerig.features.bringup.cli.record_track",
-    "Record a track in YAML while you move the head by hand, torque off.",
+    "Record a track in YAML: by hand with torque off, or with --live of a running head.",
     examples={
         "record-track": (
             ("record-track my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
+            (
+                "record-track my.yaml mouth --live --joints jaw --play turn",
+                "of a running head: your jaw to a track of the neck",
+            ),
         )
     },
 )

@@ -1,6 +1,7 @@
-"""Recording of a head moved by hand, without torque: its joints are read at regular times."""
+"""Recording of joints at regular times: of a limp head moved by hand, or of a running head."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from math import degrees
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import TelemetrySample
 from gazerig.gaze.types import Floats
+from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
@@ -20,8 +22,12 @@ _LEAST_SHARE = 0.5
 """Fraction of answered readings that a recorded joint must exceed."""
 
 
-class HandRecording(NamedTuple):
-    """A recording by hand.
+Row = tuple[float, Mapping[str, float | None]]
+"""Time in s and angles in degrees by joint, None for a servo that did not answer."""
+
+
+class Recording(NamedTuple):
+    """Angles of joints over time.
 
     series: times in seconds from the start, and angles in degrees, by joint
     left_out: joints whose servos failed to answer too often
@@ -60,8 +66,8 @@ def record_hand_motion(
     clock: Clock,
     stopped: Callable[[], str | None],
     seconds: float = LONGEST_S,
-) -> HandRecording:
-    """Read the joints until the time is over or a person ends it.
+) -> Recording:
+    """Read the joints of a limp head until the time is over or a person ends it.
 
     Args:
         sample: reads every servo once.
@@ -73,23 +79,82 @@ def record_hand_motion(
         SetupError: a torque was switched on: another program moves the head.
         DriverError: a port has disappeared, or no servo answered.
     """
-    start_s, rows = clock.now_s(), list[TelemetrySample]()
-    ended_by, slot = None, 0
-    while ended_by is None and clock.now_s() - start_s < seconds:
+
+    def measure() -> Row:
         row = sample()
         on = [name for name, seen in row.servos.items() if seen is not None and seen.torque]
         if on:
             raise SetupError(f"the torque of {on[0]} came on: another program moves the head")
-        rows.append(row)
+        angles = {name: seen and seen.position_deg for name, seen in row.servos.items()}
+        return row.at_s, angles
+
+    return _record(measure, clock, stopped, seconds)
+
+
+def record_live(
+    read: Callable[[], HeadState],
+    joints: Sequence[str],
+    clock: Clock,
+    stopped: Callable[[], str | None],
+    seconds: float,
+    track: int = 0,
+) -> Recording:
+    """Record the commanded angles of joints of a running head; it sends no command.
+
+    Args:
+        read: returns the newest tick.
+        joints: names of the joints.
+        clock: clock of the samples.
+        stopped: returns why to end, None before.
+        seconds: longest time.
+        track: number of the track whose end ends the recording; 0 for none.
+
+    Raises:
+        DriverError: the head did not answer at the start; later, what was recorded is returned.
+    """
+    last: list[Row] = []
+    ends: list[str] = []
+
+    def measure() -> Row:
+        try:
+            state = read()
+        except DriverError as error:
+            if not last:
+                raise
+            ends.append(str(error))
+            return last[0]
+        if state.stopped:
+            ends.append(f"the head was stopped: {state.stopped}")
+        ends.extend(
+            f"{one.name}: {one.end_reason}"
+            for one in state.tracks
+            if one.number == track and one.end_reason
+        )
+        last[:] = [
+            (state.t_s, {name: degrees(state.joints[name].commanded_rad) for name in joints})
+        ]
+        return last[0]
+
+    return _record(measure, clock, lambda: stopped() or next(iter(ends), None), seconds)
+
+
+def _record(
+    measure: Callable[[], Row], clock: Clock, stopped: Callable[[], str | None], seconds: float
+) -> Recording:
+    """Take rows until the time is over or there is a reason to end."""
+    start_s, rows = clock.now_s(), list[Row]()
+    ended_by, slot = None, 0
+    while ended_by is None and clock.now_s() - start_s < seconds:
+        row = measure()
+        if not rows or row[0] > rows[-1][0]:
+            rows.append(row)
         ended_by = stopped()
         slot = max(slot + 1, int((clock.now_s() - start_s) * RATE_HZ))
         clock.sleep_until(start_s + slot / RATE_HZ)
     series, left_out = {}, []
-    for name in rows[0].servos if rows else ():
+    for name in rows[0][1] if rows else ():
         pairs = [
-            (row.at_s - start_s, seen.position_deg)
-            for row in rows
-            if (seen := row.servos[name]) is not None and seen.position_deg is not None
+            (at_s - rows[0][0], angle) for at_s, row in rows if (angle := row[name]) is not None
         ]
         if len(pairs) <= _LEAST_SHARE * len(rows):
             left_out.append(name)
@@ -98,4 +163,4 @@ def record_hand_motion(
             series[name] = np.array(times), np.array(angles)
     if not series:
         raise DriverError("no servo answered: check power, cable, ids and baud rate")
-    return HandRecording(series, tuple(left_out), ended_by or "the time is over")
+    return Recording(series, tuple(left_out), ended_by or "the time is over")

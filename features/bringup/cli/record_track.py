@@ -1,12 +1,14 @@
-"""The command record-track: torque off, and a track is recorded by hand."""
+"""The command record-track: a track is recorded by hand, torque off, or of a running head."""
 
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import track_name
 from gazerig.drivers.errors import SetupError
@@ -19,9 +21,17 @@ from gazerig.features.bringup.cli.ports import (
     open_port,
     rig_ports,
 )
-from gazerig.features.bringup.hand_recording import LONGEST_S, record_hand_motion, switch_off
+from gazerig.features.bringup.hand_recording import (
+    LONGEST_S,
+    Recording,
+    record_hand_motion,
+    record_live,
+    switch_off,
+)
 from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
+from gazerig.gaze.track.track import MAX_DURATION_S
+from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
@@ -32,7 +42,9 @@ from gazerig.robot.cli.terminal import (
     say,
 )
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
+from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
 
@@ -42,9 +54,25 @@ def record_track(
     rig: RigArgument = "desk",
     *,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the track.")],
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="Record what moves a running head: page, gamepad or program."),
+    ] = False,
+    joints: Annotated[
+        str,
+        typer.Option(
+            metavar="JOINT,...", help="With --live: joints to record; default: those of no track."
+        ),
+    ] = "",
+    play: Annotated[
+        str,
+        typer.Option(metavar="TRACK", help="With --live: play a track meanwhile, until its end."),
+    ] = "",
+    which: PidOption = None,
     seconds: Annotated[
-        float, typer.Option(min=0.5, max=LONGEST_S, help="Longest time, s; Enter ends it earlier.")
-    ] = LONGEST_S,
+        float | None,
+        typer.Option(min=0.5, max=MAX_DURATION_S, help="Longest time, s; Enter ends it earlier."),
+    ] = None,
     folder: FolderOption = Path("."),
     force: ForceOption = False,
     yes: Annotated[
@@ -53,46 +81,96 @@ def record_track(
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Record a track in YAML while you move the head by hand, torque off."""
+    """Record a track in YAML: by hand with torque off, or with --live of a running head."""
     with clear_errors(rig, port, mock):
         from gazerig.robot.app.track_file import track_text, write_track
 
         loaded = load_rig(rig)
-        measured = [one for one in loaded.names if loaded.joints[one].model_facts.measures_position]
-        if not measured:
-            raise SetupError(
-                f"{rig}: hobby servos do not report their position: none can be recorded"
-            )
         track_name(f"{name}.yaml")
         refuse_existing(folder / f"{name}.yaml", force=force)
-        confirm_safe(
-            "the torque of all servos goes off and stays off: a heavy head drops",
-            "hold it",
-            "Is the head held, and no finger between its parts?",
-            yes,
-        )
-        clock, there = RealClock(), {one: loaded.joints[one] for one in measured}
-        with (
-            record_signals() as stopped,
-            rig_ports(loaded, mock, port) as wire,
-            ExitStack() as ports,
-        ):
-            readers = {}
-            for bus in dict.fromkeys(joint.bus for joint in there.values()):
-                line = ports.enter_context(open_port(loaded, wire, bus))
-                own = {one: joint for one, joint in there.items() if joint.bus == bus}
-                switch_off(own, line)
-                readers[bus] = SmartServoTelemetry(line, servo_kind(next(iter(own.values())).model))
-            say(f"the torque is off; move the head, Enter ends it (within {seconds:g} s)")
-            watch = Monitor(readers, there, clock.now_s)
+        with record_signals() as stopped:
             end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
-            recorded = record_hand_motion(watch.sample, clock, end, seconds)
-            say(f"recorded {len(recorded.series)} joints; the torque stays off")
+            if live:
+                wanted = [word.strip() for word in joints.split(",") if word.strip()]
+                recorded = _record_live(which, wanted, play, end, seconds or MAX_DURATION_S)
+            else:
+                recorded = _record_hand(loaded, mock, port, yes, end, seconds or LONGEST_S)
             ended = stopped()
         if ended:
-            say("ended by Ctrl-C: the torque is off, nothing is written")
+            say("ended by Ctrl-C: nothing is written")
             raise typer.Exit(INTERRUPTED)
+        say(f"recorded {len(recorded.series)} joints; ended: {recorded.ended_by}")
         for one in recorded.left_out:
             say(f"{one}: answered too seldom and is left out")
-        made = track_text(loaded, recorded.series, "recorded by hand")
+        made = track_text(
+            loaded,
+            recorded.series,
+            "recorded from a running head" if live else "recorded by hand",
+            owned=live,
+        )
+        for note in made.notes:
+            say(note)
         print_track_fit(loaded.name, *write_track(loaded, name, made.text, folder, force))
+
+
+def _record_hand(
+    rig: Rig,
+    mock: bool,
+    port: str | None,
+    yes: bool,
+    end: Callable[[], str | None],
+    seconds: float,
+) -> Recording:
+    """Switch the torque off, and record a head that is moved by hand."""
+    measured = [one for one in rig.names if rig.joints[one].model_facts.measures_position]
+    if not measured:
+        raise SetupError(
+            f"{rig.name}: hobby servos do not report their position: none can be recorded"
+        )
+    confirm_safe(
+        "the torque of all servos goes off and stays off: a heavy head drops",
+        "hold it",
+        "Is the head held, and no finger between its parts?",
+        yes,
+    )
+    clock, there = RealClock(), {one: rig.joints[one] for one in measured}
+    with rig_ports(rig, mock, port) as wire, ExitStack() as ports:
+        readers = {}
+        for bus in dict.fromkeys(joint.bus for joint in there.values()):
+            line = ports.enter_context(open_port(rig, wire, bus))
+            own = {one: joint for one, joint in there.items() if joint.bus == bus}
+            switch_off(own, line)
+            readers[bus] = SmartServoTelemetry(line, servo_kind(next(iter(own.values())).model))
+        say(f"the torque is off and stays off; move the head, Enter ends it (within {seconds:g} s)")
+        watch = Monitor(readers, there, clock.now_s)
+        return record_hand_motion(watch.sample, clock, end, seconds)
+
+
+def _record_live(
+    which: str | None,
+    joints: list[str],
+    play: str,
+    end: Callable[[], str | None],
+    seconds: float,
+) -> Recording:
+    """Record joints of a running head, which others move."""
+    with RobotClient.connect(which, "record-track") as head:
+
+        def read() -> HeadState:
+            state = head.state()[0]
+            if state is None:
+                raise SetupError("the head has just started: its loop is not running yet")
+            return state
+
+        there = read()
+        unknown = [one for one in joints if one not in there.joints]
+        if unknown:
+            raise SetupError(
+                f"no joint {unknown[0]!r}; joints of the head: {', '.join(there.joints)}"
+            )
+        track = head.play(play).track if play else None
+        owned = {joint for one in read().tracks if not one.end_reason for joint in one.owns}
+        wanted = joints or [one for one in there.joints if one not in owned]
+        say(f"recording {', '.join(wanted)}; Enter ends it (within {seconds:g} s)")
+        number = track.number if track else 0
+        return record_live(read, wanted, RealClock(), end, seconds, number)

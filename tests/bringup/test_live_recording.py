@@ -1,0 +1,104 @@
+"""Puppeteering: a track of some joints of a running head, while a track plays on others."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gazerig
+from gazerig.config.load import shipped_path
+from gazerig.config.schema import load_rig
+from gazerig.config.tracks import load_track
+from gazerig.drivers.errors import DriverError
+from gazerig.features.bringup.hand_recording import record_live
+from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
+from gazerig.robot.control.head_state import HeadState
+from gazerig.robot.model.track_fit import track_motions
+
+TURN = """description: the neck turns
+owns: [neck]
+fit: slow
+frames:
+  - {time_s: 1.5, head_yaw_deg: 20}
+  - {time_s: 3.0, head_yaw_deg: -15}
+"""
+
+
+class SteppedClock:
+    """The head's clock: waiting steps the head, and a puppeteer moves the jaw on the way."""
+
+    def __init__(self, head: gazerig.SimulatedHead) -> None:
+        self.head = head
+        self.stop_at_s = np.inf
+
+    def now_s(self) -> float:
+        return self.head.state.t_s
+
+    def sleep_until(self, t_s: float) -> None:
+        while self.now_s() < t_s:
+            if self.now_s() >= self.stop_at_s:
+                self.head.stop("a hand is near")
+                self.stop_at_s = np.inf
+            if not self.head.state.stopped:
+                self.head.level("mouth", 0.5 + 0.5 * np.sin(3.0 * self.now_s()))
+            self.head.step(0.01)
+
+
+def test_a_puppeteered_jaw_becomes_a_track_of_its_own(tmp_path: Path) -> None:
+    rig_file = tmp_path / "rig.yaml"
+    (tmp_path / "turn.yaml").write_text(TURN)
+    rig_file.write_text(
+        shipped_path("rigs", "expressive").read_text() + "\ntrack_files: [turn.yaml]\n"
+    )
+    rig = load_rig(str(rig_file))
+    with gazerig.open(str(rig_file), fast=True) as head:
+        head.step(3.0)
+        order = head.play("turn")
+        assert order.reply.track is not None
+        clock = SteppedClock(head)
+        seen: list[HeadState] = []
+
+        def read() -> HeadState:
+            seen.append(head.state)
+            return head.state
+
+        number = order.reply.track.number
+        found = record_live(read, ["jaw"], clock, lambda: None, 60.0, number)
+    assert found.ended_by.startswith("turn: ") and set(found.series) == {"jaw"}
+    times, angles = found.series["jaw"]
+    commanded = np.degrees([state.joints["jaw"].commanded_rad for state in seen])
+    assert np.ptp(angles) > 5.0 and len(times) > 100
+    assert angles == pytest.approx(commanded[: len(angles)])
+    made = track_text(rig, found.series, "puppeteered", owned=True)
+    path, on_rig = write_track(rig, "mouth", made.text, tmp_path, False)
+    track = load_track(path)
+    assert track.owns == ("jaw",) and on_rig.refused == ""
+    motion = track_motions(track, rig.names).motion
+    late_s = motion.duration_s - times[-1] - track.return_s
+    played = np.degrees(motion.sample_at(times + round(late_s, 3)).value)
+    (column,) = np.flatnonzero(np.ptp(played, axis=0) > 1.0)
+    assert np.abs(played[:, column] - angles).max() < TOLERANCE_DEG + 0.8
+
+
+def test_a_stop_or_a_lost_head_ends_the_recording_and_keeps_it() -> None:
+    with gazerig.open("expressive", fast=True) as head:
+        head.step(3.0)
+        clock = SteppedClock(head)
+        clock.stop_at_s = head.state.t_s + 1.0
+        found = record_live(lambda: head.state, ["jaw"], clock, lambda: None, 60.0)
+    assert found.ended_by.startswith("the head was stopped: a hand is near")
+    assert 40 <= len(found.series["jaw"][0]) <= 60
+    with gazerig.open("expressive", fast=True) as head:
+        head.step(1.0)
+        left = [head.state] * 1
+
+        def read() -> HeadState:
+            if not left:
+                raise DriverError("the rig (process 7) ended")
+            return left.pop()
+
+        clock = SteppedClock(head)
+        found = record_live(read, ["jaw"], clock, lambda: None, 60.0)
+        assert found.ended_by == "the rig (process 7) ended" and len(found.series["jaw"][0]) == 1
+        with pytest.raises(DriverError, match="process 7"):
+            record_live(read, ["jaw"], clock, lambda: None, 60.0)
