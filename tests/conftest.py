@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import child_processes
 import pytest
@@ -103,6 +104,12 @@ def pytest_xdist_auto_num_workers() -> int:
     """
     processors = os.cpu_count() or 1
     return processors + min(processors, 2) + 1
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_handlecrashitem(crashitem: str, sched: Any) -> None:
+    """Run the rest of a file whose worker ended, without the test that ended it."""
+    running_order.leave_out(crashitem, sched.workqueue)
 
 
 @pytest.hookimpl(tryfirst=True)

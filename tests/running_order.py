@@ -5,7 +5,7 @@ for other processes at the same time, nobody computes. So files that wait, files
 long and all others take turns, until only short ones are left for the end.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 
 import pytest
@@ -89,6 +89,13 @@ def waits(item: pytest.Item) -> bool:
     """Return whether a test mostly waits rather than computes."""
     names = vars(getattr(item, "module", object)).keys()
     return bool(_marks(item) & WAITING or _WAITING_NAMES & names)
+
+
+def leave_out(name: str, files: Mapping[str, dict[str, bool]]) -> None:
+    """Mark a test as done in the queue of pytest-xdist, which else runs it in the next worker."""
+    for tests in files.values():
+        if name in tests:
+            tests[name] = True
 
 
 def _cost_s(file: str, tests: Sequence[pytest.Item]) -> float:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from features_there import needs_all_features
-from running_order import COSTS_S, spread
+from running_order import COSTS_S, leave_out, spread
 from shared_compiling import order_of
 
 
@@ -50,3 +50,9 @@ def test_workers_compile_the_same_files_in_orders_of_their_own() -> None:
     first, second = (order_of(worker, reversed(files)) for worker in ("gw0", "gw1"))
     assert sorted(first) == sorted(second) == sorted(files)
     assert first != second and first == order_of("gw0", files)
+
+
+def test_a_test_that_ended_its_worker_is_not_run_again_but_the_others_of_its_file_are() -> None:
+    files = {"a": {"a::1": True, "a::2": False, "a::3": False}, "b": {"b::1": False}}
+    leave_out("a::2", files)
+    assert files == {"a": {"a::1": True, "a::2": True, "a::3": False}, "b": {"b::1": False}}
