@@ -140,6 +140,18 @@ def rotate_about_axis(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
     )
 
 
+def turn_about(axis: Vec3, angle_rad: float) -> Mat3:
+    """Return the rotation about a unit vector by an angle (Rodrigues' formula)."""
+    x, y, z = axis
+    c, s = cos(angle_rad), sin(angle_rad)
+    d = 1.0 - c
+    return (
+        (c + x * x * d, x * y * d - z * s, x * z * d + y * s),
+        (y * x * d + z * s, c + y * y * d, y * z * d - x * s),
+        (z * x * d - y * s, z * y * d + x * s, c + z * z * d),
+    )
+
+
 def shorten_arc(v: Vec3, offset_rad: float, start: Vec3 = (1.0, 0.0, 0.0)) -> Vec3:
     """Return a direction moved back towards another by an angle along the great circle.
 

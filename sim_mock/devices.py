@@ -16,6 +16,7 @@ from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec
+from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
@@ -37,10 +38,12 @@ class _SmartServoLine:
     Attributes:
         servos: specifications of the servos.
         baud: the servos' rate; clients at another rate get no answer; None: any rate works.
+        weight: weight of the head that they move, if it depends on the whole pose.
     """
 
     servos: tuple[ServoSpec, ...]
     baud: int | None = None
+    weight: HeadWeight | None = None
     listens: ClassVar[str] = "the servos listen"
 
 
@@ -173,13 +176,16 @@ def build(
         return build_bridge(
             what.addresses, now_s, what.oscillator_hz, seed, what.servos, shafts.make_servo
         )
+    # A world computes the weight on its shafts.
+    weight = what.weight if shafts.make_shaft is create_shaft else None
+    options: dict[str, Any] = {"seed": seed, "make_shaft": shafts.make_shaft, "weight": weight}
     if isinstance(what, FeetechLine):
         from gazerig.sim_mock.feetech.chain import build_feetech
 
-        return build_feetech(what.servos, now_s, what.baud, seed=seed, make_shaft=shafts.make_shaft)
+        return build_feetech(what.servos, now_s, what.baud, **options)
     from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 
-    return build_dynamixel(what.servos, now_s, what.baud, seed=seed, make_shaft=shafts.make_shaft)
+    return build_dynamixel(what.servos, now_s, what.baud, **options)
 
 
 def plugin_line(kind: BusKind, params: object, servos: tuple[EmulatedJoint, ...]) -> PluginLine:
@@ -214,6 +220,8 @@ def device_of_data(data: Mapping[str, Any]) -> Emulated:
         raise ValueError(f"unknown device kind {kind!r}: expected {', '.join(_KINDS)}")
     read = HobbySpec._make if kind in HOBBY_KINDS else _servo_of_data
     settings["servos"] = tuple(read(spec) for spec in settings.get("servos", ()))
+    if settings.get("weight") is not None:
+        settings["weight"] = HeadWeight.of_data(settings["weight"])
     return _KINDS[kind](**settings)
 
 

@@ -4,7 +4,6 @@ One that outlives its test may hold the standard output of the whole run open; w
 would wait for ever.
 """
 
-import ctypes
 import os
 import signal
 from collections.abc import Iterable, Iterator
@@ -12,7 +11,8 @@ from contextlib import suppress
 from multiprocessing import forkserver, resource_tracker
 from pathlib import Path
 
-_PR_SET_PDEATHSIG = 1
+from gazerig.drivers.process.own_session import parent_death_signal
+
 _PROC = Path("/proc")
 
 
@@ -40,7 +40,7 @@ def end(pids: Iterable[int]) -> None:
 
 def end_with_parent() -> None:
     """Let this process, a fork, be killed as soon as the thread that forked it has gone."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    parent_death_signal(signal.SIGKILL)()
 
 
 def _children(pid: int) -> Iterator[int]:

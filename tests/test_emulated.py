@@ -1,11 +1,15 @@
 """Devices as plain data: there and back through JSON, and built from it."""
 
 import json
+from dataclasses import replace
 from math import inf
 from typing import cast
 
 import pytest
 
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.model.mass_params import MassParams
 from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import (
     BAUDS,
@@ -27,6 +31,7 @@ LINES: list[Emulated] = [
     FeetechLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),
     MaestroLine(24, 5, True, (HobbySpec(3, 4000.0),), 9600),
     MaestroLine(),
+    *emulated_lines(replace(load_rig("desk"), mass=MassParams(density_kg_m3=900.0))).values(),
 ]
 KINDS = pytest.mark.parametrize("line", LINES, ids=[line.kind for line in LINES])
 

@@ -11,12 +11,19 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from types import FrameType
 
 from gazerig.drivers.process.priority import raise_priority
 
 _PASSED_ON = {"SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGCONT"}
 _PR_SET_PDEATHSIG = 1
+
+
+def parent_death_signal(number: signal.Signals) -> Callable[[], object]:
+    """Return what makes a fork receive a signal when the thread that forked it ends; on Linux."""
+    prctl = ctypes.CDLL(None).prctl  # loaded before the fork
+    return lambda: prctl(_PR_SET_PDEATHSIG, number)
 
 
 def run(words: list[str]) -> int:
@@ -32,10 +39,10 @@ def run(words: list[str]) -> int:
     numbers = {signal.Signals[name] for name in _PASSED_ON}
     if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:  # with nohup it outlives the terminal
         numbers.remove(signal.SIGHUP)
-    prctl = ctypes.CDLL(None).prctl  # loaded before the fork
+    end_with_parent = parent_death_signal(signal.SIGTERM)
 
     def prepare() -> None:
-        prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        end_with_parent()
         raise_priority()
         signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)
 

@@ -24,10 +24,12 @@ from gazerig.robot.app.bus_wiring import (
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.description.statics import Weight, joint_weights
+from gazerig.robot.description.statics import Weight, joint_weights, moving_bodies
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import coupled_pairs, pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.mass_params import MassParams
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -41,7 +43,8 @@ from gazerig.sim_mock.devices import (
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.ideal.bus import IdealBus
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.head_weight import HeadWeight, TurnedJoints
+from gazerig.sim_mock.smart_servo.physics import STEPS_PER_RAD, STEPS_PER_TURN, Physics, ServoSpec
 
 TrueSteps = Callable[[], Mapping[str, float]]
 """Function that returns the present true positions of the servos in steps, by joint."""
@@ -95,48 +98,23 @@ def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
     )
 
 
-class _ServoWeight(NamedTuple):
-    """Torque of a weight at a servo after its linkage: nm * sin(turns * (angle - upright)) + load.
+def _emulated_servo(rig: Rig, name: str, weight: Weight, has_own_weight: bool) -> ServoSpec:
+    """Return the smart servo of one joint.
 
-    turns: turns of the weight per turn of the servo's part of the linkage
+    Args:
+        rig: its rig.
+        name: its joint.
+        weight: weight on the joint with all others at 0.
+        has_own_weight: whether the servo carries this weight; else its chain has the whole head's.
     """
-
-    nm: float
-    upright_rad: float
-    turns: float = 1.0
-    load_nm: float = 0.0
-
-
-def _servo_weight(rig: Rig, name: str, weights: Mapping[str, Weight]) -> _ServoWeight:
-    """Return the weight at a servo, with all other joints at 0 (in a pair: the second)."""
-    for first, second, coupling in coupled_pairs(rig.couplings):
-        if name in (first, second):
-            (a, b), (c, d) = coupling.rates((0.0, 0.0))
-            det = a * d - b * c
-            own, shares = (a, (d, -c)) if name == first else (c, (-b, a))
-            pitch, roll = weights[first], weights[second]
-            level = coupling.servo_rad((0.0, 0.0))[name == second]
-            return _ServoWeight(
-                shares[0] / det * pitch.nm,
-                level + own * pitch.upright_rad,
-                1.0 / own,
-                shares[1] / det * roll.torque_nm(0.0),
-            )
-    return _ServoWeight(weights[name].nm, weights[name].upright_rad)
-
-
-def _emulated_servo(rig: Rig, name: str, weights: Mapping[str, Weight]) -> ServoSpec:
-    """Return the smart servo of one joint."""
-    joint, weight = rig.joints[name], _servo_weight(rig, name, weights)
+    joint = rig.joints[name]
     start, (low, high) = _start_step(rig, name), _mechanical_stops(rig, name)
-    linkage = joint.make_linkage()
-    turns = linkage.steepest * 2.0 * pi / joint.model_facts.steps_per_turn
+    turns = _steepest_turns(joint)
     physics = Physics(
-        load_kg_m2=weights[name].inertia_kg_m2 / turns**2,
-        load_nm=(1.0 if linkage.rising else -1.0) * weight.load_nm / turns,
-        gravity_nm=weight.nm / turns,
+        load_kg_m2=weight.inertia_kg_m2 / turns**2,
+        gravity_nm=weight.nm / turns if has_own_weight else 0.0,
         upright_steps=joint.steps(weight.upright_rad),
-        gravity_turns=weight.turns / turns,
+        gravity_turns=1.0 / turns,
         spring_nm_rad=degrees(joint.spring_nm_deg) / turns**2,
         spring_rest_steps=joint.steps(radians(joint.spring_rest_deg)),
         friction_nm=joint.friction_nm / turns,
@@ -145,6 +123,28 @@ def _emulated_servo(rig: Rig, name: str, weights: Mapping[str, Weight]) -> Servo
         play_deg=joint.play_deg * turns,
     )
     return ServoSpec(joint.id, joint.model, start, physics=physics)
+
+
+def _steepest_turns(joint: JointParams) -> float:
+    return joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
+
+
+def _turned_joints(rig: Rig, name: str) -> TurnedJoints:
+    """Return the joints that a servo turns, near angle 0."""
+    joint, level = rig.joints[name], 0.0
+    shares: tuple[tuple[str, float], ...] = ((name, 1.0),)
+    for first, second, coupling in coupled_pairs(rig.couplings):
+        if name in (first, second):
+            (a, b), (c, d) = coupling.rates((0.0, 0.0))
+            level = coupling.servo_rad((0.0, 0.0))[name == second]
+            own = (d, -c) if name == first else (-b, a)
+            det = a * d - b * c
+            shares = ((first, own[0] / det), (second, own[1] / det))
+    per_rad = _steepest_turns(joint) * STEPS_PER_RAD
+    if not joint.make_linkage().rising:
+        per_rad = -per_rad
+    zero = joint.steps(level) * STEPS_PER_TURN / joint.model_facts.steps_per_turn
+    return TurnedJoints(zero, tuple((turned, share / per_rad) for turned, share in shares))
 
 
 def servo_index(rig: Rig, joint: str) -> int:
@@ -157,9 +157,16 @@ def servo_index(rig: Rig, joint: str) -> int:
 def _emulated_line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind in CHAINS:
-        weights = joint_weights(description_of(rig, looks=False), rig.joints)
-        specs = tuple(_emulated_servo(rig, joint, weights) for joint in joints)
-        return CHAINS[config.kind](specs, config.baud)
+        description = description_of(rig, looks=False)
+        weights = joint_weights(description, rig.joints)
+        # Estimated masses are nearly balanced; then each joint has the weight with all others at 0.
+        whole = rig.mass != MassParams() or bool(rig.couplings)
+        specs = tuple(_emulated_servo(rig, one, weights[one], not whole) for one in joints)
+        weight = None
+        if whole:
+            bodies = moving_bodies(description, rig.joints)
+            weight = HeadWeight(bodies, tuple(_turned_joints(rig, one) for one in joints))
+        return CHAINS[config.kind](specs, config.baud, weight)
     if config.kind in BOARDS:
         return BOARDS[config.kind](config, tuple(_hobby_spec(rig, one) for one in joints))
     servos = tuple(

@@ -14,7 +14,8 @@ import numpy as np
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.build import RigShape, describe
-from gazerig.robot.description.links import CollisionShape, Description, Pose
+from gazerig.robot.description.links import ORIGIN, CollisionShape, Description, Pose
+from gazerig.robot.description.solid import ellipsoid
 
 _STEPS, _HALVINGS = 7, 7
 """Number of tested angles of a joint, including its limits; number of bisections."""
@@ -188,10 +189,7 @@ def _distances(shape: CollisionShape, pose: Pose, points: Floats) -> Floats:
         outside = np.linalg.norm(np.maximum(off, 0.0), axis=1)
         return np.asarray(outside + np.minimum(off.max(axis=1), 0.0))
     if shape.kind == "ellipsoid":
-        scaled = local / shape.half_m
-        near = np.linalg.norm(scaled, axis=1)
-        steep = np.linalg.norm(scaled / np.array(shape.half_m), axis=1)
-        return np.asarray(near * (near - 1.0) / np.maximum(steep, 1e-9))
+        return ellipsoid(ORIGIN, shape.half_m)(local)
     radius, half, _ = shape.half_m
     if shape.kind == "capsule":
         local[:, 2] -= np.clip(local[:, 2], -half, half)

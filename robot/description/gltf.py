@@ -14,7 +14,7 @@ from trimesh.exchange.gltf import export_glb
 from trimesh.transformations import quaternion_from_matrix
 from trimesh.visual.material import PBRMaterial
 
-from gazerig.gaze.angles import compose
+from gazerig.gaze.angles import compose, turn_about
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import (
     IDENTITY,
@@ -22,7 +22,6 @@ from gazerig.robot.description.links import (
     Description,
     Finish,
     Visual,
-    turn_about,
 )
 from gazerig.robot.description.texture import add_texture
 

@@ -6,10 +6,10 @@ are parallel to it while every joint is at 0.
 """
 
 from collections.abc import Mapping, Sequence
-from math import cos, inf, sin
+from math import inf
 from typing import Literal, NamedTuple
 
-from gazerig.gaze.angles import add, compose, rotate
+from gazerig.gaze.angles import add, compose, rotate, turn_about
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.description.mesh import Painted
 
@@ -211,15 +211,3 @@ class Description(NamedTuple):
                 R = compose(R, turn_about(link.joint.axis, angles_rad[link.joint.name]))
             found[link.name] = R, p
         return found
-
-
-def turn_about(axis: Vec3, angle_rad: float) -> Mat3:
-    """Return the rotation about a unit vector by an angle (Rodrigues' formula)."""
-    x, y, z = axis
-    c, s = cos(angle_rad), sin(angle_rad)
-    d = 1.0 - c
-    return (
-        (c + x * x * d, x * y * d - z * s, x * z * d + y * s),
-        (y * x * d + z * s, c + y * y * d, y * z * d - x * s),
-        (z * x * d - y * s, z * y * d + x * s, c + z * z * d),
-    )

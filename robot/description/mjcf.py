@@ -8,8 +8,8 @@ import xml.etree.ElementTree as ET
 from math import atan, degrees, isfinite, tan
 from typing import NamedTuple
 
-from gazerig.gaze.angles import compose
-from gazerig.robot.description.links import IDENTITY, CollisionShape, Description, Link, turn_about
+from gazerig.gaze.angles import compose, turn_about
+from gazerig.robot.description.links import IDENTITY, CollisionShape, Description, Link
 from gazerig.robot.description.mesh_files import mesh_files, numbers
 from gazerig.robot.model.frames import quaternion
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.angles import add, compose, dot, rotate, rotate_back, scale
+from gazerig.gaze.angles import add, compose, rotate, scale
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.description.links import (
     IDENTITY,
@@ -19,15 +19,14 @@ from gazerig.robot.description.links import (
     Description,
     Inertia,
     LinkageFollower,
-    turn_about,
 )
 from gazerig.robot.description.mass import in_parent_frame, join_inertias
 from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION, STALL_RISE_C
 from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
+from gazerig.robot.model.weight import MovingBody, weight_nm
 
-GRAVITY_M_S2 = 9.81
 NECK_JOINTS = (*LOWER_NECK, *NECK)
 """Joints that carry the head."""
 STRONG_SHARE = 1.0 / 3.0
@@ -67,7 +66,7 @@ def rig_statics(
     """
     chosen = {name: one for name, one in joints.items() if not of_neck or name in NECK_JOINTS}
     pairs = tuple(one for one in coupled_pairs(couplings) if {one.first, one.second} <= {*chosen})
-    return Statics(_nodes(description, chosen.keys()), chosen, pairs)
+    return Statics(moving_bodies(description, chosen.keys()), chosen, pairs)
 
 
 class Statics:
@@ -79,7 +78,7 @@ class Statics:
 
     def __init__(
         self,
-        nodes: "Sequence[_MovingBody]",
+        nodes: Sequence[MovingBody],
         joints: Mapping[str, JointParams],
         pairs: Sequence[CoupledPair],
     ) -> None:
@@ -96,7 +95,7 @@ class Statics:
 
     def load_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the torque of weight and spring at each joint; omitted joints are at 0."""
-        weight = _weight_nm(self._nodes, angles_rad)
+        weight = weight_nm(self._nodes, angles_rad)
         return {
             name: weight.get(name, 0.0) + spring_nm(joint, angles_rad.get(name, 0.0))
             for name, joint in self.joints.items()
@@ -182,12 +181,12 @@ class Statics:
 
 def joint_weights(description: Description, joints: Collection[str]) -> dict[str, Weight]:
     """Return the weight at each of some joints of a rig with all others at 0."""
-    nodes, inertias = _nodes(description, joints), _inertias(description, joints)
-    level, found = _weight_nm(nodes, {}), {}
+    nodes, inertias = moving_bodies(description, joints), _inertias(description, joints)
+    level, found = weight_nm(nodes, {}), {}
     for name in joints:
         # About a fixed axis the torque is a sine of the angle.
         torque = level.get(name, 0.0)
-        aside = _weight_nm(nodes, {name: 0.5 * pi}).get(name, 0.0)
+        aside = weight_nm(nodes, {name: 0.5 * pi}).get(name, 0.0)
         found[name] = Weight(hypot(torque, aside), atan2(-torque, aside), inertias[name])
     return found
 
@@ -221,28 +220,9 @@ def _shaft_turns(joint: JointParams) -> float:
     return joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
 
 
-class _MovingBody(NamedTuple):
-    """Links that move together, in the frame of the joint that turns them.
-
-    joint, ratio, axis: the rig's joint, rotation per rotation of that joint, and axis
-    parent: number of the node that carries it; the first one has no parent
-    R_parent, p_parent_m: pose in the parent with the joint at 0
-    mass_kg, moment_kg_m: mass, and mass times its centre
-    """
-
-    joint: str
-    ratio: float
-    axis: Vec3
-    parent: int
-    R_parent: Mat3
-    p_parent_m: Vec3
-    mass_kg: float = 0.0
-    moment_kg_m: Vec3 = ORIGIN
-
-
-def _nodes(description: Description, moving: Collection[str]) -> tuple[_MovingBody, ...]:
+def moving_bodies(description: Description, moving: Collection[str]) -> tuple[MovingBody, ...]:
     """Merge the links of a description into few bodies; joints that do not move are at 0."""
-    nodes = [_MovingBody("", 0.0, ORIGIN, -1, IDENTITY, ORIGIN)]
+    nodes = [MovingBody("", 0.0, ORIGIN, -1, IDENTITY, ORIGIN)]
     at: dict[str, tuple[int, Mat3, Vec3]] = {}
     for link in description.links:
         number, R, p = (0, IDENTITY, ORIGIN) if link.parent is None else at[link.parent]
@@ -250,7 +230,7 @@ def _nodes(description: Description, moving: Collection[str]) -> tuple[_MovingBo
         if link.joint is not None:
             name, ratio = link.joint.follows or LinkageFollower(link.joint.name)
             if name in moving:
-                nodes.append(_MovingBody(name, ratio, link.joint.axis, number, R, p))
+                nodes.append(MovingBody(name, ratio, link.joint.axis, number, R, p))
                 number, R, p = len(nodes) - 1, IDENTITY, ORIGIN
         at[link.name] = number, R, p
         if link.inertia is not None:
@@ -260,29 +240,6 @@ def _nodes(description: Description, moving: Collection[str]) -> tuple[_MovingBo
                 mass_kg=node.mass_kg + kg, moment_kg_m=add(node.moment_kg_m, moment)
             )
     return tuple(nodes)
-
-
-def _weight_nm(nodes: Sequence[_MovingBody], angles_rad: Mapping[str, float]) -> dict[str, float]:
-    """Return the torque of the weight at each joint of some bodies."""
-    turns = [
-        compose(one.R_parent, turn_about(one.axis, one.ratio * angles_rad.get(one.joint, 0.0)))
-        for one in nodes
-    ]
-    masses = [one.mass_kg for one in nodes]
-    moments = [one.moment_kg_m for one in nodes]
-    for i in range(len(nodes) - 1, 0, -1):  # children come after their parents
-        parent, p = nodes[i].parent, nodes[i].p_parent_m
-        masses[parent] += masses[i]
-        carried = add(scale(p, masses[i]), rotate(turns[i], moments[i]))
-        moments[parent] = add(moments[parent], carried)
-    up: list[Vec3] = [(0.0, 0.0, 1.0)]
-    found: dict[str, float] = {}
-    for one, turn, (x, y, z) in zip(nodes[1:], turns[1:], moments[1:], strict=True):
-        a, b, c = rotate_back(turn, up[one.parent])
-        up.append((a, b, c))
-        torque = dot(one.axis, (y * c - z * b, z * a - x * c, x * b - y * a))
-        found[one.joint] = found.get(one.joint, 0.0) - one.ratio * GRAVITY_M_S2 * torque
-    return found
 
 
 def spring_nm(joint: JointParams, angle_rad: float) -> float:

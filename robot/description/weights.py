@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.description import mass
 from gazerig.robot.description.head_shape import HeadMeasures, field
@@ -39,7 +40,7 @@ def weighed(link: Link, params: MassParams, printed: bool) -> Link:
         shape = inertia or mass.servo()
         kg = shape.mass_kg if wanted.mass_kg is None else wanted.mass_kg
         shape = mass.scale_mass(shape, kg)
-        com = shape.com_m if wanted.com_mm is None else _metres(wanted.com_mm)
+        com = shape.com_m if wanted.com_mm is None else scale(wanted.com_mm, 1e-3)
         inertia = Inertia(kg, com, _tensor(wanted.inertia_kg_mm2) or shape.tensor_kg_m2)
     return link._replace(inertia=_with_counterweights(inertia, link.name, params, ORIGIN))
 
@@ -62,9 +63,8 @@ def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[I
         own = mass.filled(own, kg, measures.interocular_m, middle)
     else:
         com = _head_com_m(wanted.com_mm, measures)
-        share = rest.mass_kg / kg
-        x, y, z = (c + share * (c - off) for c, off in zip(com, rest.com_m, strict=True))
-        own = mass.filled(own, kg, measures.interocular_m, middle, (x, y, z))
+        ahead = add(com, scale(sub(com, rest.com_m), rest.mass_kg / kg))
+        own = mass.filled(own, kg, measures.interocular_m, middle, ahead)
     if (tensor := _tensor(wanted.inertia_kg_mm2)) is not None:
         whole = mass.join_inertias((own, rest))
         excess = np.array(whole.tensor_kg_m2) - np.array(tensor)
@@ -160,19 +160,13 @@ def _with_counterweights(
     none: Mat3 = mass.diagonal(0.0, 0.0, 0.0)
     for one in params.counterweights.values():
         if one.link == link and one.mass_kg > 0.0:
-            x, y, z = (a / 1e3 + b for a, b in zip(one.position_mm, origin_m, strict=True))
-            parts.append(Inertia(one.mass_kg, (x, y, z), none))
+            at_m = add(scale(one.position_mm, 1e-3), origin_m)
+            parts.append(Inertia(one.mass_kg, at_m, none))
     return mass.join_inertias(parts) if len(parts) > 1 else inertia
 
 
 def _head_com_m(com_mm: Vec3, measures: HeadMeasures) -> Vec3:
-    x, y, z = (a / 1e3 + b for a, b in zip(com_mm, measures.pivot_m, strict=True))
-    return x, y, z
-
-
-def _metres(at_mm: Vec3) -> Vec3:
-    x, y, z = at_mm
-    return x / 1e3, y / 1e3, z / 1e3
+    return add(scale(com_mm, 1e-3), measures.pivot_m)
 
 
 def _tensor(moments: Moments | None) -> Mat3 | None:
@@ -187,11 +181,7 @@ def carried_links(links: Iterable[Link]) -> list[Inertia]:
     at: dict[str, Vec3] = {HEAD: ORIGIN}
     found = []
     for link in links:
-        x, y, z = at[link.parent or HEAD]
-        px, py, pz = link.p_m
-        at[link.name] = x + px, y + py, z + pz
+        p = at[link.name] = add(at[link.parent or HEAD], link.p_m)
         if link.inertia is not None:
-            cx, cy, cz = link.inertia.com_m
-            com = (x + px + cx, y + py + cy, z + pz + cz)
-            found.append(link.inertia._replace(com_m=com))
+            found.append(link.inertia._replace(com_m=add(p, link.inertia.com_m)))
     return found

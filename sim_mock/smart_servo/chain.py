@@ -14,13 +14,16 @@ from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
 from gazerig.sim_mock.smart_servo.addresses import AddressTable, at_baud
 from gazerig.sim_mock.smart_servo.faults import ServoFaults
 from gazerig.sim_mock.smart_servo.framing import PING, SYNC_READ, SYNC_WRITE, Framing, Instruction
+from gazerig.sim_mock.smart_servo.head_weight import HeadWeight
 from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
 from gazerig.sim_mock.smart_servo.integration import whole_ms
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, create_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, change_quirk
+from gazerig.sim_mock.smart_servo.quirks import PAUSE_MS, ChainQuirks, change_quirk
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
+WEIGH_MS = 10
+"""Time for which the torques of the head's weight are constant."""
 TWIN_AWAY_STEPS = 257
 """Distance of a second servo with a taken id from the first, so that they differ."""
 
@@ -42,6 +45,7 @@ class ServoChain(Generic[S, Q]):
         quirks: behaviour where documents and devices differ; None: the first value of each case.
         check_baud: whether only clients at a servo's baud rate get answers, instead of all.
         seed: seed of the random numbers of faults.
+        weight: weight of the head on the servos; None: each has its own load.
     """
 
     servo_type: type[S]
@@ -62,8 +66,10 @@ class ServoChain(Generic[S, Q]):
         quirks: Q | None = None,
         check_baud: bool = False,
         seed: int = 0,
+        weight: HeadWeight | None = None,
     ) -> None:
         self.servos = tuple(servos)
+        self._weight = weight
         self.now_s = now_s
         self.quirks = quirks or self.quirks_type()
         self.check_baud = check_baud
@@ -78,6 +84,33 @@ class ServoChain(Generic[S, Q]):
             servo.on_address = self._mark_stale
         self._apply_quirks(self.quirks)
         self.refresh()
+        self._weighed_ms = self._now_ms
+        if weight is not None:
+            self._apply_weight(weight)
+
+    # --- time
+
+    def _advance(self, servos: Iterable[S], now_ms: int) -> None:
+        """Advance servos; the head's weight is applied every 10 ms to all."""
+        weight = self._weight
+        if weight is not None:
+            if now_ms - self._weighed_ms > PAUSE_MS:
+                # Of a long pause only the end matters; servos skip its middle, too.
+                self._weighed_ms = now_ms - WEIGH_MS
+            while self._weighed_ms + WEIGH_MS <= now_ms:
+                self._weighed_ms += WEIGH_MS
+                for servo in self.servos:
+                    servo.advance(self._weighed_ms, self._fed_ms)
+                self._apply_weight(weight)
+        for servo in servos:
+            servo.advance(now_ms, self._fed_ms)
+
+    def _apply_weight(self, weight: HeadWeight) -> None:
+        servos = self.servos[: len(weight.shafts)]
+        for servo, load in zip(
+            servos, weight.loads_nm([one.shaft.x for one in servos]), strict=True
+        ):
+            servo.shaft.set_weight(load / servo.model.stall_torque_nm)
 
     # --- addresses
 
@@ -106,7 +139,7 @@ class ServoChain(Generic[S, Q]):
     def find_servo(self, servo_id: int) -> S:
         """Return a servo by its id, advanced to the present time."""
         servo = self[servo_id]
-        servo.advance(whole_ms(self.now_s()), self._fed_ms)
+        self._advance((servo,), whole_ms(self.now_s()))
         return servo
 
     def ids(self) -> tuple[int, ...]:
@@ -140,9 +173,7 @@ class ServoChain(Generic[S, Q]):
 
     def positions_steps(self) -> tuple[float, ...]:
         """Return the true positions now, in the order of ``servos``."""
-        now_ms = whole_ms(self.now_s())
-        for servo in self.servos:
-            servo.advance(now_ms, self._fed_ms)
+        self._advance(self.servos, whole_ms(self.now_s()))
         return tuple(servo.position_steps for servo in self.servos)
 
     # --- what a make of servos adds
@@ -169,6 +200,8 @@ class ServoChain(Generic[S, Q]):
         """Process received bytes and return the answer to each instruction in them."""
         now_s = self._now_s = self.now_s()
         self._now_ms = whole_ms(now_s)
+        if self._weight is not None:
+            self._advance((), self._now_ms)
         if client_baud != self._client_baud:
             self._client_baud = client_baud
             self._framing.forget()
@@ -356,6 +389,7 @@ def build_chain(
     quirks: ChainQuirks | None = None,
     seed: int = 0,
     make_shaft: ShaftMaker = create_shaft,
+    weight: HeadWeight | None = None,
 ) -> C:
     """Build servos and their bus.
 
@@ -368,6 +402,7 @@ def build_chain(
         quirks: behaviour where documents and devices differ.
         seed: seed of the random numbers of faults.
         make_shaft: creates the shaft of each servo.
+        weight: weight of a head on these servos.
 
     Raises:
         ValueError: the model is unknown, or does not support this baud rate.
@@ -377,7 +412,7 @@ def build_chain(
     if baud is not None:
         for servo in servos:
             servo.set_baud(baud)
-    return chain(servos, now_s, quirks, baud is not None, seed)
+    return chain(servos, now_s, quirks, baud is not None, seed, weight)
 
 
 def _merge_answers(one: Answer | None, other: Answer | None) -> Answer | None:

@@ -17,15 +17,19 @@ from gazerig.sim_mock.smart_servo.physics import (
 )
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
+LEAST_WEIGHT = 1e-4
+"""Smallest change of the weight that counts, so that a shaft at rest remains so."""
+
 
 class Shaft(ShaftMotion):
     """Position and speed of one output shaft, advanced in whole milliseconds."""
 
-    __slots__ = ("_held", "_low_high")
+    __slots__ = ("_held", "_low_high", "_set_load", "_weight")
 
     def __init__(self, model: Motor, physics: Physics, position_steps: float) -> None:
         self._built = mechanics_of(model, physics)
-        self._constant = self._load = self._built.accel * physics.load_nm / model.stall_torque_nm
+        self._set_load, self._weight = physics.load_nm / model.stall_torque_nm, 0.0
+        self._constant = self._load = self._built.accel * self._set_load
         self._heavy = self._built.gravity != 0.0 or self._built.spring != 0.0
         self._low_high = physics.stop_low_steps, physics.stop_high_steps
         self._low, self._high = self._low_high
@@ -69,7 +73,17 @@ class Shaft(ShaftMotion):
 
     def set_load(self, share: float) -> None:
         """Set the constant torque on the joint as a share of the stall torque."""
-        self._constant = self._load = self._built.accel * share
+        self._set_load = share
+        self._change_load()
+
+    def set_weight(self, share: float) -> None:
+        """Set the torque of the weight on the joint as a share of the stall torque."""
+        if abs(share - self._weight) > LEAST_WEIGHT:
+            self._weight = share
+            self._change_load()
+
+    def _change_load(self) -> None:
+        self._constant = self._load = self._built.accel * (self._set_load + self._weight)
         self.resume()
 
     def feed(self, supply: float) -> None:

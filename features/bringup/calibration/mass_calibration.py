@@ -7,7 +7,7 @@ mass times its distance, in three directions; only a lower neck also gives the m
 
 from collections.abc import Mapping, Sequence
 from math import radians
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from gazerig.features.bringup.calibration.smart_servo_access import CalibrationS
 from gazerig.features.bringup.manual_control import ManualControl, Step
 from gazerig.gaze.types import Vec3
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.statics import GRAVITY_M_S2, Statics, spring_nm
+from gazerig.robot.description.statics import Statics, moving_bodies, spring_nm
 from gazerig.robot.model.kinematics import NECK
+from gazerig.robot.model.weight import ORIGIN, weight_nm
 
 SWEPT = ("lower_neck_pitch", "neck_pitch", "neck_roll")
 """Joints whose loads depend on the weight."""
@@ -27,6 +28,13 @@ _STEADY_RAD_S = radians(2.0)
 """Slower samples are omitted, because their friction may have any value."""
 _EVERY, _FEWEST = 4, 20
 """Steps per sample, and samples of each joint in each direction."""
+_UNKNOWNS: tuple[dict[str, Any], ...] = (
+    {"moment_kg_m": (1.0, 0.0, 0.0)},
+    {"moment_kg_m": (0.0, 1.0, 0.0)},
+    {"moment_kg_m": (0.0, 0.0, 1.0)},
+    {"mass_kg": 1.0},
+)
+"""Heads of 1 kg m ahead, left and above of the pitch axis, and of 1 kg on it."""
 
 
 class LoadSample(NamedTuple):
@@ -132,11 +140,21 @@ def fit_balance(
                     f"{_FEWEST} are needed: let it move farther (min_deg, max_deg)"
                 )
     has_mass = "lower_neck_pitch" in swept
+    # The last joint of the neck moves the head; its other joints have no mass here.
+    necks = [
+        one._replace(mass_kg=0.0, moment_kg_m=ORIGIN)
+        for one in moving_bodies(description, statics.joints)
+    ]
+    heads = _UNKNOWNS[: 4 if has_mass else 3]
     rows, torques = [], []
     for one in samples:
-        basis = _torques_of_moment(description, one.joint, one.pose_rad)
+        # The servo holds against the weight.
+        basis = [
+            -weight_nm([*necks[:-1], necks[-1]._replace(**head)], one.pose_rad)[one.joint]
+            for head in heads
+        ]
         friction = [one.direction * (one.joint == name) for name in swept]
-        rows.append([*basis[: 4 if has_mass else 3], *friction])
+        rows.append([*basis, *friction])
         # The servo holds weight and spring, and overcomes the friction.
         spring = spring_nm(statics.joints[one.joint], one.pose_rad[one.joint])
         torques.append(one.torque_nm + spring)
@@ -153,24 +171,3 @@ def _neck_kg(description: Description) -> float:
     """Return the mass of the links on the pitch axis, which a lower neck carries with the head."""
     necks = (one for one in description.links if one.joint and one.joint.name in NECK)
     return sum(one.inertia.mass_kg for one in necks if one.inertia is not None)
-
-
-def _torques_of_moment(
-    description: Description, joint: str, pose_rad: Mapping[str, float]
-) -> list[float]:
-    """Return a joint's holding torque for 1 kg m ahead, left and above, and for 1 kg in between.
-
-    The moment is about the pitch axis; the mass adds the arm from a lower joint to that axis.
-    """
-    poses = description.poses(description.angles(tuple(pose_rad), tuple(pose_rad.values())))
-    link = next(one for one in description.links if one.joint and one.joint.name == joint)
-    assert link.joint is not None
-    R_joint, p_joint = poses[link.name]
-    head = description.link("head")
-    R_head = np.array(poses[head.name][0])
-    pivot = np.array(poses[head.parent or link.name][1])
-    across = np.cross((0.0, 0.0, 1.0), np.array(R_joint) @ link.joint.axis)
-    # Of weight: -g (up x axis) . arm; the servo holds against it.
-    moment = GRAVITY_M_S2 * (R_head.T @ across)
-    arm = GRAVITY_M_S2 * float(across @ (pivot - np.array(p_joint)))
-    return [*moment.tolist(), arm]

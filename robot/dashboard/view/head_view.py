@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from gazerig.gaze.angles import compose, rotate_back, rotation, sub
+from gazerig.gaze.angles import compose, rotate_back, rotation, sub, turn_about
 from gazerig.gaze.types import Mat3
 from gazerig.robot.dashboard.view.glb import (
     CLOTH,
@@ -23,7 +23,7 @@ from gazerig.robot.dashboard.view.scene_node import set_pose
 from gazerig.robot.description import links
 from gazerig.robot.description.build import SIDES, RigShape, describe
 from gazerig.robot.description.head_shape import HeadMeasures, measures_of
-from gazerig.robot.description.links import Description, Link, turn_about
+from gazerig.robot.description.links import Description, Link
 from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import FLOOR_M, meeting_rad
 from gazerig.robot.model.frames import CameraParams, quaternion
