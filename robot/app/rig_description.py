@@ -11,7 +11,8 @@ from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
-from gazerig.robot.description.statics import NECK_JOINTS, Statics, rig_statics
+from gazerig.robot.description.statics import NECK_JOINTS, Statics, moving_bodies
+from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.guard_params import CollisionParams
 from gazerig.robot.model.types import order_joints
 
@@ -67,9 +68,15 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
 
 
 def statics_of(rig: Rig, *, of_neck: bool = False) -> Statics:
-    """Return the model of the torques that a rig's servos, or those of its neck, hold at rest."""
-    description = description_of(rig, looks=False)
-    return rig_statics(description, rig.joints, rig.couplings, of_neck=of_neck)
+    """Return the torques that a rig's servos hold at rest.
+
+    Args:
+        rig: the rig.
+        of_neck: only for the joints of the neck, with all others at 0, which is faster.
+    """
+    joints = {n: one for n, one in rig.joints.items() if not of_neck or n in NECK_JOINTS}
+    pairs = [one for one in coupled_pairs(rig.couplings) if {one.first, one.second} <= {*joints}]
+    return Statics(moving_bodies(description_of(rig, looks=False), joints), joints, pairs)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:

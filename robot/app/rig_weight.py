@@ -8,7 +8,8 @@ from typing import Literal, NamedTuple
 from gazerig.config.rig import Rig
 from gazerig.robot.app.rig_description import statics_of
 from gazerig.robot.app.rig_limits import park_rad
-from gazerig.robot.description.statics import NECK_JOINTS, STRONG_SHARE, Statics, holding_c
+from gazerig.robot.description.statics import NECK_JOINTS, STRONG_SHARE, Statics
+from gazerig.robot.model.assumed_servo import AMBIENT_C, STALL_RISE_C
 from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.types import JointAngles
 
@@ -53,7 +54,7 @@ class Holding(NamedTuple):
     @property
     def temperature_c(self) -> float:
         """Return the temperature of the servo after half an hour in this pose."""
-        return holding_c(self.share)
+        return AMBIENT_C + STALL_RISE_C * self.share * self.share
 
     def text(self) -> str:
         """Return share and current."""

@@ -6,7 +6,7 @@ servos of joints that move together share the torques.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from math import atan2, copysign, degrees, hypot, pi, sin
+from math import atan2, copysign, degrees, hypot, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +21,8 @@ from gazerig.robot.description.links import (
     LinkageFollower,
 )
 from gazerig.robot.description.mass import in_parent_frame, join_inertias
-from gazerig.robot.model.assumed_servo import AMBIENT_C, GEAR_FRICTION, STALL_RISE_C
-from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
+from gazerig.robot.model.assumed_servo import GEAR_FRICTION
+from gazerig.robot.model.coupling_params import CoupledPair
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.robot.model.weight import MovingBody, weight_nm
@@ -44,46 +44,24 @@ class Weight(NamedTuple):
     upright_rad: float
     inertia_kg_m2: float
 
-    def torque_nm(self, angle_rad: float) -> float:
-        """Return the torque at an angle."""
-        return self.nm * sin(angle_rad - self.upright_rad)
-
-
-def rig_statics(
-    description: Description,
-    joints: Mapping[str, JointParams],
-    couplings: Mapping[str, CouplingParams],
-    *,
-    of_neck: bool = False,
-) -> "Statics":
-    """Return the torques that the servos of a rig hold at rest.
-
-    Args:
-        description: description of the rig, with its masses.
-        joints: joints of the rig.
-        couplings: couplings of the rig.
-        of_neck: only for the joints of the neck, with all others at 0, which is faster.
-    """
-    chosen = {name: one for name, one in joints.items() if not of_neck or name in NECK_JOINTS}
-    pairs = tuple(one for one in coupled_pairs(couplings) if {one.first, one.second} <= {*chosen})
-    return Statics(moving_bodies(description, chosen.keys()), chosen, pairs)
-
 
 class Statics:
-    """Torques that servos hold at rest; created by ``rig_statics``.
+    """Torques that servos hold at rest.
 
-    Attributes:
+    Args:
+        bodies: bodies that the joints move.
         joints: the joints considered.
+        pairs: their coupled pairs.
     """
 
     def __init__(
         self,
-        nodes: Sequence[MovingBody],
+        bodies: Sequence[MovingBody],
         joints: Mapping[str, JointParams],
         pairs: Sequence[CoupledPair],
     ) -> None:
         self.joints = joints
-        self._nodes, self._pairs = tuple(nodes), tuple(pairs)
+        self._bodies, self._pairs = tuple(bodies), tuple(pairs)
         self._stall_nm = {
             name: one.model_facts.stall_torque_nm * _shaft_turns(one)
             for name, one in joints.items()
@@ -91,11 +69,11 @@ class Statics:
 
     def retuned(self, joints: Mapping[str, JointParams]) -> "Statics":
         """Return the same statics with other joint parameters."""
-        return Statics(self._nodes, {name: joints[name] for name in self.joints}, self._pairs)
+        return Statics(self._bodies, {name: joints[name] for name in self.joints}, self._pairs)
 
     def load_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the torque of weight and spring at each joint; omitted joints are at 0."""
-        weight = weight_nm(self._nodes, angles_rad)
+        weight = weight_nm(self._bodies, angles_rad)
         return {
             name: weight.get(name, 0.0) + spring_nm(joint, angles_rad.get(name, 0.0))
             for name, joint in self.joints.items()
@@ -245,8 +223,3 @@ def moving_bodies(description: Description, moving: Collection[str]) -> tuple[Mo
 def spring_nm(joint: JointParams, angle_rad: float) -> float:
     """Return the torque of a joint's spring at an angle."""
     return -joint.spring_nm_deg * (degrees(angle_rad) - joint.spring_rest_deg)
-
-
-def holding_c(share: float) -> float:
-    """Return the final temperature of a servo that holds a fraction of its stall torque."""
-    return AMBIENT_C + STALL_RISE_C * share * share
