@@ -11,6 +11,7 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
+from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.track_fit import shortest_move_s
@@ -164,6 +165,10 @@ def check_keys(where: str, times_s: Floats, values: np.ndarray[Any, Any]) -> Non
     finite = np.isfinite(times_s) & np.isfinite(values.reshape(len(times_s), -1)).all(axis=1)
     if not finite.all():
         raise SetupError(f"{where}: key {int(finite.argmin())} is not a number: export it again")
+    if len(times_s) and times_s[-1] > MAX_DURATION_S:
+        raise SetupError(
+            f"{where}: it takes {times_s[-1]:g} s; at most {MAX_DURATION_S:g} s are read: split it"
+        )
     steps = np.diff(times_s)
     if len(times_s) and times_s[0] < 0.0:
         raise SetupError(f"{where}: key 0 is at {times_s[0]:g} s, before 0: begin at frame 0")

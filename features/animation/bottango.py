@@ -114,6 +114,7 @@ def _sample(where: str, curves: Sequence[Sequence[float]]) -> Series:
     table = np.array(sorted(curves, key=lambda one: one[0]))
     start_s = table[:, 0] / 1e3
     check_keys(where, start_s, table)
+    check_keys(where, np.maximum.accumulate(start_s + table[:, 1] / 1e3)[-1:], table[-1:])
     until_s = np.append(start_s[1:] - start_s[:-1] - 1e-3, np.inf)
     times: list[Floats] = []
     values: list[Floats] = []

@@ -110,7 +110,15 @@ def track_text(
             at_s = round(time_s + begins_s, 3)
             if at_s > 0.0:
                 value = _channel_value(rig, name, value, float(means[name][1][0]), owned)
+                most = 90.0 if name in GAZE_JOINTS else 180.0
+                if abs(value) > most:
+                    raise SetupError(
+                        f"{name} at {time_s + start_s:.2f} s: {value:.1f} deg, more than the "
+                        f"{most:g} deg of any joint: check the unit of the angles"
+                    )
                 frames.setdefault(at_s, {})[channel_of_joint(name)] = round(value, 3)
+    notes += tuple(_lid_note(rig, name, *means[name]) for name in keys if name in LIDS)
+    notes = tuple(filter(None, notes))
     if begins_s:
         notes += (f"begins with {begins_s:.2f} s from the neutral pose to its first one",)
     if len(frames) > MAX_FRAMES:
@@ -215,6 +223,19 @@ def _lid_ends(rig: Rig, joint: str) -> tuple[float, float]:
     if shut is None or wide is None:
         raise SetupError(f"{joint}: the rig does not define its shut and open angles")
     return shut, wide
+
+
+def _lid_note(rig: Rig, joint: str, times_s: Floats, angles_deg: Floats) -> str:
+    """Return by how much a lid would leave its travel, "" if it does not."""
+    low, high = sorted(_lid_ends(rig, joint))
+    beyond = np.maximum(low - angles_deg, angles_deg - high)
+    worst = int(beyond.argmax())
+    if beyond[worst] < TOLERANCE_DEG:
+        return ""
+    return (
+        f"{joint} stops at its shut or open angle: {beyond[worst]:.1f} deg less "
+        f"(at {times_s[worst]:.2f} s)"
+    )
 
 
 def _rest_deg(rig: Rig, joint: str) -> float:

@@ -66,6 +66,7 @@ BAD = {
     "time,neck_yaw\n": "no rows",
     "time,tail\n0,1\n1,5\n": "no joint 'tail': rename it or add --map NAME=JOINT; joints of the rig: left_eye_pan",
     "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
+    "time,neck_yaw\n0,1\n1,555\n": "neck_yaw at 1.00 s: 554.0 deg, more than the 90 deg of any",
     "time,neck_yaw\n0,1\n20000,5\n": "a track takes at most 14400 s",
 }
 
@@ -216,6 +217,13 @@ BAD_FILES: dict[str, tuple[bytes, str]] = {
         GOOD.replace(b'"byteOffset": 12', b'"byteOffset": 92'),
         "the file is truncated",
     ),
+    "long.glb": (clip([0.0, 2e9], NAN[[0, 0]], "CUBICSPLINE"), "needs 6 rotations for 2 times"),
+    "years.glb": (clip([0.0, 2e9], NAN[[0, 0]]), "it takes 2e+09 s; at most 14400 s are read"),
+    "days.json": (
+        b'[{"Animations": [{"Animation Name": "a", "Animation Commands": '
+        b'"sC,neck_yaw,0,9000000000,1,1,0,1,1,0"}]}]',
+        "neck_yaw: it takes 9e+06 s; at most",
+    ),
     "half.json": (b'{"fps": 30, "servos": {', "half.json: Input data was truncated"),
     "old.json": (b'{"fps": 30, "positions": []}', "no servos: it is not a file of Blender's"),
     "fps.json": (b'{"fps": 0, "servos": {}}', "fps is 0; it must be within"),
@@ -347,6 +355,23 @@ def test_an_imported_track_has_few_keys_and_the_same_curve(tmp_path: Path) -> No
     at = np.linspace(0.0, 1.0, 200)
     curves = [track_motions(one, DESK.names).motion.sample_at(at) for one in (again, first)]
     assert np.degrees(np.abs(curves[0].value - curves[1].value)[:, :3].max()) < 0.1
+
+
+def test_lids_beyond_their_travel_and_eyes_that_differ_are_reported() -> None:
+    times = np.array([0.0, 1.0, 2.0])
+    shut, wide = DESK.lid_joints.ends_deg("left_upper_lid")
+    assert shut is not None and wide is not None
+    series = {
+        "left_upper_lid": (times, np.array([wide, shut - 4.0, wide])),
+        "left_eye_pan": (times, np.array([0.0, 10.0, 0.0])),
+        "right_eye_pan": (times, np.array([0.0, 16.0, 0.0])),
+    }
+    made = track_text(DESK, series, "x", owned=True)
+    assert "left_eye_pan and right_eye_pan differ by up to 6.0 deg (at 1.00 s)" in made.notes[0]
+    assert (
+        "left_upper_lid stops at its shut or open angle: 4.0 deg less (at 1.00 s)" in made.notes[1]
+    )
+    assert "{time_s: 1.0, eyes_yaw_deg: 13.0, lids: {left_upper_lid: 0.0}}" in made.text
 
 
 def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(tmp_path: Path) -> None:
