@@ -70,7 +70,7 @@ bench: $(VENV)/.installed-dev
 links:
 	@ln -sf $(addprefix ../../,$(wildcard api/*.py api/py.typed)) .links/gazerig/
 	@ln -sfn ../../api/testing .links/gazerig/testing
-	@for room in config drivers features gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
+	@for room in config doors drivers features gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
 
 # The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.
 docs: $(VENV)/.installed-docs

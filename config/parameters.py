@@ -41,6 +41,7 @@ _AT_START: dict[str, str] = {
     "joints.*.transmission_points": "positions of a push rod are applied while its servo has no torque",
     "joints.*.servo_speed_deg_s": "positions of the servos are estimated with it from the first goal on",
     "track_files": "tracks are read and checked when the rig is read",
+    "doors": "their processes are started with the run",
     "couplings.*": "positions of the servos are converted to angles with it from the first reading on",
     "mass.*": _MASSES,
     "joints.*.friction_nm": _MASSES,

@@ -187,6 +187,8 @@ class Rig:
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
     levels: Annotated[Mapping[str, LevelParams],
         "values 0..1 that a program sets many times per second, such as a jaw's opening from loudness"] = field(default_factory=dict)
+    doors: Annotated[tuple[str, ...],
+        "voice stacks that take part, each in a process of its own: NAME [ADDRESS] [--bind HOST:PORT], as for gazerig door"] = ()
     # fmt: on
 
     @property

@@ -15,7 +15,9 @@ from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.config.tracks import load_track, shipped_tracks, track_name, track_path
 from gazerig.drivers.bus.servo_models import SERVOS
+from gazerig.drivers.errors import PluginError
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
+from gazerig.drivers.plugins import DOOR, find
 from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
@@ -442,6 +444,14 @@ def track_rules(rig: Rig) -> Iterable[tuple[str, str]]:
             )
 
 
+def _doors(rig: Rig) -> Iterable[tuple[str, str]]:
+    for i, entry in enumerate(rig.doors):
+        try:
+            find(DOOR, next(iter(entry.split()), ""))
+        except PluginError as fault:
+            yield f"doors.{i}", str(fault)
+
+
 RULES = (
     _joint_names,
     _servo_ids,
@@ -456,5 +466,6 @@ RULES = (
     expressions,
     levels,
     track_rules,
+    _doors,
 )
 """Rules between several sections of a rig."""

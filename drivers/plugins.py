@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
 ATTENTION, TRACKS, RIGS = "gazerig.attention", "gazerig.tracks", "gazerig.rigs"
 COMMAND, SCHEMA, PAGE_PANEL = "gazerig.command", "gazerig.schema", "gazerig.page_panel"
-SURROUNDINGS = "gazerig.surroundings"
+SURROUNDINGS, DOOR = "gazerig.surroundings", "gazerig.door"
 GROUPS: Mapping[str, str] = {
     BUS: "bus",
     CAMERA: "camera",
@@ -36,6 +36,7 @@ GROUPS: Mapping[str, str] = {
     SCHEMA: "schema",
     SURROUNDINGS: "surroundings",
     PAGE_PANEL: "page panel",
+    DOOR: "door",
 }
 """Group of entry points -> its name in messages."""
 
@@ -84,12 +85,20 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
     },
     PAGE_PANEL: {},
     SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:WorldSurroundings"},
+    DOOR: {
+        "voice-assistant": "gazerig.doors.voice_assistant:DOOR",
+        "wyoming": "gazerig.doors.wyoming:DOOR",
+        "pipecat": "gazerig.doors.pipecat:DOOR",
+        "livekit": "gazerig.doors.livekit:DOOR",
+        "openai-realtime": "gazerig.doors.openai_realtime:DOOR",
+    },
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
 Tracks and rigs are folders of YAML files: a module of that folder, or its path. A command is a
 ``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills;
-surroundings a subclass of ``gazerig.robot.app.surroundings.Surroundings``.
+surroundings a subclass of ``gazerig.robot.app.surroundings.Surroundings``, a door a
+``gazerig.doors.door.Door``.
 """
 
 OUR_PACKAGE = "gazerig"

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("config", "drivers", "features", "gaze", "robot", "sim_mock")
+ROOMS = ("config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
 
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
@@ -39,7 +39,7 @@ OWNERS = {
         "features.study.report.",
         "features.study.preregistration_text",
     ),
-    "aiohttp": ("robot.dashboard.", "features.study.pages."),
+    "aiohttp": ("robot.dashboard.", "features.study.pages.", "doors."),
     "ruamel": ("config.entries", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),

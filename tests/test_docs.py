@@ -39,7 +39,7 @@ WORLDS = pytest.importorskip("gazerig.features.world.room").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
 
-FOLDERS = ("api", "config", "drivers", "features", "gaze", "robot", "sim_mock")
+FOLDERS = ("api", "config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
 PARAMETERS = ROOT / "docs/parameters.md"
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
 

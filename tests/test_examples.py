@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
@@ -13,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from fakes.talking_head import TalkingHead
 from papers import ROOT
 
 import gazerig
@@ -165,6 +167,16 @@ def test_the_hand_before_a_webcam_moves_the_fist_of_the_opponent(
             motion.set_target(fists[number // 5], 0.01 * number)
         motion.step(number)
     assert "punch" in [event.name for event in motion.events]
+
+
+def test_the_own_door_passes_words_on(monkeypatch: pytest.MonkeyPatch, shown: Shown) -> None:
+    head, words = TalkingHead(), iter((b"listening\n", b"sing", b"\xff", b"speaking"))
+    port = SimpleNamespace(bind=lambda address: None, recv=lambda most: next(words))
+    monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(head))
+    monkeypatch.setattr(socket, "socket", lambda **_: nullcontext(port))
+    with pytest.raises(StopIteration):
+        shown("own_door.py")
+    assert head.states == ["listening", "speaking"]
 
 
 @pytest.mark.slow

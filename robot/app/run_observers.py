@@ -18,6 +18,7 @@ from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.computer import level_text, slower_rate
+from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
@@ -125,6 +126,8 @@ class RunObservers:
             if tuning is not None and not options.fast
             else None
         )
+        doors = assembly.live_params.rig.doors if self._live is not None and steer is None else ()
+        self._doors = DoorProcesses(doors, os.getpid(), say)
         self._picking = ClickToLook(
             PixelToWorld(assembly.mount, assembly.poses, assembly.camera_params)
         )
@@ -283,6 +286,8 @@ class RunObservers:
                 self._page.offer(steps or self._made.robot.menus())
                 infos = [] if steps else self._made.robot.tracks()
                 self._page.offer_tracks([info._asdict() for info in infos])
+        with self._report_errors("the doors"):
+            self._doors.open()
 
     @contextlib.contextmanager
     def _report_errors(self, name: str) -> Iterator[None]:
@@ -312,6 +317,8 @@ class RunObservers:
 
     def close(self, count: LoopCount) -> None:
         """Close everything, when the torque is off."""
+        with self._report_errors("the doors"):
+            self._doors.close()
         with self._report_errors("the remote control"):
             if self._live is not None:
                 self._live.close()

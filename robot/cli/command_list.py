@@ -71,6 +71,11 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "rig_check",
             "Check a rig's YAML and list all faults at once; no servo is contacted.",
         ),
+        "door": CommandEntry(
+            "door",
+            "Let a voice assistant or agent take part with the running head; without a name, list "
+            "all.",
+        ),
         "models": CommandEntry(
             "models",
             "List and download model files that detect faces, people, hands and eyes.",

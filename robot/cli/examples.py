@@ -44,6 +44,11 @@ EXAMPLES: dict[str, Examples] = {
     "record-camera": (
         ("record-camera seen.mcap --oak", "record frames, depth and times of a camera"),
     ),
+    "door": (
+        ("door", "list the doors"),
+        ("door voice-assistant", "follow the Linux Voice Assistant of this computer"),
+        ("door wyoming --bind 0.0.0.0:10601", "be the loudspeaker of satellites on the network"),
+    ),
     "emulate": (
         ("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),
         ("emulate --servos 1-6:sts3215", "Feetech servos"),

@@ -1,0 +1,142 @@
+"""Door to LiveKit Agents: the attribute ``lk.agent.state`` of the agent in a room.
+
+As a program of its own, the door joins the room with LIVEKIT_URL and LIVEKIT_TOKEN of its
+environment, subscribes to no media, and publishes nothing. In the agent's program one line is
+enough: ``follow(session)``. Both are read by the names of their fields, so they fit several
+versions; the package ``livekit`` is only needed to join a room.
+"""
+
+import asyncio
+import logging
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import gazerig
+from gazerig.doors.door import Door, DoorLink, connect
+from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
+
+ATTRIBUTE = "lk.agent.state"
+_URL, _TOKEN = "LIVEKIT_URL", "LIVEKIT_TOKEN"
+
+
+class LiveKit:
+    """States of an agent and its user as orders."""
+
+    def __init__(self) -> None:
+        self.talk = TurnTaking(after_speech="listening")
+
+    def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
+        """Return the orders for changed states.
+
+        Args:
+            message: ``lk.agent.state``, or "user": the state of ``user_state_changed``.
+            now_s: Present time, s.
+
+        Raises:
+            UnknownMessage: the state is unknown.
+        """
+        talk = self.talk
+        if message.get("user") == "speaking":
+            return talk.partner_speaks()
+        match message.get(ATTRIBUTE):
+            case "thinking":
+                return talk.partner_pauses()
+            case "speaking":
+                return talk.speak(now_s)
+            case "listening":
+                return talk.end_speech() if talk.state == "speaking" else talk.partner_speaks()
+            case "initializing" | "idle" | "":
+                return talk.end()
+            case None:
+                return ()
+            case other:
+                raise UnknownMessage(f"{ATTRIBUTE} {other!r} is unknown and ignored")
+
+
+def follow(session: Any, head: int | str | None = None, link: DoorLink | None = None) -> DoorLink:
+    """Let a running head take part in an ``AgentSession``; return the connection to the head.
+
+    Args:
+        session: The session, before or after its start, in a running event loop.
+        head: Process id or name of the head; None if only one runs on this computer.
+        link: Connection to the head; None for a new one.
+    """
+    log = logging.getLogger("gazerig").warning
+    used = link or DoorLink(lambda: connect(head, "LiveKit"), log)
+    states = LiveKit()
+
+    def take(message: Mapping[str, Any]) -> None:
+        try:
+            used.send(states.take(message, used.now_s()))
+        except UnknownMessage as error:
+            used.report(str(error))
+
+    session.on("agent_state_changed", lambda event: take({ATTRIBUTE: str(event.new_state)}))
+    session.on("user_state_changed", lambda event: take({"user": str(event.new_state)}))
+    session.on("close", lambda event: take({ATTRIBUTE: "idle"}))
+    used.start()
+    return used
+
+
+async def follow_room(link: DoorLink, room: Any, token: str) -> None:
+    """Join a room and follow its agent until the room is closed.
+
+    Args:
+        link: The head.
+        room: A ``livekit.rtc.Room``.
+        token: Access token of a participant who may subscribe.
+    """
+    states, closed = LiveKit(), asyncio.Event()
+
+    def take(changed: Mapping[str, str]) -> None:
+        try:
+            link.send(states.take(changed, link.now_s()))
+        except UnknownMessage as error:
+            link.report(str(error))
+
+    def leave(participant: Any) -> None:
+        if ATTRIBUTE in participant.attributes:
+            take({ATTRIBUTE: "idle"})
+
+    room.on("participant_attributes_changed", lambda changed, participant: take(changed))
+    room.on("participant_connected", lambda participant: take(participant.attributes))
+    room.on("participant_disconnected", leave)
+    room.on("disconnected", lambda *reason: closed.set())
+    try:
+        await room.connect(link.address, token)
+        link.report(f"connected to {link.address}")
+        for participant in room.remote_participants.values():
+            take(participant.attributes)
+        await closed.wait()
+    finally:
+        link.send(states.talk.end())
+        await room.disconnect()
+
+
+async def serve(link: DoorLink) -> None:
+    """Join the room of the environment's address and token; join again for ever.
+
+    Raises:
+        gazerig.Error: the address, the token or the package is missing.
+    """
+    link.address = link.address or os.environ.get(_URL, "")
+    token = os.environ.get(_TOKEN, "")
+    if not link.address or not token:
+        raise gazerig.Error(
+            f"set {_URL}, e.g. ws://127.0.0.1:7880, and {_TOKEN}: lk token create --join "
+            "--room ROOM --identity head"
+        )
+    try:
+        from livekit import rtc
+    except ImportError as error:
+        raise gazerig.Error(f"livekit is missing ({error}): pip install livekit") from None
+    await link.keep(
+        lambda: follow_room(link, rtc.Room(), token),
+        "a LiveKit room with an agent",
+        f"a token lasts for hours only: check {_TOKEN}",
+        (OSError, TimeoutError, rtc.ConnectError),
+    )
+
+
+DOOR = Door("livekit", serve, "LiveKit Agents: an agent's state in a room")

@@ -1,0 +1,281 @@
+"""Door to Wyoming, the protocol of Rhasspy and Home Assistant: a ``snd`` service.
+
+The head plays the sound and moves its mouth by it. The same port accepts the events of a satellite
+(``--event-uri``): detection, voice-started and -stopped, transcript, synthesize. Events:
+github.com/OHF-Voice/wyoming; the package ``wyoming`` reads and writes them.
+"""
+
+import asyncio
+import queue
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import Any
+
+import gazerig
+from gazerig.doors.door import Address, Door, DoorLink
+from gazerig.doors.turn_taking import Orders, TurnTaking, field
+
+_MAX_CHUNKS = 64
+"""Chunks of sound that wait; a neighbour that sends more is slowed down."""
+_PLAYED_AHEAD_S = 0.3
+"""Sound that the head has before it is heard; an interruption cannot take it back."""
+_PIECE_S = 0.04
+_MAX_BYTES, _MAX_LINE = 1_000_000, 65_536
+_MAX_NEIGHBOURS = 8
+_WIDTH = 2
+
+
+class Wyoming:
+    """Events of all connections of one satellite as orders."""
+
+    def __init__(self) -> None:
+        self.talk = TurnTaking()
+        self.audio_s = 0.0
+
+    def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
+        """Return the orders for an event; other events are ignored.
+
+        Args:
+            message: "type", "data", and "audio_s", the duration of an audio-chunk.
+            now_s: Present time, s.
+        """
+        talk, data = self.talk, field(message, "data", dict, {})
+        match message.get("type"):
+            case "detection" | "voice-started":
+                return talk.partner_speaks()
+            case "transcript" if not field(data, "text", str, "").strip():
+                return talk.end()
+            case "voice-stopped" | "transcript":
+                return talk.partner_pauses()
+            case "synthesize":
+                return talk.add_text(field(data, "text", str, ""), now_s)
+            case "audio-start":
+                if talk.state != "speaking":  # otherwise the sounds follow each other
+                    self.audio_s = 0.0
+                return talk.speak(now_s)
+            case "audio-chunk":
+                self.audio_s += field(message, "audio_s", float, 0.0)
+            case "audio-stop" if self.audio_s and talk.state == "speaking":
+                return talk.speak(now_s, self.audio_s)
+            case "played":
+                return talk.end_speech()
+            case "error" | "pause-satellite" | "satellite-disconnected":
+                return talk.end()
+        return ()
+
+
+class _LimitedReader(asyncio.StreamReader):
+    """A stream that refuses to read a huge event."""
+
+    async def readexactly(self, n: int) -> bytes:
+        if not isinstance(n, int) or n > _MAX_BYTES:
+            raise ValueError(f"an event of {n} bytes; the limit is {_MAX_BYTES}")
+        return await super().readexactly(n)
+
+
+class SpokenSound:
+    """A sound that the head says while it arrives; ``say`` is called in a thread.
+
+    Args:
+        rate_hz: Rate of the samples.
+        channels: 1 or 2.
+    """
+
+    def __init__(self, rate_hz: int, channels: int) -> None:
+        self._rate_hz, self._channels = rate_hz, channels
+        self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def feed(self, pcm: bytes) -> None:
+        """Add samples: signed, 16 bits, channels interleaved."""
+        step = _WIDTH * self._channels * round(_PIECE_S * self._rate_hz)
+        for at in range(0, len(pcm), step):
+            self._pieces.put(pcm[at : at + step])
+
+    def end(self) -> None:
+        """End the sound."""
+        self._pieces.put(b"")
+
+    def say(self, connect: Any) -> str:
+        """Let the head say it, by a connection of its own; return why that fails, "" if not."""
+        try:
+            head = connect()
+            try:
+                order = head.say(self._read(), rate_hz=self._rate_hz, channels=self._channels)
+                return str(order.reply.refused or "")
+            finally:
+                head.__exit__(None, None, None)
+        except gazerig.Error as error:
+            return str(error)
+
+    def _read(self) -> Iterator[bytes]:
+        while piece := self._pieces.get():
+            yield piece
+
+
+class Satellite:
+    """The connections of a satellite.
+
+    Args:
+        link: The head.
+    """
+
+    def __init__(self, link: DoorLink) -> None:
+        self._link, self._events = link, Wyoming()
+        self._sounds: list[asyncio.Queue[Any]] = []
+
+    async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Read one connection to its end."""
+        if len(self._sounds) >= _MAX_NEIGHBOURS:
+            self._link.report(f"more than {_MAX_NEIGHBOURS} connections: the newest is refused")
+            writer.close()
+            return
+        sounds: asyncio.Queue[Any] = asyncio.Queue(_MAX_CHUNKS)
+        self._sounds.append(sounds)
+        player = asyncio.ensure_future(self._play(sounds, writer))
+        try:
+            await self._read(reader, writer, sounds)
+        except (ConnectionError, asyncio.IncompleteReadError):
+            pass  # it has disconnected
+        except (ValueError, AttributeError, KeyError, TypeError) as error:
+            self._link.report(
+                f"a connection is closed, because it sent no Wyoming event ({error}); check the "
+                "neighbour's address and version"
+            )
+        finally:
+            player.cancel()
+            await asyncio.gather(player, return_exceptions=True)
+            self._sounds.remove(sounds)
+            if not self._sounds:
+                self._link.send(self._events.talk.end())
+            writer.close()
+
+    async def _read(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, sounds: asyncio.Queue[Any]
+    ) -> None:  # fmt: skip
+        """Read events until the connection ends.
+
+        Raises:
+            ValueError, AttributeError, KeyError, TypeError: an event is malformed.
+        """
+        from wyoming.audio import AudioChunk, AudioStart
+        from wyoming.event import async_read_event, async_write_event
+
+        while True:
+            event = await async_read_event(reader)
+            if event is None:
+                if not reader.at_eof():
+                    raise ValueError("not a line of JSON, or too long")
+                return
+            if event.type == "describe":
+                await async_write_event(_info(), writer)
+                continue
+            if event.type == "ping":
+                from wyoming.ping import Ping, Pong
+
+                await async_write_event(Pong(text=Ping.from_event(event).text).event(), writer)
+                continue
+            message: dict[str, Any] = {"type": event.type, "data": event.data}
+            if event.type == "audio-start":
+                await sounds.put(AudioStart.from_event(event))
+            elif event.type == "audio-chunk":
+                chunk = AudioChunk.from_event(event)
+                message["audio_s"] = chunk.seconds
+                await sounds.put(chunk)
+            elif event.type == "audio-stop":
+                await sounds.put(None)
+            orders = self._events.take(message, self._link.now_s())
+            self._link.send(orders)
+            if any(order.state == "interrupt" for order in orders):
+                for waiting in self._sounds:
+                    while not waiting.empty():
+                        waiting.get_nowait()
+                    waiting.put_nowait(None)
+
+    async def _play(self, sounds: asyncio.Queue[Any], writer: asyncio.StreamWriter) -> None:
+        """Let the head say the sounds of a connection, at the pace at which they are heard."""
+        from wyoming.audio import AudioChunk, AudioChunkConverter
+        from wyoming.event import async_write_event
+        from wyoming.snd import Played
+
+        while True:
+            start = await sounds.get()
+            if start is None or isinstance(start, AudioChunk):
+                continue
+            link, channels = self._link, min(start.channels, 2)
+            convert = AudioChunkConverter(start.rate, _WIDTH, channels).convert
+            sound = SpokenSound(start.rate, channels)
+            saying = asyncio.ensure_future(asyncio.to_thread(sound.say, link.connect))
+            begin_s, sent_s = link.now_s(), 0.0
+            try:
+                while (chunk := await sounds.get()) is not None:
+                    if isinstance(chunk, AudioChunk):
+                        sound.feed(convert(chunk).audio)
+                        sent_s += chunk.seconds
+                        await asyncio.sleep(begin_s + sent_s - _PLAYED_AHEAD_S - link.now_s())
+            finally:
+                sound.end()
+            if refused := await saying:
+                link.report(f"the sound is not heard: {refused}")
+            if not sent_s:  # an event of a satellite that has another loudspeaker
+                continue
+            await asyncio.sleep(begin_s + sent_s - link.now_s())
+            if sounds.empty():
+                link.send(self._events.take({"type": "played"}, link.now_s()))
+            with suppress(ConnectionError):
+                await async_write_event(Played().event(), writer)
+
+
+def _info() -> Any:
+    """Return the event that describes the service."""
+    from wyoming.audio import AudioFormat
+    from wyoming.info import Attribution, Info, SndProgram
+
+    owner = Attribution("gazerig", "https://pypi.org/project/gazerig")
+    program = SndProgram(
+        name="gazerig", attribution=owner, installed=True, version=gazerig.__version__,
+        description="A head that speaks", snd_format=AudioFormat(22_050, _WIDTH, 1),
+    )  # fmt: skip
+    return Info(snd=[program]).event()
+
+
+async def serve(link: DoorLink) -> None:
+    """Serve satellites for ever.
+
+    Raises:
+        gazerig.Error: the package wyoming is missing.
+        OSError: the port is not free.
+    """
+    try:
+        import wyoming  # noqa: F401
+    except ImportError as error:
+        raise gazerig.Error(f"{error}: pip install 'gazerig[doors]'") from None
+    satellite, open_tasks = Satellite(link), set[asyncio.Task[None]]()
+
+    def begin() -> asyncio.StreamReaderProtocol:
+        async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            task = asyncio.current_task()
+            assert task is not None
+            open_tasks.add(task)
+            try:
+                await satellite.accept(reader, writer)
+            finally:
+                open_tasks.discard(task)
+
+        return asyncio.StreamReaderProtocol(_LimitedReader(limit=_MAX_LINE), accept)
+
+    host, port = Address.parse(link.bind)
+    server = await asyncio.get_running_loop().create_server(begin, host, port)
+    link.report(f"waiting for a Wyoming satellite on tcp://{link.bind} (--snd-uri, --event-uri)")
+    try:
+        await asyncio.Event().wait()
+    finally:
+        server.close()
+        for task in open_tasks:
+            task.cancel()
+        await asyncio.gather(*open_tasks, return_exceptions=True)
+
+
+DOOR = Door(
+    "wyoming", serve, "Wyoming satellites of Rhasspy and Home Assistant: the head is their loudspeaker",
+    bind="127.0.0.1:10601",
+)  # fmt: skip

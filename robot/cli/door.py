@@ -1,0 +1,57 @@
+"""Command door: a neighbour such as a voice assistant takes part with the running head."""
+
+from typing import Annotated
+
+import typer
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.plugins import DOOR, registrations
+from gazerig.errors import Error
+from gazerig.robot.app.door_processes import load_door
+from gazerig.robot.cli.terminal import clear_errors, say
+
+app = typer.Typer()
+
+
+def complete_door(incomplete: str) -> list[str]:
+    """Complete the name of a door."""
+    return [one.name for one in registrations(DOOR) if one.name.startswith(incomplete)]
+
+
+@app.command()
+def door(
+    name: Annotated[
+        str | None, typer.Argument(help="Name of the door.", autocompletion=complete_door)
+    ] = None,
+    address: Annotated[
+        str, typer.Argument(metavar="ADDRESS", help="Address of the neighbour; see docs/doors.md.")
+    ] = "",
+    bind: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT", help="Where to listen; the usual port on this computer only."
+        ),
+    ] = "",
+    head: Annotated[
+        str | None,
+        typer.Option(
+            "--head",
+            "--rig",
+            "--pid",
+            metavar="NAME|N",
+            help="Name or process id of the head, if several run.",
+        ),
+    ] = None,
+) -> None:
+    """Let a voice assistant or agent take part with the running head; without a name, list all."""
+    with clear_errors():
+        if name is None:
+            for one in registrations(DOOR):
+                print(f"{one.name:<16} {load_door(one.name).summary}")
+            return
+        try:
+            load_door(name).run(head, address, bind, say)
+        except SetupError:
+            raise
+        except Error as error:
+            raise SetupError(str(error)) from error

@@ -1,0 +1,604 @@
+"""Doors: the messages of each neighbour as orders, and what a bad neighbour does not do."""
+
+import asyncio
+import base64
+import json
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from aiohttp import ClientSession, WSServerHandshakeError, web
+from fakes.talking_head import TalkingHead, until
+
+pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
+
+import gazerig
+from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
+from gazerig.doors.door import Address, Door, DoorLink
+from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
+from gazerig.drivers.plugins import DOOR, SHIPPED, find
+
+
+def brief(orders: Orders) -> list[Any]:
+    """Return orders as names; those of speech with their known duration or the text's length."""
+    return [
+        (o.state, o.seconds) if o.seconds is not None
+        else (o.state, f"{len(o.text)} characters") if o.text else o.state
+        for o in orders
+    ]  # fmt: skip
+
+
+def lva(event: str, **data: Any) -> dict[str, Any]:
+    return {"event": event, "data": data} if data else {"event": event}
+
+
+def rtvi(kind: str, text: str | None = None) -> dict[str, Any]:
+    data = {} if text is None else {"data": {"text": text}}
+    return {"label": "rtvi-ai", "type": kind, "id": "1", **data}
+
+
+def agent(state: str) -> dict[str, Any]:
+    return {"lk.agent.state": state}
+
+
+def wyo(kind: str, audio_s: float | None = None, **data: Any) -> dict[str, Any]:
+    return {"type": kind, "data": data} | ({} if audio_s is None else {"audio_s": audio_s})
+
+
+def audio(seconds: float, bytes_per_s: int = 48_000) -> dict[str, Any]:
+    pcm = bytes(round(seconds * bytes_per_s))
+    return {"type": "response.output_audio.delta", "delta": base64.b64encode(pcm).decode()}
+
+
+def event(kind: str, **rest: Any) -> dict[str, Any]:
+    return {"type": kind, "event_id": "event_1", **rest}
+
+
+ULAW = {"audio": {"output": {"format": {"type": "audio/pcmu"}}}}
+SAID = "Sure, I have set a timer of 5 minutes for the eggs in your kitchen."  # 67 characters
+LVA, RTVI, LK = voice_assistant.VoiceAssistant, pipecat.Pipecat, livekit.LiveKit
+WYO, OAI = wyoming.Wyoming, openai_realtime.OpenAIRealtime
+
+CONVERSATIONS: dict[str, tuple[Callable[[], Any], Sequence[tuple[Mapping[str, Any], list[Any]]]]] = {
+    "voice assistant": (LVA, [
+        (lva("snapshot", muted=False, volume=0.8, ha_connected=True, last_tts_text=None), []),
+        (lva("zeroconf", status="connected"), []),
+        (lva("wake_word_detected"), ["listening"]),
+        (lva("listening"), []),
+        (lva("stt_text", text="set a timer"), ["thinking"]),
+        (lva("thinking"), []),
+        (lva("tts_text", text=SAID), []),
+        (lva("tts_speaking"), [("speaking", "67 characters")]),
+        (lva("wake_word_detected"), ["interrupt"]),  # barge-in
+        (lva("thinking"), ["thinking"]),
+        (lva("tts_text", text="Yes."), []),
+        (lva("tts_speaking"), [("speaking", "4 characters")]),
+        (lva("tts_finished"), ["idle"]),
+        (lva("idle"), []),
+        (lva("listening"), ["listening"]),
+        (lva("muted", muted=True), ["idle"]),
+        (lva("muted", muted=False), []),
+        (lva("timer_ringing", id="1", name="eggs", total_seconds=300, seconds_left=0), []),
+    ]),
+    "out of order": (LVA, [
+        (lva("tts_finished"), []),
+        (lva("tts_speaking"), ["speaking"]),  # no text: no plan
+        (lva("tts_speaking"), []),
+        (lva("thinking"), []),  # of the next sentence
+        (lva("tts_text", text=SAID), [("speaking", "67 characters")]),
+        (lva("pipeline_error", reason="stt"), ["idle"]),
+        ({"event": "tts_text", "data": ["no object"]}, []),
+        ({"event": "tts_text", "data": {"text": 7}}, []),
+        (lva("disconnected"), []),
+    ]),
+    "pipecat": (RTVI, [
+        (rtvi("bot-ready"), []),
+        (rtvi("user-started-speaking"), ["listening"]),
+        (rtvi("user-stopped-speaking"), ["thinking"]),
+        (rtvi("user-transcription", "hello"), []),
+        (rtvi("bot-llm-started"), []),
+        (rtvi("bot-llm-text", "Hello, I am the "), []),
+        (rtvi("bot-started-speaking"), [("speaking", "16 characters")]),
+        (rtvi("bot-llm-text", "head that you see here."), [("speaking", "39 characters")]),
+        (rtvi("bot-tts-text", "Hello,"), []),  # while it is spoken
+        (rtvi("bot-stopped-speaking"), ["listening"]),
+        (rtvi("bot-tts-text", "A sentence that no model wrote."), []),
+        (rtvi("bot-started-speaking"), [("speaking", "31 characters")]),
+        (rtvi("user-started-speaking"), ["interrupt"]),
+        (rtvi("bot-interrupted"), []),
+        (rtvi("bot-stopped-speaking"), []),
+    ]),
+    "livekit": (LK, [
+        (agent("initializing"), []),
+        (agent("listening"), ["listening"]),
+        (agent("thinking"), ["thinking"]),
+        (agent("speaking"), ["speaking"]),
+        ({"user": "listening"}, []),
+        (agent("listening"), ["listening"]),
+        (agent("speaking"), ["speaking"]),
+        ({"user": "speaking"}, ["interrupt"]),
+        (agent("listening"), []),
+        ({"another": "attribute"}, []),
+        (agent(""), ["idle"]),  # the attribute was deleted
+    ]),
+    "wyoming": (WYO, [
+        (wyo("run-pipeline"), []),
+        (wyo("detection", name="ok_nabu"), ["listening"]),
+        (wyo("voice-started"), []),
+        (wyo("voice-stopped"), ["thinking"]),
+        (wyo("transcript", text="set a timer"), []),
+        (wyo("synthesize", text=SAID), []),
+        (wyo("audio-start", rate=22050, width=2, channels=1), [("speaking", "67 characters")]),
+        (wyo("audio-chunk", 2.0), []),
+        (wyo("audio-chunk", 1.5), []),
+        (wyo("audio-stop"), [("speaking", 3.5)]),
+        (wyo("played"), ["idle"]),
+        (wyo("audio-start"), ["speaking"]),
+        (wyo("audio-chunk", 1.0), []),
+        (wyo("detection"), ["interrupt"]),
+        (wyo("audio-chunk", 1.0), []),
+        (wyo("audio-stop"), []),  # of the interrupted sound
+        (wyo("transcript", text=" "), ["idle"]),  # nobody spoke
+    ]),
+    "openai": (OAI, [
+        (event("session.created", session={"output_audio_format": "pcm16"}), []),
+        (event("input_audio_buffer.speech_started", audio_start_ms=1000, item_id="i"), ["listening"]),
+        (event("input_audio_buffer.speech_stopped", audio_end_ms=2000, item_id="i"), ["thinking"]),
+        (event("response.created"), []),
+        (audio(0.5), ["speaking"]),
+        (audio(1.0), []),
+        (event("response.output_audio.done"), [("speaking", 1.5)]),
+        (event("response.done"), []),
+        (event("input_audio_buffer.speech_started"), ["interrupt"]),
+        (event("session.updated", session=ULAW), []),
+        (event("response.created"), ["thinking"]),
+        (audio(1.5, 8_000) | {"type": "response.audio.delta"}, ["speaking"]),
+        (event("response.audio.done"), [("speaking", 1.5)]),
+        (event("output_audio_buffer.stopped"), ["listening"]),
+        (event("input_audio_buffer.committed"), ["thinking"]),
+        (event("response.done"), ["idle"]),  # a call of a function, without speech
+        (event("rate_limits.updated"), []),
+        (event("response.output_audio.delta", delta=None), []),
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONVERSATIONS)
+def test_messages_become_orders(name: str) -> None:
+    make, messages = CONVERSATIONS[name]
+    door = make()
+    assert [brief(door.take(message, 10.0)) for message, _ in messages] == [
+        orders for _, orders in messages
+    ]
+
+
+@pytest.mark.parametrize("name", CONVERSATIONS)
+def test_any_order_of_messages_gives_orders_for_changes_only(name: str) -> None:
+    make, messages = CONVERSATIONS[name]
+    door, former = make(), "idle"
+    for i in range(7 * len(messages)):
+        for order in door.take(messages[i * 5 % len(messages)][0], i * 0.4):
+            assert order.state != former or order.state == "speaking"
+            assert order.seconds is None or order.seconds >= 0.0
+            former = "listening" if order.state == "interrupt" else order.state
+        assert door.talk.state == former
+
+
+@pytest.mark.parametrize(
+    ("make", "message", "remedy"),
+    [
+        (LVA, {"event": "sing"}, "check that the address"),
+        (LVA, {}, "check that the address"),
+        (RTVI, {"type": "bot-started-speaking"}, "forward the RTVI messages"),
+        (LK, agent("dancing"), "ignored"),
+    ],
+)
+def test_a_message_of_another_version_is_named(
+    make: Callable[[], Any], message: Mapping[str, Any], remedy: str
+) -> None:
+    door = make()
+    with pytest.raises(UnknownMessage, match=remedy):
+        door.take(message, 0.0)
+    assert door.talk.state == "idle"
+
+
+def test_played_speech_ends_by_its_length() -> None:
+    door = OAI()
+    for message in (event("response.created"), audio(2.0), event("response.output_audio.done")):
+        door.take(message, 5.0)
+    assert door.due(8.0) == ()  # the answer may continue
+    door.take(event("response.done"), 5.2)
+    assert door.due(6.9) == () and brief(door.due(7.1)) == ["listening"] and door.due(9.0) == ()
+
+
+def test_added_text_moves_the_planned_end_once() -> None:
+    talk = TurnTaking()
+    talk.add_text("x" * 30, 0.0)
+    assert brief(talk.speak(1.0)) == [("speaking", "30 characters")]
+    assert brief(talk.add_text("xx", 2.0)) == []
+    assert brief(talk.add_text("x" * 28, 2.0)) == [("speaking", "45 characters")]  # 15 are spoken
+    assert brief(talk.add_text("x" * 9000, 2.0)) == [("speaking", "4985 characters")]
+
+
+# A neighbour on this computer
+
+
+Scenario = Callable[[DoorLink, TalkingHead], Awaitable[object]]
+
+
+def run(door: Door, scenario: Scenario, address: str = "", bind: str = "") -> TalkingHead:
+    """Run a door with a recording head until a scenario has ended."""
+    head = TalkingHead()
+    link = DoorLink(head.connect, head.said.append, address, bind)
+
+    async def both() -> None:
+        tasks = [asyncio.ensure_future(door.serve(link)), asyncio.ensure_future(link.run())]
+        try:
+            await scenario(link, head)
+            assert not any(task.done() for task in tasks)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    asyncio.run(both())
+    return head
+
+
+def free_port() -> int:
+    import socket
+
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+class Assistant:
+    """A voice assistant's server: sends lines to whoever connects, then waits or closes."""
+
+    def __init__(self) -> None:
+        self.port = free_port()
+        self.sockets: list[web.WebSocketResponse] = []
+
+    async def __aenter__(self) -> "Assistant":
+        app = web.Application()
+        app.router.add_get("/", self._accept)
+        self._runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
+        await self._runner.setup()
+        await web.TCPSite(self._runner, "127.0.0.1", self.port).start()
+        return self
+
+    async def __aexit__(self, *raised: object) -> None:
+        await self._runner.cleanup()
+
+    async def _accept(self, request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse()
+        await socket.prepare(request)
+        self.sockets.append(socket)
+        await socket.send_json(lva("snapshot", muted=False))
+        async for _ in socket:
+            pass
+        return socket
+
+    async def send(self, *messages: Any) -> None:
+        for message in messages:
+            await self.sockets[-1].send_str(
+                message if isinstance(message, str) else json.dumps(message)
+            )
+
+
+@pytest.mark.own_timeouts
+def test_a_voice_assistant_is_followed_and_found_again() -> None:
+    """It is not there at first; it sends nonsense, a flood, and closes; it returns."""
+    assistant = Assistant()
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        assert "waiting for a Linux Voice Assistant at ws" in head.said[0]
+        async with assistant:
+            await until(lambda: assistant.sockets)
+            await assistant.send(lva("wake_word_detected"))
+            await until(lambda: head.states == ["listening"])
+            await assistant.send("{not JSON", "[1]", "[1]", lva("sing"), lva("sing"))
+            await assistant.send(*([lva("thinking"), lva("listening")] * 400), lva("thinking"))
+            await until(lambda: head.last == "thinking" and len(head.orders) > 2)
+            await assistant.sockets[-1].close()
+            await until(lambda: head.last == "idle" and len(assistant.sockets) == 2)
+            await assistant.send(lva("listening"))
+            await until(lambda: head.last == "listening")
+
+    head = run(voice_assistant.DOOR, scenario, f"ws://127.0.0.1:{assistant.port}")
+    assert len(head.orders) < 200  # of 801: the newest ones
+    for words in (
+        "not a JSON object (Exp",
+        "expected an object",
+        "'sing'",
+        "500 messages a second",
+    ):
+        assert sum(words in line for line in head.said) == 1, head.said
+
+
+@pytest.mark.own_timeouts
+def test_a_head_that_ends_is_found_again_with_its_state() -> None:
+    assistant = Assistant()
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        async with assistant:
+            await until(lambda: assistant.sockets)
+            await assistant.send(lva("listening"))
+            await until(lambda: head.states == ["listening"])
+            head.refuses = "the rig is stopped"
+            await assistant.send(lva("thinking"))
+            await until(lambda: any("refuses thinking: the rig is stopped" in s for s in head.said))
+            head.ended, head.refuses = True, ""
+            await assistant.send(lva("tts_speaking"))
+            await until(lambda: any("which has ended" in line for line in head.said))
+            await until(lambda: any("waiting for a head: no rig" in line for line in head.said))
+            head.ended = False
+            await until(lambda: head.states == ["listening", "thinking", "speaking"])
+
+    run(voice_assistant.DOOR, scenario, f"ws://127.0.0.1:{assistant.port}")
+
+
+@pytest.mark.own_timeouts
+def test_rtvi_messages_are_received_but_not_from_other_sites() -> None:
+    bind = f"127.0.0.1:{free_port()}"
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        async with ClientSession() as session:
+            with pytest.raises(WSServerHandshakeError, match="403"):
+                await session.ws_connect(f"ws://{bind}", origin="https://elsewhere.example")
+            sockets = [await session.ws_connect(f"ws://{bind}/x?y=1") for _ in range(8)]
+            with pytest.raises(WSServerHandshakeError, match="503"):
+                await session.ws_connect(f"ws://{bind}")
+            await sockets[0].send_json(rtvi("user-started-speaking"))
+            await until(lambda: head.states == ["listening"])
+            await sockets[0].send_json({"type": "x"})
+            await sockets[0].close()
+            await until(lambda: head.states == ["listening", "idle"])
+
+    head = run(pipecat.DOOR, scenario, bind=bind)
+    assert [line.split(" ")[0] for line in head.said] == ["waiting", "a", "more", "a"]
+
+
+@pytest.mark.own_timeouts
+def test_realtime_sessions_are_relayed_with_their_key() -> None:
+    """The server sees the program's key and question; the program, the server's events."""
+    port, bind = free_port(), f"127.0.0.1:{free_port()}"
+    seen: list[Any] = []
+    sockets: list[web.WebSocketResponse] = []
+
+    async def server(request: web.Request) -> web.WebSocketResponse:
+        seen.append((str(request.rel_url), request.headers["Authorization"]))
+        socket = web.WebSocketResponse(protocols=("realtime",))
+        await socket.prepare(request)
+        sockets.append(socket)
+        async for message in socket:
+            seen.append(message.data)
+        return socket
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        url, key = f"ws://{bind}/v1/realtime?model=m", {"Authorization": "Bearer hush"}
+        async with ClientSession() as session:
+            with pytest.raises(WSServerHandshakeError, match="502"):
+                await session.ws_connect(url, headers=key)
+            app = web.Application()
+            app.router.add_get("/v1/realtime", server)
+            runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
+            await runner.setup()
+            await web.TCPSite(runner, "127.0.0.1", port).start()
+            program = await session.ws_connect(url, headers=key, protocols=("realtime",))
+            assert program.protocol == "realtime"
+            await program.send_str("hello")
+            await until(lambda: "hello" in seen)
+            for one in (event("input_audio_buffer.speech_started"), audio(0.1)):
+                await sockets[0].send_json(one)
+            await sockets[0].send_str("no JSON")
+            assert [(await program.receive_json())["type"] for _ in range(2)][1] == audio(0)["type"]
+            assert (await program.receive()).data == "no JSON"
+            await until(lambda: head.last == "speaking")
+            await sockets[0].send_json(event("response.output_audio.done"))
+            await sockets[0].send_json(event("response.done"))
+            await until(lambda: head.last == "listening")
+            await sockets[0].close(code=4000)
+            while not program.closed:
+                await program.receive()
+            assert program.close_code == 4000
+            await until(lambda: head.last == "idle")
+            await runner.cleanup()
+
+    head = run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
+    assert seen == [("/v1/realtime?model=m", "Bearer hush"), "hello"]
+    assert not any("hush" in line for line in head.said)
+
+
+@pytest.mark.own_timeouts
+def test_a_satellite_s_sound_is_said_and_reported_as_played() -> None:
+    """The package wyoming is the judge: it writes and reads what the door reads and writes."""
+    pytest.importorskip("wyoming", reason="it is in the extra doors")
+    from wyoming.audio import AudioChunk, AudioStart, AudioStop
+    from wyoming.client import AsyncTcpClient
+    from wyoming.info import Describe, Info
+    from wyoming.ping import Ping, Pong
+    from wyoming.snd import Played
+    from wyoming.vad import VoiceStarted
+    from wyoming.wake import Detection
+
+    port = free_port()
+    pcm = bytes(range(256)) * 50  # .4 s
+    shape = {"rate": 16000, "width": 2, "channels": 1}
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        async with (
+            AsyncTcpClient("127.0.0.1", port) as sounds, AsyncTcpClient("127.0.0.1", port) as events
+        ):  # fmt: skip
+            await sounds.write_event(Describe().event())
+            answer = await sounds.read_event()
+            assert answer is not None and [one.name for one in Info.from_event(answer).snd]
+            await sounds.write_event(Ping(text="x").event())
+            answer = await sounds.read_event()
+            assert answer is not None and Pong.from_event(answer).text == "x"
+            await events.write_event(Detection(name="hey").event())
+            await until(lambda: head.states == ["listening"])
+            for one in (AudioStart(**shape), AudioChunk(**shape, audio=pcm), AudioStop()):
+                await sounds.write_event(one.event())
+            answer = await sounds.read_event()
+            assert answer is not None and Played.is_type(answer.type)
+            await until(lambda: head.last == "idle")
+            assert head.pcm == pcm and ("said", 16000, 1) in head.orders
+            assert any(order[:2] == ("speaking", 0.4) for order in head.orders), head.orders
+            # A long sound is interrupted: most of it is never said.
+            head.pcm = b""
+            await sounds.write_event(AudioStart(**shape).event())
+            await sounds.write_event(AudioChunk(**shape, audio=bytes(960_000)).event())
+            await until(lambda: head.last == "speaking")
+            await events.write_event(VoiceStarted().event())
+            await until(lambda: "interrupt" in head.states)
+        await until(lambda: head.last == "idle")
+
+    run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
+
+
+@pytest.mark.own_timeouts
+@pytest.mark.parametrize(
+    "sent",
+    [b"GET / HTTP/1.1\r\n\r\n", b"[]\n", b"{}\n", b"x" * 100_000,
+     b'{"type": "audio-chunk", "payload_length": 99999999999}\n',
+     b'{"type": "audio-start", "data": {"rate": "fast"}}\n',
+     b'{"type": "audio-start", "data_length": 3}\nabc'],
+)  # fmt: skip
+def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent: bytes) -> None:
+    pytest.importorskip("wyoming", reason="it is in the extra doors")
+    port = free_port()
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(sent)
+        assert await reader.read() == b""
+        writer.close()
+        await until(lambda: len(head.said) == 2)
+        assert "no Wyoming event" in head.said[1] and "check the neighbour" in head.said[1]
+
+    run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
+
+
+# In the neighbour's own process
+
+
+def frame(name: str, number: int, **fields: Any) -> Any:
+    return type(name, (), {"id": number, **fields})()
+
+
+def pushed(one: Any, direction: str = "DOWNSTREAM") -> Any:
+    return SimpleNamespace(frame=one, direction=SimpleNamespace(name=direction))
+
+
+def test_an_observer_of_a_pipeline_steers_the_head() -> None:
+    """Frames as of pipecat/frames/frames.py; each is pushed by several processors."""
+    head = TalkingHead()
+
+    async def scenario() -> None:
+        observer = pipecat.HeadObserver(link=DoorLink(head.connect, head.said.append))
+        names = ("UserStartedSpeakingFrame", "AudioRawFrame", "UserStoppedSpeakingFrame",
+                 "BotStartedSpeakingFrame", "InterruptionFrame", "EndFrame")  # fmt: skip
+        for number, name in enumerate(names):
+            one = frame(name, number)
+            for _ in range(3):
+                await observer.on_push_frame(pushed(one))
+            await observer.on_push_frame(pushed(frame(name, number + 100), "UPSTREAM"))
+            wanted = ["listening", "listening", "thinking", "speaking", "interrupt", "idle"]
+            await until(lambda w=wanted[number]: head.last == w)  # type: ignore[misc]
+        await observer.cleanup()
+
+    asyncio.run(scenario())
+    assert head.states == ["listening", "thinking", "speaking", "interrupt", "idle"]
+
+
+def test_the_observer_fits_pipecat() -> None:
+    pytest.importorskip("pipecat", reason="pipecat-ai is large; its users have it")
+    from pipecat.observers.base_observer import BaseObserver
+
+    assert issubclass(pipecat.HeadObserver, BaseObserver)
+
+
+class Emitter:
+    """Calls what was registered, as livekit.rtc.EventEmitter does."""
+
+    def __init__(self) -> None:
+        self.handlers: dict[str, Callable[..., object]] = {}
+        self.remote_participants: dict[str, Any] = {}
+        self.joined: tuple[str, ...] = ()
+
+    def on(self, name: str, handler: Callable[..., object]) -> None:
+        self.handlers[name] = handler
+
+    async def connect(self, *joined: str) -> None:
+        self.joined = joined
+
+    async def disconnect(self) -> None:
+        self.joined = ()
+
+
+def test_an_agent_s_session_steers_the_head() -> None:
+    head, session = TalkingHead(), Emitter()
+
+    async def scenario() -> None:
+        link = livekit.follow(session, link=DoorLink(head.connect, head.said.append))
+        for kind, state in (("agent", "listening"), ("agent", "speaking"), ("user", "speaking")):
+            session.handlers[f"{kind}_state_changed"](SimpleNamespace(new_state=state))
+            await until(lambda s=head.states: len(head.states) > len(s))  # type: ignore[misc]
+        session.handlers["agent_state_changed"](SimpleNamespace(new_state="dancing"))
+        await link.close()
+
+    asyncio.run(scenario())
+    assert head.states == ["listening", "speaking", "interrupt"] and len(head.said) == 1
+
+
+def test_an_agent_in_a_room_steers_the_head() -> None:
+    head, room = TalkingHead(), Emitter()
+
+    async def scenario() -> None:
+        link = DoorLink(head.connect, head.said.append, "ws://room")
+        link.start()
+        room.remote_participants = {"a": SimpleNamespace(attributes=agent("thinking"))}
+        following = asyncio.ensure_future(livekit.follow_room(link, room, "token"))
+        await until(lambda: head.states == ["thinking"])
+        assert room.joined == ("ws://room", "token")
+        room.handlers["participant_attributes_changed"](agent("speaking"), None)
+        await until(lambda: head.last == "speaking")
+        room.handlers["participant_disconnected"](SimpleNamespace(attributes=agent("speaking")))
+        await until(lambda: head.last == "idle")
+        room.handlers["disconnected"]("closed")
+        await following
+        await link.close()
+
+    asyncio.run(scenario())
+    assert room.joined == () and not any("token" in line for line in head.said)
+
+
+def test_a_room_needs_an_address_and_a_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("LIVEKIT_URL", raising=False)
+    link = DoorLink(lambda: None, print)
+    with pytest.raises(gazerig.Error, match="set LIVEKIT_URL"):
+        asyncio.run(livekit.serve(link))
+
+
+# All doors
+
+
+def test_doors_listen_on_this_computer_unless_told_otherwise() -> None:
+    for name in SHIPPED[DOOR]:
+        door = find(DOOR, name).load()
+        assert isinstance(door, Door) and door.summary
+        assert not door.bind or Address.parse(door.bind).host == "127.0.0.1"
+
+
+@pytest.mark.parametrize("bind", ["6055", "host:", "host:99999", ":80", "host:x"])
+def test_a_wrong_address_is_named(bind: str) -> None:
+    with pytest.raises(gazerig.Error, match="is not HOST:PORT"):
+        Address.parse(bind)
