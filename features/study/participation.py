@@ -17,7 +17,6 @@ from gazerig.features.study.data_folder import StudyData
 from gazerig.features.study.design import Condition, StudyDesign
 from gazerig.features.study.journal import (
     FILE,
-    AnswerValue,
     ConsentGiven,
     ItemAnswered,
     ParticipationClosed,
@@ -35,21 +34,13 @@ LEAST_SAME = 8
 
 
 @dataclass(frozen=True)
-class AnswerRow:
-    """One answer, a row of the tidy table.
+class AnswerRow(ItemAnswered):
+    """An answer of a participant, a row of the tidy table.
 
-    trial: None for questions at the end, below 0 in practice
     left_out: reason of its exclusion, "" if it counts
     """
 
     participant: str
-    trial: int | None
-    condition: str
-    questionnaire: str
-    item: str
-    value: AnswerValue
-    ms: float
-    utc: str
     left_out: str = ""
 
 
@@ -121,10 +112,8 @@ def participation(
     answers: dict[tuple[int | None, str, str], AnswerRow] = {}  # the last one to each item
     for one in records:
         if isinstance(one, ItemAnswered):
-            answers[one.trial, one.questionnaire, one.item] = AnswerRow(
-                opened.participant, one.trial, one.condition, one.questionnaire, one.item,
-                one.value, one.ms, one.utc,
-            )  # fmt: skip
+            row = AnswerRow(**vars(one), participant=opened.participant)
+            answers[one.trial, one.questionnaire, one.item] = row
         elif isinstance(one, TrialBegan):
             attempts = found[one.trial, one.side].attempts if (one.trial, one.side) in found else 0
             found[one.trial, one.side] = TrialRow(

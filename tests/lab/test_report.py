@@ -36,7 +36,7 @@ from gazerig.features.lab.report.gaze_trace import (
 from gazerig.features.lab.report.landing import planned_saccades
 from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.features.lab.report.page import (
-    Figure,
+    PageFigure,
     RunHeader,
     band_text,
     make_gauge,
@@ -422,7 +422,8 @@ def test_a_report_writes_over_one_of_before_when_it_is_forced(tmp_path: Path) ->
     run = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
     about, findings = RunHeader("x"), judge_run(run)
     drawing = DRAWINGS[0]
-    figure = Figure(drawing, drawing_png(drawing, [ShownRun("x", run, COLOURS[0])]), "nothing")
+    png = drawing_png(drawing, [ShownRun("x", run, COLOURS[0])])
+    figure = PageFigure(drawing.title, png, "nothing", drawing.key, drawing.group)
     page = report_page(about, run, findings, [figure])
     numbers: list[dict[str, object]] = [{"key": f.band.key} for f in findings]
     out = tmp_path / "x.html"

@@ -18,7 +18,7 @@ import numpy as np
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.page import (
-    Figure,
+    PageFigure,
     RunHeader,
     TextLine,
     banner,
@@ -224,7 +224,7 @@ class ComparedSection(NamedTuple):
 
     name: str
     rows: tuple[ComparedRow, ...]
-    figures: tuple[Figure, ...]
+    figures: tuple[PageFigure, ...]
     left_out: tuple[str, ...]
     basis: tuple[str, ...]
 
@@ -233,14 +233,14 @@ def compare_page(
     abouts: tuple[RunHeader, RunHeader],
     runs: Sequence[GazeTrace],
     differences: Sequence[MeasureDifference],
-    figures: Sequence[Figure],
+    figures: Sequence[PageFigure],
 ) -> str:
     """Return the page as HTML that needs no other file."""
     sections = tuple(
         ComparedSection(
             group,
             tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
-            tuple(p for p in figures if p.drawing.group == group),
+            tuple(p for p in figures if p.group == group),
             _left_out(abouts, runs, group),
             tuple(run.joints.basis(group) for run in runs),
         )

@@ -17,7 +17,6 @@ from gazerig.features.lab.report.face import ReferenceWalk
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.joint_basis import JointBasis
-from gazerig.features.lab.report.plotting import Drawing
 from gazerig.features.lab.report.statistics import MeasureResult, format_number
 from gazerig.robot.analysis.human_norms import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
@@ -47,12 +46,14 @@ _CLASSES = {
 }  # fmt: skip
 
 
-class Figure(NamedTuple):
-    """A drawn figure, and its caption for the runs in it."""
+class PageFigure(NamedTuple):
+    """A drawn figure with its caption; key, group: those of its drawing."""
 
-    drawing: Drawing
+    title: str
     png: bytes
     caption: str
+    key: str = ""
+    group: str = ""
 
     @property
     def data_uri(self) -> str:
@@ -94,7 +95,7 @@ class PageSection(NamedTuple):
 
     name: str
     lines: tuple[TextLine, ...]
-    figures: tuple[Figure, ...]
+    figures: tuple[PageFigure, ...]
     left_out: tuple[str, ...]
     basis: Basis
 
@@ -103,7 +104,7 @@ def report_page(
     about: RunHeader,
     run: GazeTrace,
     findings: Sequence[MeasureResult],
-    figures: Sequence[Figure],
+    figures: Sequence[PageFigure],
     gaze: MutualGazeReport | None = None,
 ) -> str:
     """Return the page of one run as HTML that needs no other file."""
@@ -112,7 +113,7 @@ def report_page(
         PageSection(
             group,
             tuple(finding_line(f, styles) for f in findings if f.band.group == group),
-            tuple(p for p in figures if p.drawing.group == group),
+            tuple(p for p in figures if p.group == group),
             left_out(run.joints, group),
             run.joints.basis(group),
         )
@@ -269,7 +270,7 @@ def refuse_foreign(paths: Collection[Path], force: bool = False) -> None:
 def write_all(
     out: Path,
     page: str,
-    figures: Sequence[Figure],
+    figures: Sequence[PageFigure],
     numbers: Sequence[dict[str, object]],
     force: bool = False,
 ) -> tuple[tuple[Path, ...], Path]:
@@ -280,7 +281,7 @@ def write_all(
     Raises:
         SetupError: something already exists or cannot be written.
     """
-    _, data, *paths = files = report_files(out, [figure.drawing.key for figure in figures])
+    _, data, *paths = files = report_files(out, [figure.key for figure in figures])
     refuse_foreign(files, force)
     make_folder(out.with_name(f"{out.stem}_figures"))
     for path, figure in zip(paths, figures, strict=True):

@@ -22,7 +22,7 @@ from gazerig.features.lab.report import (
 )
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.heads import MutualGazeReport
-from gazerig.features.lab.report.page import Figure, RunHeader, report_page, write_all
+from gazerig.features.lab.report.page import PageFigure, RunHeader, report_page, write_all
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, basis_text, drawing_png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
 from gazerig.robot.analysis.human_norms import BY_KEY, band_applies
@@ -118,7 +118,7 @@ def judge_run(run: GazeTrace) -> tuple[MeasureResult, ...]:
     return tuple(judge(m, BY_KEY[m.key]) for m in measure_run(run))
 
 
-def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[Figure, ...]:
+def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[PageFigure, ...]:
     """Draw every figure of one run, or of two runs together; skip runs without its joints."""
     figures = []
     for count, drawing in enumerate(DRAWINGS):
@@ -127,7 +127,8 @@ def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[Figure, 
         if able:
             basis = basis_text(able, drawing.group)
             caption = drawing.caption.replace("{measured}", basis)
-            figures.append(Figure(drawing, drawing_png(drawing, able), caption))
+            png = drawing_png(drawing, able)
+            figures.append(PageFigure(drawing.title, png, caption, drawing.key, drawing.group))
     progress(DRAWING, 1.0)
     return tuple(figures)
 

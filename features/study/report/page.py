@@ -1,6 +1,5 @@
 """The page of a study's report: texts, tables and figures in its template."""
 
-from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable
 from math import isfinite, nan
@@ -9,7 +8,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from gazerig.features.lab.report.page import render
+from gazerig.features.lab.report.page import PageFigure, render
 from gazerig.features.lab.report.statistics import format_number
 from gazerig.features.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
@@ -45,19 +44,6 @@ class TestLine(NamedTuple):
     notes: tuple[str, ...]
 
 
-class StudyFigure(NamedTuple):
-    """A drawn figure with its caption."""
-
-    title: str
-    png: bytes
-    caption: str
-
-    @property
-    def data_uri(self) -> str:
-        """Return the picture as a data URI for the page."""
-        return f"data:image/png;base64,{b64encode(self.png).decode()}"
-
-
 class MeasureSection(NamedTuple):
     """Section of a measure; rows: condition, n, mean, interval, SD, median."""
 
@@ -65,7 +51,7 @@ class MeasureSection(NamedTuple):
     asked: str
     facts: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    figures: tuple[StudyFigure, ...]
+    figures: tuple[PageFigure, ...]
 
 
 class ChoiceSection(NamedTuple):
@@ -100,7 +86,7 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
         for test in (one.test, *one.further_tests)
         if test is not None
     ]  # fmt: skip
-    forest = StudyFigure(
+    forest = PageFigure(
         "Effects", figures.forest_png(study, [_label(one, study) for one in study.decisions]),
         "Squares: the effect of each hypothesis; lines: its 95 % interval. Right of zero lies what "
         "was expected.",
@@ -231,10 +217,10 @@ def _measure_section(one: MeasureSummary, study: StudyAnalysis) -> MeasureSectio
         if one.alpha is not None and isfinite(one.alpha.value):
             facts.append(Markup("reliability {}").format(apa.effect_text(one.alpha)))
         counted = figures.counts_png(items, study)
-        drawn.append(StudyFigure("Answers to each item", counted, _COUNTS))
+        drawn.append(PageFigure("Answers to each item", counted, _COUNTS))
     elif measure.kind == "item":
-        drawn.append(StudyFigure("Answers", figures.counts_png([one], study), _COUNTS))
-    drawn.append(StudyFigure("Participants and means", figures.paired_png(one, study), _PAIRED))
+        drawn.append(PageFigure("Answers", figures.counts_png([one], study), _COUNTS))
+    drawn.append(PageFigure("Participants and means", figures.paired_png(one, study), _PAIRED))
     rows = tuple(
         (study.label(c.condition), str(c.n), _number_text(c.mean),
          f"{format_number(c.low95)} to {format_number(c.high95)}" if isfinite(c.low95) else "",
