@@ -15,6 +15,7 @@ _KIND_OF_KEY = {
     "gaze.scanpath.transition_matrix": "scanpaths",
     "profile": "profiles",
     "track_files": "",
+    "sound.folders": "",
     "detector.model_file": "",
     "oak.face_model": "",
 }
@@ -28,6 +29,11 @@ class AllowedFolder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = os.path.realpath(folder)
+
+    @property
+    def folder(self) -> Path:
+        """Return the folder."""
+        return Path(self._folder)
 
     def check_file(
         self, given: str, kind: str = "", key: str = "", start: Path | None = None

@@ -40,6 +40,7 @@ _AT_START: dict[str, str] = {
     "joints.*.bus": "servos are searched with it when the bus is opened",
     "joints.*.transmission_points": "positions of a push rod are applied while its servo has no torque",
     "joints.*.servo_speed_deg_s": "positions of the servos are estimated with it from the first goal on",
+    "sound.device": "the process that plays sounds is started with it",
     "track_files": "tracks are read and checked when the rig is read",
     "doors": "their processes are started with the run",
     "couplings.*": "positions of the servos are converted to angles with it from the first reading on",

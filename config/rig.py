@@ -14,6 +14,7 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.sound.params import SoundParams
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.attention.aversion import AversionParams
@@ -23,6 +24,7 @@ from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
 from gazerig.gaze.lids.lids import LidParams
+from gazerig.gaze.mouth.params import MouthParams
 from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
@@ -143,6 +145,7 @@ class GazeConfig:
     sway: Annotated[SwayParams, "random sway of the head"] = field(default_factory=SwayParams)
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
     tracks: Annotated[TrackParams, "tracks added to the gaze"] = field(default_factory=TrackParams)
+    mouth: Annotated[MouthParams, "motion while the head speaks"] = field(default_factory=MouthParams)
     oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = field(default_factory=OculomotorParams)
     # fmt: on
 
@@ -182,6 +185,7 @@ class Rig:
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
     track_files: Annotated[tuple[str, ...], "YAML files with further tracks, relative to this file; file names are track names"] = ()
+    sound: Annotated[SoundParams, "loudspeaker and voice"] = field(default_factory=SoundParams, kw_only=True)
     expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; for a lid, to the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5

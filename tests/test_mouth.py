@@ -15,11 +15,14 @@ from gazerig.gaze.mouth.loudness import (
 from gazerig.gaze.mouth.mouth_keys import (
     Closure,
     JawLimits,
+    MouthKey,
     estimated_closures,
     frame_s,
     mouth_keys,
     phoneme_closures,
 )
+from gazerig.gaze.mouth.speech_sway import sway_keys
+from gazerig.gaze.mouth.stream_mouth import StreamMouth
 from gazerig.gaze.types import Floats
 
 RATE = 16000
@@ -104,3 +107,32 @@ def test_a_pause_keeps_the_mouth_shut_until_the_next_word() -> None:
     ends = [key.time_s for key in keys if 0.45 < key.time_s < 1.6 and key.opening == 0.0]
     assert not [key for key in pause if key.opening > 0.0]
     assert min(ends) < 0.6 and max(ends) > 1.45
+
+
+def test_a_stream_opens_the_mouth_as_the_whole_sound_does() -> None:
+    t_s = np.arange(3 * RATE) / RATE
+    samples = tone(1000, 3.0) * (0.5 - 0.5 * np.cos(2 * np.pi * 4 * t_s))
+    mouth = StreamMouth(RATE, -30.0)
+    for piece in np.array_split(samples, 75):
+        mouth.add(piece)
+    whole = openings(band_pressures(samples, RATE), loud_pressure(samples), -30.0)
+    times = [frame_s(i) for i in range(100, len(whole) - 20)]
+    found = np.array([mouth.opening_at(at_s) for at_s in times])
+    assert np.corrcoef(found, whole[100 : 100 + len(found)])[0, 1] > 0.95
+    assert mouth.opening_at(-1.0) == mouth.opening_at(4.0) == 0.0
+
+
+def test_words_close_the_lips_at_their_letters() -> None:
+    (closure,) = phoneme_closures([("hello", 0.0), ("number", 1.0)], 3.0)[:1]
+    assert closure.begin_s == pytest.approx(1.18)
+    assert len(phoneme_closures([("hello", 0.0), ("number", 1.0)], 3.0)) == 2
+
+
+def test_the_sway_is_bounded_larger_in_loud_parts_and_the_same_each_time() -> None:
+    small, large = (
+        sway_keys([MouthKey(0.0, value), MouthKey(9.0, value)], 9.0, 2.0) for value in (0.0, 1.0)
+    )
+    assert max(abs(key.offset_deg) for key in large) == pytest.approx(2.0)
+    assert max(abs(key.offset_deg) for key in small) == pytest.approx(0.6)
+    assert sway_keys((), 9.0, 2.0) == large
+    assert [key.time_s for key in large] == sorted(key.time_s for key in large)

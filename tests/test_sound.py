@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.drivers.sound.params import NULL_DEVICE, SoundParams
+from gazerig.drivers.sound.params import SILENT_DEVICE, SoundParams
 from gazerig.drivers.sound.playback import PcmQueue, Playback, SoundEvent
 from gazerig.drivers.sound.player import MAX_AHEAD_S, SoundError, SoundPlayer
 from gazerig.drivers.sound.position import PlayedSound
@@ -204,7 +204,7 @@ def test_piper_is_run_with_its_voice_and_its_errors_are_one_line(
 
 @pytest.fixture
 def player() -> Iterator[SoundPlayer]:
-    player = SoundPlayer(NULL_DEVICE)
+    player = SoundPlayer(SILENT_DEVICE)
     yield player
     player.close()
 

@@ -5,8 +5,11 @@ from typing import Annotated, Literal
 
 from gazerig.params import Bounds
 
-NULL_DEVICE = "null"
+SILENT_DEVICE = "silent"
 """Name of the device that plays nothing but keeps time."""
+
+KINDS = (".wav", ".flac", ".mp3", ".ogg")
+"""Endings of sound files."""
 
 
 @dataclass(frozen=True)
@@ -14,7 +17,7 @@ class SoundParams:
     """Loudspeaker and voice of the head."""
 
     # fmt: off
-    device: Annotated[str, "name of the loudspeaker or a part of it; empty: the system's default; null: silent, but keeps time"] = ""
+    device: Annotated[str, "name of the loudspeaker or a part of it; empty: the system's default; silent: plays nothing, keeps time"] = ""
     volume: Annotated[float, Bounds(0, 1), "factor on all sounds"] = 1.0
     latency_ms: Annotated[float, Bounds(0, 1000),
         "delay of the loudspeaker itself, e.g. by Bluetooth; motion waits for it"] = 0.0

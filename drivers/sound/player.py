@@ -21,8 +21,6 @@ from gazerig.drivers.sound.position import PlayedSound, PositionMemory, shared_f
 
 MAX_AHEAD_S = 2.0
 """Longest part of a stream that is stored before it is heard."""
-START_S = 0.12
-"""Time in which a started process plays the first sample of a sound."""
 
 _MODULE = "gazerig.drivers.sound.process"
 _PIECE_BYTES = 60_000
@@ -48,7 +46,7 @@ class SoundPlayer:
     """Sounds on one loudspeaker. The methods are for one thread, except ``position_s``.
 
     Args:
-        device: Name of the loudspeaker, a part of it, "" for the default, or "null".
+        device: Name of the loudspeaker, a part of it, "" for the default, or "silent".
     """
 
     def __init__(self, device: str) -> None:
@@ -71,12 +69,17 @@ class SoundPlayer:
         return None if self._process is None else self._process.pid
 
     def prepare(self) -> None:
-        """Start the process and open the loudspeaker, so that the next sound begins quickly.
+        """Start the process and open the loudspeaker; ``is_open`` reports when it is.
 
         Raises:
             SoundError: miniaudio is missing, or the process cannot be started.
         """
         self._send("prepare")
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether the loudspeaker is open, so that a sound begins without delay."""
+        return self._link is not None and self._memory.is_open
 
     def play(self, path: str, from_s: float, heard_s: float, volume: float = 1.0) -> int:
         """Play a file instead of the present sound; return its number.

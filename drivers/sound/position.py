@@ -4,6 +4,7 @@
     offset 8    uint64    number of the sound
     offset 16   float64   time at which its start is heard, monotonic s
     offset 24   float64   end of the sound that the device has received, s
+    offset 32   uint64    whether a device is open
 
 The position at a time is the time since the start is heard, at most the received end, so it stops
 if the device or a stream stalls. Only the sound's process writes.
@@ -46,6 +47,16 @@ class PositionMemory:
         self._map = mmap.mmap(fd, SIZE)
         view = memoryview(self._map)
         self._counts, self._times = view[:16].cast("Q"), view[16:32].cast("d")
+        self._open = view[32:40].cast("Q")
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether a device is open."""
+        return bool(self._open[0])
+
+    @is_open.setter
+    def is_open(self, value: bool) -> None:
+        self._open[0] = value
 
     def write(self, played: PlayedSound) -> None:
         """Write the record; only the sound's process may call it."""

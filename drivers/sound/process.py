@@ -16,7 +16,7 @@ import miniaudio
 import msgspec
 
 from gazerig.drivers.process.message_link import DONT_WAIT, TOKEN_VARIABLE, MessageLink, open_link
-from gazerig.drivers.sound.params import NULL_DEVICE
+from gazerig.drivers.sound.params import SILENT_DEVICE
 from gazerig.drivers.sound.playback import PcmQueue, Playback, SampleSource, SoundEvent
 from gazerig.drivers.sound.position import PositionMemory
 
@@ -66,7 +66,7 @@ class _Device:
         self.format = rate_hz, channels
         self.playback = playback
         self.filled_s = time.monotonic()
-        null = name == NULL_DEVICE
+        null = name == SILENT_DEVICE
         self._device = miniaudio.PlaybackDevice(
             nchannels=channels,
             sample_rate=rate_hz,
@@ -139,6 +139,7 @@ class _Player:
             self._close()
             playback = Playback(rate_hz, channels, _LATENCY_S, self._memory.write, self._report)
             self._device = _Device(self._name, rate_hz, channels, playback)
+            self._memory.is_open = True
         return self._device
 
     def check(self) -> None:
@@ -164,6 +165,7 @@ class _Player:
         if self._device is not None:
             self._device.close()
         self._device = None
+        self._memory.is_open = False
 
     def _report(self, event: SoundEvent) -> None:
         try:
@@ -216,7 +218,7 @@ def _error_text(error: Exception, device: str) -> str:
     if isinstance(error, miniaudio.MiniaudioError):
         return (
             f"no sound: the loudspeaker {device or 'of the system'} cannot be opened ({error}); connect one "
-            f"or set sound.device ({NULL_DEVICE}: silent)"
+            f"or set sound.device ({SILENT_DEVICE}: none)"
         )
     return str(error)
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.sound.params import KINDS
 from gazerig.drivers.sound.player import SoundError, require_miniaudio
 
-KINDS = (".wav", ".flac", ".mp3", ".ogg")
 MOUTH_RATE_HZ = 16000
 """Rate at which the mouth reads a sound."""
 _PLAYED_HZ = 48000

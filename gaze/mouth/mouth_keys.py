@@ -25,6 +25,7 @@ _SILENT, _SILENT_S = 0.03, 0.06
 _DIP_SHARE, _DIP_FRAMES = 0.4, 15
 _LEAST_GAP_S = 0.02
 _P_CLOSED_S = 0.055
+_LONGEST_PHONEME, _LONGEST_LETTER_S = 2, 0.09
 _B_SHARE, _M_SHARE = 0.5, 0.65
 
 
@@ -56,25 +57,28 @@ class MouthKey(NamedTuple):
     opening: float
 
 
-def phoneme_closures(phonemes: Sequence[tuple[str, float]], end_s: float) -> tuple[Closure, ...]:
-    """Return the closures of spoken phonemes.
+def phoneme_closures(spoken: Sequence[tuple[str, float]], end_s: float) -> tuple[Closure, ...]:
+    """Return the closures of spoken phonemes or words.
 
-    A p is reported at its release, which the closure precedes; b and m begin with it.
+    A p is reported at its release, which the closure precedes; b and m begin with it. The letters
+    of a word follow each other evenly.
 
     Args:
-        phonemes: (name, begin in s) in the names of espeak-ng or IPA.
+        spoken: (name, begin in s): phonemes in the names of espeak-ng or IPA, or words.
         end_s: End of the last one.
     """
     closures = []
-    for (name, begin_s), (_, next_s) in pairwise([*phonemes, ("", end_s)]):
-        if name[:1] not in CLOSED_PHONEMES:
-            continue
-        length_s = next_s - begin_s
-        if name[:1] == "p":
-            closures.append(Closure(max(0.0, begin_s - _P_CLOSED_S), begin_s))
-        else:
-            share = _B_SHARE if name[:1] == "b" else _M_SHARE
-            closures.append(Closure(begin_s, begin_s + share * length_s))
+    for (name, begin_s), (_, next_s) in pairwise([*spoken, ("", end_s)]):
+        length_s = (next_s - begin_s) / max(1, len(name))
+        if len(name) > _LONGEST_PHONEME:
+            length_s = min(length_s, _LONGEST_LETTER_S)
+        for i, letter in enumerate(name.lower()):
+            at_s = begin_s + i * length_s
+            if letter == "p":
+                closures.append(Closure(max(0.0, at_s - _P_CLOSED_S), at_s))
+            elif letter in CLOSED_PHONEMES:
+                share = _B_SHARE if letter == "b" else _M_SHARE
+                closures.append(Closure(at_s, at_s + share * length_s))
     return tuple(closures)
 
 
