@@ -22,6 +22,7 @@ from gazerig.gaze.attention.bottom_up import BottomUpParams
 from gazerig.gaze.attention.idle import IdleParams
 from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDownParams
+from gazerig.gaze.attention.turn_gaze import TurnParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
 from gazerig.gaze.lids.lids import LidParams
 from gazerig.gaze.mouth.params import MouthParams
@@ -137,6 +138,7 @@ class GazeConfig:
     attention: Annotated[AttentionParams, "who wins"] = field(default_factory=AttentionParams)
     idle: Annotated[IdleParams, "idle gaze without a target"] = field(default_factory=IdleParams)
     aversion: Annotated[AversionParams, "gaze aversion during conversation"] = field(default_factory=AversionParams)
+    conversation: Annotated[TurnParams, "gaze in reported turns of a conversation"] = field(default_factory=TurnParams)
     scanpath: Annotated[ScanpathParams, "scanpath over a face"] = field(default_factory=ScanpathParams)
     saccade: Annotated[SaccadeParams, "saccades of the eyes"] = field(default_factory=SaccadeParams)
     pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = field(default_factory=PursuitParams)

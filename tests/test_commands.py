@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from gazerig.config.schema import load_rig
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
+from gazerig.gaze.attention.turn_gaze import TurnGaze, TurnParams
 from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.gaze.track.expression import Expressions
 from gazerig.gaze.track.track import TrackParams
@@ -224,7 +225,9 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
     lids = Lids(LidParams(), np.random.default_rng(1))
     none = TrackChoices({}, TrackPlayer(0), TrackParams(), ("eyes_pan",), {})
     aversion = Aversion(AversionParams(), np.random.default_rng(2))
-    menus = Menus(aversion, lids, Expressions({}, 0.5, 0), none)
+    unused: Any = None  # no turn is reported
+    turns = TurnGaze(TurnParams(), aversion, unused, np.random.default_rng(3))
+    menus = Menus(turns, lids, Expressions({}, 0.5, 0), none)
     for asked in ("none" if mode != "none" else "talk", mode):
         menus.choose(Ask("conversation", asked), TopDown(TopDownParams()), 0.0)
     expected_of = "rest" if mode == "none" else "conversation"

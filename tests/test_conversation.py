@@ -2,15 +2,21 @@
 
 import json
 from collections.abc import Callable, Iterator
-from math import nan
+from math import inf, nan
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pytest
 from commanded_robot import Running, running_desk
 
 import gazerig
+from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
+from gazerig.gaze.attention.aversion import Aversion, AversionParams
+from gazerig.gaze.attention.turn_gaze import NOD, TurnGaze, TurnParams, TurnState
+from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
@@ -209,3 +215,108 @@ def test_reports_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -
     assert ticks[-1].conversation.end_reason == "not renewed"
     again = rerun(recording)
     assert again.is_same and again.sent_bytes_same and not again.notes
+
+
+# Gaze
+
+
+def share_on(rig: Running, face: int, seconds: float) -> float:
+    """Return the share of the time in which a person is the target, also while looking away."""
+    ticks = rig.go(seconds)
+    return sum(one.target.id == face for one in ticks) / len(ticks)
+
+
+def wait_for(rig: Running, kind: str, within_s: float) -> float:
+    """Return the time until the target is of a kind, inf if it is not in time."""
+    start_s = rig.ticks[-1].t_s
+    for tick in rig.go(within_s):
+        if tick.target.kind == kind:
+            return tick.t_s - start_s
+    return inf
+
+
+def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(rig: Running) -> None:
+    rig.do(Talk("listening", stay=True), 2.0)
+    rig.do(Talk("thinking", stay=True))
+    assert wait_for(rig, "away", 0.3) < 0.05
+    rig.do(Talk("speaking", seconds=8.0, stay=True), 0.5)
+    assert rig.ticks[-1].target.kind == "away"  # the look of thinking continues
+    late = [tick for tick in rig.go(9.0) if tick.t_s > rig.ticks[-1].t_s - 2.0]
+    assert {tick.target.kind for tick in late} == {"face"}  # the end, and the time after it
+    rig.do(Talk("thinking", stay=True), 0.5)
+    assert rig.ticks[-1].target.kind == "away"
+    rig.do(Talk("interrupt", stay=True))
+    assert wait_for(rig, "face", 0.3) < 0.02
+
+
+def test_a_short_answer_is_given_with_the_gaze_on_the_face(rig: Running) -> None:
+    rig.do(Talk("thinking", stay=True), 1.0)
+    rig.do(Talk("speaking", text="Yes, of course.", stay=True))
+    assert {tick.target.kind for tick in rig.go(1.2)} == {"face"}
+
+
+def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
+    made = assemble(
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=2, scene="three-people")
+    )
+    made.robot.start(made.clock)
+    rig = Running(made)
+    rig.go(12.0)
+    percept = rig.ticks[-1].percept
+    assert percept is not None
+    addressee = next(face.id for face in percept.faces if face.id != rig.ticks[-1].target.id)
+    rig.do(Talk("speaking", addressee, seconds=60.0, stay=True), 0.5)
+    assert rig.ticks[-1].target.id == addressee
+    assert 0.6 < share_on(rig, addressee, 30.0) < 0.95
+    rig.do(Talk("listening", stay=True), 2.0)
+    on, alone, shifts, onset = 0, 0, list[float](), (-1, 0.0)
+    for tick in rig.go(60.0):
+        assert tick.percept is not None
+        speaks = [face.id for face in tick.percept.faces if face.speaks]
+        if len(speaks) == 1:
+            if speaks[0] != onset[0]:
+                onset = (speaks[0], tick.t_s)
+            alone, on = alone + 1, on + (tick.target.id == speaks[0])
+            if tick.target.id == speaks[0] and onset[1] > 0.0:
+                shifts.append(tick.t_s - onset[1])
+                onset = (speaks[0], -1.0)
+    assert on / alone > 0.8
+    assert len(shifts) > 5 and sorted(shifts)[len(shifts) // 2] < 0.4
+    made.robot.stop()
+    made.close()
+
+
+def test_nods_are_off_and_each_head_has_its_own_rate() -> None:
+    def times(nods: float, seed: int) -> list[float]:
+        rng = np.random.default_rng(seed)
+        params, unused = TurnParams(nods_per_min=nods), Aversion(AversionParams(), rng)
+        ignored: Any = SimpleNamespace(converse=lambda *of: None)
+        turns = TurnGaze(params, unused, ignored, rng)
+        turns.enter("listening", 1, None, 0.0, 0.0)
+        return [0.1 * n for n in range(6000) if turns.step(0.1 * n) == NOD]
+
+    assert times(0.0, 1) == []
+    counts = [len(times(8.0, seed)) for seed in range(6)]
+    assert times(8.0, 1) == times(8.0, 1) and len(set(counts)) > 3
+    assert 20 < sum(counts) / 6 < 200  # in ten minutes
+
+
+def test_a_listener_nods_on_the_robot() -> None:
+    with gazerig.open("desk", fast=True, scene="face-to-face") as head:
+        head.set({"gaze.conversation.nods_per_min": 30.0})
+        head.listening()
+        assert head.run_until(lambda state: any(one.name == NOD for one in state.tracks), 20.0)
+
+
+def test_published_laws_stay_a_choice() -> None:
+    rng = np.random.default_rng(1)
+    aversion = Aversion(AversionParams(), rng)
+    ignored: Any = SimpleNamespace(converse=lambda *of: None)
+    turns = TurnGaze(TurnParams(role_law="eyes_alive"), aversion, ignored, rng)
+    for state, mode in (("listening", "listen"), ("thinking", "think"), ("speaking", "talk")):
+        turns.enter(cast(TurnState, state), None, None, 0.0, 0.0)
+        assert aversion.mode == mode
+    turns.choose_mode("think", 0.0)
+    assert aversion.mode == "talk" and turns.chosen_mode == "think"
+    turns.enter("idle", None, None, 0.0, 0.0)
+    assert aversion.mode == "think"

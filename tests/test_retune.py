@@ -130,7 +130,7 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
 
 # Return the place of a section's parameters; limits of joints concern both worlds.
 OF_GAZE = (
-    "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion",
+    "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion", "conversation",
     "oculomotor", "saccade", "pursuit", "head", "breathing", "lids",
     "tracks",
 )  # fmt: skip

@@ -32,6 +32,10 @@ _SPEED_OVER_S = 0.2  # longest interval between two positions for a speed of the
 _LONGEST_EXTRA_S = 6.0  # beyond 15 s on one face a look is a stare
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
+_TURNS_S = 1.5
+"""Time after a change of speaker or addressee in which only they are looked at."""
+_URGENT = 3.0
+"""Factor of their salience in this time, if a voice agent has reported the change."""
 
 
 class Attention:
@@ -95,6 +99,22 @@ class Attention:
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
+        self._focus: tuple[float, float] | None = None
+        self._partner: int | None = None
+        self._turned_s = self._reported_s = -inf
+
+    def converse(self, focus: tuple[float, float] | None, partner: int | None, t_s: float) -> None:
+        """Let the choice among people follow a conversation.
+
+        Args:
+            focus: share of the looks at several people that the partner gets, 0: the share of
+                those who speak; and the least salience of faces. None: no conversation.
+            partner: id of the partner or addressee, None if unknown.
+            t_s: present time.
+        """
+        if (focus, partner) != (self._focus, self._partner) and focus is not None:
+            self._turned_s = self._reported_s = self._changed_s = t_s
+        self._focus, self._partner = focus, partner
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target at ``t_s``."""
@@ -151,7 +171,10 @@ class Attention:
         self._persons.update(percept, state.p_world_head_m, recovery_s)
         unseen_s = self._persons.may_speak_unseen_s if self._params.speaker_share > 0.0 else -inf
         bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s, unseen_s)
-        self._speakers = self._persons.speaking.union(bodies.ids[len(percept.bodies) :])
+        speaking = self._persons.speaking
+        if self._focus is not None and speaking.difference(self._speakers):
+            self._turned_s = t_s
+        self._speakers = speaking.union(bodies.ids[len(percept.bodies) :])
         if self.top_down.plans:
             self.top_down.plan(percept, state.p_world_head_m, t_s)
         trait = self.top_down.rule.person
@@ -236,6 +259,8 @@ class Attention:
         rule = [0.0] * (n + 1)
         amount = [*[terms.total for terms in motion], 0.0]
         point = rule_target is not None and rule_target.point_world_m is not None
+        if rule_target is not None and self._focus is not None:
+            rule_target = self._urge(rule_target, t_s)
         if rule_target is not None:
             wanted = [n] if point else rule_target.rows
             for row in wanted:
@@ -254,6 +279,21 @@ class Attention:
         return TargetComparison(
             bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
         )
+
+    def _urge(self, rule_target: RuleTarget, t_s: float) -> RuleTarget:
+        """Return the targets of a rule with the salience of faces in a conversation."""
+        if self._focus is None or self.top_down.rule.kind != "face":
+            return rule_target
+        least = self._focus[1] * (_URGENT if t_s - self._reported_s < _TURNS_S else 1.0)
+        return rule_target._replace(salience=max(rule_target.salience, least))
+
+    def _favoured(self, ids: list[int]) -> tuple[frozenset[int], float]:
+        """Return the people who have a share of the looks together, and that share."""
+        share, partner = self._params.speaker_share, [id for id in ids if id == self._partner]
+        found = self._speakers.intersection(ids)
+        if self._focus is not None and partner and (self._focus[0] > 0.0 or not found):
+            return frozenset(partner), self._focus[0] or share
+        return found, share
 
     def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
         """Return the limit of each body's motion, and the share of it that counts."""
@@ -296,12 +336,14 @@ class Attention:
             factor * one * (rule_target.stay if id == self._stay.id else 1.0)
             for id, factor, one in zip(named, factors, mine, strict=True)
         ]
+        if t_s - self._turned_s < _TURNS_S and (favoured := self._favoured(named)[0]):
+            shares = [one if id in favoured else 0.0 for id, one in zip(named, shares, strict=True)]
         most = max(*shares, 1e-9)
         return [one / most for one in shares]
 
     def _favour_speakers(self, ids: list[int], weights: list[float]) -> list[float]:
         """Return the weights of people, in which those who may speak have their share."""
-        share, speaking = self._params.speaker_share, self._speakers
+        speaking, share = self._favoured(ids)
         spoken = sum(one for id, one in zip(ids, weights, strict=True) if id in speaking)
         mute = sum(weights) - spoken
         if share == 0.0 or spoken <= 0.0 or mute <= 0.0:

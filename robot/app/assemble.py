@@ -17,6 +17,7 @@ from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
+from gazerig.gaze.attention.turn_gaze import TurnGaze
 from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
@@ -243,6 +244,7 @@ class _Generators(NamedTuple):
     head: np.random.Generator
     sway: np.random.Generator
     stays: np.random.Generator
+    turns: np.random.Generator
 
 
 def _build_components(
@@ -262,6 +264,10 @@ def _build_components(
     moves = motion_models(rig, random.head, random.sway)
     field_of_view, bottom_up = FieldOfView(rig.gaze.field_of_view), BottomUp(rig.gaze.bottom_up)
     top_down, idle = TopDown(rig.gaze.top_down), Idle(rig.gaze.idle, random.idle)
+    attention = Attention(
+        rig.gaze.attention, field_of_view, bottom_up, top_down, idle, random.reaction, random.stays
+    )
+    aversion = Aversion(rig.gaze.aversion, random.aversion)
     animation = Animation(further_joints(rig.joints), animation_tables(rig))
     return Components(
         body=body,
@@ -286,21 +292,14 @@ def _build_components(
             kinematics.body_volumes,
         ),
         tracker=tracker,
-        attention=Attention(
-            rig.gaze.attention,
-            field_of_view,
-            bottom_up,
-            top_down,
-            idle,
-            random.reaction,
-            random.stays,
-        ),  # fmt: skip
+        attention=attention,
         field_of_view=field_of_view,
         bottom_up=bottom_up,
         top_down=top_down,
         idle=idle,
         scanpath=Scanpath(rig.gaze.scanpath, walk, random.scanpath),
-        aversion=Aversion(rig.gaze.aversion, random.aversion),
+        aversion=aversion,
+        conversation=TurnGaze(rig.gaze.conversation, aversion, attention, random.turns),
         oculomotor=oculomotor(rig, kinematics, moves, lids, random.endpoint),
         saccade=moves.saccade,
         pursuit=moves.pursuit,
@@ -341,6 +340,7 @@ def _build_robot(
         substitutes.chooser(chooser),
         parts.scanpath,
         parts.aversion,
+        parts.conversation,
         parts.oculomotor,
         parts.lids,
         parts.animation,

@@ -19,6 +19,7 @@ from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
+from gazerig.gaze.attention.turn_gaze import TurnGaze
 from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.head import HeadModel
@@ -71,6 +72,7 @@ class Components(NamedTuple):
     idle: Idle
     scanpath: Scanpath
     aversion: Aversion
+    conversation: TurnGaze
     oculomotor: Oculomotor
     saccade: SaccadeModel
     pursuit: Pursuit
@@ -102,7 +104,7 @@ class _PreparedChange(NamedTuple):
 
 
 _ALIKE = (
-    "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "saccade", "pursuit",
+    "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "conversation", "saccade", "pursuit",
     "breathing", "sway", "lids",
 )  # fmt: skip
 """Sections of the gaze parameters whose part of the same name needs no other parameters."""

@@ -3,14 +3,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
 
-from gazerig.gaze.attention.aversion import MODES, Aversion, AversionMode
+from gazerig.gaze.attention.aversion import MODES
 from gazerig.gaze.attention.top_down import TopDown
+from gazerig.gaze.attention.turn_gaze import TurnGaze
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.expression import Expressions
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import NO_TRACK, Ask, Command, Express, Jog, Play, SetLevel
-from gazerig.robot.model.conversation import ConversationState, TalkState
+from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.joint import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
@@ -24,31 +25,23 @@ LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
 }
 """Commands for the lids."""
 
-_ROLES: dict[TalkState, AversionMode | None] = {
-    "idle": None, "listening": "listen", "thinking": "think", "speaking": "talk",
-    "interrupted": "listen",
-}  # fmt: skip
-"""State of conversation -> mode of aversion, None for the chosen one."""
-
 
 class Menus:
     """The menus of behaviours, conversation, lids, expressions and tracks."""
 
     def __init__(
-        self, aversion: Aversion, lids: Lids, expressions: Expressions, tracks: TrackChoices
+        self, turn_gaze: TurnGaze, lids: Lids, expressions: Expressions, tracks: TrackChoices
     ) -> None:
-        self._aversion = aversion
+        self._turn_gaze = turn_gaze
         self._lids = lids
         self._expressions = expressions
         self._tracks = tracks
-        self._mode: AversionMode = "none"
-        self._role: AversionMode | None = None
 
     def choices(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
         menus = {
             "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
-            "conversation": _put_first(self._mode, MODES),
+            "conversation": _put_first(self._turn_gaze.chosen_mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }
         if names := self._expressions.names:
@@ -64,8 +57,8 @@ class Menus:
             top_down.behave(command.choice)
         elif command.menu == "conversation":
             mode = next(mode for mode in MODES if mode == command.choice)
-            self._mode = mode
-            self._apply_mode(t_s)
+            self._turn_gaze.choose_mode(mode, t_s)
+            self._set_blinks()
         elif command.menu == "expression":
             self._expressions.express(command.choice)
         else:
@@ -73,13 +66,11 @@ class Menus:
 
     def converse(self, state: ConversationState, t_s: float) -> None:
         """Let gaze and lids follow a state of conversation; when idle, the chosen mode."""
-        self._role = _ROLES[state.state]
-        self._apply_mode(t_s)
+        self._turn_gaze.enter(state.state, state.partner, state.ends_s, state.confidence, t_s)
+        self._set_blinks()
 
-    def _apply_mode(self, t_s: float) -> None:
-        mode = self._role or self._mode
-        self._aversion.converse(mode, t_s)
-        self._lids.set_mode("rest" if mode == "none" else "conversation")
+    def _set_blinks(self) -> None:
+        self._lids.set_mode("conversation" if self._turn_gaze.converses else "rest")
 
 
 def refuse_impossible(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from gazerig.gaze.attention.turn_gaze import TurnGaze
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.track import KEEP
@@ -219,6 +220,14 @@ class CommandExecutor:
             by = f" for {command.who}" if command.who else ""
             self._messages.append(f"track{by}: {reply.text()}")
         return reply
+
+    def follow_turn(self, turn_gaze: TurnGaze, t_s: float) -> None:
+        """Let the gaze follow the present turn, and play a listener's nod or brow flash."""
+        name = turn_gaze.step(t_s)
+        if name and not self._stop.stop_reason and not self._lead.active:
+            reply = self._play(Play(name, who="conversation"), t_s)
+            if reply.refused:
+                self._messages.append(f"track for conversation {reply.text()}")
 
     def direct_by_track(
         self, target: Target, percept: Percept | None, pose: GazeState, t_s: float

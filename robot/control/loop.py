@@ -8,6 +8,7 @@ from typing import NamedTuple
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.aversion import Aversion
+from gazerig.gaze.attention.turn_gaze import TurnGaze
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.scanpath.scanpath import Scanpath
@@ -64,6 +65,7 @@ class Robot:
         attention: Chooses the target.
         scanpath: Chooses the part of a face.
         aversion: Looks away in a conversation.
+        turn_gaze: Lets the gaze follow reported turns.
         oculomotor: Target to eyes, head and lids; reports whether the gaze has arrived.
         lids: Lids, for winks and sleepiness.
         animation: Tracks and expressions on top of the gaze.
@@ -84,6 +86,7 @@ class Robot:
         attention: TargetChooser,
         scanpath: Scanpath,
         aversion: Aversion,
+        turn_gaze: TurnGaze,
         oculomotor: Oculomotor,
         lids: Lids,
         animation: Animation,
@@ -101,8 +104,9 @@ class Robot:
         self._poses = poses
         self._scanpath = scanpath
         self._aversion = aversion
+        self._turn_gaze = turn_gaze
         self._oculomotor = oculomotor
-        self._menus = Menus(aversion, lids, animation.expressions, tracks)
+        self._menus = Menus(turn_gaze, lids, animation.expressions, tracks)
         self._animation = animation
         self._tracks = tracks
         self._guard = guard
@@ -239,6 +243,8 @@ class Robot:
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
+        if self._conversation.active:
+            self._executor.follow_turn(self._turn_gaze, t_s)
         chosen = self.attention.choose(percept, pose, t_s)
         chosen = self._executor.direct_by_track(chosen, percept, pose, t_s)
         target = self._lead.target(chosen, percept, t_s)

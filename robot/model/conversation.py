@@ -1,11 +1,10 @@
 """State of a conversation, as a voice agent reports it, and its end."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
+from gazerig.gaze.attention.turn_gaze import TurnState
 from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.lease import Lease
-
-TalkState = Literal["idle", "listening", "thinking", "speaking", "interrupted"]
 
 CHARACTERS_PER_S = 15.0
 """Speed of speech, for the end of a text without times."""
@@ -38,7 +37,7 @@ class ConversationState(NamedTuple):
     """
 
     number: int = 0
-    state: TalkState = "idle"
+    state: TurnState = "idle"
     partner: int | None = None
     since_s: float = 0.0
     ends_s: float | None = None
@@ -77,7 +76,7 @@ class Conversation:
             ValueError: There is no speech or thought to interrupt.
         """
         now, active = self.state, self.active
-        state: TalkState = "interrupted" if command.state == "interrupt" else command.state
+        state: TurnState = "interrupted" if command.state == "interrupt" else command.state
         if state == "interrupted" and now.state not in ("thinking", "speaking"):
             raise ValueError(
                 f"there is nothing to interrupt: the state is {now.state}; report speaking or "
