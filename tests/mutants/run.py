@@ -30,6 +30,7 @@ COPIED = (
     "api",
     "config",
     "docs",
+    "doors",
     "drivers",
     "examples",
     "features",
