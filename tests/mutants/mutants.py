@@ -96,7 +96,7 @@ MUTANTS = (
     Mutant("gaze/lids/lids.py", 'return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min',
            "return par.blinks_per_min", "a conversation does not change the rate of blinks", ("lids",)),
     Mutant("robot/control/command_choices.py",
-           'self._lids.set_mode("rest" if mode == "none" else "conversation")', "pass",
+           'self._lids.set_mode("conversation" if self._turn_gaze.converses else "rest")', "pass",
            "asking for a conversation does not reach the lids", ("commands", "profiles")),
     Mutant("gaze/attention/aversion.py", "looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))",
            "looking = add(scale(ahead, cos(angle)), scale(aside, -sin(angle)))",
