@@ -117,6 +117,7 @@ class AsyncHead:
     set_track_speed = _order(Head.set_track_speed)
     end_track = _order(Head.end_track)
     sync_track = _order(Head.sync_track)
+    say = _order(Head.say)
     express = _order(Head.express)
     level = _order(Head.level)
     converse = _order(Head.converse)

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
+from gazerig.drivers.sound.params import KINDS
 from gazerig.order import Order
 from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.head_state import (
@@ -33,6 +34,7 @@ from gazerig.robot.model.commands import (
     MoveOpponent,
     Play,
     Resume,
+    Say,
     SetLevel,
     Stop,
     SyncTrack,
@@ -40,6 +42,9 @@ from gazerig.robot.model.commands import (
     Value,
 )
 from gazerig.robot.model.outcome import Progress
+
+STREAM_AHEAD_S = 1.0
+"""Length of a stream that is sent before it is heard."""
 
 
 class Head(ABC):
@@ -270,6 +275,38 @@ class Head(ABC):
             up_m: z of it.
         """
         return self._send(MoveOpponent((ahead_m, left_m, up_m)))
+
+    def say(
+        self, what: str | Path | Iterable[bytes], *, rate_hz: int = 16000, channels: int = 1,
+        volume: float = 1.0, sway: bool = True, spoken: Iterable[tuple[str, float]] = (),
+    ) -> Order:  # fmt: skip
+        """Say a sound file, a text, or a stream, with the mouth of a rig that has one.
+
+        A text needs espeak-ng or piper. A stream is heard 0.15 s after its pieces arrive; this
+        method returns when its last piece has been accepted.
+
+        Args:
+            what: a file (.wav, .flac, .mp3, .ogg), a text, or pieces of a stream: samples, signed,
+                16 bits, channels interleaved, of 20 to 60 ms each.
+            rate_hz: rate of a stream.
+            channels: number of channels of a stream, 1 or 2.
+            volume: factor 0..1 on a file or a text.
+            sway: whether the head sways slightly; for a file or a text.
+            spoken: phonemes or words of a file with their begins in seconds, for closed lips.
+
+        Raises:
+            Refused: it cannot be said; the message names the file or program and the remedy.
+        """
+        if not isinstance(what, str | Path):
+            return self._say_stream(what, rate_hz, channels)
+        text = str(what)
+        if Path(text).suffix.lower() in KINDS and Path(text).is_file():
+            text = str(Path(text).absolute())
+        return self._send(Say(text, volume, sway, tuple(spoken), self._who))
+
+    @abstractmethod
+    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
+        """Say a stream; return when its last piece has been accepted."""
 
     def converse(self, mode: str) -> Order:
         """Look away and blink as speakers or listeners do.

@@ -6,20 +6,22 @@ import os
 import signal
 import threading
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from gazerig.config.faults import ConfigError
+from gazerig.drivers.sound.player import SoundError
 from gazerig.errors import Error, HeadEnded, Refused
-from gazerig.head import Head
+from gazerig.head import STREAM_AHEAD_S, Head
 from gazerig.order import Order
 from gazerig.program_signals import SIGNALS
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.app.voice import Voice
 from gazerig.robot.control.head_state import HeadEvent, HeadState, head_state
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.line_queue import LineQueue
@@ -27,8 +29,9 @@ from gazerig.robot.control.loop import TickLoop
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Command, Value
+from gazerig.robot.model.commands import Command, Say, Value
 from gazerig.robot.model.outcome import Progress
+from gazerig.robot.model.reply import CommandReply
 
 _LOG = logging.getLogger("gazerig")
 _POLL_S = 0.004
@@ -103,8 +106,10 @@ class LocalHead(Head):
     def _send(self, command: Command) -> Order:
         robot = self._active_run().assembly.robot
         try:
+            if isinstance(command, Say):
+                command = self._voice().prepare(command)
             ticket = robot.command(command)
-        except ValueError as error:
+        except (ValueError, SoundError) as error:
             raise Refused(str(error)) from None
         order = Order(self, lambda: ticket.wait(0.0))
         self._feed.follow(order._update_outcome)
@@ -123,6 +128,12 @@ class LocalHead(Head):
         tuning = self._active_run().tuning
         assert tuning is not None, "only a run without a program has none"
         return tuning
+
+    def _voice(self) -> Voice:
+        """Return the voice of the run; raises as ``_active_run`` does."""
+        voice = self._active_run().voice
+        assert voice is not None, "only a run without a program has none"
+        return voice
 
     def _compose(self) -> session.ComposedRun:
         if self._composed is not None:
@@ -224,6 +235,17 @@ class RunningHead(LocalHead):
             if now_s >= end_s:
                 return
             self._clock.sleep_until(min(now_s + _POLL_S, end_s))
+
+    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
+        for piece in pieces:
+            try:
+                ahead_s = self._voice().feed(piece, rate_hz, channels)
+            except (ValueError, SoundError) as error:
+                raise Refused(str(error)) from None
+            if ahead_s > STREAM_AHEAD_S:
+                self.sleep(ahead_s - STREAM_AHEAD_S)
+        self._voice().finish()
+        return Order(self, CommandReply)
 
     def _run(self, composed: session.ComposedRun) -> None:
         """Run from torque on to torque off; the target of the loop's thread."""
@@ -352,6 +374,14 @@ class SimulatedHead(LocalHead):
             if condition(self.state):
                 return True
         return False
+
+    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
+        """Say the whole stream; its pieces are read first, as time does not pass meanwhile."""
+        try:
+            speech = self._voice().prepare_stream(tuple(pieces), rate_hz, channels, self._who)
+        except (ValueError, SoundError) as error:
+            raise Refused(str(error)) from None
+        return self._send(speech)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self.time_s + seconds - 1e-9

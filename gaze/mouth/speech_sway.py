@@ -48,6 +48,6 @@ def _loud_shares(mouth: Sequence[MouthKey], times_s: Floats) -> Floats:
     if not mouth:
         return np.ones(len(times_s))
     around_s = times_s[:, None] + np.linspace(-_AVERAGED_S, _AVERAGED_S, 11)
-    opening = np.interp(around_s, *zip(*mouth, strict=True))
+    opening = np.interp(around_s, [key.time_s for key in mouth], [key.opening for key in mouth])
     shares: Floats = np.minimum(1.0, _LEAST_SHARE + 2.0 * opening.mean(axis=1))
     return shares

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import radians
+from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -11,6 +12,8 @@ from gazerig.config.schema import load_walk
 from gazerig.config.shipped_files import shipped_names
 from gazerig.config.tracks import tracks_of
 from gazerig.drivers.camera.depth_roi import depth_at
+from gazerig.drivers.sound.player import SoundError
+from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.aversion import Aversion
@@ -22,6 +25,7 @@ from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.gaze.track.animation import Animation
+from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.robot.app.camera_factory import (
     camera_placement,
     camera_poses,
@@ -50,6 +54,7 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.moved_opponent import BoxingScene, TickClockOpponent
+from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
@@ -316,8 +321,21 @@ def _build_components(
             lid_spans(rig),
             animation_tables(rig),
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
+            _sound_s,
         ),
     )
+
+
+def _sound_s(path: str) -> float:
+    """Return the duration of a track's sound, s.
+
+    Raises:
+        TrackRefused: it cannot be played.
+    """
+    try:
+        return check_sound(Path(path), MAX_DURATION_S).duration_s
+    except SoundError as error:
+        raise TrackRefused(str(error)) from None
 
 
 def _build_robot(

@@ -23,6 +23,7 @@ from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.scene_files import load_scene
+from gazerig.robot.app.voice import Voice
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
@@ -77,6 +78,7 @@ class RunObservers:
         tuning: the parameters; None if they cannot be changed from outside.
         recorder: records the run.
         browse: opens the page in the user's browser.
+        voice: Says sounds and texts; it is closed with the observers.
         steer: Buttons that steer the head; the page can then only stop and resume besides.
     """
 
@@ -90,8 +92,9 @@ class RunObservers:
         recorder: "Recorder | None" = None,
         steer: SteeringButtons | None = None,
         browse: Callable[[str], object] | None = None,
+        voice: Voice | None = None,
     ) -> None:
-        self._steer, self._lent = steer, False
+        self._steer, self._lent, self._voice = steer, False, voice
         self._made, self._fast, self._say = assembly, options.fast, say
         self._agent = MockAgent(
             assembly.robot.command,
@@ -122,6 +125,7 @@ class RunObservers:
                 assembly.inject_fault,
                 lambda: {"page": self._page.url() if self._page is not None else None},
                 tuning.confined,
+                voice,
             )
             if tuning is not None and not options.fast
             else None
@@ -239,6 +243,8 @@ class RunObservers:
             observers.add("the status line", self._status.update)
         if self._live is not None:
             observers.add("the remote control", self._live.update)
+        if self._voice is not None:
+            observers.add("the voice", self._follow_tracks)
 
     def update(self, tick: Tick) -> None:
         """Update all observers with a tick; called by a loop that does not update them itself."""
@@ -251,6 +257,8 @@ class RunObservers:
     def show_parking(self, tick: Tick) -> None:
         """Show a tick of the motion to the parking pose, which is not recorded."""
         with contextlib.suppress(Exception):  # nothing may prevent the head from parking
+            if self._voice is not None:
+                self._voice.stop()
             if self._status is not None:
                 self._status.update(tick)
             if self._live is not None:
@@ -319,6 +327,9 @@ class RunObservers:
         """Close everything, when the torque is off."""
         with self._report_errors("the doors"):
             self._doors.close()
+        with self._report_errors("the voice"):
+            if self._voice is not None:
+                self._voice.close()
         with self._report_errors("the remote control"):
             if self._live is not None:
                 self._live.close()
@@ -347,6 +358,12 @@ class RunObservers:
             return "refused: only a head with emulated servos plays a conversation"
         self._agent.play(load_scene("interview").agent)
         return "the head listens, thinks, answers and is interrupted, for a minute"
+
+    def _follow_tracks(self, tick: Tick) -> None:
+        """Let the sound follow the tracks, and report its messages."""
+        assert self._voice is not None
+        for line in self._voice.update(tick):
+            self._made.robot.report(line)
 
     def _record_time(self, tick: Tick) -> None:
         """Record the time of a tick; a tuned loop has its own slots."""

@@ -18,6 +18,7 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_info, run_rig
 from gazerig.robot.app.surroundings import RunRoom
+from gazerig.robot.app.voice import Voice
 from gazerig.robot.control.event_text import group_events, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -100,12 +101,14 @@ class ComposedRun(NamedTuple):
     """A robot assembled for one run, with its remote controls and its recorder.
 
     tuning: None if its parameters cannot be changed from outside
+    voice: None if it cannot say anything
     """
 
     options: RunOptions
     assembly: Assembly
     tuning: ParamStore | None
     recorder: "Recorder | None"
+    voice: Voice | None = None
 
 
 def compose(
@@ -133,12 +136,15 @@ def compose(
         substitutes = substitutes._replace(body=recorder.wrap_body)
     assembly = assemble(rig, options, substitutes, room)
     names = (options.rig, options.character, options.profile)
-    return ComposedRun(
-        options,
-        assembly,
-        ParamStore(assembly.live_params, assembly.robot.command, *names),
-        recorder,
+    tuning = ParamStore(assembly.live_params, assembly.robot.command, *names)
+    voice = Voice(
+        assembly.robot.command,
+        lambda: assembly.live_params.rig,
+        assembly.clock,
+        tuning.confined.folder,
+        options.fast,
     )
+    return ComposedRun(options, assembly, tuning, recorder, voice)
 
 
 def run(
@@ -198,8 +204,9 @@ class Session:
 
         self._say = tried
         self._run_observers = RunObservers(
-            assembly, options, tried, status, composed.tuning, composed.recorder, browse=browse
-        )
+            assembly, options, tried, status, composed.tuning, composed.recorder, browse=browse,
+            voice=composed.voice,
+        )  # fmt: skip
         self._summary = Summary() if summarised else None
         self._faults = JointFaults(tried, self._run_observers.busy_message)
         scene = assembly.scene

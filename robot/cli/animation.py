@@ -4,11 +4,13 @@ import contextlib
 import sys
 from collections.abc import Iterator, Mapping
 from math import inf
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.sound.params import KINDS
 from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
@@ -17,6 +19,7 @@ from gazerig.robot.model.commands import NO_TRACK, TrackAction
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
+_PIECE_S = 0.04
 _SET_EVERY_S = 0.1
 """Interval of setting; a level that is not set for half a second falls to 0."""
 
@@ -121,6 +124,35 @@ def play(
                 say(_track_line(one))
             return
         say(rig.play("" if track == NO_TRACK else track, speed, count, from_s, loop).text())
+
+
+@app.command(name="say")
+def say_aloud(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE | TEXT | -",
+            help="A sound file, by its ending, a text, or - for samples from standard input: "
+            "signed, 16 bits, one channel.",
+        ),
+    ],
+    volume: Annotated[float, typer.Option(min=0.0, max=1.0, help="Factor on the volume.")] = 1.0,
+    sway: Annotated[bool, typer.Option(help="Let the head sway slightly.")] = True,
+    rate: Annotated[int, typer.Option(help="Rate of the samples from standard input, Hz.")] = 16000,
+    pid: PidOption = None,
+) -> None:
+    """Say a sound file or a text on the running head, with the mouth of a rig that has one."""
+    with clear_errors(), RobotClient.connect(pid, "gazerig ctl say") as rig:
+        if what == "-":
+            clock = RealClock()
+            while piece := sys.stdin.buffer.read(2 * round(_PIECE_S * rate)):
+                waits_s = rig.say_piece(piece, rate) - 1.0
+                clock.sleep_until(clock.now_s() + max(0.0, waits_s))
+            rig.say_piece(b"", rate, last=True)
+            return
+        if Path(what).suffix.lower() in KINDS and Path(what).is_file():
+            what = str(Path(what).absolute())
+        say(rig.say(what, volume, sway).text())
 
 
 def _track_line(track: Mapping[str, Any]) -> str:

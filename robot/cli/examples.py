@@ -102,6 +102,11 @@ EXAMPLES: dict[str, Examples] = {
         ('ctl talk speaking --text "Good morning"', "look as a speaker; the end is estimated"),
         ("ctl talk idle", "end the conversation"),
     ),
+    "say": (
+        ('ctl say "Hello, my name is Bob."', "a text, with the mouth; needs espeak-ng or piper"),
+        ("ctl say hello.wav", "a sound file"),
+        ("ctl say - --rate 22050", "samples from standard input, as they arrive"),
+    ),
     "status": (
         ("ctl status", "target and its reason, guard, joints of the running rig"),
         ("ctl status --json", "the same for programs"),

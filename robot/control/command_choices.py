@@ -10,7 +10,17 @@ from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.expression import Expressions
 from gazerig.robot.control.track_choices import TrackChoices
-from gazerig.robot.model.commands import NO_TRACK, Ask, Command, Express, Jog, Play, SetLevel
+from gazerig.robot.model.commands import (
+    NO_TRACK,
+    Ask,
+    Command,
+    Express,
+    Jog,
+    Play,
+    Say,
+    SetLevel,
+    Speak,
+)
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.joint import JointLimit
 
@@ -100,6 +110,10 @@ def refuse_impossible(
         animation.expressions.require(command.expression)
     elif isinstance(command, SetLevel):
         animation.levels.require(command.level)
+    elif isinstance(command, Say):
+        raise ValueError("this run has no voice")
+    elif isinstance(command, Speak):
+        tracks.prepare(command)
     elif isinstance(command, Play):
         tracks.require(command)
 

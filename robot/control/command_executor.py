@@ -30,6 +30,7 @@ from gazerig.robot.model.commands import (
     Renew,
     Resume,
     SetLevel,
+    Speak,
     Stop,
     SyncTrack,
     Talk,
@@ -142,6 +143,10 @@ class CommandExecutor:
                 if self._stop.stop_reason:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 return self._play(command, t_s)
+            case Speak():
+                if self._stop.stop_reason:
+                    return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
+                return self._play(command, t_s)
             case ControlTrack():
                 return self._tracks.control(command, t_s, self._guard.limits)
             case SyncTrack():
@@ -211,12 +216,17 @@ class CommandExecutor:
         self._menus.converse(self._conversation.state, t_s)
         return CommandReply()
 
-    def _play(self, command: Play, t_s: float) -> CommandReply:
+    def _play(self, command: Play | Speak, t_s: float) -> CommandReply:
         """Play a track on top of the gaze, unless a client holds the joints."""
-        if command.track and self._lead.pose_rad:
+        starts = isinstance(command, Speak) or bool(command.track)
+        if starts and self._lead.pose_rad:
             return CommandReply(f"{self._lead.controlled_by}: the joints are held at their angles")
-        reply = self._tracks.play(command, t_s, self.commanded_rad, self._guard.limits)
-        if command.track:
+        limits = self._guard.limits
+        if isinstance(command, Speak):
+            reply = self._tracks.speak(command, t_s, self.commanded_rad, limits)
+        else:
+            reply = self._tracks.play(command, t_s, self.commanded_rad, limits)
+        if starts:
             by = f" for {command.who}" if command.who else ""
             self._messages.append(f"track{by}: {reply.text()}")
         return reply

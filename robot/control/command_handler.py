@@ -6,7 +6,9 @@ renew), a change of parameters (set, save, revert, character) or a question (``Q
 caller turns the result into JSON or a line of text.
 """
 
+import binascii
 import json
+from base64 import b64decode
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -14,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.command_json import from_json
-from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value
+from gazerig.robot.model.commands import COMMANDS, Command, Say, Speak, Tune, Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import Ticket
 
@@ -35,10 +37,18 @@ CHANGES: dict[str, tuple[str, dict[str, Any]]] = {
     "save": ("Write the values to the rig's file, or to an absolute path", {"path": str | None}),
     "revert": ("Apply the values of the rig's file again", {}),
     "character": ("Apply another character to the rig", {"name": str}),
+    "say_piece": (
+        "Say a piece of a stream, base64 of signed 16 bits; returns the unheard length in s",
+        {"pcm": str, "rate_hz": int, "channels": int, "last": bool},
+    ),
     "fault": ("Execute a fault command of emulated servos (gazerig emulate)", {"text": str}),
 }
 """Requests besides commands: their descriptions, and the types of their fields."""
-ORDERS: dict[str, type[Command]] = {name: COMMANDS[name] for name in COMMANDS if name != "tune"}
+_PREPARED = {Tune: "set", Speak: "say"}
+"""Commands that programs cannot send, and the requests that check and prepare them."""
+ORDERS: dict[str, type[Command]] = {
+    name: kind for name, kind in COMMANDS.items() if kind not in _PREPARED
+}
 """Commands that programs may send."""
 REQUESTS = (
     *(", ".join((name, *map(json.dumps, of))) for name, (_, of) in (QUESTIONS | CHANGES).items()),
@@ -122,6 +132,25 @@ class PathGuard(Protocol):
         ...
 
 
+class Speaker(Protocol):
+    """The voice of a head (``gazerig.robot.app.voice.Voice``)."""
+
+    def prepare(self, command: Say, confined: bool = False, /) -> Speak:
+        """Return the command that says a file or a text; raise if it cannot be said.
+
+        confined: only files in the folders of sounds
+        """
+        ...
+
+    def feed(self, pcm: bytes, rate_hz: int, channels: int, /) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+        ...
+
+    def finish(self) -> None:
+        """Mark the end of the stream."""
+        ...
+
+
 class CommandTarget(Protocol):
     """A robot that takes commands, such as ``gazerig.robot.control.loop.Robot``."""
 
@@ -181,6 +210,7 @@ class CommandHandler:
         state: Returns the newest tick and the events above a number as plain values.
         fault: Executes a fault command of the emulated servos and returns the result; None if
             the servos are real.
+        voice: Says sounds and texts; None if the head has no voice.
     """
 
     def __init__(
@@ -194,8 +224,9 @@ class CommandHandler:
         fixed: str = FIXED,
         state: Callable[[int], object] = lambda after: {},
         fault: Callable[[str], str] | None = None,
+        voice: Speaker | None = None,
     ) -> None:
-        self._fault = fault
+        self._fault, self._voice = fault, voice
         self._state = state
         self._robot, self._params, self._status = robot, params, status
         self._saved, self._paths, self._fixed = saved, paths, fixed
@@ -231,6 +262,11 @@ class CommandHandler:
                 if self._fault is None:
                     raise ValueError(REAL)
                 return QuestionAnswer(self._fault(text))
+            case {
+                "do": "say_piece", "pcm": str(text), "rate_hz": int(rate_hz),
+                "channels": int(channels), "last": bool(last), **rest,
+            } if not rest:  # fmt: skip
+                return QuestionAnswer(self._say_piece(text, rate_hz, channels, last))
             case {"do": str(name)} if name in COMMANDS:
                 return self.queue_command(sign(from_json(request)))
         return self._handle_params(request)
@@ -241,9 +277,28 @@ class CommandHandler:
         Raises:
             ValueError: The command is invalid; the message lists the available choices.
         """
-        if isinstance(command, Tune):
-            raise ValueError("parameters are changed by the request set, which checks them")
+        if (request := _PREPARED.get(type(command))) is not None:
+            raise ValueError(f"this is done by the request {request}, which checks it")
+        if isinstance(command, Say):
+            command = self._require_voice().prepare(command, self._paths is not None)
         return PendingCommand(command, self._robot.command(command))
+
+    def _say_piece(self, text: str, rate_hz: int, channels: int, last: bool) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+        voice = self._require_voice()
+        try:
+            pcm = b64decode(text, validate=True)
+        except binascii.Error:
+            raise ValueError("pcm must be base64") from None
+        ahead_s = voice.feed(pcm, rate_hz, channels)
+        if last:
+            voice.finish()
+        return ahead_s
+
+    def _require_voice(self) -> Speaker:
+        if self._voice is None:
+            raise ValueError("this head has no voice")
+        return self._voice
 
     def _handle_params(self, request: object) -> RequestResult:
         match request:

@@ -32,7 +32,7 @@ from gazerig.robot.control.track_choices import TrackChoices, TrackInfo
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import check_command
-from gazerig.robot.model.commands import Ask, Command, Jog, MoveOpponent, Play, Tune
+from gazerig.robot.model.commands import Ask, Command, Jog, MoveOpponent, Play, Speak, Tune
 from gazerig.robot.model.conversation import Conversation
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
@@ -333,7 +333,7 @@ class Robot:
         taken = []
         for waiting in self._commands.take() if self._commands else ():
             command = self._looks.resolve_pixel(waiting.command)
-            if isinstance(command, Play):
+            if isinstance(command, Play | Speak):
                 command = self._tracks.measure_sound(command)
             taken.append(command)
             waiting.ticket.answer(self._executor.execute(command, t_s))

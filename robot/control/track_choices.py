@@ -6,11 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.mouth.mouth_keys import MouthKey
+from gazerig.gaze.mouth.speech_track import SPEECH, SPEECH_SWAY, speech_track, sway_track
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
 from gazerig.gaze.track.track import KEEP, MAX_TRACKS, Track, TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
-from gazerig.robot.model.commands import ControlTrack, Play, SyncTrack
+from gazerig.robot.model.commands import ControlTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, TrackReply
@@ -25,6 +27,8 @@ from gazerig.robot.model.types import JointAngles
 
 _MOST_KEPT = 64
 """Number of tracks with a non-default count whose curves are cached."""
+_MOST_SPEECHES = 8
+_SPEECHES = (SPEECH, SPEECH_SWAY)
 
 
 class TrackInfo(NamedTuple):
@@ -88,6 +92,7 @@ class TrackChoices:
         self._sounds: dict[str, float] = {}
         self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
+        self._speeches: dict[Speak, dict[str, TrackMotions]] = {}
         self.retune(params, lid_spans_rad, tables, lead_s)
         for name in tracks:
             self._motions(name, 0)
@@ -109,7 +114,9 @@ class TrackChoices:
     def names(self) -> tuple[str, ...]:
         """Return the tracks whose joints this rig has."""
         return tuple(
-            name for name in self._tracks if not isinstance(self._motions(name, 0), Exception)
+            name
+            for name in self._tracks
+            if name not in _SPEECHES and not isinstance(self._motions(name, 0), Exception)
         )
 
     @property
@@ -164,8 +171,47 @@ class TrackChoices:
         if command.from_s > length_s:
             raise ValueError(f"{command.track} lasts {length_s:.2f} s: from_s must be less")
 
-    def measure_sound(self, command: Play) -> Play:
+    def prepare(self, command: Speak) -> dict[str, TrackMotions]:
+        """Return the tracks of a speech by name, which takes time. Thread-safe.
+
+        Raises:
+            ValueError: The rig has no such level.
+        """
+        key = command._replace(lead_s=None, who="")
+        if key not in self._speeches:
+            if command.level and command.level not in self._tables.levels:
+                raise ValueError(f"no level {command.level!r} for the mouth")
+            sound, duration_s, level, pairs, sway_deg, volume, *_ = command
+            mouth = [MouthKey(*pair) for pair in pairs]
+            tracks = {SPEECH: speech_track(sound, duration_s, level, mouth, volume)}
+            if sway_deg > 0.0 and any(name.startswith("neck_") for name in self._joints):
+                tracks[SPEECH_SWAY] = sway_track(duration_s, mouth, sway_deg)
+            for old in tuple(self._speeches)[: 1 - _MOST_SPEECHES]:
+                self._speeches.pop(old, None)
+            self._speeches[key] = {
+                name: track_motions(track, self._joints, 0, self._tables.levels, duration_s)
+                for name, track in tracks.items()
+            }
+        return self._speeches[key]
+
+    def speak(
+        self, command: Speak, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
+    ) -> CommandReply:
+        """Start a speech; the arguments are those of ``play``."""
+        replies = []
+        for name, made in self.prepare(command).items():
+            moved = self._player.overlapping(made.motion)
+            if name == SPEECH_SWAY and any(voice.played.name != name for voice in moved):
+                continue  # another track moves the head
+            self._tracks[name], self._cache[name, 0] = made.track, made
+            played = Play(name, who=command.who, lead_s=command.lead_s, sound_s=command.duration_s)
+            replies.append(self.play(played, t_s, commanded_rad, limits))
+        return replies[0]
+
+    def measure_sound(self, command: Play | Speak) -> Play | Speak:
         """Return a command with lead and duration of a sound, which a recording needs."""
+        if isinstance(command, Speak):
+            return command if command.lead_s is not None else command._replace(lead_s=self._lead_s)
         track = self._tracks.get(command.track)
         if track is None or not track.sound or command.lead_s is not None:
             return command
@@ -177,7 +223,11 @@ class TrackChoices:
         Args:
             limits: Limits of the joints.
         """
-        return tuple(self._info(name, track, limits) for name, track in self._tracks.items())
+        return tuple(
+            self._info(name, track, limits)
+            for name, track in self._tracks.items()
+            if name not in _SPEECHES
+        )
 
     def _info(self, name: str, track: Track, limits: Sequence[JointLimit]) -> TrackInfo:
         middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
@@ -304,6 +354,12 @@ class TrackChoices:
     ) -> CommandReply:
         """End tracks early, with a blend."""
         ended = list(voices)
+        if any(voice.played.name == SPEECH for voice in ended):
+            ended = [
+                voice
+                for voice in self._player.voices
+                if voice in ended or voice.played.name == SPEECH_SWAY
+            ]
         least_s = max([voice.played.blend_s[1] for voice in ended], default=0.0)
         fade_s = self._fit.fade_s(
             self._player.state(t_s, ended), limits, self._params.limit_share,

@@ -26,7 +26,9 @@ from gazerig.robot.model.commands import (
     Play,
     Renew,
     Resume,
+    Say,
     SetLevel,
+    Speak,
     Stop,
     SyncTrack,
     Talk,
@@ -52,6 +54,12 @@ MAX_TALK_CHARACTERS = 10_000
 """Longest text of speech, and longest path of its sound."""
 MAX_TALK_WORDS = 2000
 """Largest number of words with times."""
+MAX_SPEECH_S = 1210.0
+"""Longest speech."""
+MAX_SWAY_DEG = 5.0
+"""Largest sway of a speech."""
+MAX_MOUTH_KEYS = 40_000
+"""Largest number of keys of a speech."""
 MAX_PIXEL = 20000.0
 """Largest coordinate of a pixel."""
 _MAX_TIME_S = 1e12
@@ -118,6 +126,8 @@ def check_command(command: Command) -> None:
                 raise ValueError(f"clock {clock!r:.40}: expected sound or external")
         case Talk():
             _check_talk(command)
+        case Say() | Speak():
+            _check_speech(command)
         case MoveOpponent(p):
             if not _are_numbers(p, 3, MAX_COORDINATE_M) or any(
                 not least <= one <= most
@@ -236,6 +246,36 @@ def _check_person(person: object) -> None:
         raise ValueError(f"a person must be given by a whole number from 0 on, not {person!r:.40}")
 
 
+def _check_speech(command: Say | Speak) -> None:
+    _check_who(command.who, isinstance(command, Say) and command.sway)
+    if not _is_within(command.volume, 1.0) or command.volume < 0.0:
+        raise ValueError("the volume of a speech must be a number 0..1")
+    if isinstance(command, Say):
+        pairs = isinstance(command.spoken, tuple) and all(
+            isinstance(one, tuple) and len(one) == 2 and isinstance(one[0], str)
+            and _is_within(one[1], MAX_SPEECH_S) and one[1] >= 0.0
+            for one in command.spoken
+        )  # fmt: skip
+        if not isinstance(command.what, str) or not pairs:
+            raise ValueError(
+                "say a file or a text; spoken must be pairs of a word and its begin in s"
+            )
+        return
+    if not isinstance(command.sound, str) or not isinstance(command.level, str):
+        raise ValueError("sound and level of a speech must be names")
+    if not _is_within(command.sway_deg, MAX_SWAY_DEG) or command.sway_deg < 0.0:
+        raise ValueError(f"the sway of a speech must be a number 0..{MAX_SWAY_DEG:g} deg")
+    if not _is_within(command.duration_s, MAX_SPEECH_S) or command.duration_s <= 0.0:
+        raise ValueError(f"a speech must last above 0 and at most {MAX_SPEECH_S:g} s")
+    if not isinstance(command.mouth, tuple) or len(command.mouth) > MAX_MOUTH_KEYS:
+        raise ValueError(f"a mouth must be at most {MAX_MOUTH_KEYS} pairs of a time and an opening")
+    last_s = -1.0
+    for key in command.mouth:
+        if not _are_numbers(key, 2, MAX_SPEECH_S) or not (0.0 <= key[1] <= 1.0 and key[0] > last_s):
+            raise ValueError("a mouth must be pairs of an increasing time in s and an opening 0..1")
+        last_s = key[0]
+
+
 def _check_point(p: object) -> None:
     if not _are_numbers(p, 3, MAX_COORDINATE_M):
         raise ValueError(
@@ -260,7 +300,7 @@ def _check_who(who: object, flag: object = False) -> None:
     if not isinstance(who, str) or len(who) > MAX_WORDS:
         raise ValueError(f"who must be text of at most {MAX_WORDS} characters")
     if not isinstance(flag, bool):
-        raise ValueError("stay and confirmed must be true or false")
+        raise ValueError("stay, sway and confirmed must be true or false")
 
 
 def _check_share(what: str, key: str, name: object, value: object) -> None:
@@ -333,7 +373,8 @@ def from_recorded_json(data: dict[str, object]) -> Command:
 
 def set_client(command: Command, who: str) -> Command:
     """Return a command with its client's name; commands without that field stay unchanged."""
-    if isinstance(command, ControlCommand | Play | ControlTrack | Talk | Renew | Stop | Resume):
+    named = ControlCommand | Play | ControlTrack | Say | Speak | Talk | Renew | Stop | Resume
+    if isinstance(command, named):
         return command._replace(who=who[:MAX_WORDS])
     return command
 

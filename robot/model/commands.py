@@ -239,6 +239,48 @@ class Talk(NamedTuple):
     stay: bool = False
 
 
+class Say(NamedTuple):
+    """Say a sound file or a text; a run's voice makes a ``Speak`` of it.
+
+    Attributes:
+        what: A file, by its ending (.wav, .flac, .mp3, .ogg), or a text.
+        volume: Factor 0..1.
+        sway: Whether the head sways.
+        spoken: (phoneme or word, begin in s) of the file, if known.
+        who: Name of the client.
+    """
+
+    what: str
+    volume: float = 1.0
+    sway: bool = True
+    spoken: tuple[tuple[str, float], ...] = ()
+    who: str = ""
+
+
+class Speak(NamedTuple):
+    """Speak: a track with a sound, its mouth and a sway.
+
+    Attributes:
+        sound: Path of the sound, "" without one.
+        duration_s: Duration in s.
+        level: Level of the rig's table that opens the mouth, "" without one.
+        mouth: (time in s, opening 0..1) pairs; the mouth shuts at the end.
+        sway_deg: Largest yaw of the sway.
+        volume: Factor 0..1.
+        who: Name of the client.
+        lead_s: As in Play.
+    """
+
+    sound: str
+    duration_s: float
+    level: str = ""
+    mouth: tuple[tuple[float, float], ...] = ()
+    sway_deg: float = 0.0
+    volume: float = 1.0
+    who: str = ""
+    lead_s: float | None = None
+
+
 OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))
 """Least and greatest x, y and z to which the opponent's fist can be moved."""
 
@@ -303,6 +345,8 @@ Command = (
     | ControlTrack
     | SyncTrack
     | Talk
+    | Say
+    | Speak
     | MoveOpponent
     | Renew
     | Stop
@@ -318,7 +362,7 @@ COMMANDS: dict[str, type[Command]] = {
     "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
     "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
     "play": Play, "control_track": ControlTrack, "sync_track": SyncTrack,
-    "talk": Talk, "opponent": MoveOpponent,
+    "talk": Talk, "say": Say, "speak": Speak, "opponent": MoveOpponent,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 

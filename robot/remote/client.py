@@ -11,6 +11,7 @@ with RobotClient.connect() as rig:
 
 import os
 import threading
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import radians
@@ -32,6 +33,7 @@ from gazerig.robot.model.commands import (
     Play,
     Renew,
     Resume,
+    Say,
     SetLevel,
     Stop,
     SyncTrack,
@@ -60,7 +62,7 @@ CONNECT_S = 1.0
 _ANSWER_S = 10.0
 _FILES_S = 40.0
 """Timeout of requests that read or write files, which another process of the rig does, s."""
-_WITH_FILES = {"save", "character"}
+_WITH_FILES = {"save", "character", "say"}
 
 
 class NoRobotError(SetupError, NotFound):
@@ -421,6 +423,31 @@ class RobotClient:
     def sync_track(self, number: int, position_s: float) -> None:
         """Give the position of a track by another clock, at most some ten times per second."""
         self._command(SyncTrack(number, position_s))
+
+    def say(self, what: str, volume: float = 1.0, sway: bool = True) -> CommandReply:
+        """Say a sound file, by its ending, or a text; return when it begins.
+
+        Raises:
+            RequestRejected: it cannot be said; the message names the file or program.
+        """
+        return self._command(Say(what, volume, sway, (), self.who))
+
+    def say_piece(self, pcm: bytes, rate_hz: int, channels: int = 1, last: bool = False) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s.
+
+        Args:
+            pcm: Samples, signed, 16 bits, channels interleaved.
+            rate_hz: Rate of the stream.
+            channels: 1 or 2.
+            last: Whether it is the last piece.
+
+        Raises:
+            RequestRejected: too much is waiting, or nothing can be played.
+        """
+        said = self._connection.ask(
+            "say_piece", pcm=b64encode(pcm).decode(), rate_hz=rate_hz, channels=channels, last=last
+        )
+        return float(cast(float, said))
 
     def tracks(self) -> tuple[dict[str, Any], ...]:
         """Return all tracks: name, description, duration_s, slowed_by, refused (if it is)."""

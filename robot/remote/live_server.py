@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.robot.control.command_handler import CommandTarget, ParamAccess, PathGuard
+from gazerig.robot.control.command_handler import CommandTarget, ParamAccess, PathGuard, Speaker
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import Clock
@@ -192,6 +192,7 @@ class LiveServer:
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
+        voice: Says sounds and texts; None if the head has no voice.
     """
 
     def __init__(
@@ -206,6 +207,7 @@ class LiveServer:
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
         paths: PathGuard | None = None,
+        voice: Speaker | None = None,
     ) -> None:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
@@ -215,7 +217,7 @@ class LiveServer:
         self._watch = FileWatch(self._files, self._read_again)
         requests = RequestHandler(
             robot, tuning, self._pulse, about, refusals, self._watch.saved, fault=fault,
-            changing=changing, paths=paths,
+            changing=changing, paths=paths, voice=voice,
         )  # fmt: skip
         self._server = RemoteServer(requests, say)
 

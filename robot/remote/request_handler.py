@@ -22,6 +22,7 @@ from gazerig.robot.control.command_handler import (
     PendingCommand,
     QuestionAnswer,
     RequestResult,
+    Speaker,
     as_changes,
 )
 from gazerig.robot.control.feedback_basis import estimated_joints
@@ -160,6 +161,7 @@ class RequestHandler:
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
+        voice: Says sounds and texts; None if the head has no voice.
     """
 
     def __init__(
@@ -174,6 +176,7 @@ class RequestHandler:
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
         paths: PathGuard | None = None,
+        voice: Speaker | None = None,
     ) -> None:
         self._params = params
         self._pulse = pulse
@@ -190,6 +193,7 @@ class RequestHandler:
                 fixed=fixed,
                 state=pulse.state,
                 fault=fault,
+                voice=voice,
             )
             for rules in (None, paths)
         )

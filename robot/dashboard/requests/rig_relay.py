@@ -72,7 +72,7 @@ class RigRelay:
 
     def _exchange(self, path: Path, request: Mapping[str, object]) -> Answer:
         """Exchange one request and answer; called by a thread."""
-        within_s = _FILES_S if request.get("do") in CHANGES else _ANSWER_S
+        within_s = _FILES_S if request.get("do") in (*CHANGES, "say") else _ANSWER_S
         # The rig may have closed this connection as the least recently active one.
         for first in (True, False):
             wire = None
