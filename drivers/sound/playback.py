@@ -109,7 +109,13 @@ class Playback:
         self._missing = 0
 
     def play(
-        self, number: int, source: SampleSource, from_s: float, heard_s: float, volume: float
+        self,
+        number: int,
+        source: SampleSource,
+        from_s: float,
+        heard_s: float,
+        volume: float,
+        skips: bool = True,
     ) -> None:
         """Play a sound instead of the present one.
 
@@ -117,12 +123,12 @@ class Playback:
             number: Number of the sound.
             source: Its samples, from the position ``from_s`` on.
             from_s: Position of the first sample, s.
-            heard_s: Time at which the position 0 is heard, monotonic s; silence precedes it, and
-                what should have been heard already is skipped.
+            heard_s: Time at which the position 0 is heard, monotonic s; silence precedes it.
             volume: Factor.
+            skips: Whether what should have been heard already is skipped; otherwise it is late.
         """
         self._stop()
-        self._number, self._volume = number, volume
+        self._number, self._volume, self._skips = number, volume, skips
         self._from_s, self._heard_s = from_s, heard_s
         self._received = 0
         self._source = source
@@ -155,7 +161,8 @@ class Playback:
             silence = min(frames, max(0, round(early_s * self.rate_hz)))
             if silence == frames:
                 return bytes(frames * self._frame_bytes)
-            self._skip(self._source, round(-early_s * self.rate_hz))
+            if self._skips:
+                self._skip(self._source, round(-early_s * self.rate_hz))
             self._first = begin + silence - self._received - round(self._from_s * self.rate_hz)
             self._begun = True
             self._report(SoundEvent("started", self._number))

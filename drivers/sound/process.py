@@ -131,7 +131,8 @@ class _Player:
         volume: float,
     ) -> None:  # fmt: skip
         device = self._open(rate_hz, channels)
-        device.playback.play(self._number, source, from_s, heard_s, volume)
+        skips = isinstance(source, _FileSource)
+        device.playback.play(self._number, source, from_s, heard_s, volume, skips)
 
     def _open(self, rate_hz: int, channels: int) -> _Device:
         """Return the open device with this format."""

@@ -255,6 +255,8 @@ class Voice:
             SoundError: too much is waiting, the format is not possible, or nothing can be played.
             ValueError: the head does not accept the speech.
         """
+        if self._stream is None:
+            self._open_loudspeaker()
         now_s = self._clock.now_s()
         with self._lock:
             tick = self._tick
@@ -458,7 +460,11 @@ def _has_ended(ticket: Ticket | None, tick: Tick) -> bool:
     reply = ticket.wait(0.0) if ticket is not None else None
     if reply is None or reply.track is None:
         return reply is not None and bool(reply.refused)
-    return all(one.number != reply.track.number or not one.is_playing for one in tick.tracks)
+    number = reply.track.number
+    newest = max([one.number for one in tick.tracks], default=0)  # the tick may be older
+    return newest >= number and not any(
+        one.number == number and one.is_playing for one in tick.tracks
+    )
 
 
 def _has_finished(number: int, tick: Tick | None) -> bool:

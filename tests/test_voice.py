@@ -1,0 +1,282 @@
+"""A head that speaks: files, texts and streams as tracks with a mouth, and every end of them."""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_sound import needs_espeak
+
+import gazerig
+from gazerig.drivers.sound.sound_file import write_wav
+from gazerig.errors import Refused
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.command_json import as_json, check_command, from_json
+from gazerig.robot.model.commands import Say, Speak
+from gazerig.robot.model.control_source import TrackState
+
+RATE = 16000
+SHIPPED = Path(__file__).parents[1] / "config" / "rigs" / "expressive.yaml"
+JAW_DEG = 12.0
+
+
+def speech(seconds: float) -> bytes:
+    """Return samples of syllables, four a second."""
+    t_s = np.arange(round(seconds * RATE)) / RATE
+    voice = np.sin(2 * np.pi * 1000 * t_s) * (0.5 - 0.5 * np.cos(2 * np.pi * 4 * t_s))
+    return (12000 * voice).astype("<i2").tobytes()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with an expressive rig whose sounds are silent, and two sounds."""
+    folder = tmp_path_factory.mktemp("voice")
+    text = SHIPPED.read_text("utf-8").replace(
+        "profile: robot", "profile: robot\nsound: {device: silent}"
+    )
+    (folder / "rig.yaml").write_text(text, "utf-8")
+    write_wav(folder / "short.wav", speech(1.5), RATE)
+    write_wav(folder / "long.wav", speech(60.0), RATE)
+    return folder
+
+
+class Ticks:
+    """Ticks of a head, by tracks and jaw."""
+
+    def __init__(self) -> None:
+        self.all: list[Tick] = []
+
+    def speech(self) -> list[tuple[TrackState, float]]:
+        found = []
+        for tick in self.all:
+            jaw = tick.guard_result.joints.index("jaw")
+            found += [
+                (one, float(np.degrees(tick.guard_result.command_rad[jaw])))
+                for one in tick.tracks
+                if one.name == "speech" and one.is_playing
+            ]
+        return found
+
+
+def opened(folder: Path, ticks: Ticks | None = None, **given: Any) -> Any:
+    head: Any = gazerig.open(str(folder / "rig.yaml"), mock=True, say=lambda line: None, **given)
+    if ticks is not None:
+        update = head._feed.update
+
+        def both(tick: Tick) -> None:
+            ticks.all.append(tick)
+            update(tick)
+
+        head._feed.update = both
+    return head
+
+
+# --- in simulated time
+
+
+@pytest.mark.parametrize("what", ["file", "stream", pytest.param("text", marks=needs_espeak)])
+def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: str) -> None:
+    ticks = Ticks()
+    with opened(folder, ticks, fast=True) as head:
+        if what == "stream":
+            order = head.say(
+                [speech(1.5)[i : i + 1280] for i in range(0, 48000, 1280)], rate_hz=RATE
+            )
+        else:
+            order = head.say("short.wav" if what == "file" else "Mama, bob, baby, papa.")
+        assert order.wait(10.0) == "arrived"
+        assert order.reply.track.slowed_by == 1.0
+        head.step(0.5)
+        said = ticks.speech()
+        jaw = [angle for _, angle in said]
+        assert max(jaw) > 0.5 * JAW_DEG and min(jaw) > -0.1
+        assert abs(head.state.joints["jaw"].commanded_deg) < 0.1
+        if what != "text":
+            shut = sum(1 for a, b, c in zip(jaw, jaw[1:], jaw[2:], strict=False) if a > b <= c)
+            assert 4 <= shut <= 7  # once in each of six syllables
+        sway = [one for one in head.state.tracks if one.name == "speech_sway"]
+        assert len(sway) == 1
+
+
+def test_the_same_speech_gives_the_same_bytes(folder: Path) -> None:
+    digests = []
+    for _ in range(2):
+        with opened(folder, fast=True) as head:
+            head.say("short.wav").wait(10.0)
+            digests.append(head._composed.assembly.sent_bytes_digest())
+    assert digests[0] == digests[1]
+
+
+def test_a_nod_takes_the_head_and_the_speech_continues(folder: Path) -> None:
+    with opened(folder, fast=True) as head:
+        head.say("long.wav")
+        head.step(1.0)
+        head.play("nod")
+        head.step(0.5)
+        playing = {one.name for one in head.state.tracks if one.is_playing}
+        assert playing == {"speech", "nod"}
+        head.say("short.wav", sway=False)
+        head.step(0.5)
+        assert [one.end_reason for one in head.state.tracks if one.name == "speech"] == [
+            "another track: speech", ""
+        ]  # fmt: skip
+        head.play("")
+        head.step(0.1)
+        assert not [one for one in head.state.tracks if one.is_playing]
+
+
+def test_a_rig_without_a_mouth_plays_the_sound_and_sways(folder: Path) -> None:
+    with gazerig.open("desk", fast=True) as head:
+        order = head.say(folder / "short.wav")
+        assert order.wait(10.0) == "arrived"
+        assert order.reply.track is not None and order.reply.track.duration_s == pytest.approx(
+            1.5, abs=0.05
+        )
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("none.wav", "there is no such file"),
+        ("rig.wav", "write it again"),
+        (" ", "a spoken text has 1 to 5000 characters"),
+    ],
+)
+def test_what_cannot_be_said_is_refused_with_one_message(
+    folder: Path, what: str, message: str
+) -> None:
+    (folder / "rig.wav").write_bytes(b"no sound")
+    with opened(folder, fast=True) as head, pytest.raises(Refused, match=message):
+        head.say(what)
+
+
+def test_clients_of_the_network_may_name_sounds_of_the_folders_only(
+    folder: Path, tmp_path: Path
+) -> None:
+    write_wav(tmp_path / "secret.wav", speech(0.5), RATE)
+    with opened(folder, fast=True) as head:
+        voice = head._composed.voice
+        assert voice.prepare(Say("short.wav"), True).sound == str(folder / "short.wav")
+        for name in (str(tmp_path / "secret.wav"), "../secret.wav"):
+            with pytest.raises(gazerig.Error, match="only sounds in .* may be named"):
+                voice.prepare(Say(name), True)
+        assert voice.prepare(Say(str(tmp_path / "secret.wav"))).duration_s == pytest.approx(0.5)
+
+
+BAD: list[Any] = [
+    Say("a", volume=1.5), Say("a", sway=1), Say(3), Say("a", spoken=(("a", -1.0),)),  # type: ignore[arg-type]
+    Speak("", 0.0), Speak("", 1e9), Speak("", float("nan")), Speak("", 1.0, "mouth", ((0.1, 2.0),)),
+    Speak("", 1.0, "mouth", ((0.2, 0.0), (0.1, 0.0))), Speak("", 1.0, sway_deg=90.0),
+    Speak("", 1.0, volume=float("nan")), Speak("", 1.0, "mouth", ((0.1, float("nan")),)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", BAD, ids=repr)
+def test_bad_speeches_are_refused(command: Say | Speak) -> None:
+    with pytest.raises(ValueError):
+        check_command(command)
+
+
+def test_a_speech_is_the_same_after_json() -> None:
+    for command in (Say("a", 0.5, False, (("b", 0.1),), "me"), Speak("a", 1.0, "m", ((0.1, 0.5),))):
+        assert from_json(as_json(command)) == command
+
+
+# --- in real time
+
+
+@contextlib.contextmanager
+def speaking(folder: Path) -> Iterator[Any]:
+    """Yield a head in real time that says a long file."""
+    with opened(folder) as head:
+        head.say("long.wav")
+        wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
+        yield head
+
+
+def sound_s(head: Any) -> float | None:
+    player = head._composed.voice._player
+    found: float | None = player.position_s(RealClock().now_s()) if player is not None else None
+    return found
+
+
+def wait_until(condition: Any) -> None:
+    clock = RealClock()
+    for _ in range(1000):
+        if condition():
+            return
+        clock.sleep_until(clock.now_s() + 0.01)
+    raise AssertionError("it has not happened")
+
+
+def is_silent(head: Any) -> bool:
+    """Return whether the position of the sound stands still."""
+    first, clock = sound_s(head), RealClock()
+    clock.sleep_until(clock.now_s() + 0.1)
+    return sound_s(head) == first
+
+
+@pytest.mark.own_timeouts
+def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder: Path) -> None:
+    with speaking(folder) as head:
+        track = next(one for one in head.state.tracks if one.name == "speech")
+        assert track.clock == "sound" or track.position_s < 1.0
+        pid = head._composed.voice._player.pid
+        for end in (lambda: head.play(""), lambda: head.jog("neck_yaw", 1.0), head.stop):
+            end()
+            wait_until(lambda: is_silent(head))
+            if end != head.stop:
+                head.release_joints()
+                head.say("long.wav")
+                wait_until(lambda: not is_silent(head))
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+@pytest.mark.own_timeouts
+def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_message(
+    folder: Path,
+) -> None:
+    with opened(folder) as head:
+        voice = head._composed.voice
+        voice.feed(speech(1.0), RATE, 1)
+        wait_until(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
+        wait_until(lambda: any("stalled" in one.text for one in head.events(0.0)))
+        wait_until(lambda: abs(head.state.joints["jaw"].commanded_deg) < 0.5)
+        with pytest.raises(gazerig.Error, match="this piece is not played"):
+            voice.feed(speech(5.0), RATE, 1)
+        with pytest.raises(gazerig.Error, match="finish it before another one"):
+            voice.feed(speech(0.1), 8000, 1)
+        voice.finish()
+        wait_until(lambda: not [one for one in head.state.tracks if one.is_playing])
+        head.say("long.wav")
+        wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
+        os.kill(voice._player.pid, 9)
+        wait_until(lambda: not [one for one in head.state.tracks if one.is_playing])
+        lines = [one.text for one in head.events(0.0) if "sound's process" in one.text]
+        assert lines == ["the sound's process has ended (SIGKILL): the next sound starts it again"]
+        assert head.say("short.wav").wait(20.0) == "arrived"
+
+
+@pytest.mark.own_timeouts
+def test_other_programs_say_files_and_streams(folder: Path) -> None:
+    async def say(pid: int) -> str:
+        async with gazerig.aio.connect(pid) as head:
+            return await head.say("short.wav")
+
+    with opened(folder) as here:
+        with gazerig.connect(os.getpid()) as head:
+            assert head.say("short.wav").reply.track.name == "speech"  # type: ignore[union-attr]
+            with pytest.raises(Refused, match="there is no such file"):
+                head.say("none.wav")
+            pieces = [speech(0.2)[i : i + 1280] for i in range(0, 6400, 1280)]
+            assert head.say(pieces, rate_hz=RATE).wait() == "arrived"
+            with pytest.raises(Refused, match="whole frames"):
+                head._client.say_piece(b"a", RATE)
+            wait_until(lambda: not [one for one in here.state.tracks if one.is_playing])
+        assert asyncio.run(say(os.getpid())) == "arrived"
