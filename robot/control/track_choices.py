@@ -189,7 +189,7 @@ class TrackChoices:
             for old in tuple(self._speeches)[: 1 - _MOST_SPEECHES]:
                 self._speeches.pop(old, None)
             self._speeches[key] = {
-                name: track_motions(track, self._joints, 0, self._tables.levels, duration_s)
+                name: track_motions(track, self._joints, 0, self._tables)
                 for name, track in tracks.items()
             }
         return self._speeches[key]
