@@ -21,7 +21,7 @@ from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.app.voice import Voice
+from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.head_state import HeadEvent, HeadState, head_state
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.line_queue import LineQueue
@@ -129,7 +129,7 @@ class LocalHead(Head):
         assert tuning is not None, "only a run without a program has none"
         return tuning
 
-    def _voice(self) -> Voice:
+    def _voice(self) -> RunVoice:
         """Return the voice of the run; raises as ``_active_run`` does."""
         voice = self._active_run().voice
         assert voice is not None, "only a run without a program has none"

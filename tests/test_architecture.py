@@ -25,7 +25,9 @@ OWNERS = {
     "mcap": ("drivers.camera.playback", "drivers.camera.recorder", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),
     "zstandard": ("robot.recording.",),
+    "miniaudio": ("drivers.sound.",),
     "msgspec": (
+        "drivers.sound.",
         "robot.control.tick_stream",
         "robot.recording.",
         "features.study.participation",

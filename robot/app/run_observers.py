@@ -23,7 +23,7 @@ from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.scene_files import load_scene
-from gazerig.robot.app.voice import Voice
+from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
@@ -92,7 +92,7 @@ class RunObservers:
         recorder: "Recorder | None" = None,
         steer: SteeringButtons | None = None,
         browse: Callable[[str], object] | None = None,
-        voice: Voice | None = None,
+        voice: RunVoice | None = None,
     ) -> None:
         self._steer, self._lent, self._voice = steer, False, voice
         self._made, self._fast, self._say = assembly, options.fast, say

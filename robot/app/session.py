@@ -18,7 +18,7 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_info, run_rig
 from gazerig.robot.app.surroundings import RunRoom
-from gazerig.robot.app.voice import Voice
+from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.event_text import group_events, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -108,7 +108,7 @@ class ComposedRun(NamedTuple):
     assembly: Assembly
     tuning: ParamStore | None
     recorder: "Recorder | None"
-    voice: Voice | None = None
+    voice: RunVoice | None = None
 
 
 def compose(
@@ -137,7 +137,7 @@ def compose(
     assembly = assemble(rig, options, substitutes, room)
     names = (options.rig, options.character, options.profile)
     tuning = ParamStore(assembly.live_params, assembly.robot.command, *names)
-    voice = Voice(
+    voice = RunVoice(
         assembly.robot.command,
         lambda: assembly.live_params.rig,
         assembly.clock,

@@ -67,7 +67,7 @@ class _Stream(NamedTuple):
     ticket: Ticket | None
 
 
-class Voice:
+class RunVoice:
     """The voice of one head. Except ``update``, all methods may be called by any thread.
 
     Args:

@@ -133,7 +133,7 @@ class PathGuard(Protocol):
 
 
 class Speaker(Protocol):
-    """The voice of a head (``gazerig.robot.app.voice.Voice``)."""
+    """The voice of a head (``gazerig.robot.app.voice.RunVoice``)."""
 
     def prepare(self, command: Say, confined: bool = False, /) -> Speak:
         """Return the command that says a file or a text; raise if it cannot be said.
