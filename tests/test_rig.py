@@ -74,7 +74,16 @@ def test_the_desk_rig_explains_its_keys_as_they_are_declared() -> None:
         if found is None:
             continue
         path = [*path[: len(found[1]) // 2], found[2]]
-        if path[0] not in ("gaze", "guard", "tracker", "loop", "motion", "detector", "oak", "sound"):
+        if path[0] not in (
+            "gaze",
+            "guard",
+            "tracker",
+            "loop",
+            "motion",
+            "detector",
+            "oak",
+            "sound",
+        ):
             continue
         said = line.partition("  # ")[2]
         above = number - 1

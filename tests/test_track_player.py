@@ -102,6 +102,9 @@ def test_other_channels_run_together_and_the_same_replace() -> None:
     states = it.choices.states(0.6)
     assert [one.name for one in states if one.is_playing] == ["pitch", "talk"]
     assert states[1].end_reason == "another track: talk"
+    assert not it.choices.ends_show(Play("talk")) and not it.choices.ends_show(Play("pitch"))
+    it.play("jaw", 0.65)
+    assert it.choices.ends_show(Play("talk"))
     assert it.do("end", 0.7) == ""
     it.player.step(0.7)
     assert not [one for one in it.choices.states(0.7) if one.is_playing]

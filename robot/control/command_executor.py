@@ -233,11 +233,16 @@ class CommandExecutor:
 
     def follow_turn(self, turn_gaze: TurnGaze, t_s: float) -> None:
         """Let the gaze follow the present turn, and play a listener's nod or brow flash."""
-        name = turn_gaze.step(t_s)
-        if name and not self._stop.stop_reason and not self._lead.active:
-            reply = self._play(Play(name, who="conversation"), t_s)
-            if reply.refused:
-                self._messages.append(f"track for conversation {reply.text()}")
+        if name := turn_gaze.step(t_s):
+            self._play_by_itself(Play(name, who="conversation"), t_s)
+
+    def _play_by_itself(self, command: Play, t_s: float) -> None:
+        """Play a track that no client has asked for, unless a client or a show moves the head."""
+        if self._stop.stop_reason or self._lead.active or self._tracks.ends_show(command):
+            return
+        reply = self._play(self._tracks.measure_sound(command), t_s)
+        if reply.refused:
+            self._messages.append(f"track for {command.who} {reply.text()}")
 
     def direct_by_track(
         self, target: Target, percept: Percept | None, pose: GazeState, t_s: float
@@ -256,12 +261,8 @@ class CommandExecutor:
         name = self._trigger.step(
             top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
         )
-        if name and not self._stop.stop_reason and not self._lead.active:
-            reply = self._play(
-                self._tracks.measure_sound(Play(name, who=f"rule {top_down.behaviour}")), t_s
-            )
-            if reply.refused:
-                self._messages.append(f"track for rule {top_down.behaviour} {reply.text()}")
+        if name:
+            self._play_by_itself(Play(name, who=f"rule {top_down.behaviour}"), t_s)
         if self._animation.tracks.look is KEEP:
             return target
         return self._tracks.target(target, percept, pose.p_world_head_m, t_s)

@@ -288,6 +288,13 @@ class TrackChoices:
         )  # fmt: skip
         return CommandReply(track=reply)
 
+    def ends_show(self, command: Play) -> bool:
+        """Return whether a track would replace one that owns joints."""
+        made = self._motions(command.track, command.times)
+        return isinstance(made, TrackMotions) and any(
+            voice.motion.owned for voice in self._player.overlapping(made.motion)
+        )
+
     def control(
         self, command: ControlTrack, t_s: float, limits: Sequence[JointLimit]
     ) -> CommandReply:
