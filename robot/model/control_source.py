@@ -103,8 +103,9 @@ NO_CLIENT_CONTROL = ControlState()
 
 
 def playing(tracks: Sequence[TrackState]) -> TrackState | None:
-    """Return the newest track that plays, None without one."""
-    return next((track for track in reversed(tracks) if track.is_playing), None)
+    """Return the newest track that plays, with a sound if one has it; None without a track."""
+    found = [track for track in reversed(tracks) if track.is_playing]
+    return next((track for track in found if track.sound), found[0] if found else None)
 
 
 class ControlSource(NamedTuple):

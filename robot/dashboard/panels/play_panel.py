@@ -152,10 +152,8 @@ def _row(
     yield line(((x, top + 16.0), (x, bar + _BAR_PX)), "mean")
     owns = f"owns {', '.join(track.owns)}" if track.owns else "gaze moves all joints"
     layers = ", ".join(map(str, _words(info, "layers")))
-    whose = f"{layers}; {owns}" if layers else owns
-    yield text(
-        0.0, bar + _BAR_PX + 11.0, whose + (f"; {track.who}" if track.who else ""), size=10.5
-    )
+    owns = f"owns {', '.join(track.owns)}" if track.owns else "owns no joint"
+    yield text(0.0, bar + _BAR_PX + 12.0, f"{layers}; {owns}" if layers else owns, size=11.0)
 
 
 def _info_html(info: Mapping[str, object]) -> str:
