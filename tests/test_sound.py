@@ -3,17 +3,22 @@
 import os
 import shutil
 import signal
+import socket
 import stat
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
 from gazerig.drivers.sound.params import SILENT_DEVICE, SoundParams
 from gazerig.drivers.sound.playback import PcmQueue, Playback, SoundEvent
 from gazerig.drivers.sound.player import MAX_AHEAD_S, SoundError, SoundPlayer
-from gazerig.drivers.sound.position import PlayedSound
+from gazerig.drivers.sound.position import PlayedSound, PositionMemory, shared_file
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import MAX_CHARACTERS, speak
 from gazerig.robot.model.clock import RealClock
@@ -273,6 +278,49 @@ def test_the_process_ends_with_its_link_and_names_a_missing_loudspeaker(folder: 
     player.close()
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+_KILLED = """
+import os, sys
+from gazerig.drivers.sound.player import SoundPlayer
+player = SoundPlayer("silent")
+player.prepare()
+while not player.is_open:
+    pass
+print(player.pid, flush=True)
+os.kill(os.getpid(), 9)
+"""
+
+
+@pytest.mark.own_timeouts
+def test_the_process_ends_with_a_killed_program() -> None:
+    done = subprocess.run([sys.executable, "-c", _KILLED], capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL
+    clock = RealClock()
+    for _ in range(1000):
+        if not Path(f"/proc/{int(done.stdout)}").exists():
+            return
+        clock.sleep_until(clock.now_s() + 0.01)
+    raise AssertionError("the sound's process still runs")
+
+
+def test_a_loudspeaker_that_requests_nothing_more_is_one_message() -> None:
+    process = pytest.importorskip("gazerig.drivers.sound.process")
+    here, there = socket.socketpair()
+    fd = shared_file()
+    player = process._Player(here, PositionMemory(fd), "USB speaker")
+    os.close(fd)
+    device = SimpleNamespace(
+        filled_s=-100.0, playback=SimpleNamespace(is_playing=True), close=lambda: None
+    )
+    player._device = device
+    player.check()
+    player.check()
+    event = msgspec.msgpack.decode(there.recv(1000), type=SoundEvent)
+    assert event.kind == "failed" and not player.is_open
+    assert event.reason == "the loudspeaker USB speaker has disappeared: connect it"
+    here.close()
+    there.close()
 
 
 @pytest.mark.parametrize(("rate_hz", "channels"), [(1000, 1), (16000, 3), (500_000, 1)])

@@ -348,7 +348,7 @@ class RunVoice:
                     if self._stream is not None:
                         self._follow_stream(self._stream, player, tick, now_s)
                     self._follow_tracks(player, tick, now_s)
-                except SoundError as error:
+                except (SoundError, OSError) as error:
                     self._fail(str(error))
 
     def _handle_event(self, event: SoundEvent, tick: Tick | None) -> None:

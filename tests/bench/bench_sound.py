@@ -28,7 +28,7 @@ from gazerig.gaze.mouth.mouth_keys import phoneme_closures
 from gazerig.robot.control.tick import Tick
 
 RIG = Path(__file__).parents[2] / "config" / "rigs" / "expressive.yaml"
-OPEN_DEG, CLOSED_SHARE, TOLERANCE_S = 12.0, 0.12, 0.045
+OPEN_DEG, CLOSED_SHARE, TOLERANCE_S = 12.0, 0.12, 0.02
 TEXT = """
 My name is Bob, and maybe you remember me from the big museum in Bremen. Before people built me, I was
 a box of motors, bolts and rubber bands. My first problem was a simple one: nobody believed that a mouth
@@ -195,12 +195,15 @@ def lips(folder: str) -> None:
         with head:
             head.say(what).wait(200.0)
         _, track_s, _, measured, commanded = trace.columns()
-        for which, values in (("measured", measured), ("commanded", commanded)):
+        for which, values, aside_s in (
+            ("measured", measured, 0.0),
+            ("commanded", commanded, 0.0),
+            ("measured 0.15 s later, for comparison", measured, 0.15),
+        ):
             shut = 0
             for one in closures:
-                near = (track_s - start_s > one.begin_s - TOLERANCE_S) & (
-                    track_s - start_s < one.end_s + TOLERANCE_S
-                )
+                at_s = track_s - start_s - aside_s
+                near = (at_s > one.begin_s - TOLERANCE_S) & (at_s < one.end_s + TOLERANCE_S)
                 shut += bool(near.any() and values[near].min() < CLOSED_SHARE)
             print(f"{name}, {which}: {shut / len(closures):.1%} closed")
 
