@@ -42,6 +42,20 @@ def test_the_pressure_is_the_root_mean_square_in_the_band_of_an_open_mouth() -> 
     assert len(band_pressures(tone(1000, 0.01), RATE)) == 0
 
 
+def test_a_frame_has_its_time_at_every_rate_also_in_a_stream() -> None:
+    rate = 22050
+    samples = np.zeros(60 * rate)
+    samples[50 * rate : 51 * rate] = tone(1000, 1.0)[:RATE][np.arange(rate) * RATE // rate]
+    whole = band_pressures(samples, rate)
+    middle = np.flatnonzero(whole > 0.1).mean()
+    assert frame_s(middle) == pytest.approx(50.5, abs=0.005)
+    mouth = StreamMouth(rate, -30.0)
+    for piece in np.array_split(samples, 1500):
+        mouth.add(piece)
+    assert mouth.opening_at(49.9) == 0.0 and mouth.opening_at(50.5) > 0.5
+    assert mouth.opening_at(51.1) == 0.0
+
+
 def test_ten_decibels_less_are_half_as_loud() -> None:
     loud, half = openings(np.array([1.0, 10**-0.5]), 1.0, -60.0)
     shut = 10 ** (-60 / 20 * 0.6)

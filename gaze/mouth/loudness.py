@@ -20,31 +20,40 @@ _BLOCK = 2000
 _LOUD = 0.95
 
 
-def band_pressures(samples: Floats, rate_hz: float) -> Floats:
+def band_pressures(samples: Floats, rate_hz: float, first: int = 0) -> Floats:
     """Return the pressure of speech in every frame.
 
     Args:
         samples: (n,) one channel, -1..1.
         rate_hz: Rate of the samples.
+        first: Number of the frame with which the samples begin.
 
     Returns:
-        (n / rate / FRAME_S,) root mean squares, the first one centred at WINDOW_S / 2.
+        (n / rate / FRAME_S,) root mean squares, frame 0 centred at WINDOW_S / 2.
     """
-    step, length = round(FRAME_S * rate_hz), round(WINDOW_S * rate_hz)
+    length, begin = round(WINDOW_S * rate_hz), frame_start(first, rate_hz)
     if len(samples) < length:
         return np.zeros(0)
-    windows = np.lib.stride_tricks.sliding_window_view(samples, length)[::step]
+    views = np.lib.stride_tricks.sliding_window_view(samples, length)
+    numbers = range(first, first + int(len(samples) / rate_hz / FRAME_S) + 2)
+    starts = [frame_start(number, rate_hz) - begin for number in numbers]
+    rows = np.array([start for start in starts if start < len(views)])
     taper = np.hanning(length)
     frequencies = np.fft.rfftfreq(length, 1.0 / rate_hz)
     band = (frequencies >= _BAND_HZ[0]) & (frequencies <= _BAND_HZ[1])
     powers = np.concatenate(
         [
-            (np.abs(np.fft.rfft(windows[i : i + _BLOCK] * taper, axis=1)[:, band]) ** 2).sum(axis=1)
-            for i in range(0, len(windows), _BLOCK)
+            (np.abs(np.fft.rfft(views[rows[i : i + _BLOCK]] * taper, axis=1)[:, band]) ** 2).sum(1)
+            for i in range(0, len(rows), _BLOCK)
         ]
     )
     pressures: Floats = np.sqrt(2.0 * powers / (length * (taper**2).sum()))
     return pressures
+
+
+def frame_start(number: int, rate_hz: float) -> int:
+    """Return the first sample of a frame; the length of a frame need not be whole samples."""
+    return round(number * FRAME_S * rate_hz)
 
 
 def loud_pressure(pressures: Floats) -> float:

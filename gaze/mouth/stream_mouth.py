@@ -8,6 +8,7 @@ from gazerig.gaze.mouth.loudness import (
     FRAME_S,
     WINDOW_S,
     band_pressures,
+    frame_start,
     openings,
 )
 from gazerig.gaze.types import Floats
@@ -38,8 +39,9 @@ class StreamMouth:
     def add(self, samples: Floats) -> None:
         """Add samples (n,) of one channel, -1..1."""
         self._rest = np.concatenate((self._rest, samples))
-        pressures = band_pressures(self._rest, self._rate_hz)
-        self._rest = self._rest[len(pressures) * round(FRAME_S * self._rate_hz) :]
+        pressures = band_pressures(self._rest, self._rate_hz, self._count)
+        next_start = frame_start(self._count + len(pressures), self._rate_hz)
+        self._rest = self._rest[next_start - frame_start(self._count, self._rate_hz) :]
         decay = np.exp(-FRAME_S / _LOUD_DECAY_S)
         for pressure in pressures:
             self._loud = max(_FIRST_LOUD, float(pressure), self._loud * decay)
