@@ -129,7 +129,8 @@ class CommandExecutor:
         """Execute a command; return its reply."""
         match command:
             case Ask("track", name):
-                return self.execute(Play("" if name == NO_TRACK else name), t_s)
+                play = Play("" if name == NO_TRACK else name)
+                return self.execute(self._tracks.measure_sound(play), t_s)
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
             case _ if isinstance(command, ControlCommand):

@@ -115,7 +115,7 @@ class ControlSource(NamedTuple):
         kind: Kind of control.
         who: Name of the client for display, "" for none or unknown.
         description: "look at 1 0 0.3", "neck_yaw at 17.2 deg", a track's name, a stop's reason.
-        joints: Held joints.
+        joints: Held joints, or those that tracks own.
         since_s: Start of the control on the rig's clock, None if unknown.
     """
 
@@ -150,7 +150,9 @@ def control_source(
         who = lead.who or "a client"
         return ControlSource(lead.kind, who, lead.description, lead.joints, lead.since_s)
     if (track := playing(tracks)) is not None:
-        return ControlSource("track", track.who, track.name, (), track.since_s)
+        names = " and ".join(one.name for one in tracks if one.is_playing)
+        owns = tuple(joint for one in tracks if one.is_playing for joint in one.owns)
+        return ControlSource("track", track.who, names, owns, track.since_s)
     return ControlSource()
 
 
@@ -189,6 +191,9 @@ def control_sentence(leader: ControlSource, t_s: float) -> str:
             said = f"{leader.who} holds {leader.description}"
         case "track":
             said = f"it plays {leader.description}" + (f" for {leader.who}" if leader.who else "")
+            if leader.joints:
+                count = len(leader.joints)
+                said += f", with {', '.join(leader.joints) if count < 4 else f'{count} joints'}"
         case "stopped":
             return f"stopped: {leader.description}; the torque is off"
         case "parking":
