@@ -157,3 +157,21 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     assert it.do("seek", t, "hello", "top") == ""
     it.player.step(t)
     assert it.choices.states(t)[0].position_s == pytest.approx(1.0)
+
+
+def test_a_track_follows_a_clock_that_jumps() -> None:
+    it, t = show(hour=long_track(60.0, 3)), 0.0
+    number = it.play("hour", t)
+    (voice,) = it.player.voices
+    ahead_s, off = 0.0, []
+    for k in range(8000):
+        t += 0.005
+        ahead_s += {1500: 12.0, 3000: -9.0, 5000: 0.2}.get(k, 0.0)
+        it.player.step(t)
+        if k % 20 == 0:
+            it.choices.sync(SyncTrack(number, t + ahead_s), t)
+        off.append(abs(voice.position_s(t) - t - ahead_s))
+        _, speed, acceleration = it.player.state(t)
+        assert voice.played.stretch(speed[None], acceleration[None]) < 1.06  # 5 % faster
+    for k in (1400, 2900, 4900, 7900):
+        assert off[k] < 0.02, k

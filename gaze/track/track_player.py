@@ -133,6 +133,12 @@ class Voice:
         return self.clock.state_at(t_s)[0]
 
     @property
+    def _settled_s(self) -> float:
+        """Return the end of the present change of speed and of the present seek."""
+        ends_s = self.clock.from_s + self.clock.change_s
+        return ends_s if self._fade is None else max(ends_s, self._fade.until_s)
+
+    @property
     def ahead_s(self) -> float:
         """Return the distance of the motion from the position of the sound, in the track."""
         return self.played.lead_s * self.wanted
@@ -230,25 +236,28 @@ class Voice:
         self.paused = False
         self._change_speed(t_s, self.wanted)
 
-    def seek(self, t_s: float, position_s: float) -> None:
+    def seek(self, t_s: float, position_s: float, catches_up: bool = False) -> None:
         """Continue at another position, from the present motion.
 
-        The track runs on meanwhile; if the sum would be too fast, it starts there from rest.
+        The track runs on meanwhile; if the sum would be too fast, it starts from rest: there, or
+        further on if it ``catches_up`` with a clock.
         """
         now = self.state(t_s)
         position_s = min(position_s, self.played.length_s) + self.ahead_s
         self._corrected_s = None
         rate = 0.0 if self.paused else self.wanted
         runs = TrackClock(t_s, position_s, rate)
-        rests = TrackClock(t_s, position_s, 0.0)
         least_s = self.played.blend_s[1]
-        away = self._away(rests, now, t_s, least_s)
-        _, speed, acceleration = self._sample_fade(away, t_s, least_s)
-        least_s *= max(1.0, self.played.stretch(speed, acceleration))
+        rests = TrackClock(t_s, position_s, 0.0)
+        least_s *= max(1.0, self._excess(rests, self._away(rests, now, t_s, least_s), t_s, least_s))
         for from_rest in (False, True) if rate else (True,):
             time_s = least_s
             for _ in range(_ATTEMPTS if from_rest else 2):
-                clock = rests.change_speed(t_s, rate, time_s) if from_rest else runs
+                clock = runs
+                if from_rest:
+                    clock = rests.change_speed(t_s, rate, time_s)
+                    behind_s = 0.5 * rate * time_s * catches_up
+                    clock = clock._replace(position_s=position_s + behind_s)
                 fade = self._away(clock, now, t_s, time_s)
                 excess = self._excess(clock, fade, t_s, time_s)
                 if excess <= 1.0:
@@ -263,12 +272,6 @@ class Voice:
         gap = OffsetState(*(a - b for a, b in zip(now, there, strict=True)))
         return Fade(gap, t_s, time_s)
 
-    def _sample_fade(self, fade: Fade, t_s: float, time_s: float) -> OffsetState:
-        total = OffsetState(*(np.zeros((_SAMPLES, len(self.motion.rest))) for _ in range(3)))
-        for row, time in enumerate((t_s + np.linspace(0.0, time_s, _SAMPLES)).tolist()):
-            fade.add_state([column[row] for column in total], time)
-        return total
-
     def _begin(self, clock: TrackClock, fade: Fade, position_s: float) -> None:
         self.clock, self._fade = clock, fade if fade.channels else None
         self._skip_cues(position_s)
@@ -279,10 +282,15 @@ class Voice:
         self._cue = sum([time < position_s - self.ahead_s for time, _ in cues])
 
     def sync(self, t_s: float, position_s: float) -> None:
-        """Correct the position by another clock, slowly, or by a seek."""
+        """Correct the position by another clock, slowly, or by a seek; not during a transition."""
+        if self._corrected_s is None and t_s < self._settled_s:
+            return
         off_s = position_s + self.ahead_s - self.position_s(t_s)
+        if self.loop:  # the clock may have begun the next round before
+            half_s = 0.5 * self.played.length_s
+            off_s = (off_s + half_s) % (2.0 * half_s) - half_s
         if abs(off_s) >= SYNC_S:
-            self.seek(t_s, max(0.0, position_s))
+            self.seek(t_s, max(0.0, position_s), catches_up=True)
         elif abs(off_s) >= _SYNCED_S and not self.paused:
             share = min(max(off_s / _CORRECTED_IN_S, -_SYNC_SHARE), _SYNC_SHARE)
             self.clock = self.clock.change_speed(t_s, self.wanted * (1.0 + share), _CHANGE_S)
@@ -290,24 +298,20 @@ class Voice:
 
     def enter(self, t_s: float) -> float:
         """Begin to take over the owned channels; return the time that it takes."""
-        owned = sorted(self.motion.owned)
-        time_s = self.played.blend_s[0]
-        present = np.array(self.played.present) if self.played.present else self.motion.rest * 0.0
-        mask = np.zeros(len(self.motion.rest))
-        mask[owned] = 1.0
-        for _ in range(12):
+        time_s, present = self.played.blend_s[0], np.array(self.played.present or 0.0)
+        owned = np.zeros(len(self.motion.rest))
+        owned[list(self.motion.owned)] = 1.0
+        for _ in range(_ATTEMPTS):
             w, dw, ddw = _blend_rates(time_s)
             value, speed, acceleration = self._sample(self.clock, self._fade, t_s, time_s)
             gap = value - present
-            blended = w * speed + dw * gap
-            if (
-                self.played.stretch(
-                    blended * mask, (w * acceleration + 2.0 * dw * speed + ddw * gap) * mask
-                )
-                <= 1.0
-            ):
+            excess = self.played.stretch(
+                owned * (w * speed + dw * gap),
+                owned * (w * acceleration + 2.0 * dw * speed + ddw * gap),
+            )
+            if excess <= 1.0:
                 break
-            time_s *= _LONGER
+            time_s *= max(_LONGER, excess)
         self._entry_s, self._in_s = t_s, time_s
         return time_s
 
