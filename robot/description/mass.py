@@ -32,15 +32,15 @@ def density_share(params: MassParams) -> float:
     return params.density_kg_m3 / _PRINTED_KG_M3
 
 
-def head_mass_kg(interocular_m: float, printed: float) -> float:
-    """Return the mass of a head: its shell grows with its surface, its mechanism does not.
+def head_mass_kg(params: MassParams, interocular_m: float) -> float:
+    """Return the mass of the whole head: from the rig's file, or from its shapes.
 
-    Args:
-        interocular_m: distance between the eyes.
-        printed: density of its shell relative to the usual one.
+    Its shell grows with its surface, its mechanism does not.
     """
+    if params.head.mass_kg is not None:
+        return params.head.mass_kg
     share = interocular_m / _REFERENCE_M
-    return HEAD_KG * (0.5 + 0.5 * printed * share * share)
+    return HEAD_KG * (0.5 + 0.5 * density_share(params) * share * share)
 
 
 def servo(times: float = 1.0) -> Inertia:

@@ -142,15 +142,8 @@ def _is_carried(link: Link, built: Description) -> bool:
 
 
 def _whole_kg(params: MassParams, measures: HeadMeasures, rest_kg: float) -> float:
-    made = head_mass_kg(params, measures.interocular_m)
+    made = mass.head_mass_kg(params, measures.interocular_m)
     return made if params.head.mass_kg is not None else max(made, 2.0 * rest_kg)
-
-
-def head_mass_kg(params: MassParams, interocular_m: float) -> float:
-    """Return the mass of the whole head: from the rig's file, or from its shapes."""
-    if params.head.mass_kg is not None:
-        return params.head.mass_kg
-    return mass.head_mass_kg(interocular_m, mass.density_share(params))
 
 
 def _with_counterweights(

@@ -29,7 +29,7 @@ from gazerig.features.bringup.cli.rig_writer import (
 from gazerig.features.bringup.manual_control import JogParams
 from gazerig.robot.app.rig_description import description_of, statics_of
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say
-from gazerig.robot.description.weights import head_mass_kg
+from gazerig.robot.description.mass import head_mass_kg
 
 
 def calibrate_mass(
