@@ -22,6 +22,16 @@ def quiet(line: str) -> None:
 
 @pytest.fixture
 def head() -> Iterator[gazerig.SimulatedHead]:
+    yield from _opened()
+
+
+@pytest.fixture(scope="module")
+def shared_head() -> Iterator[gazerig.SimulatedHead]:
+    """Return a head for what changes nothing."""
+    yield from _opened()
+
+
+def _opened() -> Iterator[gazerig.SimulatedHead]:
     with gazerig.open("desk", fast=True, scene="face-to-face", say=quiet) as head:
         head.step(2.0)
         yield head
@@ -137,11 +147,11 @@ def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedH
     ],
 )
 def test_what_cannot_be_meant_is_refused_at_once(
-    head: gazerig.SimulatedHead, ask: object, rule: str
+    shared_head: gazerig.SimulatedHead, ask: object, rule: str
 ) -> None:
     assert callable(ask)
     with pytest.raises(gazerig.Refused, match=rule):
-        ask(head)
+        ask(shared_head)
 
 
 def test_people_pixels_points_of_the_head_and_joints(head: gazerig.SimulatedHead) -> None:

@@ -176,9 +176,15 @@ READERS_OWN = ("study.yaml", "myrig.yaml", "my.yaml", "myhead.yaml", "agree.yaml
 """Files that a reader writes."""
 
 
+@cache
+def file_names() -> set[str]:
+    """Return the names of all files."""
+    return {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
+
+
 @each_of_papers("paper")
 def test_files_named_exist(paper: Path) -> None:
-    names = {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
+    names = file_names()
     for span in spans(paper):
         if re.fullmatch(r"(?:[\w-]+/)+(?:[\w-]+\.(?:py|yaml|md))?", span):
             inside = (ROOT, ROOT / "robot")
