@@ -43,19 +43,19 @@ def show(**tracks: Track) -> Show:
     return Show(player, TrackChoices(tracks, player, TrackParams(), RIG.names, lid_spans(RIG)))
 
 
-def long_track(seconds: float, seed: int, owns: tuple[str, ...] = ()) -> Track:
+def long_track(seconds: float, seed: int, size: float = 1.0) -> Track:
     """Return a track with a key of neck and jaw in each second or so."""
     random, times = np.random.default_rng(seed), np.arange(0.8, seconds, 0.9)
     frames = tuple(
         KeyFrame(
             round(float(t), 3),
-            head_yaw_deg=float(random.uniform(-15, 15)),
+            head_yaw_deg=size * float(random.uniform(-15, 15)),
             head_pitch_deg=float(random.uniform(-6, 6)),
             joints_deg={"jaw": float(random.uniform(0, 6))},
         )
         for t in times
     )
-    return Track("a show", frames, fit="slow", owns=owns, cues={"middle": seconds / 2})
+    return Track("a show", frames, fit="slow", cues={"middle": seconds / 2})
 
 
 def test_a_show_of_an_hour_with_1000_commands_keeps_all_limits() -> None:
@@ -78,8 +78,8 @@ def test_a_show_of_an_hour_with_1000_commands_keeps_all_limits() -> None:
         after = it.player.state(t)
         for was, now in zip(before[:2], after[:2], strict=True):
             assert np.abs(was - now).max() < 1e-9
-        for _ in range(36):
-            t += 0.1
+        for _ in range(18):
+            t += 0.2
             it.player.step(t)
             _, speed, acceleration = it.player.state(t)
             worst = max(worst, voice.played.stretch(speed[None], acceleration[None]))
@@ -159,19 +159,21 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     assert it.choices.states(t)[0].position_s == pytest.approx(1.0)
 
 
-def test_a_track_follows_a_clock_that_jumps() -> None:
-    it, t = show(hour=long_track(60.0, 3)), 0.0
+@pytest.mark.parametrize("size", [1.0, 6.0])  # the second is as fast as the limits permit
+def test_a_track_follows_a_clock_that_jumps(size: float) -> None:
+    it, t, random = show(hour=long_track(60.0, 3, size)), 0.0, np.random.default_rng(4)
     number = it.play("hour", t)
     (voice,) = it.player.voices
-    ahead_s, off = 0.0, []
-    for k in range(8000):
+    at_s, off = 0.0, []
+    for k in range(12000):
         t += 0.005
-        ahead_s += {1500: 12.0, 3000: -9.0, 5000: 0.2}.get(k, 0.0)
+        at_s += 0.005 * voice.wanted
+        if k % 500 == 499:
+            at_s = float(random.uniform(1.0, 50.0))
         it.player.step(t)
         if k % 20 == 0:
-            it.choices.sync(SyncTrack(number, t + ahead_s), t)
-        off.append(abs(voice.position_s(t) - t - ahead_s))
+            it.choices.sync(SyncTrack(number, at_s), t)
+        off.append(abs(voice.position_s(t) - at_s))
         _, speed, acceleration = it.player.state(t)
         assert voice.played.stretch(speed[None], acceleration[None]) < 1.06  # 5 % faster
-    for k in (1400, 2900, 4900, 7900):
-        assert off[k] < 0.02, k
+    assert max(off[498::500]) < 0.03
