@@ -148,7 +148,14 @@ def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker) -> None:
     tracker = Tracker(TrackerParams())
     for k in range(30):
         (alone,) = tracker.step([far], CAMERA, k / 30)
-    assert tracker.step([across(0.5, 2.0)], CAMERA, 1.0)[0].id == alone.id
+    (moved,) = tracker.step([across(0.5, 2.0)], CAMERA, 1.0)
+    assert moved.id == alone.id
+    # Nor does a woman hide him who has left.
+    tracker = Tracker(TrackerParams())
+    for k in range(60):
+        tracks = tracker.step([near, far][k >= 30 :], CAMERA, k / 30)
+    (moved,) = tracker.step([across(0.5, 2.0)], CAMERA, 2.0)
+    assert [moved.id] == [track.id for track in tracks]
 
 
 def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker: Tracker) -> None:
