@@ -27,6 +27,8 @@ OWNERS = {
     "zstandard": ("robot.recording.",),
     "miniaudio": ("drivers.sound.",),
     "msgspec": (
+        "config.long_track",
+        "features.animation.",
         "drivers.sound.",
         "robot.control.tick_stream",
         "robot.recording.",
@@ -45,7 +47,13 @@ OWNERS = {
     "ruamel": ("config.entries", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
-    "typer": ("robot.cli.", "features.bringup.cli.", "features.study.cli.", "features.lab.cli."),
+    "typer": (
+        "robot.cli.",
+        "features.bringup.cli.",
+        "features.study.cli.",
+        "features.lab.cli.",
+        "features.animation.cli.",
+    ),
     "viser": ("robot.dashboard.",),
     "PIL": (
         "features.bringup.calibration.charuco_views",

@@ -27,7 +27,7 @@ LARGEST = 200_000_000
 T = TypeVar("T")
 
 
-class Animation(NamedTuple):
+class ImportedAnimation(NamedTuple):
     """An animation on one rig.
 
     series: times and angles by joint
@@ -89,7 +89,7 @@ def read_animation(
     fps: float | None = None,
     clip: str = "",
     centre_deg: float | None = None,
-) -> Animation:
+) -> ImportedAnimation:
     """Return the animation of a file, by its kind.
 
     Args:
@@ -122,7 +122,7 @@ def read_animation(
             "Bottango or of Blender's add-on Servo Animation, or CSV"
         )
     else:
-        found = Animation(table.read_table(path, data, fps, names), poses=False)
+        found = ImportedAnimation(table.read_table(path, data, fps, names), poses=False)
     if not found.series:
         raise SetupError(
             f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"

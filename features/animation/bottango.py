@@ -16,7 +16,7 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import (
     SAMPLE_S,
-    Animation,
+    ImportedAnimation,
     JointMap,
     Series,
     check_count,
@@ -44,7 +44,7 @@ class _Controller(Struct):
     clips: list[_Clip] = field(name="Animations")
 
 
-def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Animation:
+def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> ImportedAnimation:
     """Return one animation of an export.
 
     Args:
@@ -86,7 +86,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Anima
         share = movement if sign > 0 else 1.0 - movement
         series[joint] = times, low + share * (high - low)
     notes = (f"{events} on/off, trigger and colour events are left out",) if events else ()
-    return Animation(series, notes)
+    return ImportedAnimation(series, notes)
 
 
 def _commands(text: str) -> Iterator[tuple[int, list[str]]]:

@@ -32,18 +32,18 @@ class Node(Struct):
     name: str = ""
 
 
-class Target(Struct):
+class AnimationTarget(Struct):
     """What a channel moves."""
 
     path: str
     node: int | None = None
 
 
-class Channel(Struct):
+class AnimationChannel(Struct):
     """Motion of one property of one node."""
 
     sampler: int
-    target: Target
+    target: AnimationTarget
 
 
 class Sampler(Struct):
@@ -57,7 +57,7 @@ class Sampler(Struct):
 class Clip(Struct):
     """An animation of the file."""
 
-    channels: list[Channel]
+    channels: list[AnimationChannel]
     samplers: list[Sampler]
     name: str = ""
 
@@ -74,7 +74,7 @@ class Accessor(Struct, rename="camel"):
     sparse: Raw | UnsetType = UNSET
 
 
-class View(Struct, rename="camel"):
+class BufferView(Struct, rename="camel"):
     """Part of a buffer."""
 
     buffer: int
@@ -97,7 +97,7 @@ class Tree(Struct, rename="camel"):
     nodes: list[Node] = []
     animations: list[Clip] = []
     accessors: list[Accessor] = []
-    buffer_views: list[View] = []
+    buffer_views: list[BufferView] = []
     buffers: list[Buffer] = []
 
 
@@ -179,7 +179,7 @@ class GltfFile:
         kind, width = _TYPES.get(accessor.component_type), _WIDTHS.get(accessor.type)
         if accessor.buffer_view is None or accessor.sparse is not UNSET or not (kind and width):
             raise SetupError(f"{where}: sparse or of an unknown type; export without compression")
-        view: View = self.item("buffer_views", accessor.buffer_view)
+        view: BufferView = self.item("buffer_views", accessor.buffer_view)
         if any("meshopt" in name for name in view.extensions):
             raise SetupError(f"{where}: compressed by meshopt; export without compression")
         dtype = np.dtype(kind)

@@ -15,7 +15,7 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import (
     SAMPLE_S,
-    Animation,
+    ImportedAnimation,
     JointMap,
     Series,
     check_count,
@@ -32,7 +32,7 @@ _COPY = re.compile(r"(\.\d{3}|_)+$")
 _OFF_AXIS_DEG = 1.0
 
 
-def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Animation:
+def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> ImportedAnimation:
     """Return the animation of a glTF file.
 
     Args:
@@ -82,7 +82,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Anima
                     )
     if ignored:
         notes.append(f"left out: {', '.join(ignored)}")
-    return Animation(series, tuple(notes))
+    return ImportedAnimation(series, tuple(notes))
 
 
 def _clips(file: GltfFile, clip: str) -> Sequence[Clip]:

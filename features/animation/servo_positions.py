@@ -12,7 +12,7 @@ from msgspec import UNSET, Struct, UnsetType
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import (
-    Animation,
+    ImportedAnimation,
     JointMap,
     Series,
     check_count,
@@ -22,17 +22,19 @@ from gazerig.features.animation.animation import (
 from gazerig.gaze.types import Floats
 
 
-class _Servo(Struct):
+class _ServoCurve(Struct):
     name: str
     positions: list[float]
 
 
 class _File(Struct):
     fps: float
-    servos: dict[str, _Servo] | UnsetType = UNSET
+    servos: dict[str, _ServoCurve] | UnsetType = UNSET
 
 
-def read(path: Path, data: bytes, rig: Rig, names: JointMap, centre_deg: float | None) -> Animation:
+def read(
+    path: Path, data: bytes, rig: Rig, names: JointMap, centre_deg: float | None
+) -> ImportedAnimation:
     """Return the animation of a file.
 
     Args:
@@ -71,7 +73,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, centre_deg: float |
         else:
             angles = positions - centre_deg
         series[joint] = times, sign * angles
-    return Animation(series)
+    return ImportedAnimation(series)
 
 
 def _angles_deg(path: Path, rig: Rig, joint: str, positions: Floats) -> Floats:

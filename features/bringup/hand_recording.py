@@ -26,7 +26,7 @@ Row = tuple[float, Mapping[str, float | None]]
 """Time in s and angles in degrees by joint, None for a servo that did not answer."""
 
 
-class Recording(NamedTuple):
+class HandRecording(NamedTuple):
     """Angles of joints over time.
 
     series: times in seconds from the start, and angles in degrees, by joint
@@ -66,7 +66,7 @@ def record_hand_motion(
     clock: Clock,
     stopped: Callable[[], str | None],
     seconds: float = LONGEST_S,
-) -> Recording:
+) -> HandRecording:
     """Read the joints of a limp head until the time is over or a person ends it.
 
     Args:
@@ -98,7 +98,7 @@ def record_live(
     stopped: Callable[[], str | None],
     seconds: float,
     track: int = 0,
-) -> Recording:
+) -> HandRecording:
     """Record the commanded angles of joints of a running head; it sends no command.
 
     Args:
@@ -140,7 +140,7 @@ def record_live(
 
 def _record(
     measure: Callable[[], Row], clock: Clock, stopped: Callable[[], str | None], seconds: float
-) -> Recording:
+) -> HandRecording:
     """Take rows until the time is over or there is a reason to end."""
     start_s, rows = clock.now_s(), list[Row]()
     ended_by, slot = None, 0
@@ -163,4 +163,4 @@ def _record(
             series[name] = np.array(times), np.array(angles)
     if not series:
         raise DriverError("no servo answered: check power, cable, ids and baud rate")
-    return Recording(series, tuple(left_out), ended_by or "the time is over")
+    return HandRecording(series, tuple(left_out), ended_by or "the time is over")

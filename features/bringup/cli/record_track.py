@@ -23,7 +23,7 @@ from gazerig.features.bringup.cli.ports import (
 )
 from gazerig.features.bringup.hand_recording import (
     LONGEST_S,
-    Recording,
+    HandRecording,
     record_hand_motion,
     record_live,
     switch_off,
@@ -120,7 +120,7 @@ def _record_hand(
     yes: bool,
     end: Callable[[], str | None],
     seconds: float,
-) -> Recording:
+) -> HandRecording:
     """Switch the torque off, and record a head that is moved by hand."""
     measured = [one for one in rig.names if rig.joints[one].model_facts.measures_position]
     if not measured:
@@ -152,7 +152,7 @@ def _record_live(
     play: str,
     end: Callable[[], str | None],
     seconds: float,
-) -> Recording:
+) -> HandRecording:
     """Record joints of a running head, which others move."""
     with RobotClient.connect(which, "record-track") as head:
 
