@@ -31,7 +31,7 @@ _SYNCED_S = 0.005
 _CORRECTED_IN_S = 1.0
 _CHANGE_S = 0.2
 """Shortest time of a change of speed."""
-_ATTEMPTS = 8
+_ATTEMPTS, _LONGEST_S = 8, 8.0
 _SAMPLES = 41
 _HEAD = len(HEAD_CHANNELS)
 _LONGER = 1.25
@@ -223,7 +223,7 @@ class Voice:
             excess = self._excess(clock, self._fade, t_s, time_s)
             if excess <= 1.0:
                 break
-            time_s *= max(_LONGER, excess)
+            time_s = min(time_s * max(_LONGER, excess), _LONGEST_S)
         self.clock = clock
 
     def pause(self, t_s: float) -> None:
@@ -263,7 +263,7 @@ class Voice:
                 if excess <= 1.0:
                     self._begin(clock, fade, position_s)
                     return
-                time_s *= max(_LONGER, excess)
+                time_s = min(time_s * max(_LONGER, excess), _LONGEST_S)
         self._begin(clock, fade, position_s)
 
     def _away(self, clock: TrackClock, now: OffsetState, t_s: float, time_s: float) -> Fade:
@@ -311,7 +311,7 @@ class Voice:
             )
             if excess <= 1.0:
                 break
-            time_s *= max(_LONGER, excess)
+            time_s = min(time_s * max(_LONGER, excess), _LONGEST_S)
         self._entry_s, self._in_s = t_s, time_s
         return time_s
 
