@@ -131,3 +131,28 @@ def test_gaze_keeps_the_eyes_on_the_point_while_a_track_owns_neck_and_jaw(tmp_pa
     assert found[-1].tracks[-1].end_reason == "finished"
     made.robot.stop()
     made.close()
+
+
+def test_owned_eyes_and_lids_are_the_track_s_alone(tmp_path: Path) -> None:
+    file = tmp_path / "stare.yaml"
+    file.write_text(
+        "description: x\nfit: slow\nowns: [eyes, lids]\nframes:\n"
+        "  - {time_s: 1, eyes_yaw_deg: 10, lids: {all: 0.4}}\n"
+        "  - {time_s: 3, eyes_yaw_deg: 10, lids: {all: 0.4}}\n  - {time_s: 4, eyes_yaw_deg: 0}\n"
+    )
+    rig = replace(load_rig("desk"), track_files=(str(file),))
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    try:
+        made.robot.start(made.clock)
+        ticks(made, 300)
+        _, found = played(made, "stare")
+    finally:
+        made.robot.stop()
+        made.close()
+    held = found[240:580]  # saccades and blinks of gaze do not move them
+    for eye in (0, 1):
+        pans = [(tick.gaze.eye_left_rad, tick.gaze.eye_right_rad)[eye][0] for tick in held]
+        assert np.degrees(pans) == pytest.approx(10.0, abs=1e-6)
+    assert [tick.gaze.lid_left for tick in held] == pytest.approx([0.4] * len(held), abs=1e-6)
+    assert len({tick.gaze.saccades for tick in held}) > 1
+    assert found[-1].gaze.eye_left_rad != found[-1].gaze.eye_right_rad  # they converge again
