@@ -101,6 +101,18 @@ def test_a_stop_fades_out_within_one_buffer_also_before_the_start() -> None:
     assert not device.playback.is_playing
 
 
+def test_a_stream_that_was_empty_waits_until_it_can_continue() -> None:
+    queue = PcmQueue(2, 100)
+    queue.add(bytes(40))
+    assert len(queue.read(10)) == 20 and len(queue.read(20)) == 20
+    queue.add(bytes(100))
+    assert queue.read(10) == b""
+    queue.add(bytes(100))
+    assert len(queue.read(10)) == 20 and len(queue.read(80)) == 160
+    queue.finish()
+    assert len(queue.read(80)) == 20 and queue.is_over
+
+
 def test_a_late_stream_loses_nothing() -> None:
     device = Loudspeaker()
     device.playback.play(1, ramp(1.0), 0.0, -0.5, 1.0, skips=False)

@@ -280,3 +280,23 @@ def test_other_programs_say_files_and_streams(folder: Path) -> None:
                 head._client.say_piece(b"a", RATE)
             wait_until(lambda: not [one for one in here.state.tracks if one.is_playing])
         assert asyncio.run(say(os.getpid())) == "arrived"
+
+
+@pytest.mark.own_timeouts
+def test_the_sound_of_a_track_file_follows_its_pauses_and_seeks(folder: Path) -> None:
+    show = "description: x\nsound: long.wav\nframes: [{time_s: 50, head_yaw_deg: 3}]\nfit: slow\n"
+    (folder / "show.yaml").write_text(show, "utf-8")
+    text = (folder / "rig.yaml").read_text("utf-8")
+    (folder / "rig.yaml").write_text(f"{text}\ntrack_files: [show.yaml]\n", "utf-8")
+    with opened(folder) as head:
+        assert head.play("show").reply.track.duration_s >= 59.9
+        wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
+        head.pause_track("show")
+        wait_until(lambda: is_silent(head))
+        head.resume_track("show")
+        wait_until(lambda: not is_silent(head))
+        head.seek_track(30.0, "show")
+        wait_until(lambda: (sound_s(head) or 0.0) > 30.0)
+        track = head.state.tracks[-1]
+        assert track.position_s == pytest.approx(sound_s(head), abs=2.0)
+    (folder / "rig.yaml").write_text(text, "utf-8")

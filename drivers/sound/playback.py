@@ -45,16 +45,20 @@ class PcmQueue:
 
     Args:
         frame_bytes: Size of a frame.
+        refill_frames: After the queue was empty, it returns nothing until it has as many frames;
+            otherwise a late stream would be interrupted at every piece.
     """
 
-    def __init__(self, frame_bytes: int) -> None:
-        self._frame_bytes = frame_bytes
+    def __init__(self, frame_bytes: int, refill_frames: int = 0) -> None:
+        self._frame_bytes, self._refill_bytes = frame_bytes, refill_frames * frame_bytes
         self._pieces: deque[bytes] = deque()
-        self._finished = False
+        self._bytes = 0
+        self._finished = self._dry = False
 
     def add(self, pcm: bytes) -> None:
         """Add samples."""
         self._pieces.append(pcm)
+        self._bytes += len(pcm)
 
     def finish(self) -> None:
         """Mark the end of the stream."""
@@ -67,7 +71,11 @@ class PcmQueue:
 
     def read(self, frames: int) -> bytes:
         """Return at most this number of frames, b"" if none has arrived."""
+        if self._dry and not self._finished and self._bytes < self._refill_bytes:
+            return b""
         wanted, parts = frames * self._frame_bytes, []
+        self._dry = self._bytes < wanted
+        self._bytes -= min(wanted, self._bytes)
         while wanted > 0 and self._pieces:
             piece = self._pieces.popleft()
             parts.append(piece[:wanted])

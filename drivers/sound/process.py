@@ -29,6 +29,7 @@ FILE_FORMAT = 48000, 2
 _PERIOD_MS, _PERIODS = 10, 3
 _LATENCY_S = _PERIOD_MS / 1e3 * (_PERIODS - 1)
 """A requested buffer follows those that the device has already."""
+_REFILL_S = 0.12
 _IDLE_S = 10.0
 _LOST_S = 1.0
 _POLL_MS = 100
@@ -115,7 +116,7 @@ class _Player:
             self._play(_FileSource(path, from_s), *FILE_FORMAT, from_s, heard_s, volume)
         elif kind == STREAM:
             self._number, rate_hz, channels, heard_s, volume = values
-            self._queue = PcmQueue(2 * channels)
+            self._queue = PcmQueue(2 * channels, round(_REFILL_S * rate_hz))
             self._play(self._queue, rate_hz, channels, 0.0, heard_s, volume)
         elif kind == FEED:
             self._queue.add(values[0])

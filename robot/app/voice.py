@@ -422,7 +422,8 @@ class RunVoice:
         heard_s = player.position_s(now_s)
         opening = 0.0
         if heard_s is not None:
-            ahead_s = level.smoothing_ms / 1e3 * _SMOOTHING_LAG - self._latency_s
+            servo_s = rig.gaze.oculomotor.eye_lag_ms / 1e3 + _WATCH_S
+            ahead_s = level.smoothing_ms / 1e3 * _SMOOTHING_LAG + servo_s - self._latency_s
             opening = rig.gaze.mouth.size * stream.mouth.opening_at(heard_s + ahead_s)
         self._try(SetLevel(rig.gaze.mouth.level, opening))
 

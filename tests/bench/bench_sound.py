@@ -153,9 +153,10 @@ def jaw(folder: str) -> None:
     piece = 2 * round(0.04 * spoken.rate_hz)
 
     def pieces() -> Iterator[bytes]:
-        for i in range(0, len(spoken.pcm), piece):
+        begin_s = time.monotonic()
+        for k, i in enumerate(range(0, len(spoken.pcm), piece)):
             yield spoken.pcm[i : i + piece]
-            time.sleep(0.04)
+            time.sleep(max(0.0, begin_s + 0.04 * (k + 1) - time.monotonic()))
 
     says: dict[str, tuple[Callable[[Any], Any], float]] = {
         "file": (lambda head: head.say(str(file)).wait(200.0), 0.0),
