@@ -111,6 +111,8 @@ def _gaze_text(target: Target) -> str:
             return f"looks at person {target.id}{part}"
         case "thing":
             return "looks at a moving object"
+        case kind if kind == ORDERED:
+            return "looks at its point"
         case kind:
             return f"looks at a {kind}"
 
