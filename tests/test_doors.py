@@ -2,7 +2,6 @@
 
 import asyncio
 import base64
-import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 from fakes.talking_head import TalkingHead, until
+from fakes.voice_assistant import Assistant, free_port, lva
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
@@ -27,10 +27,6 @@ def brief(orders: Orders) -> list[Any]:
         else (o.state, f"{len(o.text)} characters") if o.text else o.state
         for o in orders
     ]  # fmt: skip
-
-
-def lva(event: str, **data: Any) -> dict[str, Any]:
-    return {"event": event, "data": data} if data else {"event": event}
 
 
 def rtvi(kind: str, text: str | None = None) -> dict[str, Any]:
@@ -244,48 +240,6 @@ def run(door: Door, scenario: Scenario, address: str = "", bind: str = "") -> Ta
 
     asyncio.run(both())
     return head
-
-
-def free_port() -> int:
-    import socket
-
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
-
-
-class Assistant:
-    """A voice assistant's server: sends lines to whoever connects, then waits or closes."""
-
-    def __init__(self) -> None:
-        self.port = free_port()
-        self.sockets: list[web.WebSocketResponse] = []
-
-    async def __aenter__(self) -> "Assistant":
-        app = web.Application()
-        app.router.add_get("/", self._accept)
-        self._runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
-        await self._runner.setup()
-        await web.TCPSite(self._runner, "127.0.0.1", self.port).start()
-        return self
-
-    async def __aexit__(self, *raised: object) -> None:
-        await self._runner.cleanup()
-
-    async def _accept(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse()
-        await socket.prepare(request)
-        self.sockets.append(socket)
-        await socket.send_json(lva("snapshot", muted=False))
-        async for _ in socket:
-            pass
-        return socket
-
-    async def send(self, *messages: Any) -> None:
-        for message in messages:
-            await self.sockets[-1].send_str(
-                message if isinstance(message, str) else json.dumps(message)
-            )
 
 
 @pytest.mark.own_timeouts
