@@ -176,15 +176,6 @@ class _Player:
             return
 
 
-def device_names() -> tuple[str, ...]:
-    """Return the names of the loudspeakers; without one an empty tuple."""
-    try:
-        backends = _real_backends()
-        return tuple(one["name"] for one in miniaudio.Devices(backends).get_playbacks())
-    except miniaudio.MiniaudioError:
-        return ()
-
-
 def _real_backends() -> list[miniaudio.Backend]:
     """Return all backends but the silent one, which must not replace a missing loudspeaker."""
     return [one for one in miniaudio.Backend if one != miniaudio.Backend.NULL]

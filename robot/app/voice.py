@@ -36,13 +36,11 @@ from gazerig.gaze.mouth.stream_mouth import StreamMouth
 from gazerig.gaze.types import Floats
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.command_json import check_command
+from gazerig.robot.model.command_json import MAX_SPEECH_S, check_command
 from gazerig.robot.model.commands import Command, ControlTrack, Say, SetLevel, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, TrackState
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
-LONGEST_SPEECH_S = 1200.0
-"""Longest sound that is said; longer ones belong into a track's file."""
 STREAM_DELAY_S = 0.15
 """Time from the arrival of a stream's first piece until it is heard."""
 
@@ -118,7 +116,7 @@ class RunVoice:
         check_command(command)
         what, params = command.what, self._rig().sound
         if what.lower().endswith(KINDS):
-            sound = check_sound(self._find(what, confined), LONGEST_SPEECH_S)
+            sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
             samples = read_samples(sound).astype(np.float64)
             keys = self._mouth(samples, len(samples) / sound.duration_s, command.spoken)
             speech = self._speak(sound.path, sound.duration_s, keys)

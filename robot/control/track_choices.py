@@ -106,7 +106,7 @@ class TrackChoices:
     ) -> None:
         """Change the parameters of the next track."""
         if tables != self._tables:
-            self._tables, self._cache = tables, {}
+            self._tables, self._cache, self._speeches = tables, {}, {}
         self._params, self._lead_s = params, lead_s
         self._fit = TrackFit(self._joints, lid_spans_rad)
 

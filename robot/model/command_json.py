@@ -54,8 +54,8 @@ MAX_TALK_CHARACTERS = 10_000
 """Longest text of speech, and longest path of its sound."""
 MAX_TALK_WORDS = 2000
 """Largest number of words with times."""
-MAX_SPEECH_S = 1210.0
-"""Longest speech."""
+MAX_SPEECH_S = 1200.0
+"""Longest speech; longer ones belong into a track's file."""
 MAX_SWAY_DEG = 5.0
 """Largest sway of a speech."""
 MAX_MOUTH_KEYS = 40_000

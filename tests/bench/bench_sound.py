@@ -96,7 +96,8 @@ def rig_file(folder: str) -> str:
 
 def opened(folder: str, fast: bool) -> tuple[Any, Trace]:
     """Return a head and the trace of its ticks."""
-    head = gazerig.open(rig_file(folder), fast=fast, mock=True, say=lambda line: print(" ", line))
+    open_head: Any = gazerig.open
+    head = open_head(rig_file(folder), fast=fast, mock=True, say=lambda line: print(" ", line))
     trace = Trace(head)
     target, name = (head._feed, "update") if fast else (head, "_update")
     update: Callable[[Tick], None] = getattr(target, name)
