@@ -87,7 +87,8 @@ def test_a_program_keeps_its_token_when_the_head_is_started_again(
         with urllib.request.urlopen(address, timeout=20.0) as answer:
             return int(answer.status)
 
-    words = ["run", "--mock", "--no-browser", f"--page=127.0.0.1:{port}", f"--token-file={path}"]
+    words = ["run", "--mock", "--rate=40", "--no-browser", f"--page=127.0.0.1:{port}"]
+    words.append(f"--token-file={path}")
     for _ in range(2):
         with (tmp_path / "log").open("w+", encoding="utf-8") as log:
             process = subprocess.Popen([*GAZERIG, *words], stdout=log, stderr=log)
