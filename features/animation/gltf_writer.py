@@ -63,7 +63,7 @@ def animated_gltf(
             continue
         leader, ratio = (joint.follows or (joint.name, 1.0))[:2]
         if leader in angles_rad:
-            rotations = add(_rotations(link, ratio * angles_rad[leader]), "VEC4")
+            rotations = add(node_rotations(link, ratio * angles_rad[leader]), "VEC4")
             target = {"node": nodes[joint.name], "path": "rotation"}
             channels.append({"sampler": len(samplers), "target": target})
             samplers.append({"input": clock, "output": rotations, "interpolation": "LINEAR"})
@@ -72,7 +72,7 @@ def animated_gltf(
     return join_glb(msgspec.json.encode(tree), b"".join(parts))
 
 
-def _rotations(link: Link, angles_rad: Floats) -> Floats:
+def node_rotations(link: Link, angles_rad: Floats) -> Floats:
     """Return the (n, 4) rotations x, y, z, w of a joint's node."""
     assert link.joint is not None
     w0, *v = rest_quaternion(link).tolist()

@@ -17,8 +17,11 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import Series, joint_map, read_animation
 from gazerig.features.animation.cli.export_track import app as export_app
 from gazerig.features.animation.cli.import_track import app
+from gazerig.features.animation.gltf_reader import joint_angles
+from gazerig.features.animation.gltf_writer import node_rotations
 from gazerig.robot.app.track_file import fit_to_rig, track_text, write_track
 from gazerig.robot.cli.rig_check import app as check_app
+from gazerig.robot.description.links import Link, LinkJoint
 from gazerig.robot.model.track_fit import track_motions
 
 DESK = load_rig("desk")
@@ -158,6 +161,10 @@ def test_gltf_rotations_become_joint_angles(tmp_path: Path) -> None:
     angles = [0.0, 150.0, 250.0]
     yaw = read_bytes(clip(times, about("z", angles)), tmp_path).series["neck_yaw"]
     assert yaw[1] == pytest.approx(angles, abs=1e-4) and yaw[0] == pytest.approx(times)
+    # A quaternion and its negative are the same rotation.
+    signs = np.array([[1.0], [-1.0], [1.0]])
+    again = read_bytes(clip(times, about("z", [0.0, 150.0, 250.0]) * signs), tmp_path)
+    assert again.series["neck_yaw"][1] == pytest.approx(angles, abs=1e-4)
     # Pitch is positive upwards: about -y. Blender adds .001 to a name in use.
     pitch = clip(times, about("y", [0.0, 8.0, 0.0]), node="neck_pitch.001")
     assert read_bytes(pitch, tmp_path).series["neck_pitch"][1][1] == pytest.approx(-8.0, abs=1e-4)
@@ -165,6 +172,20 @@ def test_gltf_rotations_become_joint_angles(tmp_path: Path) -> None:
     found = read_bytes(clip(times, np.asarray(both.as_quat())), tmp_path)
     assert found.series["neck_yaw"][1][1] == pytest.approx(20.0, abs=1e-3)
     assert "5.0 deg about other axes (at 0.50 s)" in found.notes[0]
+
+
+def test_angles_are_relative_to_the_rest_pose_of_a_node() -> None:
+    rest = Rotation.from_rotvec([0.3, -0.8, 0.4])
+    axis = (0.6, 0.0, 0.8)
+    link = Link(
+        "nose", "head", R=rest.as_matrix().tolist(), joint=LinkJoint("nose", axis, -1, 1, 1, 1)
+    )
+    wanted = np.array([0.0, 25.0, -40.0])
+    turned_to = rest * Rotation.from_rotvec(np.outer(wanted, axis), degrees=True)
+    angles, off = joint_angles(link, turned_to.as_quat())
+    assert angles == pytest.approx(wanted, abs=1e-9) and off.max() < 1e-5
+    written = Rotation.from_quat(node_rotations(link, np.radians(wanted)))
+    assert (written.inv() * turned_to).magnitude().max() < 1e-9
 
 
 def test_gltf_steps_and_splines_are_read(tmp_path: Path) -> None:
@@ -186,6 +207,14 @@ def test_gltf_steps_and_splines_are_read(tmp_path: Path) -> None:
     mixed = keys[0] + (3.0 * s**2 - 2.0 * s**3) * (keys[1] - keys[0])
     expected = Rotation.from_quat(mixed).as_euler("ZYX", degrees=True)[0]
     assert np.interp(0.25, at, curve) == pytest.approx(expected, abs=0.05) and len(at) > 90
+    # Equal tangents in the slope of the whole make it a straight line of quaternions.
+    tangents[:2, (0, 2)] = (keys[1] - keys[0])[None, None]
+    at, curve = read_bytes(clip(times, tangents.reshape(-1, 4), "CUBICSPLINE"), tmp_path).series[
+        "neck_yaw"
+    ]
+    mixed = keys[0] + 0.25 * (keys[1] - keys[0])
+    expected = Rotation.from_quat(mixed).as_euler("ZYX", degrees=True)[0]
+    assert np.interp(0.25, at, curve) == pytest.approx(expected, abs=0.02)
 
 
 GOOD = clip([0.0, 0.5, 1.0], about("z", [0.0, 5.0, 0.0]))
@@ -398,10 +427,10 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(tmp_pat
 
 def test_every_key_beyond_the_limits_is_listed(tmp_path: Path) -> None:
     frames = "".join(
-        f"  - {{time_s: {t}, head_yaw_deg: {yaw}, head_pitch_deg: {pitch}}}\n"
+        f"  - {{time_s: {t}, head_yaw_deg: {yaw}, head_pitch_deg: {pitch}}}\n".replace("None", "null")
         for t, yaw, pitch in (
-            (1.0, 30, 5), (1.1, -40, 4), (2.5, 88, 3), (3.5, 89, -2), (4.2, 10, 30), (4.3, 12, 31),
-            (4.35, 0, 0),
+            (1.0, 30, 0), (1.2, None, -30), (1.25, -40, None), (1.4, None, 4), (2.5, 88, 3),
+            (3.5, 89, -2), (4.2, 10, 40), (4.3, 12, 31), (4.35, 0, 0),
         )
     )  # fmt: skip
     path = tmp_path / "wild.yaml"
@@ -423,6 +452,8 @@ def test_every_key_beyond_the_limits_is_listed(tmp_path: Path) -> None:
         before = 0.0
         for frame in track.frames:
             angle = getattr(frame, name)
+            if angle is None:
+                continue
             if not params.min_deg <= angle <= params.max_deg:
                 judged[frame.time_s, joint, "range"] = angle
             at = np.arange(before, frame.time_s + 1e-9, 0.0005)

@@ -97,7 +97,7 @@ def record_track(
                 recorded = _record_hand(loaded, mock, port, yes, end, seconds or LONGEST_S)
             ended = stopped()
         if ended:
-            say("ended by Ctrl-C: nothing is written")
+            say("ended by Ctrl-C: nothing is written" + ("" if live else "; the torque is off"))
             raise typer.Exit(INTERRUPTED)
         say(f"recorded {len(recorded.series)} joints; ended: {recorded.ended_by}")
         for one in recorded.left_out:
