@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+import gazerig
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
@@ -416,9 +417,23 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(tmp_pat
     begins = track.frames[1].time_s
     yaw = np.degrees(motion.sample_at(np.array(times) + begins).value[:, 0])
     assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)
-    # Back to Blender: the angles of the file are those of the first one.
     rig = tmp_path / "rig.yaml"
     rig.write_text(shipped_path("rigs", "desk").read_text() + "\ntrack_files: [far.yaml]\n")
+    # A head that plays it has these angles, whatever its gaze does.
+    with gazerig.open(str(rig), fast=True, scene="visitor") as head:
+        head.step(3.0)
+        reply = head.play("far").reply.track
+        assert reply is not None
+        seen = []
+        while head.state.tracks and not head.state.tracks[-1].end_reason:
+            head.step(0.02)
+            position_s = head.state.tracks[-1].position_s if head.state.tracks else 0.0
+            seen.append((position_s, np.degrees(head.joints["neck_yaw"].commanded_rad)))
+    position, commanded = np.array(seen).T
+    later = (position > begins + 0.5) & (position < begins + 2.0)  # after the blend from gaze
+    wanted = np.degrees(motion.sample_at(position[later]).value[:, 0])
+    assert later.sum() > 50 and np.abs(commanded[later] - wanted).max() < 0.1
+    # Back to Blender: the angles of the file are those of the first one.
     words = [str(rig), "far", str(tmp_path / "back.glb"), "--fps", "200"]
     assert CliRunner().invoke(export_app, words).exit_code == 0
     back = read_animation(tmp_path / "back.glb", DESK, joint_map(DESK, [])).series["neck_yaw"]
