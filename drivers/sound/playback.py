@@ -89,7 +89,8 @@ class Playback:
     """One sound at a time in the buffers of a device.
 
     Args:
-        rate_hz, channels: Format of the device; samples are signed, 16 bits.
+        rate_hz: Rate of the device.
+        channels: Its channels; samples are signed, 16 bits.
         latency_s: Time from a request until the requested part is heard.
         write: Receives the record of the position.
         report: Receives events.
