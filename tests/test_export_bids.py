@@ -13,7 +13,7 @@ from exported_run import RATE_HZ, Run, seen
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.recording.export_bids import DatasetDescription, bids_label, write_bids
-from gazerig.robot.recording.gaze_angles import gaze_in_space
+from gazerig.robot.recording.gaze_angles import RecordedTurn, gaze_in_space
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -95,6 +95,18 @@ def test_a_message_of_any_text_is_one_cell(face: Run, tmp_path: Path) -> None:
     cells = line.split("\t")
     assert cells[0] == "0.100000" and cells[1:-1] == ["n/a"] * 6
     assert cells[-1] == "a servo says this and that"
+
+
+def test_a_turn_is_an_event_with_its_partner_and_text(face: Run, tmp_path: Path) -> None:
+    short = Run(face.ticks[:50])
+    turn = RecordedTurn(0.1, 2.5, "speaking", 1, "Good\tmorning.")
+    write_bids(short.trace._replace(turns=(turn,), messages=()), short.labels, (), ABOUT, tmp_path)
+    (path,) = tmp_path.rglob("*eye1_physioevents.tsv.gz")
+    cells = gzip.decompress(path.read_bytes()).decode().rstrip("\n").split("\t")
+    assert cells[:3] == ["0.100000", "2.500000", "turn_speaking"]
+    assert cells[5:] == ["face 1", "n/a", "Good morning."]
+    levels = json.loads(path.with_name(path.name.replace("tsv.gz", "json")).read_text())
+    assert cells[2] in levels["trial_type"]["Levels"]
 
 
 @pytest.mark.parametrize(

@@ -303,7 +303,7 @@ class Aversion:
         right = unit(cross(ahead, (0.0, 0.0, 1.0)))
         up = cross(right, ahead)
         way = radians(self._draw_direction_deg())
-        angle = radians(self._angle_deg(_face_extent_deg(way, norm(rel))))
+        angle = radians(self._angle_deg(face_extent_deg(way, norm(rel))))
         aside = add(scale(right, cos(way)), scale(up, sin(way)))
         looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
         return add(p_world_head_m, scale(looking, norm(rel)))
@@ -360,7 +360,7 @@ class Aversion:
         return max(drawn, self._params.min_dwell_s)
 
 
-def _face_extent_deg(way_rad: float, distance_m: float) -> float:
+def face_extent_deg(way_rad: float, distance_m: float) -> float:
     """Return the extent of a face from its centre, degrees, in a direction (0 right, pi/2 up)."""
     across, up = cos(way_rad) / _HALF_WIDE_M, sin(way_rad) / _HALF_HIGH_M
     return degrees(atan2(1.0 / hypot(across, up), distance_m))

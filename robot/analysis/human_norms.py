@@ -298,7 +298,7 @@ BANDS: tuple[NormBand, ...] = (
     NormBand("blink_rate", LIDS, "blinks a minute", "1/min", 8.0, 21.0, 8,
          "Doughty 2001, looking ahead; Bentivoglio et al. 1997: 17 at rest", "none"),
     NormBand("blink_rate_talk", LIDS, "blinks a minute in conversation", "1/min", 10.5, 32.5, 8,
-         "Doughty 2001; Bentivoglio et al. 1997: 26", "talk listen think"),
+         "Doughty 2001; Bentivoglio et al. 1997: 26", "talk listen think turns"),
     NormBand("blink_cv", LIDS, "intervals between blinks: deviation over mean", "", 0.5, 1.2, 20,
          "log-normal intervals (Bentivoglio et al. 1997)"),
     NormBand("blink_close", LIDS, "time of closing, median", "ms", 60.0, 100.0, 10,
@@ -327,6 +327,33 @@ BANDS: tuple[NormBand, ...] = (
          0.91, 0.99, 10, "Lee, Badler & Badler 2002: .95; Argyle & Cook: .75", "listen"),
     NormBand("bout_think", SOCIAL, "mean look away while thinking", "s", 2.3, 4.8, 10,
          "Andrist et al. 2014: 3.54 +- 1.26 s", "think"),
+    *(
+        NormBand(f"{key}_{role}", SOCIAL, f"{title} in {text}", unit, low, high, least,
+             f"Dembinsky et al. 2024, 19 people in remote talk: {people}")
+        for role, text, values in (
+            ("speaking", "long turns of speech", ((0.21, 0.52, ".45 [.21-.52]"),
+             (8.6, 17.7, "13.5 [8.6-17.7]"), (0.6, 0.95, ".77, quartiles not known"))),
+            ("listening", "long turns of the partner", ((0.01, 0.08, ".04 [.01-.08]"),
+             (1.0, 5.4, "3.2 [1.0-5.4]"), (0.6, 0.95, ".75, quartiles not known"))),
+            ("dialogue", "turns below 10 s", ((0.07, 0.28, ".14 [.07-.28]"),
+             (4.4, 9.9, "6.6 [4.4-9.9]"), (0.6, 0.95, ".87, quartiles not known"))),
+        )
+        for (key, title, unit, least), (low, high, people) in zip((
+            ("averted", "share of the time averted", "share", 6),
+            ("aversions", "looks away a minute", "1/min", 6),
+            ("aside", "looks away that go aside", "share", 12),
+        ), values, strict=True)
+    ),
+    NormBand("turn_begins", SOCIAL, "long turns of speech that begin averted", "share", 0.7, 1.0, 8,
+         "Kendon 1967: more than 70 %"),
+    NormBand("turn_ends", SOCIAL, "long turns of speech that end on the face", "share", 0.7, 1.0, 8,
+         "Kendon 1967: more than 70 %"),
+    NormBand("turn_motion", SOCIAL, "from a reported state to the gaze's motion, 95 % below", "ms",
+         0.0, 150.0, 5, "Saslow 1967: 200 ms after an event; a report is the head's own decision"),
+    NormBand("turn_thinks", SOCIAL, "from thinking to a look away, 95 % below", "ms", 0.0, 500.0, 5,
+         "Shiwa et al. 2008: an answer is preferred within 1 s, and a filler helps"),
+    NormBand("turn_yields", SOCIAL, "from an interruption to the face, 95 % below", "ms", 0.0, 200.0,
+         3, "Holler & Kendrick 2015: gaps between turns are some 200 ms"),
     NormBand("reaction", SOCIAL, "from coming into view to the gaze's start, median", "ms",
          150.0, 250.0, 8, "Saslow 1967: 200 ms, 150 with a gap, 250 with an overlap"),
     NormBand("express", SOCIAL, "such reactions in less than 120 ms", "share", 0.0, 0.05, 8,

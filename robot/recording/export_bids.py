@@ -281,6 +281,14 @@ def _write_events(
         ])
         for s in stretches
     ]  # fmt: skip
+    rows += [
+        (turn.onset_s, [
+            f"{turn.onset_s:.6f}", f"{turn.duration_s:.6f}", f"turn_{turn.state}", _MISSING, _MISSING,
+            _MISSING if turn.partner is None else f"face {turn.partner}", _MISSING,
+            " ".join(turn.text.split()) or _MISSING,
+        ])
+        for turn in trace.turns
+    ]  # fmt: skip
     blank = [_MISSING] * (len(_EVENT_COLUMNS) - 2)
     rows += [
         (time_s, [f"{time_s:.6f}", *blank, " ".join(text.split())])
@@ -303,6 +311,10 @@ def _write_events(
                 "saccade": "the gaze moves rapidly",
                 "pursuit": "the gaze follows a moving target",
                 "blink": "the lids close and open",
+                "turn_listening": "a voice agent reports that the partner speaks",
+                "turn_thinking": "it reports that it prepares its answer",
+                "turn_speaking": "it reports that the robot speaks",
+                "turn_interrupted": "it reports that the partner has interrupted it",
             },
         },
         "amplitude": {"Description": "great circle from first to last sample", "Units": "deg"},
@@ -312,7 +324,7 @@ def _write_events(
             "Description": "part of a face; left and right are those of the person",
             "Levels": dict(PART_NAMES),
         },
-        "message": {"Description": "message of the machine, or a command to it"},
+        "message": {"Description": "message of the machine, a command to it, or spoken text"},
     }
     return _write_pair(f"{stem}_physioevents", sidecar, (row for _, row in rows), force)
 

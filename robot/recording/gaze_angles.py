@@ -30,6 +30,7 @@ from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3, body_na
 from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import REPEATED, Command, Jog, Stop
+from gazerig.robot.model.conversation import ConversationState
 
 Ints = NDArray[np.int64]
 
@@ -67,6 +68,16 @@ class GazeTarget(NamedTuple):
     part: str
 
 
+class RecordedTurn(NamedTuple):
+    """A state of conversation: begin, duration, state, partner's number or None, spoken text."""
+
+    onset_s: float
+    duration_s: float
+    state: str
+    partner: int | None
+    text: str
+
+
 class GazeAngles(NamedTuple):
     """The columns of a run of n ticks.
 
@@ -83,6 +94,7 @@ class GazeAngles(NamedTuple):
         messages: Events and commands in order, (time_s, text).
         joints: Names of the rig's joints.
         estimated: Names of the joints whose servos have no feedback.
+        turns: Turns of conversation.
     """
 
     start_s: float
@@ -101,6 +113,7 @@ class GazeAngles(NamedTuple):
     lower_lids: Floats
     joints: tuple[str, ...]
     estimated: tuple[str, ...]
+    turns: tuple[RecordedTurn, ...] = ()
 
     @property
     def rate_hz(self) -> float:
@@ -145,6 +158,8 @@ class GazeAnglesBuilder:
         self._led = ""
         self._joints: tuple[str, ...] = ()
         self._estimated: dict[str, None] = {}
+        self._turns: list[tuple[float, ConversationState]] = []
+        self._end_s = 0.0
 
     def update(self, tick: Tick) -> None:
         """Add a tick."""
@@ -164,7 +179,10 @@ class GazeAnglesBuilder:
             head = (nan, nan, nan) if not _NECK.isdisjoint(missing) else head
             lost_lids = [nan if n in missing else o for n, o in zip(_LIDS, lids, strict=True)]
             lids = (lost_lids[0], lost_lids[1], lost_lids[2], lost_lids[3])
-        time_s = tick.t_s - self._start_s
+        self._end_s = time_s = tick.t_s - self._start_s
+        turn = tick.conversation
+        if turn.number != (self._turns[-1][1].number if self._turns else 0):
+            self._turns.append((time_s, turn))
         self._angles.extend((time_s, *left, *right, *cyclopean, *head, *lids, *planned))
         self._messages += [(time_s, event) for event in tick.events]
         for command in tick.commands:
@@ -198,8 +216,17 @@ class GazeAnglesBuilder:
         return GazeAngles(
             self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
             a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
-            tuple(self._messages), a[:, 12:14], self._joints, tuple(self._estimated),
+            tuple(self._messages), a[:, 12:14], self._joints, tuple(self._estimated), self._turn_rows(),
         )  # fmt: skip
+
+    def _turn_rows(self) -> tuple[RecordedTurn, ...]:
+        """Return the turns; the last one ends with the run."""
+        ends = [*(at_s for at_s, _ in self._turns), self._end_s][1:]
+        return tuple(
+            RecordedTurn(at_s, end_s - at_s, turn.state, turn.partner, turn.text)
+            for (at_s, turn), end_s in zip(self._turns, ends, strict=True)
+            if turn.state != "idle"
+        )
 
     def _number(self, tick: Tick) -> int:
         """Return the number of the target that the eyes are on or move to.

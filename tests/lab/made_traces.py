@@ -24,5 +24,5 @@ def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -
     shuts = tuple(BlinkEvent(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
     rows = np.full((600, len(TraceRow._fields)), np.nan)
     rows[:, 0] = np.arange(600) * 0.05
-    rows[:, -1] = 0.0
+    rows[:, TraceRow._fields.index("mode")] = 0.0
     return GazeTrace(rows, every, (), shuts, shuts)

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
 from gazerig.features.lab.report.lid_closure import blinks_of
+from gazerig.features.lab.report.turns import STATES, TurnTrace
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
+from gazerig.gaze.attention.aversion import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
 from gazerig.robot.analysis.blink_finder import LOWER, UPPER, BlinkEvent, lid_openings
@@ -78,7 +80,9 @@ class ReactionFinder:
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
 
-MODES = ("none", "talk", "listen", "think")
+MODES = ("none", "talk", "listen", "think", "turns")
+"""Modes of conversation; turns: a voice agent reports them."""
+_TURNS = MODES.index("turns")
 PHASES = ("fixate", "saccade", "pursue")
 """States of the eyes, in the order of ``phase``."""
 
@@ -100,6 +104,8 @@ class TraceRow(NamedTuple):
     face_off: angle of the person's face away from the robot
     lid, lower_lid: the wider opening of the upper and of the lower lids, 0 shut .. 1 open
     shift: the target's event count; mode: index in MODES
+    turn, turn_number: state of conversation as an index in turns.STATES, and its number
+    off_yaw, off_pitch: the gaze from the partner's face; face_edge: extent of that face there
     """
 
     t: float
@@ -135,6 +141,11 @@ class TraceRow(NamedTuple):
     eye_limited: float
     shift: float
     mode: float
+    turn: float
+    turn_number: float
+    off_yaw: float
+    off_pitch: float
+    face_edge: float
 
 
 @dataclass(frozen=True)
@@ -180,6 +191,17 @@ class GazeTrace:
         """Return the mode of conversation with the longest time."""
         modes = self.column("mode")
         return MODES[int(np.bincount(modes.astype(int)).argmax())] if len(modes) else "none"
+
+    def turns(self) -> TurnTrace:
+        """Return the turns of conversation, and the gaze from the partner's face."""
+        state, number = np.nan_to_num(self.columns("turn", "turn_number")).T
+        return TurnTrace(
+            self.column("t"),
+            state,
+            number,
+            self.columns("off_yaw", "off_pitch"),
+            self.column("face_edge"),
+        )
 
     def between(self, start_s: float, end_s: float) -> slice:
         """Return the rows from ``start_s`` to before ``end_s``."""
@@ -233,7 +255,8 @@ class GazeTraceBuilder:
             self._kinds[tick.target.kind] += tick.t_s - self._last_s
         self._last_s = tick.t_s
         if not tick.stopped:
-            self._flat.extend(trace_row(tick, self._mode))
+            turn = tick.conversation.state
+            self._flat.extend(trace_row(tick, self._mode if turn == "idle" else _TURNS))
             gaze = tick.gaze
             lids = lid_openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
             pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
@@ -304,7 +327,25 @@ def trace_row(tick: Tick, mode: int) -> TraceRow:
         PHASES.index(tick.gaze.phase),
         float(target.kind == "face"), float(target.kind in _IDLE),
         float(any("eye" in limited.axis for limited in tick.gaze.limited)), target.shift, mode,
+        STATES.index(tick.conversation.state), tick.conversation.number,
+        *_off_partner(tick, (yaw, pitch)),
     )  # fmt: skip
+
+
+def _off_partner(tick: Tick, gaze_rad: tuple[float, float]) -> tuple[float, float, float]:
+    """Return yaw and pitch of the gaze from the partner's face, and its extent; nan if unknown."""
+    now = tick.conversation
+    if now.state == "idle" or tick.percept is None:
+        return nan, nan, nan
+    wanted = now.partner if now.partner is not None else tick.target.id
+    for face in tick.percept.faces:
+        if face.id == wanted:
+            rel = sub(face.p_world_m, tick.pose.p_world_head_m)
+            at_yaw, at_pitch = yaw_pitch(rel)
+            yaw, pitch = gaze_rad[0] - at_yaw, gaze_rad[1] - at_pitch
+            edge = face_extent_deg(atan2(pitch, -yaw), norm(rel))
+            return degrees(yaw), degrees(pitch), edge
+    return nan, nan, nan
 
 
 def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from gazerig.features.lab.report import (
     pursuit,
     rests,
     saccades,
+    turns,
 )
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.heads import MutualGazeReport
@@ -103,7 +104,7 @@ def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
     each = (
         saccades.measures(run), landing.measures(run), rests.measures(run), face.measures(run),
         eye_head.measures(run), pursuit.measures(run), blinks.measures(run),
-        eye_contact.measures(run), saccades.reaction_measures(run),
+        eye_contact.measures(run), saccades.reaction_measures(run), turns.measures(run.turns()),
     )  # fmt: skip
     return tuple(
         m

@@ -1,0 +1,101 @@
+"""Turns of a scripted voice agent, for the models alone and for the whole product."""
+
+from collections.abc import Iterator
+from math import degrees
+from typing import Any, Literal
+
+import numpy as np
+
+from gazerig.config.schema import load_rig
+from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
+from gazerig.features.lab.report.turns import STATES, Role, TurnTrace
+from gazerig.gaze.angles import yaw_pitch
+from gazerig.gaze.attention.aversion import Aversion, AversionParams
+from gazerig.gaze.attention.turn_gaze import TurnGaze, TurnParams, TurnState
+from gazerig.gaze.types import Target
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import Tick, TickLoop
+from gazerig.robot.model.commands import Talk, TalkOrder
+
+Script = Literal[Role, "interrupted"]
+
+
+def scripted_turns(role: Script, rng: np.random.Generator) -> Iterator[tuple[TurnState, float]]:
+    """Return states and their durations without end.
+
+    speaking: monologues of 20 to 60 s after a thought; listening: the same of the partner;
+    dialogue: turns of some 3 s by both, with thoughts; interrupted: speech that is interrupted.
+    """
+    while True:
+        if role == "listening":
+            yield "listening", float(rng.uniform(20.0, 60.0))
+        elif role == "dialogue":
+            yield "listening", float(np.clip(rng.lognormal(np.log(3.0), 0.7), 0.7, 9.5))
+            yield "thinking", float(rng.uniform(0.4, 1.0))
+            yield "speaking", float(np.clip(rng.lognormal(np.log(3.5), 0.6), 0.7, 9.5))
+        elif role == "speaking":
+            yield "listening", 1.0
+            yield "thinking", float(rng.uniform(0.5, 1.0))
+            yield "speaking", float(rng.uniform(20.0, 60.0))
+        else:
+            yield "listening", float(rng.uniform(1.0, 4.0))
+            yield "thinking", float(rng.uniform(0.6, 2.0))
+            yield "speaking", float(rng.uniform(1.0, 8.0))
+            yield "interrupted", float(rng.uniform(1.0, 2.0))
+
+
+def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -> TurnTrace:
+    """Return the trace of aversion and turns, without a robot, before a face at 1 m."""
+    random = [np.random.default_rng((seed, n)) for n in range(4)]
+    aversion = Aversion(AversionParams(), random[0])
+    attention: Any = type("Unused", (), {"converse": lambda *of: None})()
+    gaze = TurnGaze(TurnParams(), aversion, attention, random[1])
+    face = Target((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, "face", 1, 1.0, True, None, 0, "a person")
+    script, rests_s, end_s, number, rows = scripted_turns(role, random[2]), 0.0, 0.0, 0, []
+    for t_s in np.arange(0.0, 60.0 * minutes, step_s).tolist():
+        if t_s >= end_s:
+            state, lasts_s = next(script)
+            end_s, number = t_s + lasts_s, number + 1
+            # A speech that will be interrupted was meant to be longer.
+            planned_s = end_s + 10.0 * (role == "interrupted") if state == "speaking" else None
+            gaze.enter(state, 1, planned_s, 0.9, t_s)
+        gaze.step(t_s)
+        target = aversion.step(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
+        if t_s > rests_s:
+            rests_s = t_s + float(random[3].exponential(0.3))  # looks at parts of the face
+        yaw, pitch = yaw_pitch(target.p_world_m)
+        rows.append((t_s, STATES.index(state), number, degrees(yaw), degrees(pitch)))
+    table = np.array(rows)
+    return TurnTrace(table[:, 0], table[:, 1], table[:, 2], table[:, 3:], np.zeros(len(table)))
+
+
+def whole_product(
+    role: Script, seed: int, minutes: float, rig: str = "desk", scene: str = "face-to-face"
+) -> TurnTrace:
+    """Return the trace of a simulated rig: from reported states to measured joints."""
+    rng, builder = np.random.default_rng((seed, 9)), GazeTraceBuilder()
+    made = assemble(load_rig(rig), RunOptions(mock=True, fast=True, seed=seed, scene=scene))
+    made.robot.start(made.clock)
+
+    def watch(tick: Tick) -> None:
+        if tick.t_s > 2.0:
+            builder.update(tick)
+
+    try:
+        loop = TickLoop(made.robot, made.clock, made.loop, lambda s: None, watch)
+        script, end_s = scripted_turns(role, rng), 2.0
+        while (now_s := made.clock.now_s()) < 60.0 * minutes + 2.0:
+            if now_s >= end_s:
+                state, lasts_s = next(script)
+                end_s = now_s + lasts_s
+                order: TalkOrder = "interrupt" if state == "interrupted" else state
+                planned_s = lasts_s + 10.0 * (role == "interrupted")
+                made.robot.command(
+                    Talk(order, seconds=planned_s if state == "speaking" else None, stay=True)
+                )
+            assert loop.step() is None
+    finally:
+        made.robot.stop()
+        made.close()
+    return builder.trace().turns()
