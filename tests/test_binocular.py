@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from gaze_trace_rig import CENTRED, DESK, Rig
+from gaze_trace_rig import CENTRED, DESK, NO_RELIEF, Rig
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, angle_between, direction, scale
@@ -191,7 +191,9 @@ def test_e27_both_eyes_meet_on_the_target() -> None:
 
 def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> None:
     # One camera sees for both eyes: a stopped eye continues with the other.
-    rig = Rig(params=NO_SACCADES, pursuit=MITAKE.pursuit)
+    # Without a margin of the eyes: with one the head turns, so that the stopped eye can follow.
+    head = replace(NO_RELIEF, eye_margin_deg=0.0)
+    rig = Rig(head=head, params=NO_SACCADES, pursuit=MITAKE.pursuit)
     span = (-1.0, 1.0)
     limits = ((span, span), ((-1.0, radians(-1.0)), span))
     rig.oculomotor.retune(NO_SACCADES, limits)

@@ -12,10 +12,10 @@ from gazerig.robot.app.computer import (
     level_text,
     load_level,
     measure,
-    slower_rate,
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
+from gazerig.robot.control.loop_timing import slower_rate
 from gazerig.robot.model.types import LoopFigures
 
 CARD, SOFTWARE, NOTHING = False, True, None

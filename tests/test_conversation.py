@@ -15,7 +15,8 @@ import gazerig
 from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
-from gazerig.gaze.attention.turn_gaze import NOD, TurnGaze, TurnParams, TurnState
+from gazerig.gaze.attention.turn_gaze import NOD, TurnGaze, TurnParams
+from gazerig.gaze.attention.turn_state import TurnState
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun

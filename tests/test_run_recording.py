@@ -74,7 +74,7 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
         "guard_result", "events", "commands", "stopped", "controlled_by", "client_control",
-            "tracks", "parking",
+            "tracks", "parking", "conversation",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299

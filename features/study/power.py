@@ -211,10 +211,17 @@ def _critical_rank_sum(size: tuple[int, ...], alpha: float) -> int:
             continue
         step = 2 * before + many + 1
         spaced = np.zeros(many * step + 1)
-        spaced[::step] = stats.binom.pmf(np.arange(many + 1), many, 0.5)
+        spaced[::step] = _sign_chances(many)
         chances, before = np.convolve(chances, spaced), before + many
     tail = np.cumsum(chances[::-1])[::-1]
     return int(np.searchsorted(-tail, -alpha * (1.0 + 1e-9)))
+
+
+@lru_cache(maxsize=4096)
+def _sign_chances(many: int) -> Floats:
+    """Return the probability of each number of positive signs among so many."""
+    chances: Floats = stats.binom.pmf(np.arange(many + 1), many, 0.5)
+    return chances
 
 
 def _rank_sum_power(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:

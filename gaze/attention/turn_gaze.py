@@ -20,9 +20,8 @@ import numpy as np
 
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.aversion import Aversion, AversionMode
+from gazerig.gaze.attention.turn_state import TurnState
 from gazerig.params import Bounds
-
-TurnState = Literal["idle", "listening", "thinking", "speaking", "interrupted"]
 
 NOD, BROW_FLASH = "listening_nod", "listening_brows"
 """Tracks of a listener."""

@@ -8,13 +8,10 @@ import sys
 import time
 from typing import NamedTuple
 
-from gazerig.robot.control.loop_timing import BUSY_SHARE
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.types import LoopFigures
 
 _WAITS, _WAIT_S, _LATE_S = 80, 0.005, 0.002
 _BUSY_S = 0.3
-_LONG_ENOUGH_S = 2.0
 
 
 class ComputerFigures(NamedTuple):
@@ -79,20 +76,6 @@ def level_text(name: str) -> str:
     return (
         f"measured for this computer ({name}): {LEVELS[name].text}; --rate and --world override it"
     )
-
-
-def slower_rate(figures: LoopFigures | None, rate_hz: float) -> float | None:
-    """Return a lower rate for a loop on a computer that has become busy, None to keep its rate.
-
-    Args:
-        figures: figures of the last seconds, None if unknown.
-        rate_hz: present rate.
-    """
-    if figures is None or figures.over_s < _LONG_ENOUGH_S or figures.late_share < BUSY_SHARE:
-        return None
-    lowest_hz = LEVELS["least"].rate_hz
-    assert lowest_hz is not None
-    return max(lowest_hz, rate_hz / 2.0) if rate_hz > lowest_hz else None
 
 
 def measure(software: bool | None) -> ComputerFigures:

@@ -17,7 +17,7 @@ from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
-from gazerig.robot.app.computer import level_text, slower_rate
+from gazerig.robot.app.computer import level_text
 from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
@@ -25,7 +25,7 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.loop import LoopCount
-from gazerig.robot.control.loop_timing import LoopTiming, busy_text
+from gazerig.robot.control.loop_timing import LoopTiming, busy_text, slower_rate
 from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.robot_group import RobotGroup
 from gazerig.robot.control.tick import Tick

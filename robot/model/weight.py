@@ -3,8 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.gaze.angles import add, compose, dot, rotate, rotate_back, scale, turn_about
-from gazerig.gaze.types import Mat3, Vec3
+from gazerig.gaze.angles import (
+    Mat3,
+    Vec3,
+    add,
+    compose,
+    dot,
+    rotate,
+    rotate_back,
+    scale,
+    turn_about,
+)
 
 GRAVITY_M_S2 = 9.81
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)
