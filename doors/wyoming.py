@@ -6,23 +6,21 @@ github.com/OHF-Voice/wyoming; the package ``wyoming`` reads and writes them.
 """
 
 import asyncio
-import queue
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
 import gazerig
 from gazerig.doors.door import Address, Door, DoorLink
+from gazerig.doors.spoken_sound import WIDTH, SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
 
 _MAX_CHUNKS = 64
 """Chunks of sound that wait; a neighbour that sends more is slowed down."""
 _PLAYED_AHEAD_S = 0.3
 """Sound that the head has before it is heard; an interruption cannot take it back."""
-_PIECE_S = 0.04
 _MAX_BYTES, _MAX_LINE = 1_000_000, 65_536
 _MAX_NEIGHBOURS = 8
-_WIDTH = 2
 
 
 class Wyoming:
@@ -73,45 +71,6 @@ class _LimitedReader(asyncio.StreamReader):
         return await super().readexactly(n)
 
 
-class SpokenSound:
-    """A sound that the head says while it arrives; ``say`` is called in a thread.
-
-    Args:
-        rate_hz: Rate of the samples.
-        channels: 1 or 2.
-    """
-
-    def __init__(self, rate_hz: int, channels: int) -> None:
-        self._rate_hz, self._channels = rate_hz, channels
-        self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-
-    def feed(self, pcm: bytes) -> None:
-        """Add samples: signed, 16 bits, channels interleaved."""
-        step = _WIDTH * self._channels * round(_PIECE_S * self._rate_hz)
-        for at in range(0, len(pcm), step):
-            self._pieces.put(pcm[at : at + step])
-
-    def end(self) -> None:
-        """End the sound."""
-        self._pieces.put(b"")
-
-    def say(self, connect: Any) -> str:
-        """Let the head say it, by a connection of its own; return why that fails, "" if not."""
-        try:
-            head = connect()
-            try:
-                order = head.say(self._read(), rate_hz=self._rate_hz, channels=self._channels)
-                return str(order.reply.refused or "")
-            finally:
-                head.__exit__(None, None, None)
-        except gazerig.Error as error:
-            return str(error)
-
-    def _read(self) -> Iterator[bytes]:
-        while piece := self._pieces.get():
-            yield piece
-
-
 class Satellite:
     """The connections of a satellite.
 
@@ -122,6 +81,8 @@ class Satellite:
     def __init__(self, link: DoorLink) -> None:
         self._link, self._events = link, Wyoming()
         self._sounds: list[asyncio.Queue[Any]] = []
+        self._interruptions = 0
+        self._opening: asyncio.Future[str] | None = None
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Read one connection to its end."""
@@ -130,6 +91,13 @@ class Satellite:
             writer.close()
             return
         sounds: asyncio.Queue[Any] = asyncio.Queue(_MAX_CHUNKS)
+        if self._opening is None:  # so that the first sound does not wait for the loudspeaker
+            silence = SpokenSound(16_000, 1)
+            silence.feed(bytes(640 * WIDTH))
+            silence.end()
+            self._opening = asyncio.ensure_future(
+                asyncio.to_thread(silence.say, self._link.connect)
+            )
         self._sounds.append(sounds)
         player = asyncio.ensure_future(self._play(sounds, writer))
         try:
@@ -148,6 +116,10 @@ class Satellite:
             if not self._sounds:
                 self._link.send(self._events.talk.end())
             writer.close()
+
+    def _report_sound(self, refused: str) -> None:
+        if refused:
+            self._link.report(f"no sound is heard: {refused}")
 
     async def _read(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, sounds: asyncio.Queue[Any]
@@ -176,9 +148,9 @@ class Satellite:
                 continue
             message: dict[str, Any] = {"type": event.type, "data": event.data}
             if event.type == "audio-start":
-                await sounds.put(AudioStart.from_event(event))
+                await sounds.put(_check_audio(AudioStart.from_event(event)))
             elif event.type == "audio-chunk":
-                chunk = AudioChunk.from_event(event)
+                chunk = _check_audio(AudioChunk.from_event(event))
                 message["audio_s"] = chunk.seconds
                 await sounds.put(chunk)
             elif event.type == "audio-stop":
@@ -186,6 +158,7 @@ class Satellite:
             orders = self._events.take(message, self._link.now_s())
             self._link.send(orders)
             if any(order.state == "interrupt" for order in orders):
+                self._interruptions += 1
                 for waiting in self._sounds:
                     while not waiting.empty():
                         waiting.get_nowait()
@@ -201,21 +174,25 @@ class Satellite:
             start = await sounds.get()
             if start is None or isinstance(start, AudioChunk):
                 continue
-            link, channels = self._link, min(start.channels, 2)
-            convert = AudioChunkConverter(start.rate, _WIDTH, channels).convert
+            link, channels = self._link, start.channels
+            convert = AudioChunkConverter(start.rate, WIDTH, channels).convert
             sound = SpokenSound(start.rate, channels)
+            if self._opening is not None:
+                self._report_sound(await asyncio.shield(self._opening))
             saying = asyncio.ensure_future(asyncio.to_thread(sound.say, link.connect))
-            begin_s, sent_s = link.now_s(), 0.0
+            begin_s, sent_s, interruptions = link.now_s(), 0.0, self._interruptions
             try:
                 while (chunk := await sounds.get()) is not None:
-                    if isinstance(chunk, AudioChunk):
-                        sound.feed(convert(chunk).audio)
-                        sent_s += chunk.seconds
-                        await asyncio.sleep(begin_s + sent_s - _PLAYED_AHEAD_S - link.now_s())
+                    if not isinstance(chunk, AudioChunk):
+                        continue
+                    for piece, seconds in sound.split(convert(chunk).audio):
+                        if self._interruptions == interruptions:
+                            sound.feed(piece)
+                            sent_s += seconds
+                            await asyncio.sleep(begin_s + sent_s - _PLAYED_AHEAD_S - link.now_s())
             finally:
                 sound.end()
-            if refused := await saying:
-                link.report(f"the sound is not heard: {refused}")
+            self._report_sound(await saying)
             if not sent_s:  # an event of a satellite that has another loudspeaker
                 continue
             await asyncio.sleep(begin_s + sent_s - link.now_s())
@@ -223,6 +200,20 @@ class Satellite:
                 link.send(self._events.take({"type": "played"}, link.now_s()))
             with suppress(ConnectionError):
                 await async_write_event(Played().event(), writer)
+
+
+def _check_audio(sound: Any) -> Any:
+    """Return an AudioStart or AudioChunk.
+
+    Raises:
+        ValueError: the samples cannot be read.
+    """
+    rate, width, channels = sound.rate, sound.width, sound.channels
+    if not (8_000 <= rate <= 192_000 and width in (1, 2, 4) and channels in (1, 2)):
+        raise ValueError(f"audio of {channels} channels, {width} bytes, {rate} Hz")
+    if len(getattr(sound, "audio", b"")) % (width * channels):
+        raise ValueError("an audio-chunk with a part of a sample")
+    return sound
 
 
 def _info() -> Any:
@@ -233,7 +224,7 @@ def _info() -> Any:
     owner = Attribution("gazerig", "https://pypi.org/project/gazerig")
     program = SndProgram(
         name="gazerig", attribution=owner, installed=True, version=gazerig.__version__,
-        description="A head that speaks", snd_format=AudioFormat(22_050, _WIDTH, 1),
+        description="A head that speaks", snd_format=AudioFormat(22_050, WIDTH, 1),
     )  # fmt: skip
     return Info(snd=[program]).event()
 

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any
 
+from fakes.waiting import PATIENCE_S
+
 import gazerig
 
 
@@ -13,7 +15,7 @@ class TalkingHead:
 
     def __init__(self) -> None:
         self.orders: list[tuple[Any, ...]] = []
-        self.pcm = b""
+        self.sounds: list[tuple[int, int, bytes]] = []
         self.connected = self.refuses = ""
         self.ended = False
         self.said: list[str] = []
@@ -35,7 +37,7 @@ class TalkingHead:
             raise gazerig.HeadEnded("the rig has ended")
         if order:
             self.orders.append(order)
-        return SimpleNamespace(reply=SimpleNamespace(refused=self.refuses))
+        return SimpleNamespace(reply=SimpleNamespace(refused=self.refuses), tracks=())
 
     def listening(self, person: int | None = None) -> Any:
         return self._order("listening")
@@ -55,8 +57,8 @@ class TalkingHead:
         return self._order("interrupt")
 
     def say(self, pieces: Iterable[bytes], *, rate_hz: int, channels: int) -> Any:
-        self.pcm += b"".join(pieces)
-        return self._order("said", rate_hz, channels)
+        self.sounds.append((rate_hz, channels, b"".join(pieces)))
+        return self._order()
 
     @property
     def states(self) -> list[str]:
@@ -68,6 +70,7 @@ class TalkingHead:
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Wait for a condition; a test's own limit of time is the only one."""
-    while not condition():
-        await asyncio.sleep(0.005)
+    """Wait for a condition, however busy the machine is."""
+    async with asyncio.timeout(PATIENCE_S):
+        while not condition():
+            await asyncio.sleep(0.005)
