@@ -249,9 +249,10 @@ def test_joints_whose_names_nobody_knows_are_numbered() -> None:
 def test_ticks_that_a_busy_page_did_not_take_make_no_busy_computer() -> None:
     ticks = visit()[2]
     snapshots = SnapshotBuilder(RATE_HZ)
+    own = None
     for tick in (*ticks[:50], *ticks[-700:]):
         snapshots.update(tick)
-    own = snapshots.build(SnapshotTexts())
+        own = snapshots.build(SnapshotTexts())
     assert own is not None and own.timing is not None and own.busy  # nothing better is known
     figures = own.timing._replace(overruns=0, late_share=0.0, latest_ms=0.4)
     told = snapshots.build(SnapshotTexts(timing=figures))
