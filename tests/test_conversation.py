@@ -25,9 +25,11 @@ from gazerig.robot.app.session import run as run_session
 from gazerig.robot.control.head_state import as_json as state_as_json
 from gazerig.robot.control.head_state import from_json as state_from_json
 from gazerig.robot.control.head_state import head_state
+from gazerig.robot.dashboard.door.programs import ProgramSocket
 from gazerig.robot.model.command_json import as_json, from_json
 from gazerig.robot.model.commands import LookAt, Renew, Talk
 from gazerig.robot.model.conversation import NO_CONVERSATION
+from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
 
@@ -159,6 +161,14 @@ def test_the_newer_of_two_agents_has_the_conversation(rig: Running) -> None:
     rig.go(0.9)
     rig.do(Renew("b"))
     assert rig.go(0.5)[-1].conversation.who == "b"
+
+
+def test_two_commands_of_a_terminal_are_one_agent(rig: Running) -> None:
+    rig.do(Talk("speaking", text="x" * 90, who="ctl (process 1)", stay=True))
+    first = rig.ticks[-1].conversation
+    ticks = rig.do(Talk("speaking", seconds=3.0, who="ctl (process 2)", stay=True))[1]
+    assert ticks[-1].conversation.number == first.number and not ticks[0].events
+    assert rig.do(Talk("idle", who="b", stay=True))[1][0].events
 
 
 def test_the_python_orders_report_states() -> None:
@@ -325,3 +335,19 @@ def test_published_laws_stay_a_choice() -> None:
     assert aversion.mode == "talk" and turns.chosen_mode == "think"
     turns.enter("idle", None, None, 0.0, 0.0)
     assert aversion.mode == "think"
+
+
+def test_a_websocket_renews_what_its_program_controls() -> None:
+    program, started = ProgramSocket(0.0, False), CommandReply(control_number=1)
+    look = {"do": "look_at", "p_world_m": [1.0, 0.0, 0.0], "who": "a"}
+    for message, reply, held in (
+        ({"do": "talk", "state": "listening", "who": "a"}, CommandReply(), {"talk"}),
+        (look, started, {"talk", "gaze"}),
+        ({**look, "p_world_m": None}, CommandReply(), {"talk"}),
+        ({"do": "play", "track": "nod", "who": "a"}, CommandReply(), {"talk"}),
+        ({"do": "talk", "state": "speaking", "stay": True, "who": "a"}, CommandReply(), set()),
+        ({"do": "talk", "state": "thinking", "who": "b"}, CommandReply(), {"talk"}),
+        ({"do": "talk", "state": "idle", "who": "b"}, CommandReply(), set()),
+    ):
+        program.hold(message, reply)
+        assert program.held == held and program.who == message["who"]

@@ -23,7 +23,7 @@ from remote_rig import BLINKS, RATE, Beat, Broken, SecondTuning, hung_up, server
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Tune, Value
+from gazerig.robot.model.commands import Talk, Tune, Value
 from gazerig.robot.remote import client
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote import socket_server as server_module
@@ -600,6 +600,22 @@ def test_a_program_leads_while_it_lives_and_is_named(
         assert show.in_control and beat.ticks[-1].controlled_by and len(beat.ticks) > count
     assert beat.pulse.wait_for_commands(20.0, ticks=500)
     assert beat.ticks[-1].controlled_by == "" and rig.status()["controlled_by"] == ""
+
+
+@pytest.mark.slow
+def test_a_conversation_lasts_while_its_program_lives(
+    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lease, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(client, "_EVERY_S", 0.05)
+    with RobotClient.connect(who="an agent") as agent:
+        agent.send(Talk("listening", who=agent.who))
+        agent.look_freely()  # the conversation stays
+        assert beat.pulse.wait_for_commands(20.0, ticks=800)  # twice as long
+        said = rig.status()["conversation"]
+        assert said["state"] == "listening" and said["who"].startswith("an agent (process ")
+    assert beat.pulse.wait_for_commands(20.0, ticks=500)
+    assert rig.status()["conversation"]["end_reason"] == "not renewed"
 
 
 def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path) -> None:

@@ -82,7 +82,7 @@ class Conversation:
                 f"there is nothing to interrupt: the state is {now.state}; report speaking or "
                 "thinking first"
             )
-        other = self._lease.who if active and command.who != self._lease.who else ""
+        other = self._lease.who if active and not self._comes_from_owner(command) else ""
         person = command.person if command.person is not None or not active else now.partner
         self._lease.start(command.who, command.stay, t_s)
         self._reported_s = t_s
@@ -105,6 +105,13 @@ class Conversation:
         if not other:
             return ""
         return f"conversation: {command.who or 'a client'} takes over from {other}"
+
+    def _comes_from_owner(self, command: Talk) -> bool:
+        """Return whether a report is of the same client; one that stays may be of a new process."""
+        before, now = self._lease.who, command.who
+        if self._lease.stay and command.stay:
+            before, now = (who.partition(" (process ")[0] for who in (before, now))
+        return before == now
 
     def renew(self, who: str, t_s: float) -> bool:
         """Record a heartbeat; return whether it came from the client of the conversation."""

@@ -8,16 +8,17 @@ class Lease:
 
     Attributes:
         who: Name of the client, "" without one.
+        stay: Whether it needs no heartbeat.
     """
 
     def __init__(self) -> None:
         self.who = ""
-        self._stay = False
+        self.stay = False
         self._renewed_s = 0.0
 
     def start(self, who: str, stay: bool, t_s: float) -> None:
         """Give the right to a client."""
-        self.who, self._stay, self._renewed_s = who, stay, t_s
+        self.who, self.stay, self._renewed_s = who, stay, t_s
 
     def renew(self, who: str, t_s: float) -> bool:
         """Record a heartbeat; return whether it came from the present client."""
@@ -28,4 +29,4 @@ class Lease:
 
     def has_lapsed(self, t_s: float) -> bool:
         """Return whether the heartbeat is missing."""
-        return not self._stay and t_s - self._renewed_s > HEARTBEAT_S
+        return not self.stay and t_s - self._renewed_s > HEARTBEAT_S
