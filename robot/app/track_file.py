@@ -84,10 +84,7 @@ def track_text(
         )
     start_s = min(float(times[0]) for times, _ in series.values())
     end_s = max(float(times[-1]) for times, _ in series.values())
-    if not GRID_S < end_s - start_s <= MAX_DURATION_S:
-        raise SetupError(
-            f"it takes {end_s - start_s:.1f} s: a track takes at most {MAX_DURATION_S:g} s; split it"
-        )
+    _check_length(end_s - start_s)
     means, notes = _average_eyes(series)
     keys: Keys = {}
     begins_s = ends_s = 0.0
@@ -103,6 +100,7 @@ def track_text(
         raise SetupError(f"nothing moves by more than {tolerance_deg or TOLERANCE_DEG:g} deg")
     frames: dict[float, dict[str, float]] = {}
     begins_s = GRID_S * (ceil(begins_s / GRID_S) + 1) if begins_s > GRID_S else 0.0
+    _check_length(begins_s + end_s - start_s)
     for name, found in keys.items():
         # Equal values at two keys are a rest, from which the motion begins as in its source.
         rests = [(-GRID_S, found[0][1]), found[0]] if begins_s else []
@@ -178,6 +176,13 @@ def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
         return RigTrack(fit.fit("", made, 1.0, middle, bounds, share), "", excesses)
     except TrackRefused as refused:
         return RigTrack(None, str(refused), excesses)
+
+
+def _check_length(takes_s: float) -> None:
+    if not GRID_S < takes_s <= MAX_DURATION_S:
+        raise SetupError(
+            f"it takes {takes_s:.2f} s: a track takes at most {MAX_DURATION_S:g} s; split it"
+        )
 
 
 def _average_eyes(series: Mapping[str, Series]) -> tuple[dict[str, Series], tuple[str, ...]]:

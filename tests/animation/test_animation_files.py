@@ -396,6 +396,9 @@ def test_lids_beyond_their_travel_and_eyes_that_differ_are_reported() -> None:
         "left_eye_pan": (times, np.array([0.0, 10.0, 0.0])),
         "right_eye_pan": (times, np.array([0.0, 16.0, 0.0])),
     }
+    far = {"neck_yaw": (np.array([0.0, 14400.0]), np.array([40.0, 0.0]))}
+    with pytest.raises(SetupError, match="it takes 1440[0-9.]+ s: a track takes at most 14400 s"):
+        track_text(DESK, far, "x", owned=True)
     made = track_text(DESK, series, "x", owned=True)
     assert "left_eye_pan and right_eye_pan differ by up to 6.0 deg (at 1.00 s)" in made.notes[0]
     assert (
