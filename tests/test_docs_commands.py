@@ -126,6 +126,7 @@ LEFT_OUT = {
     r".* ?myhead\.yaml": "the tutorial's, in its order: tests/test_tutorial.py",
     r"ctl fault": "needs emulated servos or a world: tests/test_emulate.py, tests/world",
     r"models fetch": "needs the network",
+    r"ctl say ": "a text needs espeak-ng, with which it is run: tests/test_docs_live.py",
     r"new ": "asks questions: tests/test_new_rig.py",
     r"record-track ": "needs a hand that moves the head",
     r".*(--camera|--oak)|calibrate (camera|face)": "needs a camera",

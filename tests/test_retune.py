@@ -146,7 +146,8 @@ def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]
     return {**held, "park": made.park_rad, "loop": (made.loop.rate_hz, made.loop.park_s)}
 
 
-IN_PICTURES = ("detector.", "motion.")
+ELSEWHERE = ("detector.", "motion.", "sound.", "gaze.mouth.")
+"""Keys of the process of the pictures, and of the voice, which reads them when a sound begins."""
 SECTIONS = [("gaze", OF_GAZE), ("joints", OF_BODY), ("guard", OF_BODY), ("", OF_SIGHT)]
 
 
@@ -156,7 +157,7 @@ def of_section(section: str) -> list[Parameter]:
     return [
         knob
         for knob in live_knobs()
-        if not knob.key.startswith(IN_PICTURES)
+        if not knob.key.startswith(ELSEWHERE)
         and (knob.key.split(".")[0] == section or not section)
         and (bool(section) or knob.key.split(".")[0] not in named)
     ]
