@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.features.lab.report.statistics import MeasuredValue, mean
-from gazerig.gaze.attention.turn_gaze import TurnState
+from gazerig.gaze.attention.turn_state import TurnState
 from gazerig.gaze.types import Floats
 
 Role = Literal["speaking", "listening", "dialogue"]
