@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from gazerig.drivers.errors import install_command
 from gazerig.drivers.sound.params import SILENT_DEVICE, SoundParams
 from gazerig.drivers.sound.playback import PcmQueue, Playback, SoundEvent
 from gazerig.drivers.sound.player import MAX_AHEAD_S, SoundError, SoundPlayer
@@ -341,3 +342,14 @@ def test_a_stream_of_another_format_is_refused(
 ) -> None:
     with pytest.raises(SoundError, match="give 1 or 2 channels at 8000..192000 Hz"):
         player.open_stream(rate_hz, channels, 0.0)
+
+
+def test_without_miniaudio_one_message_names_the_command(
+    monkeypatch: pytest.MonkeyPatch, folder: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "miniaudio", None)
+    player = SoundPlayer(SILENT_DEVICE)
+    for use in (lambda: check_sound(folder / "good.wav", 9.0), player.prepare):
+        with pytest.raises(SoundError) as told:
+            use()
+        assert str(told.value) == f"miniaudio is not installed: {install_command('sound')}"

@@ -254,6 +254,12 @@ def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_mes
             voice.feed(speech(0.1), 8000, 1)
         voice.finish()
         wait_until(lambda: not [one for one in head.state.tracks if one.is_playing])
+        voice.feed(speech(1.0), RATE, 1)
+        assert head.say("short.wav").wait(20.0) == "arrived"  # it replaces the stream
+        head.jog("neck_yaw", 0.0)
+        with pytest.raises(gazerig.Error, match="the joints are held"):
+            voice.feed(speech(0.1), RATE, 1)
+        head.release_joints()
         head.say("long.wav")
         wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
         os.kill(voice._player.pid, 9)

@@ -39,7 +39,7 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import MAX_SPEECH_S, check_command
 from gazerig.robot.model.commands import Command, ControlTrack, Say, SetLevel, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, TrackState
-from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.model.reply import CommandTaker
 
 STREAM_DELAY_S = 0.15
 """Time from the arrival of a stream's first piece until it is heard."""
@@ -49,6 +49,8 @@ _WATCH_S = 0.02
 _SYNC_EVERY_S, _SYNC_ERROR_S = 0.25, 0.003
 _RESTART_ERROR_S = 0.2
 _OPEN_S = 2.0
+_REPLY_S = 1.0
+_ABANDONED_S = 5.0
 _KEPT_FILES = 8
 _SMOOTHING_LAG = 0.6
 """Delay of a level that is set fifty times a second, as a share of its smoothing time."""
@@ -62,7 +64,7 @@ class _Stream(NamedTuple):
     mouth: StreamMouth
     rate_hz: int
     channels: int
-    ticket: Ticket | None
+    track: int
 
 
 class RunVoice:
@@ -94,7 +96,9 @@ class RunVoice:
         self._tick: Tick | None = None
         self._seen: tuple[object, ...] = ()
         self._played: TrackState | None = None
-        self._synced_s = 0.0
+        self._synced_s = self._started_s = 0.0
+        self._fed_s = 0.0
+        self._over = False
         self._stream: _Stream | None = None
         self._texts = deque[Path]()
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
@@ -261,8 +265,9 @@ class RunVoice:
             if tick is not None and tick.stopped:
                 raise SoundError("the head is stopped: resume it first")
             player = self._require_player()
-            if self._stream is None:
-                self._start_stream(player, rate_hz, channels, now_s)
+            begins = self._stream is None
+            if begins:
+                self._start_stream(player, rate_hz, channels)
             stream = self._stream
             assert stream is not None
             if (rate_hz, channels) != (stream.rate_hz, stream.channels):
@@ -270,17 +275,27 @@ class RunVoice:
                     f"the stream has {stream.channels} channels at {stream.rate_hz} Hz: "
                     "finish it before another one"
                 )
-            player.feed(pcm, now_s)
+            try:
+                player.feed(pcm, now_s)
+            except SoundError:
+                if begins:
+                    self._end_stream(tick)
+                raise
+            self._fed_s = now_s
             stream.mouth.add(_mono(pcm, channels))
             return player.ahead_s(now_s)
 
-    def _start_stream(self, player: SoundPlayer, rate_hz: int, channels: int, now_s: float) -> None:
+    def _start_stream(self, player: SoundPlayer, rate_hz: int, channels: int) -> None:
         rig = self._rig()
         check_format(rate_hz, channels)
         ticket = self._command(self._speak("", _STREAM_TRACK_S))
+        reply = ticket.wait(_REPLY_S) if ticket is not None else None
+        if reply is None or reply.track is None:
+            raise SoundError(reply.refused if reply is not None else "the control loop hangs")
+        now_s = self._clock.now_s()
         player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, rig.sound.volume)
         mouth = StreamMouth(rate_hz, rig.gaze.mouth.quiet_db)
-        self._stream = _Stream(mouth, rate_hz, channels, ticket)
+        self._stream = _Stream(mouth, rate_hz, channels, reply.track.number)
         self._wake.set()
 
     def finish(self) -> None:
@@ -347,24 +362,24 @@ class RunVoice:
                         self._follow_stream(self._stream, player, tick, now_s)
                     self._follow_tracks(player, tick, now_s)
                 except (SoundError, OSError) as error:
-                    self._fail(str(error))
+                    self._fail(str(error), tick)
 
     def _handle_event(self, event: SoundEvent, tick: Tick | None) -> None:
         if event.kind == "failed":
-            self._fail(event.reason)
+            self._fail(event.reason, tick)
         elif event.kind == "stalled":
             self._lines.append("the stream has stalled: the mouth closes until it continues")
         elif event.kind == "ended":
             self._over = True
             if self._stream is not None:
-                self._end_stream()
+                self._end_stream(tick)
 
-    def _fail(self, reason: str) -> None:
+    def _fail(self, reason: str, tick: Tick | None) -> None:
         """Report a failure once, and end the track of the sound."""
         self._lines.append(reason)
         self._over = True
         if self._stream is not None:
-            self._end_stream()
+            self._end_stream(tick)
         elif self._played is not None:
             self._try(ControlTrack("end", self._played.name))
 
@@ -378,7 +393,7 @@ class RunVoice:
             return
         track_s = wanted.position_s + now_s - tick.t_s
         if self._played is None or self._played.number != wanted.number:
-            self._end_stream()
+            self._end_stream(tick)
             self._start_sound(player, wanted, tick)
             return
         self._played = wanted
@@ -409,9 +424,14 @@ class RunVoice:
         self, stream: _Stream, player: SoundPlayer, tick: Tick | None, now_s: float
     ) -> None:
         """Open the mouth by the part of the stream that will be heard when it has moved."""
-        if tick is None or tick.stopped or _has_ended(stream.ticket, tick):
+        if tick is None or tick.stopped or _has_ended(stream.track, tick):
             player.stop()
-            self._end_stream()
+            self._end_stream(tick)
+            return
+        if now_s - self._fed_s > _ABANDONED_S and player.ahead_s(now_s) < _WATCH_S:
+            self._lines.append(f"the stream has ended, as no piece has come for {_ABANDONED_S:g} s")
+            player.stop()
+            self._end_stream(tick)
             return
         rig = self._rig()
         level = rig.levels.get(rig.gaze.mouth.level)
@@ -425,15 +445,15 @@ class RunVoice:
             opening = rig.gaze.mouth.size * stream.mouth.opening_at(heard_s + ahead_s)
         self._try(SetLevel(rig.gaze.mouth.level, opening))
 
-    def _end_stream(self) -> None:
-        """End the stream: the mouth shuts, and the sway ends."""
+    def _end_stream(self, tick: Tick | None) -> None:
+        """End the stream: the mouth shuts, and its track ends unless another has replaced it."""
         stream, self._stream = self._stream, None
         if stream is None:
             return
         level = self._rig().gaze.mouth.level
         if level in self._rig().levels:
             self._try(SetLevel(level, 0.0))
-        if stream.ticket is not None:
+        if tick is not None and not _has_ended(stream.track, tick):
             self._try(ControlTrack("end", SPEECH))
 
     def _try(self, command: Command) -> None:
@@ -454,13 +474,9 @@ def _sounding_track(tick: Tick | None) -> TrackState | None:
     return max(found, key=lambda one: one.number, default=None)
 
 
-def _has_ended(ticket: Ticket | None, tick: Tick) -> bool:
-    """Return whether the track of a stream has ended."""
-    reply = ticket.wait(0.0) if ticket is not None else None
-    if reply is None or reply.track is None:
-        return reply is not None and bool(reply.refused)
-    number = reply.track.number
-    newest = max([one.number for one in tick.tracks], default=0)  # the tick may be older
+def _has_ended(number: int, tick: Tick) -> bool:
+    """Return whether a track has ended; the tick may be older than the track."""
+    newest = max([one.number for one in tick.tracks], default=0)
     return newest >= number and not any(
         one.number == number and one.is_playing for one in tick.tracks
     )

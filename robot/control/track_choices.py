@@ -199,7 +199,17 @@ class TrackChoices:
     ) -> CommandReply:
         """Start a speech; the arguments are those of ``play``."""
         replies = []
-        for name, made in self.prepare(command).items():
+        tracks = self.prepare(command)
+        replaced = self._player.overlapping(tracks[SPEECH].motion)
+        # A stream sets its level itself, so that its track does not overlap another speech.
+        others = [
+            voice
+            for voice in self._player.voices
+            if voice.played.name == SPEECH and voice not in replaced
+        ]
+        if others:
+            self._end(others, t_s, limits, command.who)
+        for name, made in tracks.items():
             moved = self._player.overlapping(made.motion)
             if name == SPEECH_SWAY and any(voice.played.name != name for voice in moved):
                 continue  # another track moves the head
