@@ -62,6 +62,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_page.py
 	$(BIN)/python tests/bench/bench_recording.py
 	$(BIN)/python tests/bench/bench_api.py
+	$(BIN)/python tests/bench/bench_doors.py
 	if [ -d tests/lab ]; then $(BIN)/python tests/lab/bench_sweep.py; fi
 	if [ -d tests/world ]; then $(BIN)/python tests/world/bench_world.py --quick; fi
 

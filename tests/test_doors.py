@@ -2,7 +2,9 @@
 
 import asyncio
 import base64
+import socket
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +12,7 @@ import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import Assistant, free_port, lva
+from typer.testing import CliRunner
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
@@ -18,6 +21,7 @@ from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wy
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
+from gazerig.robot.cli import door as cli_door
 
 
 def brief(orders: Orders) -> list[Any]:
@@ -560,3 +564,35 @@ def test_doors_listen_on_this_computer_unless_told_otherwise() -> None:
 def test_a_wrong_address_is_named(bind: str) -> None:
     with pytest.raises(gazerig.Error, match="is not HOST:PORT"):
         Address.parse(bind)
+
+
+def test_a_door_names_who_can_reach_it_and_a_port_that_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+    async def serve(link: DoorLink) -> None:
+        link.report(f"{link.address} {link.bind}")
+
+    said: list[str] = []
+    Door("x", serve, "a neighbour", "ws://a", "127.0.0.1:1").run(say=said.append)
+    assert "ws://a 127.0.0.1:1" in said and "steer" not in said[0]
+    said.clear()
+    Door("x", serve, "a neighbour", "ws://a").run(address="ws://b", bind="[::]:1", say=said.append)
+    assert "every program on this network can steer" in said[0] and "ws://b [::]:1" in said
+    for name in ("pipecat", "wyoming"):
+        with socket.socket() as one:
+            one.bind(("127.0.0.1", 0))
+            one.listen()
+            port = one.getsockname()[1]
+            with pytest.raises(gazerig.Error, match=f"cannot listen on 127.0.0.1:{port}: "):
+                find(DOOR, name).load().run(bind=f"127.0.0.1:{port}", say=said.append)
+    with pytest.raises(gazerig.Error, match="'6055' is not ws://HOST:PORT"):
+        voice_assistant.DOOR.run(address="6055", say=said.append)
+
+
+def test_the_command_lists_doors_and_names_a_missing_one() -> None:
+    assert CliRunner().invoke(cli_door.app, []).output.count("\n") == len(SHIPPED[DOOR])
+    missed = CliRunner().invoke(cli_door.app, ["wyomin"])
+    assert missed.exit_code == 2
+    assert "no door is called 'wyomin': did you mean 'wyoming'?" in missed.output
