@@ -21,6 +21,7 @@ from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wy
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
+from gazerig.robot.app.door_processes import load_door
 from gazerig.robot.cli import door as cli_door
 
 
@@ -586,7 +587,7 @@ def test_a_door_names_who_can_reach_it_and_a_port_that_is_taken(
             one.listen()
             port = one.getsockname()[1]
             with pytest.raises(gazerig.Error, match=f"cannot listen on 127.0.0.1:{port}: "):
-                find(DOOR, name).load().run(bind=f"127.0.0.1:{port}", say=said.append)
+                load_door(name).run(bind=f"127.0.0.1:{port}", say=said.append)
     with pytest.raises(gazerig.Error, match="'6055' is not ws://HOST:PORT"):
         voice_assistant.DOOR.run(address="6055", say=said.append)
 
