@@ -434,14 +434,12 @@ class RunVoice:
             self._end_stream(tick)
             return
         rig = self._rig()
-        level = rig.levels.get(rig.gaze.mouth.level)
-        if level is None:
+        if rig.gaze.mouth.level not in rig.levels:
             return
         heard_s = player.position_s(now_s)
         opening = 0.0
         if heard_s is not None:
-            servo_s = rig.gaze.oculomotor.eye_lag_ms / 1e3 + _WATCH_S
-            ahead_s = level.smoothing_ms / 1e3 * _SMOOTHING_LAG + servo_s - self._latency_s
+            ahead_s = stream_ahead_s(rig) - self._latency_s
             opening = rig.gaze.mouth.size * stream.mouth.opening_at(heard_s + ahead_s)
         self._try(SetLevel(rig.gaze.mouth.level, opening))
 
@@ -460,6 +458,12 @@ class RunVoice:
         """Queue a command; a refusal is not important, as the next one follows."""
         with contextlib.suppress(ValueError):
             self._command(command)
+
+
+def stream_ahead_s(rig: Rig) -> float:
+    """Return the time by which the mouth of a stream is set before its sound is heard."""
+    smoothing_s = rig.levels[rig.gaze.mouth.level].smoothing_ms / 1e3
+    return smoothing_s * _SMOOTHING_LAG + rig.gaze.oculomotor.eye_lag_ms / 1e3 + _WATCH_S
 
 
 def _sounding_track(tick: Tick | None) -> TrackState | None:

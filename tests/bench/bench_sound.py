@@ -2,6 +2,7 @@
 
 drift: a sound of ten minutes, simulated and with the silent device: motion against sound
 jaw: the measured jaw of emulated servos against loudness, for a file, a text and a stream
+stream: the same for a stream in simulated time
 lips: share of b, m and p in 200 words on which the measured jaw is closed
 cost: processor and timing of the loop with and without sound
 
@@ -25,6 +26,8 @@ from gazerig.drivers.sound.sound_file import write_wav
 from gazerig.drivers.sound.speech import SpokenText, speak
 from gazerig.gaze.mouth.loudness import FRAME_S, WINDOW_S, band_pressures, loud_pressure, openings
 from gazerig.gaze.mouth.mouth_keys import phoneme_closures
+from gazerig.gaze.mouth.stream_mouth import StreamMouth
+from gazerig.robot.app.voice import STREAM_DELAY_S, stream_ahead_s
 from gazerig.robot.control.tick import Tick
 
 RIG = Path(__file__).parents[2] / "config" / "rigs" / "expressive.yaml"
@@ -184,6 +187,30 @@ def jaw(folder: str) -> None:
     report_lags("simulated file", lags_ms(track_s, measured, ideal, 0.0))
 
 
+def simulated_stream(folder: str) -> None:
+    """Measure the mouth of a stream in simulated time, in which no tick is late."""
+    spoken = speak(TEXT[:300], SoundParams())
+    samples = np.frombuffer(spoken.pcm, np.int16) / 32768.0
+    head, trace = opened(folder, True)
+    mouth, fed, piece = StreamMouth(spoken.rate_hz, -30.0), 0, round(0.04 * spoken.rate_hz)
+    heard_s, jaw_at = [], []
+    with head:
+        rig = head._composed.assembly.live_params.rig
+        begin_s = head.time_s + STREAM_DELAY_S
+        while (now_s := head.time_s - begin_s) < len(samples) / spoken.rate_hz:
+            while fed / spoken.rate_hz < now_s + STREAM_DELAY_S - 0.04:
+                mouth.add(samples[fed : fed + piece])
+                fed += piece
+            head.level("mouth", 0.9 * mouth.opening_at(now_s + stream_ahead_s(rig)))
+            for _ in range(4):
+                head.step()
+                heard_s.append(head.time_s - begin_s)
+                jaw_at.append(head.state.joints["jaw"].measured_deg / OPEN_DEG)
+    report_lags(
+        "simulated stream", lags_ms(np.array(heard_s), np.array(jaw_at), loudness(spoken), 0.0)
+    )
+
+
 def lips(folder: str) -> None:
     """Count the closed lips on b, m and p."""
     spoken = speak(TEXT, SoundParams())
@@ -287,13 +314,13 @@ def cost(folder: str) -> None:
         )
 
 
-PARTS = {"jaw": jaw, "lips": lips, "cost": cost}
+PARTS = {"jaw": jaw, "stream": simulated_stream, "lips": lips, "cost": cost}
 
 
 def main() -> None:
     """Measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", default=["lips", "jaw", "cost", "drift"])
+    parser.add_argument("parts", nargs="*", default=["lips", "stream", "jaw", "cost", "drift"])
     parser.add_argument("--minutes", type=float, default=10.0)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
