@@ -17,6 +17,7 @@ from gazerig.errors import Refused
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
 from gazerig.gaze.attention.turn_gaze import NOD, TurnGaze, TurnParams
 from gazerig.gaze.attention.turn_state import TurnState
+from gazerig.gaze.types import Target
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
@@ -351,3 +352,15 @@ def test_a_websocket_renews_what_its_program_controls() -> None:
     ):
         program.hold(message, reply)
         assert program.held == held and program.who == message["who"]
+
+
+def test_a_look_over_two_turns_is_no_stare() -> None:
+    rng = np.random.default_rng(1)
+    aversion = Aversion(AversionParams(), rng)
+    face = Target((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, "face", 1, 1.0, True, None, 0, "a person")
+    aversion.step(face, (0.0, 0.0, 0.0), 0.0)
+    aversion.converse("speaking", 0.0)
+    aversion.keep_face(0.0, 20.0)
+    aversion.converse("listening", 10.0)
+    kinds = [aversion.step(face, (0.0, 0.0, 0.0), 10.0 + 0.1 * n).kind for n in range(49)]
+    assert kinds[0] == "face" and "away" in kinds

@@ -167,6 +167,7 @@ class Aversion:
         self._away: Vec3 | None = None
         self._away_shift = 0
         self._averts_s: float | None = None
+        self._away_s = t_s
         self._shifts = 0
         self._last: tuple[Target, Target] | None = None
 
@@ -206,6 +207,9 @@ class Aversion:
         self._return()
         if self._face is not None:
             self._until_s = t_s if mode == "think" else t_s + self._mutual_s()
+            if mode in _ROLES:  # the look began in an earlier turn: together they are no stare
+                longest_s = self._away_s + self._params.longest_mutual_s
+                self._until_s = min(self._until_s, max(t_s, longest_s))
 
     def keep_face(self, t_s: float, until_s: float) -> None:
         """Return to the face now, and stay there until a time."""
@@ -244,6 +248,7 @@ class Aversion:
         if self._face is not None and t_s >= self._until_s and leaves:
             self._turn(target, p_world_head_m, t_s)
         if self._away is not None:
+            self._away_s = t_s
             return self._away_target(target, self._away, t_s)
         if self._shifts == 0:
             return target
@@ -258,7 +263,7 @@ class Aversion:
 
     def _attend(self, face: int | None, t_s: float) -> None:
         """Start mutual gaze with another face; end an aversion if there is no face."""
-        self._face = face
+        self._face, self._away_s = face, t_s
         self._return()
         if face is not None and self._averts_s is None:
             self._until_s = t_s + self._mutual_s()

@@ -11,7 +11,8 @@ from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
 from gazerig.features.lab.report.turns import STATES, Role, TurnTrace
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
-from gazerig.gaze.attention.turn_gaze import TurnGaze, TurnParams, TurnState
+from gazerig.gaze.attention.turn_gaze import TurnGaze, TurnParams
+from gazerig.gaze.attention.turn_state import TurnState
 from gazerig.gaze.types import Target
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
