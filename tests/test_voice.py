@@ -305,4 +305,7 @@ def test_the_sound_of_a_track_file_follows_its_pauses_and_seeks(folder: Path) ->
         wait_until(lambda: (sound_s(head) or 0.0) > 30.0)
         track = head.state.tracks[-1]
         assert track.position_s == pytest.approx(sound_s(head), abs=2.0)
+        head.set_track_speed(0.5, "show")
+        wait_until(lambda: is_silent(head))
+        assert "without its sound, which plays at speed 1" in head.state.tracks[-1].limited
     (folder / "rig.yaml").write_text(text, "utf-8")

@@ -57,6 +57,12 @@ class TrackInfo(NamedTuple):
     layers: tuple[str, ...] = ()
 
 
+def _limits_text(limits: str, sound: str, speed: float) -> str:
+    """Return what limits changed in a track, also that its sound is silent at other speeds."""
+    silent = "without its sound, which plays at speed 1 only" if sound and speed != 1.0 else ""
+    return "; ".join(filter(None, (limits, silent)))
+
+
 class TrackChoices:
     """The tracks of one rig.
 
@@ -290,7 +296,7 @@ class TrackChoices:
             made.left_out,
             self._number,
         )
-        limited = reply.text().partition("; ")[2]
+        limited = _limits_text(reply.text().partition("; ")[2], track.sound, fitted.track.speed)
         self._playing[self._number] = TrackState(
             self._number, command.track, 0.0, fitted.track.length_s, fitted.track.speed,
             loop=loop, owns=made.owns, who=command.who, sound=track.sound, limited=limited,
@@ -354,7 +360,8 @@ class TrackChoices:
             value, joint = self._fit.fit_speed(
                 self._tracks[name], voice.played, speed, limits, share
             )
-            limited = f"slower by {speed / value:.2f} for {joint}" if joint else ""
+            slower = f"slower by {speed / value:.2f} for {joint}" if joint else ""
+            limited = _limits_text(slower, self._tracks[name].sound, value)
             self._playing[voice.number] = self._playing[voice.number]._replace(limited=limited)
         return float(value)
 
