@@ -191,6 +191,23 @@ def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
     assert all("not both hands" in plan.why for plan in plans[unknown:])
 
 
+@pytest.mark.parametrize(("v_z_m_s", "opens"), [(-1.2, True), (-0.3, False), (1.2, False)])
+def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(
+    v_z_m_s: float, opens: bool
+) -> None:
+    """Those that were at rest or on their return to the guard when they were lost still do."""
+    planner = ActionPlanner(PARAMS)
+    stepped(planner, [guarding(k * DT_S) for k in range(9)])
+    moving = seen(9 * DT_S, fist(2, LEFT, (0.0, 0.0, v_z_m_s)), fist(3, RIGHT, (0.0, 0.0, v_z_m_s)))
+    stepped(planner, [moving])
+    plans = stepped(planner, [seen(k * DT_S) for k in range(10, 26)])
+    attacked = [k for k, plan in enumerate(plans, 1) if plan.action == "attack"]
+    assert bool(attacked) == opens
+    if opens:
+        assert attacked[0] * DT_S == pytest.approx(0.2, abs=1.5 * DT_S)
+        assert "side of the face is open" in plans[attacked[0] - 1].why
+
+
 def test_after_a_punch_less_room_will_do_for_a_moment() -> None:
     narrow = seen(0.0, fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09)))
     room = hit_places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m

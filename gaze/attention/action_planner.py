@@ -10,7 +10,8 @@ attack  The opponent is within reach, no fist approaches, and a place is open: n
         the blow.
 wait    Anything else.
 
-No place is open while the position of a hand is unknown.
+No place is open while the position of a hand is unknown. A hand that left the picture while it
+moved away from the face is taken to be lowered.
 """
 
 from dataclasses import dataclass
@@ -62,7 +63,8 @@ class ActionPlannerParams:
     counter_ratio: Annotated[float, Bounds(0, 1), "share of open_m that is sufficient during that time"] = 0.6
     attack_ms: Annotated[float, Bounds(50, 10000), "duration of the look at the place before the blow has landed"] = 600.0
     rest_ms: Annotated[float, Bounds(0, 60000), "shortest time between the end of an attack and the next"] = 800.0
-    hand_memory_ms: Annotated[float, Bounds(0, 60000), "an unseen hand keeps its last position for this long"] = 600.0
+    hand_memory_ms: Annotated[float, Bounds(0, 60000),
+        "an unseen hand is remembered for this long: where it was, or lowered if it moved away from the face"] = 600.0
     # fmt: on
 
 
@@ -127,7 +129,7 @@ class ActionPlanner:
         found = []
         if face is not None:
             memory_s = par.hand_memory_ms / 1e3
-            hands = self._hands.step(percept.bodies, face.p_world_m, memory_s, t_s)
+            hands = self._hands.step(percept.bodies, face, memory_s, t_s)
             found = (
                 hit_places(face, hands, p_eye) if len(hands) >= HANDS or asked is not None else []
             )

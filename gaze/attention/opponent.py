@@ -23,6 +23,10 @@ CHEST_M: Vec3 = (0.0, 0.0, -0.30)
 
 _ARM_M = 0.9
 """A hand farther than this from a face belongs to another person."""
+_DROPS_M_S, _LOWERED_M = 0.25, 0.7
+"""A hand that is lost while it moves away from the face faster than this goes on in its direction,
+to this distance: an arm that hangs with a bent elbow.
+"""
 HANDS = 2
 
 
@@ -45,11 +49,16 @@ class Approach(NamedTuple):
 
 
 class SeenHand(NamedTuple):
-    """A hand of the opponent at its last position; off_m: its distance from the face then."""
+    """A hand of the opponent at its last position.
+
+    off_m: its position relative to the face then
+    recedes: whether it was moving away from the face
+    """
 
     id: int
     off_m: Vec3
     seen_s: float
+    recedes: bool = False
 
 
 class HitTarget(NamedTuple):
@@ -104,7 +113,8 @@ class OpponentHands:
     """Last positions of the opponent's two hands.
 
     A motion detector does not detect a hand at rest, and it may give another number to a hand that
-    moves again. So the newest unseen hands are remembered, up to two hands in all.
+    moves again. So the newest unseen hands are remembered, up to two hands in all. A hand that left
+    the picture while it moved away from the face is taken to be lowered.
     """
 
     def __init__(self) -> None:
@@ -114,27 +124,32 @@ class OpponentHands:
         """Forget both hands."""
         self._known: list[SeenHand] = []
 
-    def step(self, bodies: Bodies, p_face: Vec3, memory_s: float, t_s: float) -> list[SeenHand]:
+    def step(self, bodies: Bodies, face: Face, memory_s: float, t_s: float) -> list[SeenHand]:
         """Return the known hands, those seen now first.
 
         Args:
             bodies: contents of one frame.
-            p_face: the opponent's face in it.
+            face: the opponent's face in it.
             memory_s: a hand unseen for longer is forgotten.
             t_s: time of the frame.
         """
         seen = []
         for row, kind in enumerate(bodies.kinds):
             if kind in FISTS:
-                off = sub(vec(bodies.p_world_m[row]), p_face)
-                if norm(off) <= _ARM_M:
-                    seen.append(SeenHand(bodies.ids[row], off, t_s))
+                off = sub(vec(bodies.p_world_m[row]), face.p_world_m)
+                away_m = norm(off)
+                if away_m <= _ARM_M:
+                    v = sub(vec(bodies.v_world_m_s[row]), face.v_world_m_s)
+                    recedes = dot(v, off) > _DROPS_M_S * away_m
+                    seen.append(SeenHand(bodies.ids[row], off, t_s, recedes))
         # An opponent has two hands: a later, third one belongs to another person or is an arm.
         before = {hand.id for hand in self._known}
         seen = sorted(seen, key=lambda hand: hand.id not in before)[:HANDS]
         ids = {hand.id for hand in seen}
         rest = [
-            hand for hand in self._known if hand.id not in ids and t_s - hand.seen_s <= memory_s
+            _lowered(hand)
+            for hand in self._known
+            if hand.id not in ids and t_s - hand.seen_s <= memory_s
         ]
         # A hand with a new number is most likely the nearest known one.
         for hand in seen:
@@ -143,6 +158,14 @@ class OpponentHands:
         rest.sort(key=lambda one: -one.seen_s)
         self._known = [*seen, *rest[: max(0, HANDS - len(seen))]]
         return self._known
+
+
+def _lowered(hand: SeenHand) -> SeenHand:
+    """Return an unseen hand, lowered if it was lost while it moved away from the face."""
+    away_m = norm(hand.off_m)
+    if not hand.recedes or away_m >= _LOWERED_M:
+        return hand
+    return hand._replace(off_m=scale(hand.off_m, _LOWERED_M / max(away_m, 1e-6)))
 
 
 def hit_places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTarget]:
