@@ -108,7 +108,7 @@ class ScanpathParams:
     spot_left_mm: Annotated[float, Bounds(-80, 80), "distance of that spot from it towards the face's left"] = 0.0
     spot_width_mm: Annotated[float, Bounds(0, 1000),
         "standard deviation of the looks about that spot; smaller: the spot has more effect; 0: none"] = 60.0
-    speech_mouth_ratio: Annotated[float, Bounds(0.1, 20), "factor on the looks at the mouth of a person who speaks"] = 2.5
+    speech_mouth_ratio: Annotated[float, Bounds(0.1, 20), "factor on the looks at the mouth of a person who speaks"] = 6.0
     least_shift_deg: Annotated[float, Bounds(0, 10),
         "smallest angle between two parts of a face for which the gaze shifts; the fovea covers less; 0: any"] = 1.5
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
