@@ -293,6 +293,7 @@ class RunVoice:
         if reply is None or reply.track is None:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
         now_s = self._clock.now_s()
+        self._played = None  # the stream replaces it; to stop it later would stop the stream
         player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, rig.sound.volume)
         mouth = StreamMouth(rate_hz, rig.gaze.mouth.quiet_db)
         self._stream = _Stream(mouth, rate_hz, channels, reply.track.number)
@@ -385,7 +386,9 @@ class RunVoice:
 
     def _follow_tracks(self, player: SoundPlayer, tick: Tick | None, now_s: float) -> None:
         """Start, stop, seek or synchronise the sound of the newest track that has one."""
-        wanted = _sounding_track(tick)
+        wanted, stream = _sounding_track(tick), self._stream
+        if stream is not None and wanted is not None and wanted.number < stream.track:
+            wanted = None  # the tick is older than the stream
         if tick is None or wanted is None:
             if self._played is not None and not _has_finished(self._played.number, tick):
                 player.stop()
