@@ -98,12 +98,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Return five workers for two processors: for a third of the time tests wait.
+    """Return four workers for two processors: for a third of the time tests wait.
 
     More processors have fewer each, as a worker takes 0.8 GB.
     """
     processors = os.cpu_count() or 1
-    return processors + min(processors, 2) + 1
+    return processors + min(processors, 2)
 
 
 @pytest.hookimpl(optionalhook=True)
