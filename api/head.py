@@ -42,6 +42,7 @@ from gazerig.robot.model.commands import (
     Value,
 )
 from gazerig.robot.model.outcome import Progress
+from gazerig.robot.model.reply import CommandReply
 
 STREAM_AHEAD_S = 1.0
 """Length of a stream that is sent before it is heard."""
@@ -304,9 +305,22 @@ class Head(ABC):
             text = str(Path(text).absolute())
         return self._send(Say(text, volume, sway, tuple(spoken), self._who))
 
-    @abstractmethod
     def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
         """Say a stream; return when its last piece has been accepted."""
+        for piece in pieces:
+            ahead_s = self._say_piece(piece, rate_hz, channels)
+            if ahead_s > STREAM_AHEAD_S:
+                self.sleep(ahead_s - STREAM_AHEAD_S)
+        self._end_stream(rate_hz, channels)
+        return Order(self, CommandReply)
+
+    @abstractmethod
+    def _say_piece(self, piece: bytes, rate_hz: int, channels: int) -> float:
+        """Say a piece of a stream; return the length that has not been heard, s."""
+
+    @abstractmethod
+    def _end_stream(self, rate_hz: int, channels: int) -> None:
+        """Mark the end of a stream."""
 
     def converse(self, mode: str) -> Order:
         """Look away and blink as speakers or listeners do.

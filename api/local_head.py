@@ -14,7 +14,7 @@ from typing import Any, Self
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.sound.player import SoundError
 from gazerig.errors import Error, HeadEnded, Refused
-from gazerig.head import STREAM_AHEAD_S, Head
+from gazerig.head import Head
 from gazerig.order import Order
 from gazerig.program_signals import SIGNALS
 from gazerig.robot.app import session
@@ -31,7 +31,6 @@ from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Say, Value
 from gazerig.robot.model.outcome import Progress
-from gazerig.robot.model.reply import CommandReply
 
 _LOG = logging.getLogger("gazerig")
 _POLL_S = 0.004
@@ -135,6 +134,15 @@ class LocalHead(Head):
         assert voice is not None, "only a run without a program has none"
         return voice
 
+    def _say_piece(self, piece: bytes, rate_hz: int, channels: int) -> float:
+        try:
+            return self._voice().feed(piece, rate_hz, channels)
+        except (ValueError, SoundError) as error:
+            raise Refused(str(error)) from None
+
+    def _end_stream(self, rate_hz: int, channels: int) -> None:
+        self._voice().finish()
+
     def _compose(self) -> session.ComposedRun:
         if self._composed is not None:
             raise Error("a head can be used in one with block only: open another")
@@ -235,17 +243,6 @@ class RunningHead(LocalHead):
             if now_s >= end_s:
                 return
             self._clock.sleep_until(min(now_s + _POLL_S, end_s))
-
-    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
-        for piece in pieces:
-            try:
-                ahead_s = self._voice().feed(piece, rate_hz, channels)
-            except (ValueError, SoundError) as error:
-                raise Refused(str(error)) from None
-            if ahead_s > STREAM_AHEAD_S:
-                self.sleep(ahead_s - STREAM_AHEAD_S)
-        self._voice().finish()
-        return Order(self, CommandReply)
 
     def _run(self, composed: session.ComposedRun) -> None:
         """Run from torque on to torque off; the target of the loop's thread."""

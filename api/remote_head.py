@@ -1,19 +1,18 @@
 """A head that runs in another program of the same user."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from gazerig.errors import HeadEnded, NotFound
-from gazerig.head import STREAM_AHEAD_S, Head
+from gazerig.head import Head
 from gazerig.order import Order
 from gazerig.robot.control.command_handler import as_value
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Value
 from gazerig.robot.model.outcome import Progress
-from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.client import RequestRejected, RobotClient, connect_to_all
 
 _POLL_S = 0.02
@@ -78,13 +77,11 @@ class RemoteHead(Head):
         """Return behaviours, conversation modes and lid states; the active one is the first."""
         return self._client.menus()
 
-    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
-        for piece in pieces:
-            ahead_s = self._client.say_piece(piece, rate_hz, channels)
-            if ahead_s > STREAM_AHEAD_S:
-                self.sleep(ahead_s - STREAM_AHEAD_S)
+    def _say_piece(self, piece: bytes, rate_hz: int, channels: int) -> float:
+        return self._client.say_piece(piece, rate_hz, channels)
+
+    def _end_stream(self, rate_hz: int, channels: int) -> None:
         self._client.say_piece(b"", rate_hz, channels, last=True)
-        return Order(self, CommandReply)
 
     def _progress(self) -> Progress:
         state = self.state

@@ -163,8 +163,8 @@ class DoorLink:
             try:
                 await attempt()
             except errors as error:
-                told = getattr(error, "strerror", None) or str(error)
-                reason = " ".join(told.split()) or type(error).__name__
+                text = getattr(error, "strerror", None) or str(error)
+                reason = " ".join(text.split()) or type(error).__name__
             if self.now_s() - begin_s > _STEADY_S:
                 wait_s = FIRST_WAIT_S
                 self.report_again()

@@ -10,7 +10,7 @@ _REPLAN_S = 0.3
 """A change of the planned end by less than this gives no order."""
 _MAX_CHARACTERS = 5000
 
-TurnState = Literal["listening", "thinking", "speaking", "idle", "interrupt"]
+OrderName = Literal["listening", "thinking", "speaking", "idle", "interrupt"]
 
 
 class TurnOrder(NamedTuple):
@@ -22,7 +22,7 @@ class TurnOrder(NamedTuple):
         text: What is spoken from now on, from which the head estimates the end otherwise.
     """
 
-    state: TurnState
+    state: OrderName
     seconds: float | None = None
     text: str = ""
 
@@ -45,8 +45,8 @@ class TurnTaking:
     """
 
     def __init__(self, after_speech: Literal["listening", "idle"] = "idle") -> None:
-        self._after_speech: TurnState = after_speech
-        self.state: TurnState = "idle"
+        self._after_speech: OrderName = after_speech
+        self.state: OrderName = "idle"
         self._text = ""
         self._begin_s = self._end_s = inf
 
@@ -107,7 +107,7 @@ class TurnTaking:
         """Return whether the planned end of own speech has passed."""
         return self.state == "speaking" and now_s >= self._end_s
 
-    def _change(self, state: TurnState, order: TurnState | None = None) -> Orders:
+    def _change(self, state: OrderName, order: OrderName | None = None) -> Orders:
         if self.state == state:
             return ()
         self.state = state

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
-from aiohttp import ClientError, ClientSession, WSMsgType, web
+from aiohttp import ClientError, ClientSession, ClientWebSocketResponse, WSMsgType, web
 
 from gazerig.doors.door import LOOPBACK, Address, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
@@ -46,6 +46,15 @@ class Intake:
     def __init__(self, link: DoorLink, translator: Translator) -> None:
         self._link, self._translator = link, translator
         self._second_s, self._count = link.now_s(), 0
+
+    async def read(self, socket: ClientWebSocketResponse | web.WebSocketResponse) -> None:
+        """Read the messages of a connection until it ends, and with it the conversation."""
+        try:
+            async for message in socket:
+                if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                    await self.take(message.data)
+        finally:
+            self.end()
 
     async def take(self, text: str | bytes) -> None:
         """Read one message."""
@@ -104,13 +113,7 @@ async def follow_socket(
             ) as socket,
         ):
             link.report(f"connected to {link.address}")
-            intake = Intake(link, make())
-            try:
-                async for message in socket:
-                    if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                        await intake.take(message.data)
-            finally:
-                intake.end()
+            await Intake(link, make()).read(socket)
 
     if urlsplit(link.address).scheme not in ("ws", "wss", "http", "https"):
         import gazerig
@@ -131,13 +134,7 @@ async def receive_sockets(link: DoorLink, make: Callable[[], Translator], neighb
     async def handle(request: web.Request) -> web.WebSocketResponse:
         socket = web.WebSocketResponse(heartbeat=_HEARTBEAT_S, max_msg_size=MAX_BYTES)
         await socket.prepare(request)
-        intake = Intake(link, make())
-        try:
-            async for message in socket:
-                if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                    await intake.take(message.data)
-        finally:
-            intake.end()
+        await Intake(link, make()).read(socket)
         return socket
 
     await listen(link, handle, neighbour)

@@ -127,15 +127,6 @@ def split_glb(path: Path, data: bytes) -> tuple[bytes, bytes]:
     return parts[_JSON], parts.get(_BIN, b"")
 
 
-def join_glb(tree: bytes, binary: bytes) -> bytes:
-    """Return a binary file of its two parts."""
-    tree += b" " * (-len(tree) % 4)
-    binary += b"\0" * (-len(binary) % 4)
-    body = struct.pack("<I4s", len(tree), _JSON) + tree
-    body += struct.pack("<I4s", len(binary), _BIN) + binary
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
-
-
 class GltfFile:
     """A file with checked structure.
 

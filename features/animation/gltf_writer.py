@@ -7,9 +7,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from gazerig.features.animation.glb import join_glb, split_glb
+from gazerig.features.animation.glb import split_glb
 from gazerig.features.animation.gltf_reader import rest_quaternion
 from gazerig.gaze.types import Floats
+from gazerig.robot.description.glb_file import join_glb
 from gazerig.robot.description.gltf import gltf
 from gazerig.robot.description.links import Description, Link
 

@@ -5,7 +5,6 @@ graphics card does not have to light every pixel of every frame.
 """
 
 import json
-import struct
 from math import pi
 from typing import Any, Final, NamedTuple
 
@@ -15,6 +14,7 @@ import viser
 from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.description.glb_file import join_glb
 from gazerig.robot.description.mesh import (
     Colour,
     Mesh,
@@ -226,14 +226,7 @@ def glb_file(
     }
     if used := sorted(material["extensions"]):
         tree["extensionsUsed"] = used
-    text = json.dumps(tree, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    length = 12 + 8 + len(text) + 8 + len(data)
-    head = struct.pack("<4sII", b"glTF", 2, length)
-    return b"".join(
-        (head, struct.pack("<I4s", len(text), b"JSON"), text,
-         struct.pack("<I4s", len(data), b"BIN\0"), data)
-    )  # fmt: skip
+    return join_glb(json.dumps(tree, separators=(",", ":")).encode(), data)
 
 
 def glow_disc(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
