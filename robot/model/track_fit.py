@@ -252,14 +252,10 @@ class TrackFit:
         channels = (*POSE_CHANNELS, *further_joints(joints))
         self._matrix = np.zeros((len(channels), len(joints)))
         for j, name in enumerate(joints):
-            if name in channels:
-                self._matrix[channels.index(name), j] = lid_spans_rad.get(name, 1.0)
-            elif name.startswith("neck_"):
-                self._matrix[channels.index(name.replace("neck", "head")), j] = 1.0
-            else:
-                axis = 0 if name.endswith("pan") else 1
-                self._matrix[axis, j] = -1.0
-                self._matrix[channels.index(EYE_CHANNELS[axis]), j] = 1.0
+            channel = channel_of_joint(name)
+            self._matrix[channels.index(channel), j] = lid_spans_rad.get(name, 1.0)
+            if channel in EYE_CHANNELS:
+                self._matrix[EYE_CHANNELS.index(channel), j] = -1.0
         # Ranges are checked only for direct motion of a joint: lids are limited by their
         # openings, and eyes that compensate for the head move as far as they can.
         self._own = np.where(self._matrix > 0.0, self._matrix, 0.0)
@@ -380,7 +376,7 @@ class TrackFit:
         owned = [name in made.owns for name in self.joints]
         base = np.where(owned, 0.0, base_rad)
         low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
-        most = [share * np.array([limit[at] for limit in limits]) for at in (2, 3)]
+        most = _track_limits(limits, share)
         reach_of = self._own  # without eyes that compensate for the head as far as they can
         if made.track.space == "joint":
             reach_of = matrix * (self._own != 0.0).any(axis=1, keepdims=True)
@@ -467,11 +463,11 @@ class TrackFit:
     ) -> tuple[float, str, str]:
         """Return the time factor that keeps all limits, its joint and a text with the reason."""
         found = (1.0, "", "")
-        for column, power, at, unit in (
-            (samples.speed, 1.0, 2, "deg/s"),
-            (samples.acceleration, 0.5, 3, "deg/s2"),
+        speeds, accelerations = _track_limits(limits, share)
+        for column, power, most, unit in (
+            (samples.speed, 1.0, speeds, "deg/s"),
+            (samples.acceleration, 0.5, accelerations, "deg/s2"),
         ):
-            most = share * np.array([limit[at] for limit in limits])
             ratio = np.abs(column @ matrix) / most
             row, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             factor = float(ratio[row, j]) ** power
@@ -487,11 +483,7 @@ class TrackFit:
         self, state: OffsetState, limits: Sequence[JointLimit], share: float, least_s: float
     ) -> float:
         """Return the time in which a moving offset can return to rest within limits."""
-        begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
-        most = [
-            np.maximum(share * np.array([limit[at] for limit in limits]), np.abs(now)) + _ROUNDING
-            for at, now in zip((2, 3), begins, strict=True)
-        ]
+        most = self._transition_limits(state, limits, share)
         for factor in _LONGER:
             if self._keeps_limits(_fade_samples(state, factor * least_s), most):
                 return factor * least_s
@@ -509,11 +501,7 @@ class TrackFit:
         if not any(map(np.any, state)):
             return 0.0
         fade = _fade_samples(state, fade_s)
-        begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
-        most = [
-            np.maximum(share * np.array([limit[at] for limit in limits]), np.abs(now)) + _ROUNDING
-            for at, now in zip((2, 3), begins, strict=True)
-        ]
+        most = self._transition_limits(state, limits, share)
         for wait in _WAITS:
             since = np.maximum(0.0, fade.times_s - wait * fade_s) * played.speed
             also = played.motion.sample_at(since).scale(np.array(played.sizes), played.speed)
@@ -524,6 +512,16 @@ class TrackFit:
                 return wait * fade_s
         return fade_s
 
+    def _transition_limits(
+        self, state: OffsetState, limits: Sequence[JointLimit], share: float
+    ) -> list[Floats]:
+        """Return the joints' speeds and accelerations that a transition from a state may have."""
+        begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
+        return [
+            np.maximum(most, np.abs(now)) + _ROUNDING
+            for most, now in zip(_track_limits(limits, share), begins, strict=True)
+        ]
+
     def _keeps_limits(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
         """Return whether speeds and accelerations stay below given ones."""
         return all(
@@ -532,11 +530,19 @@ class TrackFit:
         )
 
 
+def _track_limits(limits: Sequence[JointLimit], share: float) -> tuple[Floats, Floats]:
+    """Return the speeds and accelerations of the joints that tracks may use."""
+    return (
+        share * np.array([limit.speed_rad_s for limit in limits]),
+        share * np.array([limit.accel_rad_s2 for limit in limits]),
+    )
+
+
 def _stretch(
     matrix: Floats, limits: Sequence[JointLimit], share: float
 ) -> Callable[[Floats, Floats], float]:
     """Return the function ``PlayedTrack.stretch`` for limits."""
-    speeds, accelerations = (share * np.array([limit[at] for limit in limits]) for at in (2, 3))
+    speeds, accelerations = _track_limits(limits, share)
 
     def stretch(speed: Floats, acceleration: Floats) -> float:
         fastest = float((np.abs(speed @ matrix) / speeds).max())
