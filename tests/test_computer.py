@@ -8,6 +8,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.computer import (
     LEVELS,
+    LOWEST_HZ,
     ComputerFigures,
     level_text,
     load_level,
@@ -101,8 +102,8 @@ def test_a_computer_that_becomes_busy_halves_the_rate(
     over_s: float, late_share: float, rate_hz: float, slower_hz: float | None
 ) -> None:
     figures = LoopFigures(rate_hz, 0.0, 1.0, 30.0, 9, 9, over_s, late_share, 30.0)
-    assert slower_rate(figures, rate_hz) == slower_hz
-    assert slower_rate(None, rate_hz) is None
+    assert slower_rate(figures, rate_hz, LOWEST_HZ) == slower_hz
+    assert slower_rate(None, rate_hz, LOWEST_HZ) is None
 
 
 def test_a_slow_rig_stays_slow() -> None:

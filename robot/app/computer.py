@@ -12,6 +12,8 @@ from gazerig.robot.model.clock import RealClock
 
 _WAITS, _WAIT_S, _LATE_S = 80, 0.005, 0.002
 _BUSY_S = 0.3
+LOWEST_HZ = 50.0
+"""Rate of the loop on the weakest computer."""
 
 
 class ComputerFigures(NamedTuple):
@@ -51,7 +53,7 @@ LEVELS = {
     "full": LoadLevel(None, "full", True, "the rig's loop rate, full pictures"),
     "small": LoadLevel(100.0, "coarse", True, "a loop of 100 Hz, 15 coarse pictures a second"),
     "busy": LoadLevel(100.0, "none", True, "a loop of 100 Hz, a room without rendered pictures"),
-    "least": LoadLevel(50.0, "none", False, "a loop of 50 Hz, a scene instead of a room"),
+    "least": LoadLevel(LOWEST_HZ, "none", False, "a loop of 50 Hz, a scene instead of a room"),
 }
 """Load levels by name, from the highest to the lowest."""
 

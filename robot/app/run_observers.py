@@ -17,7 +17,7 @@ from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
-from gazerig.robot.app.computer import level_text
+from gazerig.robot.app.computer import LOWEST_HZ, level_text
 from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
@@ -376,7 +376,7 @@ class RunObservers:
         if tick.t_s < self._relief_s:
             return
         self._relief_s, rate_hz = tick.t_s + _RELIEF_S, self._made.loop.rate_hz
-        slower_hz = slower_rate(self._timing.figures(), rate_hz)
+        slower_hz = slower_rate(self._timing.figures(), rate_hz, LOWEST_HZ)
         if slower_hz is not None and self._tuning is not None:
             self._say(
                 f"the computer has become too busy for {rate_hz:g} Hz: the loop continues at "

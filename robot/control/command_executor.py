@@ -140,11 +140,7 @@ class CommandExecutor:
                 return reply._replace(
                     control_number=self._lead.state.number * self._lead.state.active
                 )
-            case Play():
-                if self._stop.stop_reason:
-                    return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
-                return self._play(command, t_s)
-            case Speak():
+            case Play() | Speak():
                 if self._stop.stop_reason:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 return self._play(command, t_s)

@@ -13,8 +13,6 @@ BUSY_SHARE = 0.05
 _SHORTEST_S = 3.0
 """Shortest time for a message; before it a measured computer takes a lower rate."""
 _RELIEF_S = 2.0
-LOWEST_HZ = 50.0
-"""Lowest rate that a busy computer chooses."""
 
 
 class LoopTiming:
@@ -85,13 +83,14 @@ def busy_text(figures: LoopFigures | None) -> str:
     )
 
 
-def slower_rate(figures: LoopFigures | None, rate_hz: float) -> float | None:
+def slower_rate(figures: LoopFigures | None, rate_hz: float, lowest_hz: float) -> float | None:
     """Return a lower rate for a loop on a computer that has become busy, None to keep its rate.
 
     Args:
         figures: Figures of the last seconds, None if unknown.
         rate_hz: Present rate.
+        lowest_hz: Lowest rate of any computer.
     """
     if figures is None or figures.over_s < _RELIEF_S or figures.late_share < BUSY_SHARE:
         return None
-    return max(LOWEST_HZ, rate_hz / 2.0) if rate_hz > LOWEST_HZ else None
+    return max(lowest_hz, rate_hz / 2.0) if rate_hz > lowest_hz else None

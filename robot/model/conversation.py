@@ -55,12 +55,10 @@ class Conversation:
 
     Attributes:
         state: State at the present tick.
-        speech: Newest command to speak, with words and sound; None while not speaking.
     """
 
     def __init__(self) -> None:
         self.state = NO_CONVERSATION
-        self.speech: Talk | None = None
         self._lease = Lease()
         self._reported_s = 0.0
 
@@ -86,7 +84,6 @@ class Conversation:
         person = command.person if command.person is not None or not active else now.partner
         self._lease.start(command.who, command.stay, t_s)
         self._reported_s = t_s
-        self.speech = command if state == "speaking" else None
         if state == "idle":
             self.state = ConversationState(now.number + active, since_s=t_s)
         else:
@@ -135,7 +132,6 @@ class Conversation:
 
     def end(self, why: str, t_s: float) -> None:
         """End the conversation without a request."""
-        self.speech = None
         self.state = ConversationState(self.state.number + 1, since_s=t_s, end_reason=why)
 
 

@@ -203,11 +203,11 @@ class SoundWaves:
 
 
 def outline(samples: NDArray[np.float32], bins: int) -> NDArray[np.float32]:
-    """Return the largest magnitude of each of so many equal parts, as a share of the largest.
+    """Return the largest magnitude of each part of a sound, as a share of the largest.
 
     Args:
         samples: (n,) one channel.
-        bins: number of parts.
+        bins: number of equal parts.
     """
     if not len(samples):
         return np.zeros(bins, np.float32)
