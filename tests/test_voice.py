@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakes.waiting import wait_for
 from test_sound import needs_espeak
 
 import gazerig
@@ -195,7 +196,7 @@ def speaking(folder: Path) -> Iterator[Any]:
     """Yield a head in real time that says a long file."""
     with opened(folder) as head:
         head.say("long.wav")
-        wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
+        wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
         yield head
 
 
@@ -203,15 +204,6 @@ def sound_s(head: Any) -> float | None:
     player = head._composed.voice._player
     found: float | None = player.position_s(RealClock().now_s()) if player is not None else None
     return found
-
-
-def wait_until(condition: Any) -> None:
-    clock = RealClock()
-    for _ in range(1000):
-        if condition():
-            return
-        clock.sleep_until(clock.now_s() + 0.01)
-    raise AssertionError("it has not happened")
 
 
 def is_silent(head: Any) -> bool:
@@ -229,11 +221,11 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
         pid = head._composed.voice._player.pid
         for end in (lambda: head.play(""), lambda: head.jog("neck_yaw", 1.0), head.stop):
             end()
-            wait_until(lambda: is_silent(head))
+            wait_for(lambda: is_silent(head))
             if end != head.stop:
                 head.release_joints()
                 head.say("long.wav")
-                wait_until(lambda: not is_silent(head))
+                wait_for(lambda: not is_silent(head))
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
 
@@ -245,15 +237,15 @@ def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_mes
     with opened(folder) as head:
         voice = head._composed.voice
         voice.feed(speech(1.0), RATE, 1)
-        wait_until(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
-        wait_until(lambda: any("stalled" in one.text for one in head.events(0.0)))
-        wait_until(lambda: abs(head.state.joints["jaw"].commanded_deg) < 0.5)
+        wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
+        wait_for(lambda: any("stalled" in one.text for one in head.events(0.0)))
+        wait_for(lambda: abs(head.state.joints["jaw"].commanded_deg) < 0.5)
         with pytest.raises(gazerig.Error, match="this piece is not played"):
             voice.feed(speech(5.0), RATE, 1)
         with pytest.raises(gazerig.Error, match="finish it before another one"):
             voice.feed(speech(0.1), 8000, 1)
         voice.finish()
-        wait_until(lambda: not [one for one in head.state.tracks if one.is_playing])
+        wait_for(lambda: not [one for one in head.state.tracks if one.is_playing])
         voice.feed(speech(1.0), RATE, 1)
         assert head.say("short.wav").wait(20.0) == "arrived"  # it replaces the stream
         head.jog("neck_yaw", 0.0)
@@ -261,11 +253,11 @@ def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_mes
             voice.feed(speech(0.1), RATE, 1)
         head.release_joints()
         head.say("long.wav")
-        wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
+        wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
         os.kill(voice._player.pid, 9)
-        wait_until(lambda: not [one for one in head.state.tracks if one.is_playing])
+        wait_for(lambda: not [one for one in head.state.tracks if one.is_playing])
         line = "the sound's process has ended (SIGKILL): the next sound starts it again"
-        wait_until(lambda: [one.text for one in head.events(0.0)].count(line) == 1)
+        wait_for(lambda: [one.text for one in head.events(0.0)].count(line) == 1)
         assert head.say("short.wav").wait(20.0) == "arrived"
 
 
@@ -284,7 +276,7 @@ def test_other_programs_say_files_and_streams(folder: Path) -> None:
             assert head.say(pieces, rate_hz=RATE).wait() == "arrived"
             with pytest.raises(Refused, match="whole frames"):
                 head._client.say_piece(b"a", RATE)
-            wait_until(lambda: not [one for one in here.state.tracks if one.is_playing])
+            wait_for(lambda: not [one for one in here.state.tracks if one.is_playing])
         assert asyncio.run(say(os.getpid())) == "arrived"
 
 
@@ -296,16 +288,16 @@ def test_the_sound_of_a_track_file_follows_its_pauses_and_seeks(folder: Path) ->
     (folder / "rig.yaml").write_text(f"{text}\ntrack_files: [show.yaml]\n", "utf-8")
     with opened(folder) as head:
         assert head.play("show").reply.track.duration_s >= 59.9
-        wait_until(lambda: (sound_s(head) or 0.0) > 0.1)
+        wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
         head.pause_track("show")
-        wait_until(lambda: is_silent(head))
+        wait_for(lambda: is_silent(head))
         head.resume_track("show")
-        wait_until(lambda: not is_silent(head))
+        wait_for(lambda: not is_silent(head))
         head.seek_track(30.0, "show")
-        wait_until(lambda: (sound_s(head) or 0.0) > 30.0)
+        wait_for(lambda: (sound_s(head) or 0.0) > 30.0)
         track = head.state.tracks[-1]
         assert track.position_s == pytest.approx(sound_s(head), abs=2.0)
         head.set_track_speed(0.5, "show")
-        wait_until(lambda: is_silent(head))
+        wait_for(lambda: is_silent(head))
         assert "without its sound, which plays at speed 1" in head.state.tracks[-1].limited
     (folder / "rig.yaml").write_text(text, "utf-8")
