@@ -187,8 +187,11 @@ def picked(near: Rig, person: Person, image: Any) -> None:
     wait_for(lambda: len(near.asked) > 0, "the click")
     assert near.asked[0]["pick"]["x"] == pytest.approx(0.25, abs=0.02)
     assert near.asked[0]["pick"]["y"] == pytest.approx(0.5, abs=0.02)
-    person.run(f"{element}.focus()")
+    mark = "document.querySelector('[data-panel=camera] .mark')"
+    focused = f"{element}.focus(); document.hasFocus() && document.activeElement === {element}"
+    wait_for(lambda: person.run(focused) is True, "the focus on the picture")
     key(person, "ArrowRight", 39)
+    wait_for(lambda: person.run(f"{mark}.hidden === false") is True, "the cross")
     enter(person)
-    wait_for(lambda: len(near.asked) == 2, "the cross")
-    assert near.asked[1]["pick"]["x"] == pytest.approx(0.29, abs=0.02)
+    wait_for(lambda: len(near.asked) > 1, "the cross's place")
+    assert near.asked[1]["pick"]["x"] == pytest.approx(0.29, abs=0.02), near.asked
