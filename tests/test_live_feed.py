@@ -22,9 +22,8 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.control.tick_text import perception_text
 from gazerig.robot.dashboard.feed.camera_overlay import background, draw_detections
+from gazerig.robot.dashboard.feed.gaze_trail import GAZE_KEPT_S, GazeHistory
 from gazerig.robot.dashboard.feed.live_feed import (
-    GAZE_KEPT_S,
-    GazeHistory,
     LiveFeed,
     LiveRig,
     RunState,

@@ -13,7 +13,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3
 from gazerig.robot.app.scene_files import load_scene, scene_names
 from gazerig.robot.dashboard.feed.camera_overlay import draw_heat
-from gazerig.robot.dashboard.feed.live_feed import GazeTrail
+from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.scenes.scene import ScenePicture
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.files.file_input import read_limited
 from gazerig.gaze.track.track import MAX_DURATION_S
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint import JointLimit
@@ -79,55 +78,6 @@ def joint_map(rig: Rig, given: Sequence[str]) -> JointMap:
             )
         found[name] = joint
     return JointMap(rig.names, found)
-
-
-def read_animation(
-    path: Path,
-    rig: Rig,
-    names: JointMap,
-    *,
-    fps: float | None = None,
-    clip: str = "",
-    centre_deg: float | None = None,
-) -> ImportedAnimation:
-    """Return the animation of a file, by its kind.
-
-    Args:
-        path: path of the file.
-        rig: rig that it moves.
-        names: joints by the names in the file.
-        fps: frames per second, for tables with frame numbers.
-        clip: name of the animation, for files with several.
-        centre_deg: position straight ahead, for servo positions in degrees; None for the servo's
-            own unit.
-
-    Raises:
-        SetupError: the file cannot be read or has no motion for this rig.
-    """
-    from gazerig.features.animation import bottango, gltf_reader, servo_positions, table
-
-    try:
-        data = read_limited(path, LARGEST)
-    except OSError as error:
-        raise SetupError(f"{path} cannot be read: {error.strerror}") from None
-    if data[:4] == b"glTF" or path.suffix.lower() == ".gltf":
-        found = gltf_reader.read(path, data, rig, names, clip)
-    elif data.lstrip()[:1] == b"[":
-        found = bottango.read(path, data, rig, names, clip)
-    elif data.lstrip()[:1] == b"{":
-        found = servo_positions.read(path, data, rig, names, centre_deg)
-    elif path.suffix.lower() in (".glb", ".json", ".fbx", ".bvh", ".blend"):
-        raise SetupError(
-            f"{path}: its first bytes are neither glTF nor JSON: export glTF (.glb), the JSON of "
-            "Bottango or of Blender's add-on Servo Animation, or CSV"
-        )
-    else:
-        found = ImportedAnimation(table.read_table(path, data, fps, names), poses=False)
-    if not found.series:
-        raise SetupError(
-            f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"
-        )
-    return found
 
 
 def decode(path: Path, data: bytes, kind: type[T], what: str, where: str = "") -> T:

@@ -15,7 +15,8 @@ from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.drivers.errors import SetupError
-from gazerig.features.animation.animation import Series, joint_map, read_animation
+from gazerig.features.animation.animation import Series, joint_map
+from gazerig.features.animation.animation_file import read_animation
 from gazerig.features.animation.cli.export_track import app as export_app
 from gazerig.features.animation.cli.import_track import app
 from gazerig.features.animation.gltf_reader import joint_angles

@@ -10,7 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
-from gazerig.features.animation.animation import joint_map, read_animation
+from gazerig.features.animation.animation import joint_map
+from gazerig.features.animation.animation_file import read_animation
 from gazerig.features.animation.cli.export_track import app as export_app
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.gltf import gltf

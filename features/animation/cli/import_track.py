@@ -68,7 +68,8 @@ def import_track(
 ) -> None:
     """Import an animation of another program as a track in YAML."""
     with clear_errors(rig):
-        from gazerig.features.animation.animation import joint_map, read_animation
+        from gazerig.features.animation.animation import joint_map
+        from gazerig.features.animation.animation_file import read_animation
         from gazerig.robot.app.track_file import track_text, write_track
 
         loaded = load_rig(rig)

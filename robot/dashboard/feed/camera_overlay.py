@@ -8,7 +8,7 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Depth, Detections, ImageArray
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.feed.live_feed import EVERY_S
+from gazerig.robot.dashboard.feed.gaze_trail import EVERY_S
 from gazerig.robot.model.intrinsics import project
 
 IMAGE_WIDTH_PX = 640

@@ -8,7 +8,6 @@ ticks, and other data (``RunState``) when it has changed.
 import json
 import pickle
 import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -32,6 +31,7 @@ from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import decode_plain, decode_rows, encode
 from gazerig.robot.control.tick_text import health_text, perception_text
+from gazerig.robot.dashboard.feed.gaze_trail import GazeHistory, GazeTrail
 from gazerig.robot.dashboard.feed.page_process import (
     CHOICES,
     FRAME,
@@ -55,8 +55,7 @@ from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
 """First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, and a frame
-with
-its pixels."""
+with its pixels."""
 
 _DRAWING_SHARE = 0.1
 """Largest share of a processor for drawing images of a simulated camera that delivers none."""
@@ -379,51 +378,6 @@ def project_points(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics)
     """Return points (n, 3) in the image of a camera at (R, p_m), without those behind it."""
     seen: Floats = (points_world_m - np.array(p_m)) @ np.array(R)
     return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
-
-
-GAZE_KEPT_S = 2.0
-"""Age of the oldest frame that is drawn with the gaze of its capture, s."""
-
-
-class GazeHistory:
-    """Gaze points of the last seconds, for frames that arrive after their capture."""
-
-    def __init__(self) -> None:
-        self._points: deque[tuple[float, Vec3]] = deque()
-
-    def add(self, t_s: float, point_m: Vec3) -> None:
-        """Add a gaze point; an earlier time than the last one's resets the history."""
-        if self._points and t_s < self._points[-1][0]:
-            self._points.clear()
-        self._points.append((t_s, point_m))
-        while t_s - self._points[0][0] > GAZE_KEPT_S:
-            self._points.popleft()
-
-    def at(self, t_s: float) -> Vec3:
-        """Return the gaze point nearest to a time; there must be one."""
-        return min(self._points, key=lambda one: abs(one[0] - t_s))[1]
-
-
-KEPT_S, EVERY_S = 12.0, 0.05
-"""Duration of the trail and time between its points, s."""
-
-
-class GazeTrail:
-    """Gaze points of the last seconds in the world frame, m."""
-
-    def __init__(self) -> None:
-        self._points: deque[tuple[float, Vec3]] = deque(maxlen=int(KEPT_S / EVERY_S))
-
-    def add(self, t_s: float, p_world_m: Vec3) -> None:
-        """Add a point; one with an earlier time than the last clears the trail."""
-        if self._points and t_s < self._points[-1][0]:
-            self._points.clear()
-        if not self._points or t_s - self._points[-1][0] >= EVERY_S:
-            self._points.append((t_s, p_world_m))
-
-    def points(self) -> Floats:
-        """Return the points (n, 3), oldest first."""
-        return np.array([p for _, p in self._points], dtype=np.float64).reshape(-1, 3)
 
 
 @dataclass

@@ -1,0 +1,51 @@
+"""Past gaze points, for frames that arrive late and for the trail and the heat map."""
+
+from collections import deque
+
+import numpy as np
+
+from gazerig.gaze.types import Floats, Vec3
+
+GAZE_KEPT_S = 2.0
+"""Age of the oldest frame that is drawn with the gaze of its capture, s."""
+
+
+class GazeHistory:
+    """Gaze points of the last seconds, for frames that arrive after their capture."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, Vec3]] = deque()
+
+    def add(self, t_s: float, point_m: Vec3) -> None:
+        """Add a gaze point; an earlier time than the last one's resets the history."""
+        if self._points and t_s < self._points[-1][0]:
+            self._points.clear()
+        self._points.append((t_s, point_m))
+        while t_s - self._points[0][0] > GAZE_KEPT_S:
+            self._points.popleft()
+
+    def at(self, t_s: float) -> Vec3:
+        """Return the gaze point nearest to a time; there must be one."""
+        return min(self._points, key=lambda one: abs(one[0] - t_s))[1]
+
+
+KEPT_S, EVERY_S = 12.0, 0.05
+"""Duration of the trail and time between its points, s."""
+
+
+class GazeTrail:
+    """Gaze points of the last seconds in the world frame, m."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, Vec3]] = deque(maxlen=int(KEPT_S / EVERY_S))
+
+    def add(self, t_s: float, p_world_m: Vec3) -> None:
+        """Add a point; one with an earlier time than the last clears the trail."""
+        if self._points and t_s < self._points[-1][0]:
+            self._points.clear()
+        if not self._points or t_s - self._points[-1][0] >= EVERY_S:
+            self._points.append((t_s, p_world_m))
+
+    def points(self) -> Floats:
+        """Return the points (n, 3), oldest first."""
+        return np.array([p for _, p in self._points], dtype=np.float64).reshape(-1, 3)
