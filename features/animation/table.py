@@ -6,7 +6,9 @@ Separators are commas, semicolons or tabs.
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from io import StringIO
 from math import isfinite
 from pathlib import Path
 
@@ -39,8 +41,8 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
         raise SetupError(f"{path} is not UTF-8 text: export it as CSV") from None
     separator = max(",;\t", key=text.partition("\n")[0].count)
     check_count(str(path), data.count(b"\n"))
-    rows = list(csv.reader(text.splitlines(), delimiter=separator))
-    head = [name.strip().lower() for name in rows[0]] if rows else []
+    rows = csv.reader(StringIO(text, newline=None), delimiter=separator)
+    head = [name.strip().lower() for name in next(rows, [])]
     time = next((i for i, name in enumerate(head) if name in _TIMES), None)
     if time is None:
         raise SetupError(
@@ -75,22 +77,19 @@ class _Table:
         self._joint = next((i for i, name in enumerate(head) if name in _JOINTS), None)
         self._angle = next((i for i, name in enumerate(head) if name in _ANGLES), None)
 
-    def read_keys(self, rows: Sequence[Sequence[str]]) -> dict[str, Series]:
+    def read_keys(self, rows: Iterable[Sequence[str]]) -> dict[str, Series]:
         """Return the keys by joint, in the order of their times."""
-        found: dict[str, dict[float, float]] = {}
-        last_s: dict[str, float] = {}
-        for line, row in enumerate(rows[1:], start=2):
+        found: dict[str, tuple[array[float], array[float]]] = {}
+        for line, row in enumerate(rows, start=2):
             if not any(cell.strip() for cell in row):
                 continue
             for joint, time_s, angle in self._row_keys(line, row):
-                if time_s <= last_s.get(joint, -1.0):
-                    self._add_error(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
-                last_s[joint] = time_s
-                found.setdefault(joint, {})[time_s] = angle
-        return {
-            name: (np.array(list(keys)), np.array(list(keys.values())))
-            for name, keys in found.items()
-        }
+                times, angles = found.setdefault(joint, (array("d"), array("d")))
+                if times and time_s <= times[-1]:
+                    self._add_error(line, f"{joint}: {time_s:g} s is not after {times[-1]:g} s")
+                times.append(time_s)
+                angles.append(angle)
+        return {name: (np.array(keys[0]), np.array(keys[1])) for name, keys in found.items()}
 
     def _row_keys(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
         """Yield the keys of one row; an empty cell of a wide table is not a key."""

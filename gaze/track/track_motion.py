@@ -1,6 +1,7 @@
 """Motion of one track as smooth curves, and as samples for the check of limits."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -90,19 +91,22 @@ class TrackMotion:
         channels = (*POSE_CHANNELS, *joints)
         self._rests = [rest_value(name) for name in channels]
         self.rest = np.array(self._rests)
-        # Index, curve, value at rest and factor.
+        # Index, curve, value at rest, factor and delay in s.
         self._curves = [
             (
                 channels.index(name),
                 MinimumJerkCurve(rest_value(name), found.times_s, found.values),
                 rest_value(name),
                 1.0,
+                0.0,
             )
             for name, found in keys.items()
         ]
         for level in levels:
             curve = MinimumJerkCurve(0.0, level.keys.times_s, level.keys.values)
-            self._curves += [(i, curve, 0.0, gain) for i, gain in enumerate(level.gain) if gain]
+            self._curves += [
+                (i, curve, 0.0, gain, 0.0) for i, gain in enumerate(level.gain) if gain
+            ]
         self.owned = frozenset(channels.index(name) for name in owned)
         self._follow = eyes_follow_head and not self.owned & {_FIRST_EYE, _FIRST_EYE + 1}
         self.channels = self.owned | {i for i, *_ in self._curves}
@@ -122,6 +126,16 @@ class TrackMotion:
             [curve.duration_s for _, curve, *_ in self._curves] + ends, default=0.0
         )
         self.samples = self._sample_evenly()
+
+    def delay(self, delays_s: Sequence[float]) -> "TrackMotion":
+        """Return the same motion with each channel later by its delay, at the original speed."""
+        most_s = max([delays_s[i] for i in self.channels], default=0.0)
+        if most_s == 0.0:
+            return self
+        later = copy(self)
+        later._curves = [(*one[:4], delays_s[one[0]]) for one in self._curves]
+        later.duration_s = self.duration_s + most_s
+        return later
 
     def _sample_evenly(self) -> MotionSamples:
         count = int(self.duration_s / _SAMPLE_S) + 2
@@ -149,8 +163,8 @@ class TrackMotion:
     def sample_at(self, times_s: Floats) -> MotionSamples:
         """Return the motion at (n,) times since its start."""
         columns = [np.zeros((len(times_s), len(self.rest))) for _ in range(3)]
-        for i, curve, rest, gain in self._curves:
-            value, *others = curve.sample_at(times_s)
+        for i, curve, rest, gain, delay_s in self._curves:
+            value, *others = curve.sample_at(times_s - delay_s)
             for column, found in zip(columns, (value - rest, *others), strict=True):
                 column[:, i] += gain * found
         if self._follow:
@@ -162,8 +176,8 @@ class TrackMotion:
     def state_at(self, t_s: float) -> tuple[list[float], list[float], list[float]]:
         """Return value, speed and acceleration of every channel at a time, relative to rest."""
         value, speed, acceleration = ([0.0] * len(self._rests) for _ in range(3))
-        for i, curve, rest, gain in self._curves:
-            at, rate, change = curve.state_at(t_s)
+        for i, curve, rest, gain, delay_s in self._curves:
+            at, rate, change = curve.state_at(max(0.0, t_s - delay_s))
             value[i] += gain * (at - rest)
             speed[i] += gain * rate
             acceleration[i] += gain * change
@@ -182,8 +196,8 @@ class TrackMotion:
             sizes: factor of every channel.
         """
         first = _FIRST_EYE
-        for i, curve, rest, gain in self._curves:
-            moved = sizes[i] * (gain * (curve.value_at(t_s) - rest))
+        for i, curve, rest, gain, delay_s in self._curves:
+            moved = sizes[i] * (gain * (curve.value_at(t_s - delay_s) - rest))
             flat[i] += moved
             if self._follow and i < 2:
                 flat[first + i] += moved

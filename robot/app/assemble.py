@@ -44,6 +44,7 @@ from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
+from gazerig.robot.control.joint_latency import JointLatency
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.robot_group import NamedRobot
 from gazerig.robot.control.track_choices import TrackChoices
@@ -322,6 +323,7 @@ def _build_components(
             animation_tables(rig),
             rig.gaze.oculomotor.eye_lag_ms / 1e3,
             _sound_s,
+            JointLatency([rig.joints[name].bus for name in rig.names]),
         ),
     )
 

@@ -142,6 +142,7 @@ def compose(
         lambda: assembly.live_params.rig,
         assembly.clock,
         tuning.confined.folder,
+        assembly.robot.joint_latencies_s,
         options.fast,
     )
     return ComposedRun(options, assembly, tuning, recorder, voice)

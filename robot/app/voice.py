@@ -59,12 +59,13 @@ _LEAD_IN_S = 0.05
 
 
 class _Stream(NamedTuple):
-    """A stream that is being said."""
+    """A stream that is being said; ``lead_s``: latency of the mouth's joint."""
 
     mouth: StreamMouth
     rate_hz: int
     channels: int
     track: int
+    lead_s: float
 
 
 class RunVoice:
@@ -75,6 +76,7 @@ class RunVoice:
         rig: Returns the present rig.
         clock: Clock of the loop.
         folder: Folder of the rig's file, for relative paths.
+        latencies_s: Returns the latencies of all joints.
         fast: Whether time is simulated: nothing is played.
     """
 
@@ -84,10 +86,11 @@ class RunVoice:
         rig: Callable[[], Rig],
         clock: Clock,
         folder: Path,
+        latencies_s: Callable[[], Sequence[float]],
         fast: bool,
     ) -> None:
         self._command, self._rig, self._clock = command, rig, clock
-        self._folder, self._fast = folder, fast
+        self._folder, self._latencies_s, self._fast = folder, latencies_s, fast
         self._player: SoundPlayer | None = None
         self._lock = threading.RLock()
         self._wake = threading.Event()
@@ -296,7 +299,9 @@ class RunVoice:
         self._played = None  # the stream replaces it; to stop it later would stop the stream
         player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, rig.sound.volume)
         mouth = StreamMouth(rate_hz, rig.gaze.mouth.quiet_db)
-        self._stream = _Stream(mouth, rate_hz, channels, reply.track.number)
+        level = rig.levels.get(rig.gaze.mouth.level)
+        lead_s = self._latencies_s()[rig.names.index(level.joint)] if level else 0.0
+        self._stream = _Stream(mouth, rate_hz, channels, reply.track.number, lead_s)
         self._wake.set()
 
     def finish(self) -> None:
@@ -442,7 +447,7 @@ class RunVoice:
         heard_s = player.position_s(now_s)
         opening = 0.0
         if heard_s is not None:
-            ahead_s = stream_ahead_s(rig) - self._latency_s
+            ahead_s = stream_ahead_s(rig, stream.lead_s) - self._latency_s
             opening = rig.gaze.mouth.size * stream.mouth.opening_at(heard_s + ahead_s)
         self._try(SetLevel(rig.gaze.mouth.level, opening))
 
@@ -463,10 +468,15 @@ class RunVoice:
             self._command(command)
 
 
-def stream_ahead_s(rig: Rig) -> float:
-    """Return the time by which the mouth of a stream is set before its sound is heard."""
+def stream_ahead_s(rig: Rig, lead_s: float) -> float:
+    """Return the time by which the mouth of a stream is set before its sound is heard.
+
+    Args:
+        rig: The rig.
+        lead_s: Latency of the mouth's joint.
+    """
     smoothing_s = rig.levels[rig.gaze.mouth.level].smoothing_ms / 1e3
-    return smoothing_s * _SMOOTHING_LAG + rig.gaze.oculomotor.eye_lag_ms / 1e3 + _WATCH_S
+    return smoothing_s * _SMOOTHING_LAG + lead_s + _WATCH_S
 
 
 def _sounding_track(tick: Tick | None) -> TrackState | None:

@@ -186,6 +186,10 @@ class Robot:
         """Return all tracks with their fit to this rig."""
         return self._tracks.all_tracks(self._guard.limits)
 
+    def joint_latencies_s(self) -> tuple[float, ...]:
+        """Return the time of every joint from a command to its motion. Thread-safe."""
+        return self._tracks.latencies_s()
+
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch the torque on and start from the present angles.
 
@@ -259,10 +263,12 @@ class Robot:
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
         if stopped := self._stop.stop_reason:
             self._stop.keep_released(self.body, joints, t_s)
+            self._tracks.latency.interrupt()
             guard_result = stopped_result(joints, desired, stopped, self.body.names)
         else:
             guard_result = self._guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
             self.body.write(guard_result.command_rad)
+            self._tracks.latency.add(t_s, guard_result.command_rad, joints)
         self._executor.commanded_rad = guard_result.command_rad
         converges = not self._kinematics.one_pan
         lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)

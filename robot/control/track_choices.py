@@ -12,6 +12,7 @@ from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
 from gazerig.gaze.track.track import KEEP, MAX_TRACKS, Track, TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
+from gazerig.robot.control.joint_latency import JointLatency
 from gazerig.robot.model.commands import ControlTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
@@ -73,8 +74,9 @@ class TrackChoices:
         joints: Joints of the rig, in the order of all sequences of joints.
         lid_spans_rad: Range of each lid from shut to open, by joint.
         tables: Expressions and levels of the rig.
-        lead_s: Time by which motion with sound must be early: the latency of the servos.
+        latency_s: Latency of joints that has not been measured yet.
         sound_s: Returns the duration of a track's sound.
+        latency: Measures the latencies of the joints; None: not.
     """
 
     def __init__(
@@ -85,9 +87,11 @@ class TrackChoices:
         joints: tuple[str, ...],
         lid_spans_rad: Mapping[str, float],
         tables: AnimationTables = NO_TABLES,
-        lead_s: float = 0.0,
+        latency_s: float = 0.0,
         sound_s: Callable[[str], float] = lambda path: 0.0,
+        latency: JointLatency | None = None,
     ) -> None:
+        self.latency = latency or JointLatency(("",) * len(joints))
         self._tracks, self._player, self._joints = dict(tracks), player, joints
         self._tables, self._sound_s = tables, sound_s
         self._states: tuple[TrackState, ...] = ()
@@ -99,7 +103,7 @@ class TrackChoices:
         self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
         self._speeches: dict[Speak, dict[str, TrackMotions]] = {}
-        self.retune(params, lid_spans_rad, tables, lead_s)
+        self.retune(params, lid_spans_rad, tables, latency_s)
         for name in tracks:
             self._motions(name, 0)
 
@@ -108,12 +112,12 @@ class TrackChoices:
         params: TrackParams,
         lid_spans_rad: Mapping[str, float],
         tables: AnimationTables,
-        lead_s: float,
+        latency_s: float,
     ) -> None:
         """Change the parameters of the next track."""
         if tables != self._tables:
             self._tables, self._cache, self._speeches = tables, {}, {}
-        self._params, self._lead_s = params, lead_s
+        self._params, self._latency_s = params, latency_s
         self._fit = TrackFit(self._joints, lid_spans_rad)
 
     @property
@@ -226,12 +230,19 @@ class TrackChoices:
 
     def measure_sound(self, command: Play | Speak) -> Play | Speak:
         """Return a command with lead and duration of a sound, which a recording needs."""
-        if isinstance(command, Speak):
-            return command if command.lead_s is not None else command._replace(lead_s=self._lead_s)
-        track = self._tracks.get(command.track)
-        if track is None or not track.sound or command.lead_s is not None:
+        if command.lead_s is not None:
             return command
-        return command._replace(lead_s=self._lead_s, sound_s=self._sounds.get(track.sound, 0.0))
+        if isinstance(command, Speak):
+            return command._replace(lead_s=self.latencies_s())
+        track = self._tracks.get(command.track)
+        if track is None or not track.sound:
+            return command
+        sound_s = self._sounds.get(track.sound, 0.0)
+        return command._replace(lead_s=self.latencies_s(), sound_s=sound_s)
+
+    def latencies_s(self) -> tuple[float, ...]:
+        """Return the latencies of all joints, measured or assumed. Thread-safe."""
+        return self.latency.estimates_s(self._latency_s)
 
     def all_tracks(self, limits: Sequence[JointLimit]) -> tuple[TrackInfo, ...]:
         """Return all tracks with their fit to this rig.
@@ -447,9 +458,16 @@ class TrackChoices:
     ) -> FittedTrack:
         name, made = command.track, self._require_motions(command.track, command.times)
         out_s = made.track.blend_out_s or self._params.blend_out_ms / 1e3
+        lead_s = 0.0
+        if command.lead_s and made.motion.channels:
+            # Faster joints begin later than the slowest one.
+            leads = self._fit.channel_means(command.lead_s)
+            lead_s = max([leads[i] for i in made.motion.channels])
+            delays = [max(0.0, lead_s - one) for one in leads]
+            made = made._replace(motion=made.motion.delay(delays))
         return self._fit.fit(
             name, made, command.speed, base_rad, limits, self._params.limit_share,
-            (made.track.blend_in_s, out_s), command.lead_s or 0.0, command.sound_s,
+            (made.track.blend_in_s, out_s), lead_s, command.sound_s,
         )  # fmt: skip
 
     def _require_motions(self, name: str, count: int) -> TrackMotions:

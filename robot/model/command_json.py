@@ -105,8 +105,7 @@ def check_command(command: Command) -> None:
             _check_position(sound_s)
             if not isinstance(loop, bool):
                 raise ValueError("loop must be true or false")
-            if lead_s is not None and not _is_within(lead_s, 1.0):
-                raise ValueError("lead_s must be null or at most 1 s")
+            _check_lead(lead_s)
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
                 raise ValueError(f"the times of a track must be a whole number 0..{MAX_COUNT}")
             _check_who(who)
@@ -269,11 +268,19 @@ def _check_speech(command: Say | Speak) -> None:
         raise ValueError(f"a speech must last above 0 and at most {MAX_SPEECH_S:g} s")
     if not isinstance(command.mouth, tuple) or len(command.mouth) > MAX_MOUTH_KEYS:
         raise ValueError(f"a mouth must be at most {MAX_MOUTH_KEYS} pairs of a time and an opening")
+    _check_lead(command.lead_s)
     last_s = -1.0
     for key in command.mouth:
         if not _are_numbers(key, 2, MAX_SPEECH_S) or not (0.0 <= key[1] <= 1.0 and key[0] > last_s):
             raise ValueError("a mouth must be pairs of an increasing time in s and an opening 0..1")
         last_s = key[0]
+
+
+def _check_lead(lead_s: object) -> None:
+    if lead_s is not None and not (
+        isinstance(lead_s, tuple) and _are_numbers(lead_s, len(lead_s), 1)
+    ):
+        raise ValueError("lead_s must be null or the latency of each joint, at most 1 s")
 
 
 def _check_point(p: object) -> None:

@@ -163,8 +163,8 @@ class Play(NamedTuple):
         who: Name of the client.
         from_s: Position in the track at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
-        lead_s: Time by which the motion of a track with sound is early, because servos are late;
-            set on execution for the recording.
+        lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
+            execution for the recording.
         sound_s: Duration of its sound, set on execution.
     """
 
@@ -174,7 +174,7 @@ class Play(NamedTuple):
     who: str = ""
     from_s: float = 0.0
     loop: bool = False
-    lead_s: float | None = None
+    lead_s: tuple[float, ...] | None = None
     sound_s: float = 0.0
 
 
@@ -278,7 +278,7 @@ class Speak(NamedTuple):
     sway_deg: float = 0.0
     volume: float = 1.0
     who: str = ""
-    lead_s: float | None = None
+    lead_s: tuple[float, ...] | None = None
 
 
 OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))

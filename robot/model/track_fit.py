@@ -263,6 +263,13 @@ class TrackFit:
         self._eyes = [channels.index(name) for name in EYE_CHANNELS]
         self._channels = channels
 
+    def channel_means(self, values: Sequence[float]) -> list[float]:
+        """Return the mean over the joints of each channel; 0 for a channel without a joint."""
+        found: dict[str, list[float]] = {}
+        for joint, value in zip(self.joints, values, strict=True):
+            found.setdefault(channel_of_joint(joint), []).append(value)
+        return [float(np.mean(found.get(name, 0.0))) for name in self._channels]
+
     def subtract_offset(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
         """Return commanded joint angles without the offset's part."""
         angles: Floats = np.array(commanded_rad) - state.value @ self._matrix

@@ -196,12 +196,15 @@ def simulated_stream(folder: str) -> None:
     heard_s, jaw_at = [], []
     with head:
         rig = head._composed.assembly.live_params.rig
+        head.step(5.0)
+        jaw = rig.names.index("jaw")
+        lead_s = head._composed.assembly.robot.joint_latencies_s()[jaw]
         begin_s = head.time_s + STREAM_DELAY_S
         while (now_s := head.time_s - begin_s) < len(samples) / spoken.rate_hz:
             while fed / spoken.rate_hz < now_s + STREAM_DELAY_S - 0.04:
                 mouth.add(samples[fed : fed + piece])
                 fed += piece
-            head.level("mouth", 0.9 * mouth.opening_at(now_s + stream_ahead_s(rig)))
+            head.level("mouth", 0.9 * mouth.opening_at(now_s + stream_ahead_s(rig, lead_s)))
             for _ in range(4):
                 head.step()
                 heard_s.append(head.time_s - begin_s)
