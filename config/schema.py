@@ -178,6 +178,34 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
             yield f"buses.{name}", "no joint uses it: remove it, or assign joints to it"
 
 
+_LIMPABLE = ("dynamixel", "feetech", "maestro", "pca9685")
+"""Kinds of buses that can switch the torque of one servo."""
+
+
+def _limp_joints(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find joints that must not or cannot be limp while the others have torque."""
+    coupled = {one for pair in rig.couplings.values() for one in (pair.first, pair.second)}
+    near = {one for pair in rig.guard.collisions for one in (pair.first, pair.second)}
+    for name, joint in rig.joints.items():
+        if joint.limp_when_idle_s is None:
+            continue
+        bus = rig.buses.get(joint.bus, rig.bus)
+        if name in NECK:
+            rule = "the weight of the head would drop: a joint of the neck is never limp; remove it"
+        elif name in GAZE_JOINTS:
+            rule = "gaze moves this joint all the time: only further joints can be limp; remove it"
+        elif name in coupled:
+            rule = "two servos move it together: such a joint cannot be limp; remove it"
+        elif name in near:
+            rule = "it could be pushed into a collision (guard.collisions): remove it"
+        elif bus.kind not in _LIMPABLE:
+            kinds = ", ".join(_LIMPABLE)
+            rule = f"a bus of kind {bus.kind} cannot switch one servo off, only {kinds}: remove it"
+        else:
+            continue
+        yield f"joints.{name}.limp_when_idle_s", rule
+
+
 def _channel_fault(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
     """Return why a joint cannot have its channel on a board of hobby servos, "" if it can."""
     joint, params = rig.joints[name], rig.bus_of(name).section
@@ -457,6 +485,7 @@ RULES = (
     _servo_ids,
     _models,
     _buses,
+    _limp_joints,
     _lid_ranges,
     _park_ranges,
     _part_names,

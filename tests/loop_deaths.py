@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import threading
 import time
@@ -17,6 +18,7 @@ from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.types import LimpableBus
 from gazerig.robot.app.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
@@ -37,7 +39,10 @@ def slow(kind: str, watchdog: bool = True) -> Rig:
 
 
 def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
-    """Drive all joints slowly to their ends, 100 ticks a second, and print events."""
+    """Drive all joints slowly to their ends, 100 ticks a second, and print events.
+
+    After SIGUSR1 the first servo is limp.
+    """
     rig = slow(kind, watchdog)
     paths = bus_ports(rig, path)
     bus = (
@@ -47,6 +52,9 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
     )
     bus.open()
     bus.enable_torque()
+    assert isinstance(bus, LimpableBus)
+    relax: list[int] = []
+    signal.signal(signal.SIGUSR1, lambda number, frame: relax.append(0))
     goals: list[Any] = [setup.max_steps for setup in servo_configs(rig)]
     said = False
     ticks = 0
@@ -60,6 +68,9 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
                 for r, goal in zip(readings, goals, strict=True)
             ]
             print("rearmed", flush=True)
+        if relax:
+            bus.set_limp(relax)
+            relax.clear()
         bus.write(goals)
         ticks += 1
         if not said and ticks == 30:

@@ -1,7 +1,7 @@
 """Several servo buses as one: joints of one rig on several ports, of several kinds."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from itertools import chain
 from math import inf
@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
+from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
 
 IN_A_ROW = 3
 """Consecutive reads without any answer after which a bus is read less often."""
@@ -146,6 +146,12 @@ class MultiBus:
                 self.disable_torque()
             raise
         return tuple(goals)
+
+    def set_limp(self, servos: Collection[int]) -> None:
+        """Switch torque off on these servos; all others that were limp get it again."""
+        for _, bus, places in self._shares:
+            if isinstance(bus, LimpableBus):
+                bus.set_limp([k for k, place in enumerate(places) if place in servos])
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo; goals are clipped to the limits.

@@ -11,7 +11,7 @@ unless the guardian process stops the pulses (gazerig.robot.guardian).
 - The board does not measure the servos' supply: a restart of a single servo is not detected.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import inf, nan
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -22,7 +22,7 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
-from gazerig.drivers.hobby_board.start import enable_channels
+from gazerig.drivers.hobby_board.start import HoldResult, enable_channels, hold_channel
 from gazerig.drivers.hobby_board.supervisor import BoardSupervisor, SilenceMonitor
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
@@ -76,6 +76,7 @@ class HobbyBoardBus(PortBus):
             self._supervisor.mark_all_for_recovery,
         )
         self._heard_s = -inf
+        self._limp = set[Channel]()
 
     # --- public interface
 
@@ -184,8 +185,35 @@ class HobbyBoardBus(PortBus):
             self._link.record_failed_release()  # some channels may already have pulses
             raise
         self._link.release_due = False
+        self._limp.clear()
         self._supervisor.start_supervision()
         return tuple(channel.goal_steps for channel in self._channels)
+
+    def set_limp(self, servos: Collection[int]) -> None:
+        """Stop the pulses of these servos, by index; all others that were limp get them again.
+
+        Their first pulse is the last one before: a joint that was moved by hand returns there at
+        the servo's own speed, as its position is not known. A channel that does not stop, is held.
+        """
+        if not self._supervisor.engaged or self._link.down:
+            return
+        wanted = [self._channels[i] for i in servos]
+        try:
+            off = [channel for channel in wanted if channel.held]
+            for _ in range(TRIES if off else 0):
+                self._board.stop([channel.id for channel in off])
+                pulses = self._board.read_pulses([channel.id for channel in off])
+                if pulses is not None and not any(pulses):
+                    for channel in off:
+                        channel.record_stop()
+                    self._limp.update(off)
+                    break
+            for channel in self._limp.difference(wanted):
+                self._limp.discard(channel)
+                if hold_channel(self._board, channel, 0) is not HoldResult.HELD:
+                    self._supervisor.pending.append(channel)
+        except BusLost as lost:
+            self._record_loss(lost)
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every channel in one write; goals are clipped to the limits.

@@ -1,7 +1,7 @@
 """Smart servos of one family on one serial bus: one read and one write per tick."""
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import ceil
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -293,6 +293,30 @@ class SmartServoBus(PortBus):
         self._supervisor.start_supervision(outside)
         self._speeds = self._recovery.speeds(self._ids, ())
         return goals
+
+    def set_limp(self, servos: Collection[int]) -> None:
+        """Switch torque off on these servos, by index; all others that were limp get it again.
+
+        They hold their present position. One that refuses is set up again by later reads.
+        """
+        supervisor, line = self._supervisor, self._line
+        before = supervisor.limp
+        off = {self._ids[i] for i in servos} - before
+        on = before - {self._ids[i] for i in servos}
+        if not (off or on) or not supervisor.engaged or self._link.down:
+            return
+        try:
+            if off:
+                released = switch_off(line, tuple(off))
+                off -= {*released.holding_ids, *released.unconfirmed_ids}
+            try:
+                self._recovery.enable(tuple(on))
+            except (ServoMissing, ServoFault):
+                supervisor.mark_for_recovery(on)
+        except BusLost as lost:
+            self._record_loss(lost)
+        else:
+            supervisor.set_limp((before | off) - on)
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits.

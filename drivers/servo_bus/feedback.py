@@ -5,7 +5,7 @@ joint can have reached since the last one is rejected (``gazerig.drivers.bus.pla
 a disturbed line every answer must be confirmed by a second one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from operator import mul
 from typing import TypeVar
 
@@ -66,7 +66,7 @@ class FeedbackColumns:
         self._load_units = tuple(model.load_unit for model in models)
         self._turn = family.steps_per_turn if family.single_turn else 0
         self._signs = [1 << family.sign_bits[name] for name in _SIGNED if family.sign_bits]
-        self._engaged = False
+        self._engaged, self._limp = False, frozenset[int]()
         self.places = Plausibility([model.no_load_steps_s for model in models])
         self._none = self.now = Feedback.create_missing(len(setups))
         self._tenth_volts: tuple[int, ...] = ()
@@ -107,7 +107,9 @@ class FeedbackColumns:
 
     def _expect(self) -> None:
         """Set the expected answers of healthy servos: torque as switched, limits as armed."""
-        self._torque = (self._engaged,) * len(self._ids)
+        self._torque = tuple(
+            [self._engaged and slot not in self._limp for slot in range(len(self._ids))]
+        )
         armed = self._limits if self._engaged else {}
         self._expected: Expected = {"torque": tuple(map(int, self._torque)), **armed}
 
@@ -262,9 +264,15 @@ class FeedbackColumns:
 
     def expect_torque(self, on: bool) -> None:
         """Record that torque has been switched for all servos."""
-        self._engaged = on
+        self._engaged, self._limp = on, frozenset()
         self._expect()
-        self.now = self.now._replace(torque=(on,) * len(self._ids))
+        self.now = self.now._replace(torque=self._torque)
+
+    def expect_limp(self, slots: Collection[int]) -> None:
+        """Record which servos have no torque while the others have it."""
+        self._limp = frozenset(slots)
+        self._expect()
+        self.now = self.now._replace(torque=self._torque)
 
     def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
         """Record a servo's voltage and temperature."""

@@ -68,7 +68,8 @@ class LatchedFaultSupervisor(Supervisor):
 
     def _lacks_torque(self, servo_id: int, torque: int | None) -> bool:
         """Return whether a servo's torque is off without a known reason."""
-        return self.engaged and torque == 0 and servo_id not in self._health.faults
+        known = servo_id in self._health.faults or servo_id in self.limp
+        return self.engaged and torque == 0 and not known
 
     def _suspect(self, servo_id: int) -> None:
         self._suspects.add(servo_id)
@@ -143,6 +144,8 @@ class LatchedFaultSupervisor(Supervisor):
 
     def _check(self, servo_id: int) -> None:
         """Check that a servo is still armed; a restart resets its RAM."""
+        if servo_id in self.limp:
+            return
         name, armed = ("bus_watchdog", self._watchdog) if self._watchdog else ("torque_enable", 1)
         state = self._line.ask((servo_id,), name).get(servo_id, armed)
         if state == TRIPPED:

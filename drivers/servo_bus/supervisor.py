@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
-from math import inf
+from math import inf, isfinite
 
 from gazerig.drivers.bus.goal_limits import LimitRecovery
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
@@ -34,6 +34,7 @@ class Supervisor(ABC):
     entering: servos that move slowly into their limits
     withholds_goals: whether the supervisor may ever withhold goals
     due_s: ``service`` has nothing to do before this time
+    limp: servos whose torque is off on purpose
     """
 
     withholds_goals = False
@@ -58,6 +59,7 @@ class Supervisor(ABC):
         self._plan = plan
         self._watchdog = watchdog
         self.engaged = False
+        self.limp: frozenset[int] = frozenset()
         self.due_s = -inf
         self.entering = LimitRecovery(setups)
         self._suspects: set[int] = set()
@@ -73,7 +75,7 @@ class Supervisor(ABC):
 
     def start_supervision(self, entering: Collection[int]) -> None:
         """Start supervision under torque; ``entering``: servos outside their limits."""
-        self.engaged = True
+        self.engaged, self.limp = True, frozenset()
         self.entering.begin(entering)
         self._suspects.clear()
         unit = self._family.watchdog_unit_s or 0.0
@@ -83,12 +85,26 @@ class Supervisor(ABC):
 
     def stop_supervision(self) -> None:
         """Stop supervision, as the servos have no torque."""
-        self.engaged = False
+        self.engaged, self.limp = False, frozenset()
         self.entering.clear()
         self._suspects.clear()
         self._rearmed.clear()
         self._line.starving_s, self._line.starved, self._line.tries = inf, False, TRIES
         self._feedback.expect_torque(False)
+
+    def set_limp(self, ids: Collection[int]) -> None:
+        """Record the servos whose torque is off on purpose; others have it, limited slowly."""
+        for servo_id in self.limp.difference(ids):
+            steps = self._feedback.now.position_steps[self._slot[servo_id]]
+            if isfinite(steps):
+                self.entering.add_if_outside(servo_id, round(steps))
+        self.limp, self.due_s = frozenset(ids), -inf
+        self._feedback.expect_limp([self._slot[servo_id] for servo_id in ids])
+
+    def mark_for_recovery(self, ids: Collection[int]) -> None:
+        """Mark servos for recovery."""
+        self._suspects.update(ids)
+        self._recover_at_s = self.due_s = -inf
 
     def mark_all_for_recovery(self) -> None:
         """Mark every servo for recovery."""
@@ -150,6 +166,8 @@ class Supervisor(ABC):
         for servo_id in ids:
             self._health.record_set_up(servo_id)
             self._name_fault(servo_id)
+        if self.limp:
+            self.set_limp(self.limp.difference(found))
         for servo_id, position in found.items():
             self._line.errors["rearmed"] += 1
             slot = self._slot[servo_id]

@@ -64,9 +64,9 @@ class TransientFaultSupervisor(Supervisor):
         """
         out = self._out_since_s
         if not out and not self._suspects and not self._torque_off:
-            return frozenset()
+            return self.limp
         away = {i for i, since_s in out.items() if now_s - since_s >= RESTART_S}
-        return frozenset(away | self._suspects | self._torque_off)
+        return self.limp | away | self._suspects | self._torque_off
 
     # --- one servo's answer
 
@@ -109,7 +109,7 @@ class TransientFaultSupervisor(Supervisor):
             self._health.record_cleared(servo_id)
             self._name_fault(servo_id)
             self._suspects.add(servo_id)
-        if sample.torque is not None:
+        if sample.torque is not None and servo_id not in self.limp:
             # A servo that seems no longer armed is read once more.
             if sample.torque == 1 and self._is_armed(servo_id, sample):
                 self._torque_off.discard(servo_id)
@@ -158,7 +158,8 @@ class TransientFaultSupervisor(Supervisor):
             servo_id = self._next_to_check(group, now_s + CHECK_S)
             if servo_id is not None:
                 # Shortly after trouble on the line the answers do not contain torque.
-                self._doubted.add(servo_id)
+                if servo_id not in self.limp:
+                    self._doubted.add(servo_id)
                 if self._recovery.has_differences(servo_id):
                     self._line.errors["setting changed"] += 1
                     self._suspects.add(servo_id)

@@ -6,8 +6,9 @@ from operator import add, mul, sub
 
 from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.errors import BusLost, DriverError
-from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
+from gazerig.drivers.types import Feedback, LimpableBus, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos
+from gazerig.robot.control.limp_joints import LimpJoints
 from gazerig.robot.control.sag import SagCompensation
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
 from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
@@ -67,6 +68,7 @@ class Body:
         self._pairs = tuple(pairs)
         self._coupled = CoupledServos(pairs, self.names) if pairs else None
         self._park_rad = dict(park_rad or {})
+        self._limp = LimpJoints()
         self._torque_off = False
         self._gentle_deg_s = gentle_deg_s
         self._set_up = tuple(joints[name] for name in self.names)
@@ -83,6 +85,7 @@ class Body:
 
     def _set_joints(self, joints: tuple[JointParams, ...]) -> None:
         self._joints = joints
+        self._limp.retune([joint.limp_when_idle_s for joint in joints])
         linkages = [joint.make_linkage() for joint in joints]
         # All joints are computed as if every linkage were straight; the other joints are then
         # corrected.
@@ -168,6 +171,35 @@ class Body:
             ),
         )  # fmt: skip
 
+    def relax_idle(
+        self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool
+    ) -> frozenset[int]:
+        """Switch the torque of joints off that are idle, and on again before they move.
+
+        Args:
+            desired_rad: Desired angles of this tick.
+            joints: Measured joints.
+            t_s: Present time.
+            held: Whether a client holds the joints, which are not idle then.
+
+        Returns:
+            The numbers of the joints that have no torque in this reading on purpose.
+        """
+        before = self._limp.limp
+        if self._limp.step(desired_rad, joints.torque, t_s, held):
+            self._set_limp()
+        return before
+
+    def wake(self) -> None:
+        """Switch the torque of idle joints on, at their present angles."""
+        if self._limp.limp:
+            self._limp.reset()
+            self._set_limp()
+
+    def _set_limp(self) -> None:
+        if isinstance(self.bus, LimpableBus):
+            self.bus.set_limp(self._limp.limp)
+
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo.
 
@@ -216,6 +248,7 @@ class Body:
             BusLost: The port is lost; the torque is switched off when it reconnects.
         """
         self._torque_off = True
+        self._limp.reset()
         self.bus.disable_torque()
 
     def enable_torque(self) -> JointAngles:

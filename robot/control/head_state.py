@@ -36,7 +36,8 @@ class JointReading:
         velocity_rad_s: Measured speed.
         estimated: Whether the servo has no feedback: ``measured_rad`` is then its goal, moved at
             its known speed.
-        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not.
+        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not;
+            "limp" if the joint has no torque because it is idle.
         torque: Whether the torque is on, None if unknown.
         fault: Latched hardware errors, "" for none.
         load: Share of the stall torque, signed, -1..1, None if unknown.

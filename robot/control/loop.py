@@ -266,7 +266,10 @@ class Robot:
             self._tracks.latency.interrupt()
             guard_result = stopped_result(joints, desired, stopped, self.body.names)
         else:
+            held = bool(self._lead.pose_rad)
+            self._guard.limp = self.body.relax_idle(desired, joints, t_s, held)
             guard_result = self._guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
+            self._messages += self._guard.take_reports()
             self.body.write(guard_result.command_rad)
             self._tracks.latency.add(t_s, guard_result.command_rad, joints)
         self._executor.commanded_rad = guard_result.command_rad
@@ -302,6 +305,7 @@ class Robot:
             watch: Called at every step with the last tick and the changes since.
         """
         self._guard.start_gently()
+        self.body.wake()
         newest = self._looks.newest
         rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
         end_s = start_s + params.park_s + 0.5 / rate_hz

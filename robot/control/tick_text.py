@@ -162,7 +162,8 @@ _FAULT_TEXTS = {
 def guard_text(guard_result: GuardResult) -> str:
     """Return the guard's effect on the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
-        return guard_result.level.replace("_", " ")
+        limp = f" ({', '.join(guard_result.limp)}: limp)" if guard_result.why else ""
+        return guard_result.level.replace("_", " ") + limp
     more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
     return f"{guard_result.level.replace('_', ' ')} ({guard_result.reasons[0]}{more})"
 

@@ -183,6 +183,9 @@ class JointParams:
     gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
+    limp_when_idle_s: Annotated[float | None, Bounds(0.2, 3600),
+        "torque off when nothing has moved the joint for so long, so that its servo stays cool and silent; not for joints that "
+        "gaze moves; a jaw without a spring drops; null: never"] = None
     friction_nm: Annotated[float, Bounds(0, 20), "dry friction of the joint's own bearings and linkage, in addition to the servo's"] = 0.0
     play_deg: Annotated[float, Bounds(0, 10), "play (backlash) between servo and joint, from stop to stop"] = 0.25
     spring_nm_deg: Annotated[float, Bounds(0, 5), "stiffness of a spring on the joint; 0: none"] = 0.0

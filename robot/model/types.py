@@ -102,6 +102,10 @@ class JointOutcome(NamedTuple):
     reason: str
 
 
+LIMP = "limp"
+"""The guard's remark about a joint that has no torque because it is idle."""
+
+
 class GuardResult(NamedTuple):
     """The guard's result of a tick.
 
@@ -111,7 +115,7 @@ class GuardResult(NamedTuple):
             torque must be switched off).
         reasons: "joint: reason" for every changed joint, empty if ok.
         desired_rad: Requested joint angles.
-        why: One reason per joint, "" if it was not changed; empty if ok.
+        why: One reason per joint, or ``LIMP``, "" if it was not changed; empty if all are "".
         critical_reasons: The reasons that determine the level.
         joints: Names of the joints.
     """
@@ -123,6 +127,12 @@ class GuardResult(NamedTuple):
     why: tuple[str, ...] = ()
     critical_reasons: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
+
+    @property
+    def limp(self) -> tuple[str, ...]:
+        """Return the joints that have no torque because they are idle."""
+        found = zip(self.joints, self.why, strict=False)
+        return tuple([joint for joint, why in found if why == LIMP])
 
     def applied(self, joint: str) -> JointOutcome:
         """Return the result for one joint.
@@ -243,6 +253,7 @@ class Servos(NamedTuple):
         age_s: Time since the last answer.
         unanswered: Ticks without an answer since the start, empty if they are not counted.
         limits: Limits of the readings.
+        limp: Names of joints without torque because they are idle.
     """
 
     temperature_c: tuple[float | None, ...] = ()
@@ -253,6 +264,7 @@ class Servos(NamedTuple):
     age_s: tuple[float, ...] = ()
     unanswered: tuple[int, ...] = ()
     limits: ServoLimits | None = None
+    limp: tuple[str, ...] = ()
 
 
 class LoopFigures(NamedTuple):

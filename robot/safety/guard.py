@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
+from gazerig.robot.model.types import LIMP, GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
 from gazerig.robot.safety.health import JointHealth, StallDetector
 from gazerig.robot.safety.motion_limiter import LateTicks, LimitChange, MotionLimiter
@@ -40,6 +40,9 @@ class _Hold(NamedTuple):
 
 class Guard:
     """The check of all commands, tick by tick.
+
+    Attributes:
+        limp: Numbers of joints whose torque is off as they are idle; their commands follow them.
 
     Args:
         params: Thresholds and times.
@@ -79,6 +82,7 @@ class Guard:
         self._collisions = Collisions(
             params.collisions, params.collision_margin_deg, limits, joints
         )
+        self.limp: frozenset[int] = frozenset()
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
     def _set_params(self, params: GuardParams) -> None:
@@ -145,6 +149,14 @@ class Guard:
     def limits(self) -> tuple[JointLimit, ...]:
         """Return the present limits; new ones replace them as soon as joints keep them."""
         return tuple(self._limits)
+
+    def take_reports(self) -> list[str]:
+        """Return a line for each joint that has become warm since the last call."""
+        found, self._health.warmed = self._health.warmed, []
+        return [
+            f"{self._names[i]} is warm, {celsius:.0f} deg C: slower until it cools; stops at {hot:.0f}"
+            for i, celsius, hot in found
+        ]
 
     @property
     def is_gentle(self) -> bool:
@@ -278,6 +290,12 @@ class Guard:
         """Move a joint; return the rank of its level and the reason, 0 and "" if it follows."""
         position = joints.position_rad[i]
         fault = joints.fault[i] if joints.fault else ""
+        if i in self.limp and not fault and joints.torque and not joints.torque[i]:
+            # The next motion begins at its position.
+            if isfinite(position):
+                self._change.begin(i, position)
+            self._stuck.forget(i)
+            return 0, LIMP
         fresh = fresh and isfinite(position)
         hold = self._servo_hold(i, joints, fault, fresh)
         self._held[i] = hold is not None
@@ -412,14 +430,14 @@ def _findings(short: dict[int, tuple[int, str]], joints: tuple[str, ...]) -> _Fi
     """Return the findings for all joints; the level is that of the worst joint.
 
     Args:
-        short: Rank, 1 (limited) to 3 (torque_off), and reason by the number of each joint that
-            does not follow.
+        short: Rank, 1 (limited) to 3 (torque_off), or 0 for a mere remark, and reason by the
+            number of each joint that does not follow.
         joints: Names of all joints.
     """
     if not short:
         return _Findings("ok", (), (), ())
     worst = max(rank for rank, _ in short.values())
-    reasons = {i: f"{joints[i]}: {reason}" for i, (_, reason) in short.items()}
+    reasons = {i: f"{joints[i]}: {reason}" for i, (rank, reason) in short.items() if rank}
     return _Findings(
         _LEVELS[worst],
         tuple(reasons.values()),

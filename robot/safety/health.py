@@ -26,6 +26,8 @@ class JointHealth:
         why: Reason for that part, per joint.
         held: Reason for a complete stop, per joint.
         fine: Whether no joint is strained.
+        warmed: Joints that have become warm since this was cleared, with their temperature and the
+            one at which they stop, deg C.
     """
 
     def __init__(self, params: HealthParams, limits: tuple[JointLimit, ...]) -> None:
@@ -50,6 +52,8 @@ class JointHealth:
         self._heated = [0.0] * count  # (load^2 - continuous load^2) times seconds
         self._outside_s = [0.0] * count
         self._hot = [False] * count
+        self._warm = [False] * count
+        self.warmed: list[tuple[int, float, float]] = []
         self._overloaded = [False] * count
         self._no_volts = [False] * count
         self._seen: tuple[_Column, _Column] = ((), ())
@@ -106,6 +110,10 @@ class JointHealth:
         warm = self._limits[i].hottest_c - self._params.warm_c
         hot = self._limits[i].hottest_c - self._params.hot_c
         self._hot[i] = celsius >= (hot - _COOLER_C if self._hot[i] else hot)
+        was_warm = self._warm[i]
+        self._warm[i] = celsius >= (warm - _COOLER_C if was_warm else warm)
+        if self._warm[i] and not was_warm:
+            self.warmed.append((i, celsius, hot))
         return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
 
     def _load(self, i: int, load: float | None, dt_s: float) -> float:

@@ -327,6 +327,7 @@ def _servos(tick: Tick, rig: ShownRig | None) -> Servos:
         tuple([tick.t_s - at_s for at_s in joints.measured_s]),
         (),
         limits,
+        tick.guard_result.limp,
     )
 
 

@@ -92,11 +92,13 @@ def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
             + _cell("-" if volts is None else f"{volts:.1f}", strain_of_voltage(servos, i))
         )
     said = "torque off" if servos.torque and not servos.torque[i] else ""
+    if joint in servos.limp:
+        said = "limp, as idle"
     if servos.fault and servos.fault[i]:
         said = servos.fault[i]
     elif late:
         said = f"silent for {min(servos.age_s[i], 999.0):.1f} s"
-    more = f"<div class='{'fault' if said != 'torque off' else 'quiet'}'>{escape(said)}</div>"
+    more = f"<div class='{'fault' if said not in ('torque off', 'limp, as idle') else 'quiet'}'>{escape(said)}</div>"
     return (
         f"<tr><th scope='row'>{escape(joint.replace('_', ' '))}"
         f"{more if said else ''}</th>{figures}"
