@@ -47,8 +47,12 @@ class Jaw(NamedTuple):
     def now(self) -> Any:
         return self.head.state.joints["jaw"]
 
+    @property
+    def bus(self) -> Any:
+        return self.head._composed.assembly.robot.body.bus
+
     def emulate(self, command: str) -> str:
-        return str(self.head._composed.assembly.robot.body.bus._port.faults.command(command))
+        return str(self.bus._port.faults.command(command))
 
     def open_wide(self, seconds: float = 0.4) -> list[float]:
         """Open the mouth; return the measured angles."""
@@ -119,7 +123,7 @@ def test_at_every_end_no_servo_has_torque(kind: str, stopped: bool, tmp_path: Pa
         it.emulate("turn 3 80")
         head.step(0.1)
         assert it.now.limited == "limp"
-        port = head._composed.assembly.robot.body.bus._port
+        port = it.bus._port
         if stopped:
             head.stop("at the end")
             head.step(0.1)
@@ -137,7 +141,7 @@ def test_a_run_with_a_limp_jaw_is_repeated_to_the_same_bytes(kind: str, tmp_path
             it.open_wide()
             head.step(2.0)
             assert it.now.limited == "limp"
-            digests.append(head._composed.assembly.sent_bytes_digest())
+            digests.append(it.head._composed.assembly.sent_bytes_digest())
     assert digests[0] == digests[1]
 
 
