@@ -461,7 +461,7 @@ def track_rules(rig: Rig) -> Iterable[tuple[str, str]]:
             for fault in error.faults:
                 yield f"track_files.{i}", str(fault)
         except TrackRefused as refused:
-            yield f"track_files.{i}", f"{file}: {refused}"
+            yield from ((f"track_files.{i}", f"{file}: {reason}") for reason in refused.reasons)
     for behaviour, rule in rig.gaze.top_down.rules.items():
         if rule.gesture and rule.gesture not in known:
             near = suggestion_text(rule.gesture, sorted(known)) or ";"

@@ -10,7 +10,7 @@ from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.track_file import TOLERANCE_DEG
-from gazerig.robot.model.track_fit import fit_keys, smooth
+from gazerig.robot.model.motion_keys import fit_keys, smooth
 
 
 def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> None:

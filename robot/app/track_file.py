@@ -19,17 +19,14 @@ from gazerig.gaze.track.track import HEAD_CHANNELS, MAX_DURATION_S, MAX_FRAMES, 
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import animation_tables, lid_spans, limits
 from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.robot.model.track_fit import (
-    GRID_S,
     FittedTrack,
     KeyExcess,
     TrackFit,
     TrackRefused,
     channel_of_joint,
-    fit_keys,
-    resample,
     shortest_move_s,
-    smooth,
     track_motions,
 )
 from gazerig.robot.model.types import GAZE_JOINTS

@@ -1,12 +1,6 @@
-"""Fit of a track to a rig's joints, ranges and speeds, and of key frames to a motion.
-
-A densely sampled motion becomes few keys with minimum-jerk curves between. It is smoothed first.
-Keys are placed at its turning points, and at further points until the curve through the keys
-deviates by less than a tolerance.
-"""
+"""Fit of a track to a rig's joints, ranges and speeds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 from math import degrees
 from typing import NamedTuple
 
@@ -16,7 +10,6 @@ from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
 from gazerig.gaze.track.expression import NEUTRAL
 from gazerig.gaze.track.level import LevelRange
-from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.track.track import (
     EYE_CHANNELS,
     HEAD_CHANNELS,
@@ -38,7 +31,7 @@ from gazerig.robot.model.types import GAZE_JOINTS, further_joints
 _SMALLEST = 0.2
 """Smallest share of a track that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
-_ALL_KEYS = "; gazerig check lists every such key"
+_MOST_NAMED = 200
 _BETWEEN = np.linspace(0.0, 1.0, 25)
 _KEYS_AT_ONCE = 2000
 _LONGER = tuple(1.25**i for i in range(16))
@@ -46,7 +39,21 @@ _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class TrackRefused(ValueError):
-    """A track that a rig cannot play; the message gives the joint, the time and the limit."""
+    """A track that a rig cannot play.
+
+    Attributes:
+        reasons: The reason; or one for each key that the rig cannot reach or follow, with joint,
+            time and limit, at most 200 and the number of the others.
+    """
+
+    def __init__(self, *reasons: str) -> None:
+        super().__init__(*reasons)
+        more = len(reasons) - _MOST_NAMED
+        self.reasons = (*reasons[:_MOST_NAMED], *[f"and {more} more keys"] * (more > 0))
+
+    def __str__(self) -> str:
+        """Return all reasons."""
+        return "; ".join(self.reasons)
 
 
 class FittedTrack(NamedTuple):
@@ -314,16 +321,21 @@ class TrackFit:
         if motion.owned:  # of these joints it gives the angles from the neutral pose
             base_rad = np.array(base_rad)
             base_rad[[self.joints.index(name) for name in made.owns]] = 0.0
+
+        def refusal(otherwise: str) -> TrackRefused:
+            keys = self.key_excesses(made, base_rad, limits, share, speed)
+            return TrackRefused(*[one.text() for one in keys] or [otherwise])
+
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
         if smaller and not slow:
-            raise TrackRefused(self._beyond_range(motion.samples, base_rad, limits) + _ALL_KEYS)
+            raise refusal(f"{smaller[0][0]} leaves its range")
         if smaller and min(left for _, left in smaller) < _SMALLEST:
             joint = min(smaller, key=lambda one: one[1])[0]
             raise TrackRefused(f"{joint} is at the end of its range")
         samples = motion.samples.scale(sizes, speed)
         factor, joint, text = self._too_fast(samples, limits, share, matrix)
         if factor > 1.0 + _ROUNDING and not slow:
-            raise TrackRefused(text + _ALL_KEYS)
+            raise refusal(text)
         stretch = _stretch(matrix, limits, share)
         played = PlayedTrack(
             name,
@@ -354,23 +366,10 @@ class TrackFit:
                     smaller[self.joints[j]] = float(sizes[c])
         return sizes, tuple(smaller.items())
 
-    def _beyond_range(
-        self, samples: MotionSamples, base_rad: Floats, limits: Sequence[JointLimit]
-    ) -> str:
-        """Return a text with joint, time and amount of the first excess of a range."""
-        angles = base_rad + samples.value @ self._own
-        low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
-        beyond = (angles > high + _ROUNDING) | (angles < low - _ROUNDING)
-        row, j = np.argwhere(beyond)[0]
-        return (
-            f"{self.joints[j]} at {samples.times_s[row]:.2f} s: leaves its range "
-            f"{degrees(low[j]):g}..{degrees(high[j]):g} deg; it would go to "
-            f"{degrees(angles[:, j].max() if angles[row, j] > high[j] else angles[:, j].min()):.1f}"
-        )
-
     def key_excesses(
-        self, made: TrackMotions, base_rad: Floats, limits: Sequence[JointLimit], share: float
-    ) -> tuple[KeyExcess, ...]:
+        self, made: TrackMotions, base_rad: Floats, limits: Sequence[JointLimit], share: float,
+        rate: float = 1.0,
+    ) -> tuple[KeyExcess, ...]:  # fmt: skip
         """Return every key that the rig cannot reach or follow, in the order of times.
 
         Args:
@@ -378,6 +377,7 @@ class TrackFit:
             base_rad: Joint angles to which it is added.
             limits: Limits of the joints.
             share: Share of speed and acceleration limits for tracks.
+            rate: Factor on its defined speed.
         """
         motion, matrix = made.motion, self._matrix_of(made.motion)
         owned = [name in made.owns for name in self.joints]
@@ -397,8 +397,8 @@ class TrackFit:
             blocks.append(
                 [base + motion.sample_at(ends[1:]).value @ reach_of]
                 + [
-                    np.abs(column @ matrix).reshape(*inner.shape, -1).max(axis=1)
-                    for column in samples[2:]
+                    factor * np.abs(column @ matrix).reshape(*inner.shape, -1).max(axis=1)
+                    for factor, column in zip((rate, rate**2), samples[2:], strict=True)
                 ]
             )
         found: list[KeyExcess] = []
@@ -583,115 +583,3 @@ def shortest_move_s(size_rad: Floats | float, limit: JointLimit, share: float) -
         PEAK_ACCELERATION * np.asarray(size_rad) / (share * limit.accel_rad_s2)
     )
     return np.maximum(by_speed, by_acceleration)
-
-
-GRID_S = 0.02
-"""Grid of the keys' times."""
-_SMOOTHED_OVER_S = 0.15
-_MOST_KEYS = 60
-"""Keys between two reversals, in a minute."""
-_WINDOW = round(60.0 / GRID_S)
-_STILL, _HOLD = 1e-4, round(0.1 / GRID_S)
-"""Change between samples of a constant value, and the shortest number of them."""
-
-
-def smooth(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return samples at even times without the jitter of a hand and of encoders.
-
-    Args:
-        times_s: (n,) Increasing times; the first counts as 0.
-        values: (n,) Values.
-
-    Returns:
-        Times in steps of ``GRID_S`` from 0, and values by a local cubic (Savitzky and Golay
-        1964), which keeps peaks that a mean would flatten.
-    """
-    even = np.arange(0.0, times_s[-1] - times_s[0] + 1e-9, GRID_S)
-    found = np.interp(even, times_s - times_s[0], values)
-    window = min(2 * round(_SMOOTHED_OVER_S / GRID_S / 2.0) + 1, len(found) - (len(found) + 1) % 2)
-    if window <= 3:
-        return even, found
-    half = window // 2
-    weights = np.linalg.pinv(np.vander(np.arange(-half, half + 1.0), 4))[-1]  # symmetric
-    return even, np.convolve(np.pad(found, half, mode="edge"), weights, mode="valid")
-
-
-def resample(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return samples at even times, as ``smooth``, on a cubic curve through the given ones."""
-    even = np.arange(0.0, times_s[-1] - times_s[0] + 1e-9, GRID_S)
-    i = np.clip(np.searchsorted(times_s - times_s[0], even, side="right") - 1, 0, len(times_s) - 2)
-    rate = np.gradient(values, times_s)
-    span = times_s[i + 1] - times_s[i]
-    s = np.minimum((even - times_s[i] + times_s[0]) / span, 1.0)
-    return even, (
-        values[i] * (1.0 + 2.0 * s) * (1.0 - s) ** 2
-        + values[i + 1] * s * s * (3.0 - 2.0 * s)
-        + span * s * (1.0 - s) * (rate[i] * (1.0 - s) - rate[i + 1] * s)
-    )
-
-
-def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats, Floats]:
-    """Return times and values of keys whose curve stays within a tolerance of the samples.
-
-    The curve stops where the samples reverse or hold, so the parts between two stops are
-    independent: the time needed grows with the length of the samples, not with its square.
-
-    Args:
-        times_s: (n,) Times in steps of ``GRID_S`` from 0.
-        values: (n,) Values; the first one is rest.
-        tolerance: Largest distance of the curve from the samples.
-
-    Returns:
-        Keys after time 0; none if nothing moves by more than the tolerance.
-    """
-    if np.abs(values - values[0]).max() <= tolerance:
-        return np.zeros(0), np.zeros(0)
-    chosen: list[int] = []
-    stops = {0, *_reversals(values, tolerance), *_hold_ends(values)}
-    for first, last in pairwise(sorted(stops)):
-        part = slice(first, last + 1)
-        inner = _inner_keys(times_s[part] - times_s[first], values[part], tolerance)
-        chosen += [first + i for i in inner]
-    return times_s[chosen], values[chosen]
-
-
-def _hold_ends(values: Floats) -> list[int]:
-    """Return the first and last indices of parts at a constant value."""
-    still = np.abs(np.diff(values)) < _STILL
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False])).astype(int)))
-    return [int(i) for a, b in edges.reshape(-1, 2) if b - a >= _HOLD for i in (a, b)]
-
-
-def _inner_keys(times_s: Floats, values: Floats, tolerance: float) -> list[int]:
-    """Return the indices of the keys between two stops, and the last."""
-    chosen = [len(values) - 1]
-    for _ in range(_MOST_KEYS):
-        curve = MinimumJerkCurve(
-            float(values[0]), times_s[chosen].tolist(), values[chosen].tolist()
-        )
-        error = np.abs(curve.sample_at(times_s)[0] - values)
-        if error.max() <= tolerance:
-            break
-        error[[0, *chosen]] = 0.0
-        # One key in each window of a minute that needs one.
-        windows = range(0, len(error), _WINDOW)
-        worst = [first + int(error[first : first + _WINDOW].argmax()) for first in windows]
-        chosen = sorted({*chosen, *(i for i in worst if error[i] > tolerance)})
-    return chosen
-
-
-def _reversals(values: Floats, tolerance: float) -> list[int]:
-    """Return the indices at which the samples reverse by more than the tolerance, and the last."""
-    turns: list[int] = []
-    high = low = 0
-    heading = 0
-    for i, value in enumerate(values):
-        high = i if value > values[high] else high
-        low = i if value < values[low] else low
-        if heading >= 0 and values[high] - value > tolerance:
-            turns += [high] if high and heading else []
-            heading, low = -1, i
-        elif heading <= 0 and value - values[low] > tolerance:
-            turns += [low] if low and heading else []
-            heading, high = 1, i
-    return sorted({*turns, len(values) - 1})
