@@ -2,10 +2,12 @@
 
 Wide: a column of times and one of angles for each joint. Long: columns time, joint, angle, one row
 for each key. Times are in seconds (time, time_s) or numbers of frames (frame), angles in degrees.
-Separators are commas, semicolons or tabs.
+Separators are commas, semicolons or tabs; with the latter two a decimal may be a comma, as
+spreadsheets write it in half of the world.
 """
 
 import csv
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
@@ -21,6 +23,8 @@ _TIMES = ("time", "time_s", "t", "seconds", "frame")
 _JOINTS = ("joint", "bone", "effector", "servo", "motor", "name")
 _ANGLES = ("angle", "angle_deg", "value", "degrees", "deg")
 _MOST_FAULTS = 10
+_PREFACE = re.compile(r"(?:(?:sep=.|#[^\r\n]*|[,; \t]*)(?:\r\n?|\n))*", re.IGNORECASE)
+"""Lines before the names of the columns: empty ones, comments, and Excel's own ``sep=;``."""
 
 
 def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> dict[str, Series]:
@@ -38,7 +42,10 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise SetupError(f"{path} is not UTF-8 text: export it as CSV") from None
+        raise SetupError(f"{path} is not UTF-8 text: export it as CSV in UTF-8") from None
+    preface = _PREFACE.match(text)
+    text, skipped = text[preface.end() :] if preface else text, preface[0] if preface else ""
+    line = 1 + len(skipped.splitlines())
     separator = max(",;\t", key=text.partition("\n")[0].count)
     check_count(str(path), data.count(b"\n"))
     rows = csv.reader(StringIO(text, newline=None), delimiter=separator)
@@ -46,13 +53,17 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
     time = next((i for i, name in enumerate(head) if name in _TIMES), None)
     if time is None:
         raise SetupError(
-            f"{path}:1: no column of times: the first row must name the columns, one of them "
+            f"{path}:{line}: no column of times: the first row must name the columns, one of them "
             f"{', '.join(_TIMES)}"
         )
     if head[time] == "frame" and fps is None:
-        raise SetupError(f"{path}:1: times are frame numbers: give --fps, e.g. 24 or 30")
-    table = _Table(path, head, time, 1.0 / fps if head[time] == "frame" and fps else 1.0)
-    found = table.read_keys(rows)
+        raise SetupError(f"{path}:{line}: times are frame numbers: give --fps, e.g. 24 or 30")
+    twice = next((name for name in head if name and head.count(name) > 1), None)
+    if twice is not None:
+        raise SetupError(f"{path}:{line}: two columns are named {twice!r}: remove one")
+    unit_s = 1.0 / fps if head[time] == "frame" and fps else 1.0
+    table = _Table(path, head, time, unit_s, separator != ",")
+    found = table.read_keys(rows, line + 1)
     if table.faults:
         more = len(table.faults) - _MOST_FAULTS
         shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
@@ -71,16 +82,19 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
 class _Table:
     """Rows of one file; faults: the invalid lines with their errors."""
 
-    def __init__(self, path: Path, head: Sequence[str], time: int, unit_s: float) -> None:
+    def __init__(
+        self, path: Path, head: Sequence[str], time: int, unit_s: float, decimal_comma: bool
+    ) -> None:
         self.faults: list[str] = []
         self._path, self._head, self._time, self._unit_s = path, head, time, unit_s
+        self._decimal_comma = decimal_comma
         self._joint = next((i for i, name in enumerate(head) if name in _JOINTS), None)
         self._angle = next((i for i, name in enumerate(head) if name in _ANGLES), None)
 
-    def read_keys(self, rows: Iterable[Sequence[str]]) -> dict[str, Series]:
+    def read_keys(self, rows: Iterable[Sequence[str]], first_line: int) -> dict[str, Series]:
         """Return the keys by joint, in the order of their times."""
         found: dict[str, tuple[array[float], array[float]]] = {}
-        for line, row in enumerate(rows, start=2):
+        for line, row in enumerate(rows, start=first_line):
             if not any(cell.strip() for cell in row):
                 continue
             for joint, time_s, angle in self._row_keys(line, row):
@@ -117,7 +131,7 @@ class _Table:
 
     def _read_number(self, line: int, what: str, cell: str) -> float | None:
         try:
-            value = float(cell)
+            value = float(cell.replace(",", ".") if self._decimal_comma else cell)
         except ValueError:
             value = float("nan")
         if isfinite(value):

@@ -108,7 +108,7 @@ def track_text(
                 most = 90.0 if name in GAZE_JOINTS else 180.0
                 if abs(value) > most:
                     raise SetupError(
-                        f"{name} at {time_s + start_s:.2f} s: {value:.1f} deg, more than the "
+                        f"{name} at {time_s + start_s:.2f} s: {value:.4g} deg, more than the "
                         f"{most:g} deg of any joint: check the unit of the angles"
                     )
                 frames.setdefault(at_s, {})[channel_of_joint(name)] = round(value, 3)
@@ -178,7 +178,7 @@ def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
 def _check_length(takes_s: float) -> None:
     if not GRID_S < takes_s <= MAX_DURATION_S:
         raise SetupError(
-            f"it takes {takes_s:.2f} s: a track takes at most {MAX_DURATION_S:g} s; split it"
+            f"it takes {takes_s:.6g} s: a track takes at most {MAX_DURATION_S:g} s; split it"
         )
 
 

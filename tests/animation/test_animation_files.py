@@ -44,7 +44,10 @@ LONG = "joint;time_s;angle\nneck_pitch;0;0\nneck_yaw;0;5\nneck_pitch;.5;-8\nneck
 FRAMES = "frame\tneck_pitch\tneck_yaw\n0\t0\t5\n12\t-8\t\n24\t0\t9\n"
 
 
-@pytest.mark.parametrize("text", [WIDE, LONG, FRAMES])
+EXCEL = "\ufeffsep=;\r\n;;\r\n" + WIDE.replace(",", ";").replace(".", ",").replace("\n", "\r\n")
+
+
+@pytest.mark.parametrize("text", [WIDE, LONG, FRAMES, EXCEL, "# from\n\n" + WIDE])
 def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
     text: str, tmp_path: Path
 ) -> None:
@@ -71,8 +74,12 @@ BAD = {
     "time,neck_yaw\n": "no rows",
     "time,tail\n0,1\n1,5\n": "no joint 'tail': rename it or add --map NAME=JOINT; joints of the rig: left_eye_pan",
     "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
-    "time,neck_yaw\n0,1\n1,555\n": "neck_yaw at 1.00 s: 554.0 deg, more than the 90 deg of any",
-    "time,neck_yaw\n0,1\n20000,5\n": "a track takes at most 14400 s",
+    "time,neck_yaw\n0,1\n1,555\n": "neck_yaw at 1.00 s: 554 deg, more than the 90 deg of any",
+    "time,neck_yaw\n0,1\n20000,5\n": "it takes 20000 s: a track takes at most 14400 s",
+    "time,neck_yaw\n0,1\n1,1e300\n": "neck_yaw at 1.00 s: 1e+300 deg, more",
+    "time,neck_yaw,neck_yaw\n0,0,1\n": ":1: two columns are named 'neck_yaw': remove one",
+    "# mine\n\ntime,neck_yaw\n0,1\n0.5,left\n": ":5: neck_yaw: 'left' is not a number",
+    'time,neck_yaw\n0,"1,5"\n': ":2: neck_yaw: '1,5' is not a number",
 }
 
 
