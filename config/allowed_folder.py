@@ -6,7 +6,7 @@ program reads and writes them with its user's permissions, so only files in one 
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
@@ -22,6 +22,25 @@ _KIND_OF_KEY = {
 """Keys of a rig that contain a shipped name or a file, and the kind of the names; "" for none."""
 _MESH_FILE = re.compile(r"meshes\..+\.file")
 _YAML = (".yaml", ".yml")
+
+
+def file_in_folders(folders: Sequence[Path], given: str, start: Path | None = None) -> str:
+    """Return the full path of a file in folders or below, with links resolved.
+
+    Args:
+        folders: The folders.
+        given: Path.
+        start: Base of a relative path; None: the first folder.
+
+    Raises:
+        ValueError: It is not there.
+    """
+    roots = [os.path.realpath(folder) for folder in folders]
+    if given and "\0" not in given:
+        path = os.path.realpath(os.path.join(start or roots[0], os.path.expanduser(given)))
+        if any(path.startswith(root.rstrip("/") + "/") for root in roots):
+            return path
+    raise ValueError(f"only files in {' or '.join(roots)} and below can be named here")
 
 
 class AllowedFolder:
@@ -56,13 +75,10 @@ class AllowedFolder:
             raise ConfigError(
                 [ConfigFault("", None, key, repr(given), f"no such name; available: {there}")]
             )
-        if given and "\0" not in given:
-            begin = self._folder if start is None else str(start)
-            path = os.path.realpath(os.path.join(begin, os.path.expanduser(given)))
-            if path.startswith(self._folder.rstrip("/") + "/"):
-                return path
-        rule = f"from the page only files in {self._folder} and below can be named"
-        raise ConfigError([ConfigFault("", None, key, repr(given), rule)])
+        try:
+            return file_in_folders([self.folder], given, start)
+        except ValueError as error:
+            raise ConfigError([ConfigFault("", None, key, repr(given), str(error))]) from None
 
     def check_changes(self, changes: Mapping[str, object]) -> None:
         """Check the files that are named by new values of a rig's keys.

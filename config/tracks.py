@@ -1,12 +1,12 @@
 """Tracks by name: shipped ones, and those of a rig's own files; all are checked."""
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Annotated
 
+from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.load import (
     Check,
     ConfigError,
@@ -47,10 +47,11 @@ def load_track(path: Path) -> Track:
 
 
 def _sound_file(path: Path, track: Track) -> Iterable[tuple[str, str]]:
-    folder = os.path.realpath(path.parent)
-    found = os.path.realpath(os.path.join(folder, track.sound))
-    if "\0" in track.sound or not found.startswith(folder.rstrip("/") + "/") and track.sound:
-        yield "sound", f"must be in {folder} or below; put the sound next to the track's file"
+    try:
+        if track.sound:
+            file_in_folders([path.parent], track.sound)
+    except ValueError as error:
+        yield "sound", f"{error}; put the sound next to the track's file"
 
 
 def shipped_tracks() -> Mapping[str, Track]:

@@ -234,7 +234,7 @@ BAD = {
     "cues: {a: 1, a: 2}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "duplicate key"),
     "cues: {a: 9}\nframes: [{time_s: 2, look_at: 3}]\n": ("cues.a", "after the last frame"),
     "owns: [Neck]\nframes: [{time_s: 2, look_at: 3}]\n": ("owns.0", "neck, eyes, lids"),
-    "sound: ../x.wav\n": ("sound", "or below"),
+    "sound: ../x.wav\n": ("sound", "and below can be named"),
     LONG.replace("time_s: 7,", "time_s: 3,"): ("frames.6.time_s", "which is at 6 s"),
     LONG.replace("time_s: 7,", "time_s: .nan,"): ("frames.6", "each frame is one line"),
     LONG.replace("time_s: 7, head", "time_s: 7, heat"): ("frames.6.heat_yaw_deg", "head_yaw_deg"),

@@ -164,7 +164,9 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(
         voice = head._composed.voice
         assert voice.prepare(Say("short.wav"), True).sound == str(folder / "short.wav")
         for name in (str(tmp_path / "secret.wav"), "../secret.wav"):
-            with pytest.raises(gazerig.Error, match="only sounds in .* may be named"):
+            with pytest.raises(
+                gazerig.Error, match="only files in .* can be named here; see sound.folders"
+            ):
                 voice.prepare(Say(name), True)
         assert voice.prepare(Say(str(tmp_path / "secret.wav"))).duration_s == pytest.approx(0.5)
 

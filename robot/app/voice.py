@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.rig import Rig
 from gazerig.drivers.sound.params import KINDS
 from gazerig.drivers.sound.playback import SoundEvent
@@ -197,10 +198,10 @@ class RunVoice:
         folders = [(self._folder / one).resolve() for one in self._rig().sound.folders or ("",)]
         found = [folder / given for folder in folders if (folder / given).is_file()]
         path = found[0] if found else folders[0] / given
-        if confined and not any(path.resolve().is_relative_to(folder) for folder in folders):
-            there = ", ".join(map(str, folders))
-            raise SoundError(f"{name}: only sounds in {there} may be named; see sound.folders")
-        return path
+        try:
+            return Path(file_in_folders(folders, str(path))) if confined else path
+        except ValueError as error:
+            raise SoundError(f"{name}: {error}; see sound.folders") from None
 
     def _write(self, pcm: bytes, rate_hz: int, channels: int) -> Path:
         """Write samples to a file that exists until the run ends, or some texts later."""

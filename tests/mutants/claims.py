@@ -368,7 +368,7 @@ CLAIMS = (
     Mutant("robot/dashboard/door/auth_proxy.py", 'if asked.get("do") == "stop":', "if False:",
            "a stop goes the way of all requests",
            ("page_door::test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig",), ("R12",)),
-    Mutant("config/allowed_folder.py", 'if path.startswith(self._folder.rstrip("/") + "/"):', "if True:",
+    Mutant("config/allowed_folder.py", 'if any(path.startswith(root.rstrip("/") + "/") for root in roots):', "if True:",
            "the page may name any file",
            ("confined",), ("R13",)),
     Mutant("robot/dashboard/door/browsers.py",
