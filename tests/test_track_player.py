@@ -177,3 +177,32 @@ def test_a_track_follows_a_clock_that_jumps(size: float) -> None:
         _, speed, acceleration = it.player.state(t)
         assert voice.played.stretch(speed[None], acceleration[None]) < 1.06  # 5 % faster
     assert max(off[498::500]) < 0.03
+
+
+def test_the_sum_of_two_tracks_that_turn_an_eye_keeps_its_limits() -> None:
+    def swing(key: str, size: float, period_s: float) -> Track:
+        times = np.arange(period_s, 4.0, period_s)
+        frames = tuple(
+            KeyFrame(float(t), **{key: size * (-1.0) ** i})  # type: ignore[arg-type]
+            for i, t in enumerate(times)
+        )
+        return Track(key, frames, fit="slow")
+
+    # Eyes as fast as the neck, which they compensate.
+    bounds = [
+        one._replace(speed_rad_s=LIMITS[4].speed_rad_s, accel_rad_s2=LIMITS[4].accel_rad_s2)
+        for one in LIMITS
+    ]
+    it = show(head=swing("head_yaw_deg", 4.0, 0.5), eyes=swing("eyes_yaw_deg", 10.0, 0.3))
+    it = it._replace(bounds=bounds)
+    it.play("head", 0.0)
+    it.play("eyes", 0.1)
+    head, eyes = it.player.voices
+    assert eyes.played.speed < 0.9
+    times = np.arange(0.1, 6.0, 0.005).tolist()
+    both = [it.player.state(t) for t in times]
+    speed, acceleration = (np.array([one[i] for one in both]) for i in (1, 2))
+    assert 0.5 < head.played.stretch(speed, acceleration) <= 1.0 + 1e-3
+    # A new speed of one leaves room for the other, too.
+    assert it.do("speed", 0.2, "head", 1.9) == ""
+    assert head.wanted < 1.9

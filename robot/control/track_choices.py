@@ -288,6 +288,8 @@ class TrackChoices:
         share, state = self._params.limit_share, self._player.state(t_s, replaced)
         fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
         base = self._fit.subtract_offset(commanded_rad, self._player.state(t_s))
+        beside = [voice for voice in self._player.voices if voice not in replaced]
+        limits = self._remaining(limits, beside)
         try:
             fitted = self._fit_track(command, base, limits)
         except TrackRefused as refused:
@@ -314,6 +316,13 @@ class TrackChoices:
             since_s=t_s, volume=track.volume,
         )  # fmt: skip
         return CommandReply(track=reply)
+
+    def _remaining(
+        self, limits: Sequence[JointLimit], others: Sequence[Voice]
+    ) -> Sequence[JointLimit]:
+        """Return the limits less the motion of other tracks, which may share a joint: an eye."""
+        played = [voice.played for voice in others]
+        return self._fit.remaining_limits(limits, self._params.limit_share, played)
 
     def ends_show(self, command: Play) -> bool:
         """Return whether a track would replace one that owns joints."""
@@ -368,6 +377,8 @@ class TrackChoices:
                 raise ValueError(f"{name} lasts {length_s:.2f} s, not {value:g}")
         elif command.action == "speed":
             share, speed = self._params.limit_share, float(value)
+            others = [one for one in self._player.voices if one is not voice]
+            limits = self._remaining(limits, others)
             value, joint = self._fit.fit_speed(
                 self._tracks[name], voice.played, speed, limits, share
             )

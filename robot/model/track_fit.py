@@ -1,6 +1,6 @@
 """Fit of a track to a rig's joints, ranges and speeds."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import degrees
 from typing import NamedTuple
 
@@ -31,6 +31,7 @@ from gazerig.robot.model.types import GAZE_JOINTS, further_joints
 _SMALLEST = 0.2
 """Smallest share of a track that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
+_LEFT = 0.25
 _MOST_NAMED = 200
 _BETWEEN = np.linspace(0.0, 1.0, 25)
 _KEYS_AT_ONCE = 2000
@@ -426,6 +427,26 @@ class TrackFit:
                     for t, v in zip(at_s[fast].tolist(), worst[fast].tolist(), strict=True)
                 ]
         return tuple(sorted(found))
+
+    def remaining_limits(
+        self, limits: Sequence[JointLimit], share: float, others: Iterable[PlayedTrack]
+    ) -> list[JointLimit]:
+        """Return the limits less the fastest motion of tracks that move other channels of a joint.
+
+        Their positions may change at any time, so their largest values count. A part is always
+        left; the guard limits the rest.
+        """
+        left = list(limits)
+        for played in others:
+            samples = played.motion.samples.scale(np.array(played.sizes), played.speed)
+            matrix = self._matrix_of(played.motion)
+            used = [np.abs(column @ matrix).max(axis=0) / share for column in samples[2:]]
+            for j, limit in enumerate(limits):
+                left[j] = left[j]._replace(
+                    speed_rad_s=max(left[j].speed_rad_s - used[0][j], _LEFT * limit.speed_rad_s),
+                    accel_rad_s2=max(left[j].accel_rad_s2 - used[1][j], _LEFT * limit.accel_rad_s2),
+                )
+        return left
 
     def fit_speed(
         self, track: Track, played: PlayedTrack, speed: float, limits: Sequence[JointLimit],
