@@ -477,7 +477,7 @@ def stream_ahead_s(rig: Rig, lead_s: float) -> float:
         lead_s: Latency of the mouth's joint.
     """
     smoothing_s = rig.levels[rig.gaze.mouth.level].smoothing_ms / 1e3
-    return smoothing_s * _SMOOTHING_LAG + lead_s + _WATCH_S
+    return smoothing_s * _SMOOTHING_LAG + lead_s + 0.5 * _WATCH_S
 
 
 def _sounding_track(tick: Tick | None) -> TrackState | None:
