@@ -48,7 +48,7 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
     line = 1 + len(skipped.splitlines())
     separator = max(",;\t", key=text.partition("\n")[0].count)
     check_count(str(path), data.count(b"\n"))
-    rows = csv.reader(StringIO(text, newline=None), delimiter=separator)
+    rows = _split_rows(path, text, separator, line)
     head = [name.strip().lower() for name in next(rows, [])]
     time = next((i for i, name in enumerate(head) if name in _TIMES), None)
     if time is None:
@@ -77,6 +77,15 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
             raise SetupError(f"{path}: no joint {name!r}: {names.hint()}")
         series[joint[0]] = keys[0], joint[1] * keys[1]
     return series
+
+
+def _split_rows(path: Path, text: str, separator: str, line: int) -> Iterator[list[str]]:
+    """Yield the cells of every row; ``line``: number of the first."""
+    reader = csv.reader(StringIO(text, newline=None), delimiter=separator)
+    try:
+        yield from reader
+    except csv.Error as error:
+        raise SetupError(f"{path}:{line + reader.line_num - 1}: {error}: is it a table?") from None
 
 
 class _Table:

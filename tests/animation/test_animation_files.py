@@ -79,11 +79,12 @@ BAD = {
     "time,neck_yaw\n0,1\n1,1e300\n": "neck_yaw at 1.00 s: 1e+300 deg, more",
     "time,neck_yaw,neck_yaw\n0,0,1\n": ":1: two columns are named 'neck_yaw': remove one",
     "# mine\n\ntime,neck_yaw\n0,1\n0.5,left\n": ":5: neck_yaw: 'left' is not a number",
+    f"time,neck_yaw\n0,{'1' * 200_000}\n": ":2: field larger than field limit (131072): is it a table?",
     'time,neck_yaw\n0,"1,5"\n': ":2: neck_yaw: '1,5' is not a number",
 }
 
 
-@pytest.mark.parametrize("text", BAD)
+@pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
 def test_bad_rows_are_named_with_their_line(text: str, tmp_path: Path) -> None:
     with pytest.raises(SetupError) as caught:
         track_text(DESK, read(table(tmp_path, text)), "x")
