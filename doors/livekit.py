@@ -7,6 +7,7 @@ versions; the package ``livekit`` is only needed to join a room.
 """
 
 import asyncio
+import json
 import logging
 import os
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ from gazerig.doors.door import Door, DoorLink, connect
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
 ATTRIBUTE = "lk.agent.state"
+TRANSCRIPTION = "lk.transcription"
 _URL, _TOKEN = "LIVEKIT_URL", "LIVEKIT_TOKEN"
 
 
@@ -24,28 +26,34 @@ class LiveKit:
     """States of an agent and its user as orders."""
 
     def __init__(self) -> None:
-        self.talk = TurnTaking(after_speech="listening")
+        self.talk = TurnTaking("listening", reports_silence=True, streams_text=True)
 
     def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
         """Return the orders for changed states.
 
         Args:
-            message: ``lk.agent.state``, or "user": the state of ``user_state_changed``.
+            message: ``lk.agent.state``; "user": the state of ``user_state_changed``; or "text": a
+                part of the agent's transcription, most of which arrives while it is spoken.
             now_s: Present time, s.
 
         Raises:
             UnknownMessage: the state is unknown.
         """
         talk = self.talk
-        if message.get("user") == "speaking":
-            return talk.partner_speaks()
+        match message:
+            case {"user": "speaking"}:
+                return talk.partner_speaks()
+            case {"user": _}:
+                return talk.resume(now_s)
+            case {"text": str(text)}:
+                return talk.add_text(text, now_s)
         match message.get(ATTRIBUTE):
             case "thinking":
-                return talk.partner_pauses()
+                return talk.end_speech() + talk.partner_pauses()
             case "speaking":
                 return talk.speak(now_s)
             case "listening":
-                return talk.end_speech() if talk.state == "speaking" else talk.partner_speaks()
+                return talk.end_speech() or talk.partner_speaks()
             case "initializing" | "idle" | "":
                 return talk.end()
             case None:
@@ -79,6 +87,16 @@ def follow(session: Any, head: int | str | None = None, link: DoorLink | None = 
     return used
 
 
+def plain_text(part: str) -> str:
+    """Return the text of a part of a transcription, which may be JSON with the times of words."""
+    if not part.startswith("{"):
+        return part
+    try:
+        return "".join(str(json.loads(line)["text"]) for line in part.splitlines())
+    except (ValueError, KeyError, TypeError):
+        return part
+
+
 async def follow_room(link: DoorLink, room: Any, token: str) -> None:
     """Join a room and follow its agent until the room is closed.
 
@@ -87,30 +105,48 @@ async def follow_room(link: DoorLink, room: Any, token: str) -> None:
         room: A ``livekit.rtc.Room``.
         token: Access token of a participant who may subscribe.
     """
-    states, closed = LiveKit(), asyncio.Event()
+    states, closed, reading = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
 
-    def take(changed: Mapping[str, str]) -> None:
+    def take(message: Mapping[str, str]) -> None:
         try:
-            link.send(states.take(changed, link.now_s()))
+            link.send(states.take(message, link.now_s()))
         except UnknownMessage as error:
             link.report(str(error))
+
+    def follow(attributes: Mapping[str, str]) -> None:
+        if ATTRIBUTE in attributes:
+            take({ATTRIBUTE: attributes[ATTRIBUTE]})
+
+    def transcribe(stream: Any, identity: str) -> None:
+        participant = room.remote_participants.get(identity)
+        if participant is not None and ATTRIBUTE in participant.attributes:
+            task = asyncio.ensure_future(read(stream))
+            reading.add(task)
+            task.add_done_callback(reading.discard)
+
+    async def read(stream: Any) -> None:
+        async for part in stream:
+            take({"text": plain_text(part)})
 
     def leave(participant: Any) -> None:
         if ATTRIBUTE in participant.attributes:
             take({ATTRIBUTE: "idle"})
 
-    room.on("participant_attributes_changed", lambda changed, participant: take(changed))
-    room.on("participant_connected", lambda participant: take(participant.attributes))
+    room.on("participant_attributes_changed", lambda changed, participant: follow(changed))
+    room.on("participant_connected", lambda participant: follow(participant.attributes))
     room.on("participant_disconnected", leave)
     room.on("disconnected", lambda *reason: closed.set())
+    room.register_text_stream_handler(TRANSCRIPTION, transcribe)
     try:
         await room.connect(link.address, token)
         link.report(f"connected to {link.address}")
         for participant in room.remote_participants.values():
-            take(participant.attributes)
+            follow(participant.attributes)
         await closed.wait()
     finally:
         link.send(states.talk.end())
+        for task in reading:
+            task.cancel()
         await room.disconnect()
 
 

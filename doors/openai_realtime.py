@@ -36,7 +36,7 @@ class OpenAIRealtime:
     """
 
     def __init__(self) -> None:
-        self.talk = TurnTaking(after_speech="listening")
+        self.talk = TurnTaking("listening", streams_text=True)
         self._bytes_per_s = 2 * _PCM_HZ
         self._audio_s = 0.0
         self._complete = False
@@ -52,13 +52,17 @@ class OpenAIRealtime:
             case "input_audio_buffer.speech_stopped" | "input_audio_buffer.committed":
                 return talk.partner_pauses()
             case "response.created":
-                self._audio_s, self._complete = 0.0, False
+                self._complete = False
+                if talk.state != "speaking":  # otherwise the answers follow each other
+                    self._audio_s = 0.0
                 return talk.partner_pauses()
             case "response.output_audio.delta" | "response.audio.delta":
                 # Base64: four characters for three bytes.
                 length = len(field(message, "delta", str, "")) * 3 // 4
                 self._audio_s += length / self._bytes_per_s
                 return talk.speak(now_s) if length else ()
+            case "response.output_audio_transcript.delta" | "response.audio_transcript.delta":
+                return talk.add_text(field(message, "delta", str, ""), now_s)
             case "response.output_audio.done" | "response.audio.done":
                 return talk.speak(now_s, self._audio_s) if talk.state == "speaking" else ()
             case "output_audio_buffer.stopped" | "output_audio_buffer.cleared":

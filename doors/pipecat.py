@@ -44,7 +44,7 @@ class Pipecat:
     """RTVI messages of one session as orders."""
 
     def __init__(self) -> None:
-        self.talk = TurnTaking(after_speech="listening")
+        self.talk = TurnTaking("listening", reports_silence=True, streams_text=True)
         self._has_text = False
 
     def take(self, message: Mapping[str, Any], now_s: float) -> Orders:
@@ -63,9 +63,10 @@ class Pipecat:
             case "user-started-speaking":
                 return talk.partner_speaks()
             case "user-stopped-speaking":
-                return talk.partner_pauses()
+                return talk.resume(now_s) or talk.partner_pauses()
             case "bot-interrupted":
-                return talk.partner_speaks() if talk.state == "speaking" else ()
+                orders = talk.partner_speaks() if talk.state == "speaking" else ()
+                return orders + talk.end_speech()
             case "bot-llm-started":
                 self._has_text = False
                 return talk.partner_pauses()

@@ -3,7 +3,7 @@
 import asyncio
 import base64
 import socket
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -47,16 +47,23 @@ def wyo(kind: str, audio_s: float | None = None, **data: Any) -> dict[str, Any]:
     return {"type": kind, "data": data} | ({} if audio_s is None else {"audio_s": audio_s})
 
 
+def event(kind: str, **rest: Any) -> dict[str, Any]:
+    """Return an event of OpenAI with the fields that its kinds require."""
+    required: dict[str, Any] = {
+        "event_id": "e", "item_id": "i", "previous_item_id": None, "response_id": "r",
+        "output_index": 0, "content_index": 0, "audio_start_ms": 0, "audio_end_ms": 0,
+        "response": {}, "rate_limits": [], "session": {"type": "realtime"},
+    }  # fmt: skip
+    return {**required, "type": kind, **rest}
+
+
 def audio(seconds: float, bytes_per_s: int = 48_000) -> dict[str, Any]:
     pcm = bytes(round(seconds * bytes_per_s))
-    return {"type": "response.output_audio.delta", "delta": base64.b64encode(pcm).decode()}
+    return event("response.output_audio.delta", delta=base64.b64encode(pcm).decode())
 
 
-def event(kind: str, **rest: Any) -> dict[str, Any]:
-    return {"type": kind, "event_id": "event_1", **rest}
-
-
-ULAW = {"audio": {"output": {"format": {"type": "audio/pcmu"}}}}
+PCM = {"type": "realtime", "output_audio_format": "pcm16"}
+ULAW = {"type": "realtime", "audio": {"output": {"format": {"type": "audio/pcmu"}}}}
 SAID = "Sure, I have set a timer of 5 minutes for the eggs in your kitchen."  # 67 characters
 LVA, RTVI, LK = voice_assistant.VoiceAssistant, pipecat.Pipecat, livekit.LiveKit
 WYO, OAI = wyoming.Wyoming, openai_realtime.OpenAIRealtime
@@ -100,15 +107,18 @@ CONVERSATIONS: dict[str, tuple[Callable[[], Any], Sequence[tuple[Mapping[str, An
         (rtvi("user-transcription", "hello"), []),
         (rtvi("bot-llm-started"), []),
         (rtvi("bot-llm-text", "Hello, I am the "), []),
-        (rtvi("bot-started-speaking"), [("speaking", "16 characters")]),
+        (rtvi("bot-started-speaking"), ["speaking"]),  # the text has only begun
         (rtvi("bot-llm-text", "head that you see here."), [("speaking", "39 characters")]),
         (rtvi("bot-tts-text", "Hello,"), []),  # while it is spoken
         (rtvi("bot-stopped-speaking"), ["listening"]),
         (rtvi("bot-tts-text", "A sentence that no model wrote."), []),
         (rtvi("bot-started-speaking"), [("speaking", "31 characters")]),
         (rtvi("user-started-speaking"), ["interrupt"]),
+        (rtvi("user-stopped-speaking"), [("speaking", "31 characters")]),  # it was "mhm"
+        (rtvi("user-started-speaking"), ["interrupt"]),
         (rtvi("bot-interrupted"), []),
         (rtvi("bot-stopped-speaking"), []),
+        (rtvi("user-stopped-speaking"), ["thinking"]),
     ]),
     "livekit": (LK, [
         (agent("initializing"), []),
@@ -118,9 +128,15 @@ CONVERSATIONS: dict[str, tuple[Callable[[], Any], Sequence[tuple[Mapping[str, An
         ({"user": "listening"}, []),
         (agent("listening"), ["listening"]),
         (agent("speaking"), ["speaking"]),
+        ({"text": SAID[:40]}, [("speaking", "40 characters")]),
+        ({"user": "speaking"}, ["interrupt"]),
+        ({"user": "listening"}, [("speaking", "40 characters")]),  # it was "mhm"
         ({"user": "speaking"}, ["interrupt"]),
         (agent("listening"), []),
+        ({"user": "listening"}, []),
         ({"another": "attribute"}, []),
+        (agent("speaking"), ["speaking"]),
+        (agent("thinking"), ["listening", "thinking"]),
         (agent(""), ["idle"]),  # the attribute was deleted
     ]),
     "wyoming": (WYO, [
@@ -143,12 +159,14 @@ CONVERSATIONS: dict[str, tuple[Callable[[], Any], Sequence[tuple[Mapping[str, An
         (wyo("transcript", text=" "), ["idle"]),  # nobody spoke
     ]),
     "openai": (OAI, [
-        (event("session.created", session={"output_audio_format": "pcm16"}), []),
-        (event("input_audio_buffer.speech_started", audio_start_ms=1000, item_id="i"), ["listening"]),
-        (event("input_audio_buffer.speech_stopped", audio_end_ms=2000, item_id="i"), ["thinking"]),
+        (event("session.created", session=PCM), []),
+        (event("input_audio_buffer.speech_started"), ["listening"]),
+        (event("input_audio_buffer.speech_stopped"), ["thinking"]),
         (event("response.created"), []),
         (audio(0.5), ["speaking"]),
+        (event("response.output_audio_transcript.delta", delta="Good"), []),
         (audio(1.0), []),
+        (event("response.output_audio_transcript.delta", delta=" morning" * 4), [("speaking", "36 characters")]),
         (event("response.output_audio.done"), [("speaking", 1.5)]),
         (event("response.done"), []),
         (event("input_audio_buffer.speech_started"), ["interrupt"]),
@@ -496,6 +514,10 @@ class Emitter:
         self.handlers: dict[str, Callable[..., object]] = {}
         self.remote_participants: dict[str, Any] = {}
         self.joined: tuple[str, ...] = ()
+        self.streams: dict[str, Callable[..., object]] = {}
+
+    def register_text_stream_handler(self, topic: str, handler: Callable[..., object]) -> None:
+        self.streams[topic] = handler
 
     def on(self, name: str, handler: Callable[..., object]) -> None:
         self.handlers[name] = handler
@@ -525,6 +547,9 @@ def test_an_agent_s_session_steers_the_head() -> None:
 def test_an_agent_in_a_room_steers_the_head() -> None:
     head, room = TalkingHead(), Emitter()
 
+    async def stream(text: str) -> AsyncIterator[str]:
+        yield text
+
     async def scenario() -> None:
         link = DoorLink(head.connect, head.said.append, "ws://room")
         link.start()
@@ -534,6 +559,9 @@ def test_an_agent_in_a_room_steers_the_head() -> None:
         assert room.joined == ("ws://room", "token")
         room.handlers["participant_attributes_changed"](agent("speaking"), None)
         await until(lambda: head.last == "speaking")
+        for identity in ("someone", "a"):
+            room.streams["lk.transcription"](stream(SAID), identity)
+        await until(lambda: ("speaking", None, SAID) in head.orders)
         room.handlers["participant_disconnected"](SimpleNamespace(attributes=agent("speaking")))
         await until(lambda: head.last == "idle")
         room.handlers["disconnected"]("closed")
@@ -542,6 +570,19 @@ def test_an_agent_in_a_room_steers_the_head() -> None:
 
     asyncio.run(scenario())
     assert room.joined == () and not any("token" in line for line in head.said)
+
+
+@pytest.mark.parametrize(
+    ("part", "text"),
+    [
+        ("Hi ", "Hi "),
+        ('{"text": "Hi ", "start_time": 0.1}\n{"text": "you"}\n', "Hi you"),
+        ("{Hi", "{Hi"),
+        ('{"a": 1}', '{"a": 1}'),
+    ],
+)
+def test_a_transcription_may_have_times(part: str, text: str) -> None:
+    assert livekit.plain_text(part) == text
 
 
 def test_a_room_needs_an_address_and_a_token(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,258 @@
+"""Doors and the packages of their neighbours, which write and read what the doors read and write.
+
+The packages are large, and their users have them: without one, its tests are skipped.
+"""
+
+import asyncio
+import inspect
+import re
+from collections.abc import AsyncIterator, Iterator
+from typing import Any, get_args
+
+import pytest
+from aiohttp import web
+from fakes.talking_head import TalkingHead, until
+from fakes.voice_assistant import free_port
+from test_doors import CONVERSATIONS, SAID, audio, event, run
+
+pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
+
+from gazerig.doors import livekit, openai_realtime, pipecat
+from gazerig.doors.door import DoorLink
+
+BETA = ("response.audio.delta", "response.audio.done", "response.audio_transcript.delta")
+"""Events of the beta, which the package of today does not know."""
+
+
+def needs(module: str, package: str) -> Any:
+    """Return a module of a neighbour's package, or skip the test."""
+    return pytest.importorskip(module, reason=f"pip install {package}")
+
+
+def link_to(head: TalkingHead) -> DoorLink:
+    return DoorLink(head.connect, head.said.append)
+
+
+# OpenAI
+
+
+def test_openai_s_types_accept_our_messages_and_the_door_theirs() -> None:
+    union = needs("openai.types.realtime", "openai").RealtimeServerEvent
+    types = {
+        get_args(one.model_fields["type"].annotation)[0]: one
+        for one in get_args(get_args(union)[0])
+    }
+    read = set(re.findall(r'"(\w+\.[\w.]+)"', inspect.getsource(openai_realtime.OpenAIRealtime)))
+    assert read - set(BETA) <= set(types)
+    for message, _ in CONVERSATIONS["openai"][1]:
+        if message["type"] not in BETA and message.get("delta", "") is not None:
+            types[message["type"]].model_validate(message)
+    for kind in types:
+        openai_realtime.OpenAIRealtime().take(event(kind), 0.0)
+        openai_realtime.OpenAIRealtime().take({"type": kind}, 0.0)
+
+
+@pytest.mark.own_timeouts
+def test_openai_s_client_talks_through_the_relay() -> None:
+    openai = needs("openai", "openai 'openai[realtime]'")
+    port, bind = free_port(), f"127.0.0.1:{free_port()}"
+    seen: list[Any] = []
+    answer = [
+        event("session.created"),
+        event("response.created"),
+        audio(0.2),
+        event("response.output_audio.done"),
+        event("response.done"),
+    ]
+
+    async def server(request: web.Request) -> web.WebSocketResponse:
+        seen.append((str(request.rel_url), request.headers["Authorization"]))
+        socket = web.WebSocketResponse()
+        await socket.prepare(request)
+        async for message in socket:
+            seen.append(message.json()["type"])
+            for one in answer:
+                await socket.send_json(one)
+        return socket
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        app = web.Application()
+        app.router.add_get("/v1/realtime", server)
+        runner = web.AppRunner(app, shutdown_timeout=0.1, handler_cancellation=True)
+        await runner.setup()
+        await web.TCPSite(runner, "127.0.0.1", port).start()
+        client = openai.AsyncOpenAI(api_key="hush", websocket_base_url=f"ws://{bind}/v1")
+        async with client.realtime.connect(model="m") as program:
+            await program.response.create()
+            kinds = [(await program.recv()).type for _ in answer]
+            assert kinds == [one["type"] for one in answer]
+            await until(lambda: head.last == "listening")
+            assert "speaking" in head.states
+        await until(lambda: head.last == "idle")
+        await runner.cleanup()
+
+    run(openai_realtime.DOOR, scenario, f"ws://127.0.0.1:{port}", bind)
+    assert seen == [("/v1/realtime?model=m", "Bearer hush"), "response.create"]
+
+
+# Pipecat
+
+
+def test_pipecat_s_models_accept_our_messages_and_the_door_theirs() -> None:
+    models = needs("pipecat.processors.frameworks.rtvi.models", "pipecat-ai")
+    classes: list[Any] = [one for one in vars(models).values() if inspect.isclass(one)]
+    kinds = {
+        one.model_fields["type"].default: one
+        for one in classes
+        if {"label", "type"} <= set(getattr(one, "model_fields", {}))
+    }
+    for message, _ in CONVERSATIONS["pipecat"][1]:
+        data = message.get("data", {}) | {
+            "version": "1",
+            "user_id": "u",
+            "timestamp": "",
+            "final": True,
+        }
+        kinds[message["type"]].model_validate({**message, "data": data})
+    frames = needs("pipecat.frames.frames", "pipecat-ai")
+    assert [name for name in pipecat.FRAMES if not hasattr(frames, name)] == [
+        "StartInterruptionFrame"  # of versions before 1.0
+    ]
+    assert set(pipecat.FRAMES.values()) - {"end"} <= set(kinds)
+    for kind in kinds:
+        pipecat.Pipecat().take({"label": "rtvi-ai", "type": kind, "data": {"text": "x"}}, 0.0)
+
+
+@pytest.mark.own_timeouts
+def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
+    frames = needs("pipecat.frames.frames", "pipecat-ai")
+    from pipecat.processors.filters.identity_filter import IdentityFilter
+    from pipecat.tests.utils import SleepFrame, run_test
+
+    head = TalkingHead()
+    observer = pipecat.HeadObserver(link=link_to(head))
+    sent = (
+        frames.UserStartedSpeakingFrame(), frames.UserStoppedSpeakingFrame(),
+        frames.LLMFullResponseStartFrame(), frames.LLMTextFrame(SAID),
+        frames.BotStartedSpeakingFrame(), frames.UserStartedSpeakingFrame(),
+        frames.UserStoppedSpeakingFrame(), frames.UserStartedSpeakingFrame(),
+        frames.InterruptionFrame(), frames.BotStoppedSpeakingFrame(),
+    )  # fmt: skip
+
+    async def scenario() -> None:
+        spaced = [one for frame in sent for one in (frame, SleepFrame(0.1))]
+        await run_test(IdentityFilter(), frames_to_send=spaced, observers=[observer])
+
+    asyncio.run(scenario())
+    assert head.states == [
+        "listening", "thinking", "speaking", "interrupt", "speaking", "interrupt", "idle"
+    ]  # fmt: skip
+    assert head.orders[2] == ("speaking", None, SAID) and not head.said
+
+
+# LiveKit
+
+
+def test_livekit_s_states_are_known() -> None:
+    events = needs("livekit.agents.voice.events", "livekit-agents")
+    from livekit.agents.types import ATTRIBUTE_AGENT_STATE, TOPIC_TRANSCRIPTION
+
+    assert (livekit.ATTRIBUTE, livekit.TRANSCRIPTION) == (
+        ATTRIBUTE_AGENT_STATE,
+        TOPIC_TRANSCRIPTION,
+    )
+    for state in get_args(events.AgentState):
+        livekit.LiveKit().take({livekit.ATTRIBUTE: state}, 0.0)
+    for state in get_args(events.UserState):
+        livekit.LiveKit().take({"user": state}, 0.0)
+    from google.protobuf.json_format import MessageToJson
+    from livekit.protocol.agent_pb import agent_session
+
+    timed = agent_session.TimedString(text="Hi ", start_time=0.1)
+    assert livekit.plain_text(MessageToJson(timed, indent=None) + "\n") == "Hi "
+    assert {"agent_state_changed", "user_state_changed", "close"} <= set(
+        get_args(events.EventTypes)
+    )
+
+
+@pytest.mark.own_timeouts
+def test_livekit_s_session_steers_the_head() -> None:
+    """A session without a room says a sound, and its user interrupts it."""
+    agents = needs("livekit.agents", "livekit-agents")
+    from livekit import rtc
+    from livekit.agents.voice.io import AudioOutput, AudioOutputCapabilities
+
+    class Loudspeaker(AudioOutput):
+        def __init__(self) -> None:
+            super().__init__(label="test", capabilities=AudioOutputCapabilities(pause=False))
+            self.said_s = 0.0
+
+        async def capture_frame(self, frame: Any) -> None:
+            await super().capture_frame(frame)
+            if not self.said_s:
+                self.on_playback_started(created_at=0.0)
+            self.said_s += frame.duration
+
+        def flush(self) -> None:
+            super().flush()
+            self.on_playback_finished(playback_position=self.said_s, interrupted=False)
+            self.said_s = 0.0
+
+        def clear_buffer(self) -> None:
+            pass
+
+    head = TalkingHead()
+
+    async def sound() -> AsyncIterator[Any]:
+        for _ in range(20):
+            yield rtc.AudioFrame(bytes(960), 24_000, 1, 480)
+            await asyncio.sleep(0.02)
+
+    async def scenario() -> None:
+        session = agents.AgentSession()
+        link = livekit.follow(session, link=link_to(head))
+        session.output.audio = Loudspeaker()
+        await session.start(agents.Agent(instructions=""), record=False)
+        await until(lambda: head.last == "listening")
+        await session.say("Good morning", audio=sound())
+        await until(lambda: head.states == ["listening", "speaking", "listening"])
+        await session.aclose()
+        await until(lambda: head.last == "idle")
+        await link.close()
+
+    asyncio.run(scenario())
+    assert not head.said
+
+
+@pytest.fixture
+def room() -> Iterator[Any]:
+    """Return LiveKit's room, which joins nothing."""
+    rtc = needs("livekit.rtc", "livekit")
+    yield rtc.Room
+
+
+@pytest.mark.own_timeouts
+def test_livekit_s_room_has_our_events(room: Any) -> None:
+    head = TalkingHead()
+    from livekit.rtc.room import EventTypes
+
+    async def scenario() -> None:
+        one, link = room(), link_to(head)
+        names, register = list[str](), one.on
+
+        def on(name: str, handler: Any) -> None:
+            names.append(name)
+            register(name, handler)
+
+        one.on = on
+        link.address = f"ws://127.0.0.1:{free_port()}"
+        link.start()
+        with pytest.raises(Exception, match="engine|connect|signal|refused"):
+            await livekit.follow_room(link, one, "token")
+        assert set(names) <= set(get_args(EventTypes))
+        one.emit("participant_attributes_changed", {livekit.ATTRIBUTE: "thinking"}, None)
+        await until(lambda: head.last == "thinking")
+        await link.close()
+
+    asyncio.run(scenario())
