@@ -114,11 +114,6 @@ def test_many_keys_give_the_curve_of_few_and_take_time_in_proportion(
         solved.append(len(span))
         return coefficients(span, *states)
 
-    random = np.cumsum(rng.normal(0.2, 1.0, 400))
-    passed = np.flatnonzero(np.diff(random)[:-1] * np.diff(random)[1:] > 0.0) + 1
-    span = rng.uniform(0.05, 2.0, 399)
-    at_once = minimum_jerk_curve._states_at_once(random, span, passed)
-    assert np.allclose(at_once, minimum_jerk_curve._states(random, span), atol=1e-9)
     monkeypatch.setattr(minimum_jerk_curve, "_coefficients", counted)
     for count in (500, 20_000):
         solved.clear()

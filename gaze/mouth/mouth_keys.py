@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.mouth.loudness import FRAME_S, WINDOW_S
+from gazerig.gaze.turning_points import turning_points
 from gazerig.gaze.types import Floats
 
 CLOSED_PHONEMES = ("p", "b", "m")
@@ -126,7 +127,7 @@ def mouth_keys(
     shut = sorted((*closures, *_runs(opening < _SILENT, _SILENT_S)))
     opening = np.convolve(opening, _SMOOTH, mode="same")
     keys: list[tuple[float, float, bool]] = [(0.0, 0.0, True)]
-    for i in _turning_points(opening):
+    for i in turning_points(opening, _LEAST_TURN):
         at_s = frame_s(i)
         if not any(c.begin_s - _LEAST_GAP_S < at_s < c.end_s + _LEAST_GAP_S for c in shut):
             keys.append((at_s, float(opening[i]), False))
@@ -136,25 +137,6 @@ def mouth_keys(
             keys.append((max(2 * _LEAST_GAP_S, closure.end_s), 0.0, True))
     keys.append((frame_s(len(opening)), 0.0, True))
     return _limit(_apart(sorted(keys)), limits)
-
-
-def _turning_points(values: Floats) -> list[int]:
-    """Return the indices of alternate maxima and minima that differ by ``_LEAST_TURN``."""
-    found: list[int] = []
-    low = high = 0
-    rising = True
-    for i, value in enumerate(values):
-        if value > values[high]:
-            high = i
-        if value < values[low]:
-            low = i
-        if rising and values[high] - value > _LEAST_TURN:
-            found.append(high)
-            rising, low = False, i
-        elif not rising and value - values[low] > _LEAST_TURN:
-            found.append(low)
-            rising, high = True, i
-    return found
 
 
 def _apart(keys: list[tuple[float, float, bool]]) -> list[tuple[float, float, bool]]:

@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 
-_MANY = 2000
-"""Passed keys above which all runs of them are solved at once."""
-
 
 class MinimumJerkCurve:
     """A curve from rest through key values to rest at the last of them.
@@ -93,50 +90,20 @@ class MinimumJerkCurve:
 
 
 def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
-    """Return speed and acceleration at every key: 0 at reversals and held values."""
-    speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
+    """Return speed and acceleration at every key: 0 at reversals and held values.
+
+    Elsewhere those of least jerk, unless the curve would swing back between two stops: then the
+    slower of the mean speeds before and after each key, which prevents it.
+    """
     step = np.diff(position)
     passed = np.flatnonzero(step[:-1] * step[1:] > 0.0) + 1
-    if len(passed) > _MANY:
-        return _states_at_once(position, span, passed)
-    for run in np.split(passed, np.flatnonzero(np.diff(passed) > 1) + 1):
-        if len(run):
-            # From the stop before the passed keys to the stop after them.
-            keys = slice(run[0] - 1, run[-1] + 2)
-            speed[run], acceleration[run] = _states_between(
-                position[keys], span[run[0] - 1 : run[-1] + 1]
-            )
-    return speed, acceleration
-
-
-def _states_between(position: Floats, span: Floats) -> tuple[Floats, Floats]:
-    """Return speed and acceleration at the keys between two stops.
-
-    Those of least jerk, unless the curve would swing back in between: then the slower of the mean
-    speeds before and after each key, which prevents it.
-    """
-    speed, acceleration = _least_jerk(position, span)
-    table = _coefficients(span, *_segment_ends(position, speed, acceleration))
-    s = np.linspace(0.0, 1.0, 33)[:, None] * span
-    c1, c2, c3, c4, c5 = table.T[1:]
-    rates = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
-    forward = np.sign(position[1] - position[0])
-    if (rates * forward < -1e-6 * np.abs(rates).max()).any():
-        mean = np.diff(position) / span
-        slower = np.minimum(np.abs(mean[:-1]), np.abs(mean[1:])) * forward
-        return slower, np.zeros(len(slower))
-    return speed[1:-1], acceleration[1:-1]
-
-
-def _states_at_once(
-    position: Floats, span: Floats, passed: NDArray[np.intp]
-) -> tuple[Floats, Floats]:
-    """Return the result of ``_states`` for a long curve, by one system for all passed keys."""
+    if not len(passed):
+        return np.zeros(len(position)), np.zeros(len(position))
     stops = np.ones(len(position) - 2, bool)
     stops[passed - 1] = False
     speed, acceleration = _least_jerk(position, span, stops)
     _, c1, c2, c3, c4, c5 = _coefficients(span, *_segment_ends(position, speed, acceleration)).T
-    forward = np.sign(np.diff(position))
+    forward = np.sign(step)
     lowest, highest = np.zeros((2, len(span) + 1))
     for share in np.linspace(0.0, 1.0, 33):
         s = share * span
@@ -151,15 +118,13 @@ def _states_at_once(
         np.minimum.reduceat(lowest, ends)[::2] < -1e-6 * np.maximum.reduceat(highest, ends)[::2]
     )
     slow = passed[np.repeat(swings, last - first + 1)]
-    mean = np.diff(position) / span
+    mean = step / span
     speed[slow] = np.minimum(np.abs(mean[slow - 1]), np.abs(mean[slow])) * forward[slow]
     acceleration[slow] = 0.0
     return speed, acceleration
 
 
-def _least_jerk(
-    position: Floats, span: Floats, stops: NDArray[np.bool_] | None = None
-) -> tuple[Floats, Floats]:
+def _least_jerk(position: Floats, span: Floats, stops: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Return speed and acceleration at all keys such that jerk and snap are continuous.
 
     Args:
@@ -194,8 +159,7 @@ def _least_jerk(
                 gap = gap[(gap >= 0) & (gap < count)]
                 block[gap, :, of] = jumps[:, gap].T
     right = -at_zero.reshape(2, count).T[..., None]
-    if stops is not None:
-        before[stops], own[stops], behind[stops], right[stops] = 0.0, np.eye(2), 0.0, 0.0
+    before[stops], own[stops], behind[stops], right[stops] = 0.0, np.eye(2), 0.0, 0.0
     gaps(_solve(before, own, behind, right).T.ravel())
     return speed, acceleration
 

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.turning_points import turning_points
 from gazerig.gaze.types import Floats
 
 GRID_S = 0.02
@@ -74,7 +75,8 @@ def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats,
     if np.abs(values - values[0]).max() <= tolerance:
         return np.zeros(0), np.zeros(0)
     chosen: list[int] = []
-    stops = {0, *_reversals(values, tolerance), *_hold_ends(values)}
+    ends = {0, len(values) - 1}
+    stops = ends.union(turning_points(values, tolerance), _hold_ends(values))
     for first, last in pairwise(sorted(stops)):
         part = slice(first, last + 1)
         inner = _inner_keys(times_s[part] - times_s[first], values[part], tolerance)
@@ -105,20 +107,3 @@ def _inner_keys(times_s: Floats, values: Floats, tolerance: float) -> list[int]:
         worst = [first + int(error[first : first + _WINDOW].argmax()) for first in windows]
         chosen = sorted({*chosen, *(i for i in worst if error[i] > tolerance)})
     return chosen
-
-
-def _reversals(values: Floats, tolerance: float) -> list[int]:
-    """Return the indices at which the samples reverse by more than the tolerance, and the last."""
-    turns: list[int] = []
-    high = low = 0
-    heading = 0
-    for i, value in enumerate(values):
-        high = i if value > values[high] else high
-        low = i if value < values[low] else low
-        if heading >= 0 and values[high] - value > tolerance:
-            turns += [high] if high and heading else []
-            heading, low = -1, i
-        elif heading <= 0 and value - values[low] > tolerance:
-            turns += [low] if low and heading else []
-            heading, high = 1, i
-    return sorted({*turns, len(values) - 1})

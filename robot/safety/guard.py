@@ -292,9 +292,9 @@ class Guard:
         fault = joints.fault[i] if joints.fault else ""
         if i in self.limp and not fault and joints.torque and not joints.torque[i]:
             # The next motion begins at its position.
-            if isfinite(position):
+            if isfinite(position) and position != self._motion.command[i]:
                 self._change.begin(i, position)
-            self._stuck.forget(i)
+                self._stuck.forget(i)
             return 0, LIMP
         fresh = fresh and isfinite(position)
         hold = self._servo_hold(i, joints, fault, fresh)
