@@ -11,6 +11,9 @@ import gazerig
 from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.robot.control.limp_joints import LimpJoints
+from gazerig.robot.control.tick_text import guard_text
+from gazerig.robot.dashboard.panels.servo_health import servo_table
+from gazerig.robot.model.types import LIMP, GuardResult, Servos
 
 BUSES = {
     "dynamixel": ("{kind: dynamixel, port: /dev/ttyUSB0}", "xl330-m077", "gains: [1200, 0, 12000]"),
@@ -129,6 +132,8 @@ def test_at_every_end_no_servo_has_torque(kind: str, stopped: bool, tmp_path: Pa
             head.step(0.1)
     status = json.loads(port.faults.command("status"))
     found = status["servos"]
+    if kind in SMART and not stopped:  # it has parked
+        assert abs(next(one["position"] for one in found if one["id"] == 3) - 2048) < 20
     assert not [one for one in found if one.get("torque") or one.get("target")]
 
 
@@ -143,6 +148,17 @@ def test_a_run_with_a_limp_jaw_is_repeated_to_the_same_bytes(kind: str, tmp_path
             assert it.now.limited == "limp"
             digests.append(it.head._composed.assembly.sent_bytes_digest())
     assert digests[0] == digests[1]
+
+
+def test_a_limp_servo_gets_no_goals_which_may_switch_its_torque_on(tmp_path: Path) -> None:
+    with gazerig.open(rig_file("feetech", tmp_path), fast=True) as head:
+        it = Jaw(head)
+        head.step(0.5)
+        it.emulate("set goal torque-on")
+        head.step(2.0)
+        for _ in range(20):
+            head.step(0.05)
+            assert it.now.torque is False and it.now.limited == "limp"
 
 
 @pytest.mark.parametrize("kind", SMART)
@@ -200,3 +216,13 @@ def test_a_warm_jaw_is_reported_once(tmp_path: Path) -> None:
         head.step(3.0)
     found = [line for line in lines if "warm" in line]
     assert len(found) == 1 and "jaw is warm, " in found[0] and "stops at" in found[0], lines
+
+
+def test_status_line_and_page_show_it() -> None:
+    result = GuardResult((0.0,), "ok", (), (0.0,), (LIMP,), (), ("jaw",))
+    assert result.limp == ("jaw",) and guard_text(result) == "ok (jaw: limp)"
+    row = (30.0,), (5.0,), (0.0,), (False,), ("",), (0.01,)
+    assert "<div class='quiet'>limp, as idle</div>" in servo_table(
+        Servos(*row, limp=("jaw",)), ("jaw",)
+    )
+    assert "<div class='quiet'>torque off</div>" in servo_table(Servos(*row), ("jaw",))

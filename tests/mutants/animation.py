@@ -1,4 +1,4 @@
-"""Mutants of animation files and of tracks recorded live: a wrong line, and who notices."""
+"""Mutants of animation files, tracks and limp joints: a wrong line, and who notices."""
 
 from mutants.mutants import Mutant
 
@@ -21,4 +21,16 @@ ANIMATION = (
            "the first pose is passed at speed", FILES),
     Mutant("features/bringup/hand_recording.py", "        if not rows or row[0] > rows[-1][0]:\n            rows.append(row)\n",
            "        rows.append(row)\n", "a lost head's last angle is recorded twice", ("live_recording",)),
+    Mutant("robot/control/joint_latency.py", "            error += speed * (read_s - times[1:-1])\n", "",
+           "the time of the reading is no part of the latency", ("joint_latency",)),
+    Mutant("gaze/track/track_motion.py", "curve.state_at(max(0.0, t_s - delay_s))", "curve.state_at(max(0.0, t_s))",
+           "joints of faster buses are too early", ("joint_latency",)),
+    Mutant("drivers/servo_bus/transient_faults.py", "            return self.limp\n", "            return frozenset()\n",
+           "a limp servo gets goals, with which some firmware switches torque on", ("limp_joints",)),
+    Mutant("robot/safety/guard.py", "if i in self.limp and not fault", "if False and not fault",
+           "a limp joint counts as faulty and starts slowly", ("limp_joints",)),
+    Mutant("robot/control/limp_joints.py", "if held or not abs(", "if not abs(", "a joint that a client holds goes limp", ("limp_joints",)),
+    Mutant("robot/control/loop.py", "        self.body.wake()\n", "", "a limp joint does not park", ("limp_joints",)),
+    Mutant("robot/control/track_choices.py", "        limits = self._remaining(limits, beside)\n", "",
+           "the sum of two tracks turns an eye too fast", ("track_player",)),
 )  # fmt: skip
