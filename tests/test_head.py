@@ -101,7 +101,7 @@ def test_attention_bounds_must_be_in_order() -> None:
 def test_an_eye_held_aside_is_relieved_slowly() -> None:
     model = HeadModel(replace(EQ_7, recentre_after_ms=800.0), radians(35.0), NECK)
     model.reset(0.0, (0.0, 0.0, 0.0))
-    target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
+    target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "thing", 1, 0.5, True, None, 1, "")
     yaw = radians(21.0)
     trace: list[Any] = []
     for k in range(1000):

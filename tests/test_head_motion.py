@@ -53,11 +53,13 @@ LAGS_S = np.arange(0.0, 0.6, 0.02)
 
 def test_slow_and_short_motion_is_left_to_the_eyes() -> None:
     t = np.arange(0.0, 10.0, DT)
-    assert np.abs(follow(model(), 1.0 * t)).max() == 0.0, "1 deg/s, within the range of the eyes"
+    assert np.abs(follow(model(), 1.0 * t, "thing")).max() == 0.0, (
+        "1 deg/s, within the range of the eyes"
+    )
     jump = np.clip((t - 2.0) * 180.0, 0.0, 9.0)
-    assert np.abs(follow(model(), jump)).max() == 0.0
+    assert np.abs(follow(model(), jump, "thing")).max() == 0.0
     walk = 12.0 * np.sin(2.0 * pi * 0.08 * t)
-    assert np.abs(follow(model(pursue_above_deg_s=0.0), walk)).max() == 0.0
+    assert np.abs(follow(model(pursue_above_deg_s=0.0), walk, "thing")).max() == 0.0
 
 
 def test_after_pursuit_the_head_comes_to_rest() -> None:
@@ -88,7 +90,7 @@ def test_recentring_is_late_random_and_slow() -> None:
     place = np.full(round(30.0 / DT), 32.0)
     starts, peaks, ends = [], [], []
     for seed in range(30):
-        yaws = follow(model(seed), place)
+        yaws = follow(model(seed), place, "thing")
         held = yaws[round(2.0 / DT)]
         assert held == pytest.approx(0.77 * (32.0 - 17.9), abs=3.5)
         after = yaws[round(2.0 / DT) :]
@@ -101,6 +103,26 @@ def test_recentring_is_late_random_and_slow() -> None:
     assert 5.0 < np.mean(starts) < 11.0 and np.std(starts) > 1.5
     assert max(peaks) <= 12.1
     assert min(ends) >= 0.25 * 10.0 - 0.1 and max(ends) <= 10.0
+
+
+@pytest.mark.parametrize(("elsewhere", "id"), [("away", 1), ("hand", 1_000_001), ("face", 1)])
+def test_the_head_comes_to_face_a_person_in_spite_of_short_looks_elsewhere(
+    elsewhere: str, id: int
+) -> None:
+    yaws = np.zeros((24, round(20.0 / DT)))
+    for seed, row in enumerate(yaws):
+        head, yaw = model(seed), 0.0
+        for k in range(len(row)):
+            t, place = k * DT, (radians(10.0), 0.0)
+            seen = target(t, id, elsewhere) if t % 2.0 > 1.4 else target(t)
+            yaw = head.step(seen, place, place, abs(place[0] - yaw), 1.0, t)[0]
+            row[k] = degrees(yaw)
+    assert np.abs(yaws[:, : round(3.0 / DT)]).max() == 0.0
+    turned = yaws[:, -1] > 5.0
+    assert 0.7 < turned.mean() < 1.0 and yaws.max() <= 8.01
+    half = [np.argmax(row > 3.0) * DT for row in yaws[turned]]
+    assert 6.0 < np.mean(half) < 11.0 and np.std(half) > 2.0
+    assert np.diff(yaws).max() / DT <= 12.1
 
 
 def shifts(seed: int | None) -> Floats:

@@ -12,14 +12,16 @@ straight ahead, a head that comes from 60 deg would turn past a target at 25 deg
 
 Equal shifts differ: slope, onset and duration scatter within bounds. The head stays at the position
 that its law determines. When an eye has been eccentric for a random time of some seconds, the head
-turns slowly to recentre it. A target in sustained motion is pursued by the head too: each tick
-plans a minimum-jerk movement of .6 s to where the target will be soon. On a ramp this lags by .6 of
-that time, .36 s, less the .2 s of foresight; people's heads lag by .1 to .2 s. When the motion
-ends, the last plan brings the head to rest.
+turns slowly to recentre it. It comes closer to a face, as people face each other; looks away from
+the face, and short ones elsewhere, do not restart that time. A target in sustained motion is
+pursued by the head too: each tick plans a minimum-jerk movement of .6 s to where the target will be
+soon. On a ramp this lags by .6 of that time, .36 s, less the .2 s of foresight; people's heads lag
+by .1 to .2 s. When the motion ends, the last plan brings the head to rest.
 During a look away the eyes rest on a place of the room, and the head goes on with the person.
 """
 
 from math import degrees, exp, hypot, inf, radians
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +41,7 @@ from gazerig.gaze.types import AWAY, SEARCH, Angles2, Angles3, Target, Vec3
 
 OWN_LOOKS = ("glance", SEARCH, "rest")
 """Kinds of targets that are not caused by anything visible (gazerig.gaze.attention.idle)."""
+_FACES = ("face", AWAY)
 
 _LATERAL_RAD = radians(30.0)
 _LEAST_ROLL = 0.4
@@ -134,7 +137,11 @@ _FASTEST = 3.0
 _GOES_ON = 0.3
 """Share of the threshold at which a pursuit ends."""
 _RELIEF = (0.4, 0.9)
-"""Eccentricity to which the head recentres an eye, as a share of comfort_deg."""
+"""Eccentricity to which the head recentres an eye, as a share of the one that is comfortable."""
+_BEFORE_FACE = 0.5
+"""Comfortable eccentricity of a face, as a share of comfort_deg."""
+_SHORT_LOOK_S = 2.0
+"""Duration of a look elsewhere up to which the time to recentre a face continues."""
 _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""
 
@@ -142,6 +149,16 @@ _SWINGS = 2.5
 def _draw_bounded(rng: np.random.Generator, most: float) -> float:
     """Draw a standard normal deviate within bounds."""
     return min(most, max(-most, float(rng.standard_normal())))
+
+
+class _Facing(NamedTuple):
+    """The last look at a face: when it ended, since when the face is aside, and deviates of it."""
+
+    id: int
+    until_s: float
+    since_s: float
+    later: float
+    relief: float
 
 
 class HeadModel:
@@ -196,6 +213,7 @@ class HeadModel:
         self._follows = False
         self._relieves = False
         self._aside_since_s = self._stepped_s = t_s
+        self._facing = _Facing(-1, t_s, t_s, 0.0, 0.0)
         self._lead_s = 0.0
         self._drift, self._pursues = _NO_DRIFT, False
         self._draw_variation()
@@ -317,13 +335,18 @@ class HeadModel:
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest."""
         par, share, trigger_rad = self._params, self._share, self._trigger_rad(target)
-        moving = t_s < self._ends_s
+        moving, is_face = t_s < self._ends_s, target.kind in _FACES
         if (target.kind, target.id) != self._target:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
                 self._drift, self._pursues = _NO_DRIFT, False
-            self._target = target.kind, target.id
+            if self._target is not None and self._target[0] in _FACES:
+                since_s, id = self._aside_since_s, self._target[1]
+                self._facing = _Facing(id, t_s, since_s, self._later, self._relief)
+            self._target, last = (target.kind, target.id), self._facing
             self._aside_since_s = t_s
             self._draw_variation()
+            if is_face and target.id == last.id and t_s - last.until_s <= _SHORT_LOOK_S:
+                self._aside_since_s, self._later, self._relief = last[2:]
             self._start = self._extrapolated_direction(t_s) if moving else self._goal_direction
             # The reason for the last movement ends when the eyes return from the target.
             self._follows, self._relieves = moving, False
@@ -333,7 +356,11 @@ class HeadModel:
             and angle_between(self._goal_direction, direction(facing)) < trigger_rad
         ):
             self._start = self._goal_direction
-        if eccentricity <= self._comfort_rad:
+        comfort_rad, aside_rad = self._comfort_rad, eccentricity
+        if is_face:
+            comfort_rad *= _BEFORE_FACE
+            aside_rad = angle_between(self._goal_direction, direction(facing))
+        if aside_rad <= comfort_rad:
             self._aside_since_s = t_s
         recentre_ms = par.recentre_after_ms + self._later * par.recentre_spread_ms
         if t_s - self._aside_since_s >= recentre_ms / 1e3 and not moving:
@@ -343,7 +370,7 @@ class HeadModel:
         elif not moving:
             self._follows = self._relieves = False
         if self._relieves:
-            relief_rad = min(self._relief * self._comfort_rad, share.trigger_rad)
+            relief_rad = min(self._relief * comfort_rad, share.trigger_rad)
             self._follow(target, facing, gaze, relief_rad, t_s)
         elif self._follows:
             arc_rad = angle_between(self._start, direction(facing))
