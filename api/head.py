@@ -291,7 +291,7 @@ class Head(ABC):
                 16 bits, channels interleaved, of 20 to 60 ms each.
             rate_hz: rate of a stream.
             channels: number of channels of a stream, 1 or 2.
-            volume: factor 0..1 on a file or a text.
+            volume: factor 0..1; with 0, only the mouth moves, to a stream that is heard elsewhere.
             sway: whether the head sways slightly; for a file or a text.
             spoken: phonemes or words of a file with their begins in seconds, for closed lips.
 
@@ -299,23 +299,25 @@ class Head(ABC):
             Refused: it cannot be said; the message names the file or program and the remedy.
         """
         if not isinstance(what, str | Path):
-            return self._say_stream(what, rate_hz, channels)
+            return self._say_stream(what, rate_hz, channels, volume)
         text = str(what)
         if Path(text).suffix.lower() in KINDS and Path(text).is_file():
             text = str(Path(text).absolute())
         return self._send(Say(text, volume, sway, tuple(spoken), self._who))
 
-    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
+    def _say_stream(
+        self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float
+    ) -> Order:
         """Say a stream; return when its last piece has been accepted."""
         for piece in pieces:
-            ahead_s = self._say_piece(piece, rate_hz, channels)
+            ahead_s = self._say_piece(piece, rate_hz, channels, volume)
             if ahead_s > STREAM_AHEAD_S:
                 self.sleep(ahead_s - STREAM_AHEAD_S)
         self._end_stream(rate_hz, channels)
         return Order(self, CommandReply)
 
     @abstractmethod
-    def _say_piece(self, piece: bytes, rate_hz: int, channels: int) -> float:
+    def _say_piece(self, piece: bytes, rate_hz: int, channels: int, volume: float) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
 
     @abstractmethod

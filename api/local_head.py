@@ -134,9 +134,9 @@ class LocalHead(Head):
         assert voice is not None, "only a run without a program has none"
         return voice
 
-    def _say_piece(self, piece: bytes, rate_hz: int, channels: int) -> float:
+    def _say_piece(self, piece: bytes, rate_hz: int, channels: int, volume: float) -> float:
         try:
-            return self._voice().feed(piece, rate_hz, channels)
+            return self._voice().feed(piece, rate_hz, channels, volume)
         except (ValueError, SoundError) as error:
             raise Refused(str(error)) from None
 
@@ -372,7 +372,9 @@ class SimulatedHead(LocalHead):
                 return True
         return False
 
-    def _say_stream(self, pieces: Iterable[bytes], rate_hz: int, channels: int) -> Order:
+    def _say_stream(
+        self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float
+    ) -> Order:
         """Say the whole stream; its pieces are read first, as time does not pass meanwhile."""
         try:
             speech = self._voice().prepare_stream(tuple(pieces), rate_hz, channels, self._who)

@@ -77,8 +77,8 @@ class RemoteHead(Head):
         """Return behaviours, conversation modes and lid states; the active one is the first."""
         return self._client.menus()
 
-    def _say_piece(self, piece: bytes, rate_hz: int, channels: int) -> float:
-        return self._client.say_piece(piece, rate_hz, channels)
+    def _say_piece(self, piece: bytes, rate_hz: int, channels: int, volume: float) -> float:
+        return self._client.say_piece(piece, rate_hz, channels, volume=volume)
 
     def _end_stream(self, rate_hz: int, channels: int) -> None:
         self._client.say_piece(b"", rate_hz, channels, last=True)

@@ -1,24 +1,29 @@
 """Door to LiveKit Agents: the attribute ``lk.agent.state`` of the agent in a room.
 
 As a program of its own, the door joins the room with LIVEKIT_URL and LIVEKIT_TOKEN of its
-environment, subscribes to no media, and publishes nothing. In the agent's program one line is
-enough: ``follow(session)``. Both are read by the names of their fields, so they fit several
-versions; the package ``livekit`` is only needed to join a room.
+environment, subscribes to the agent's sound only, which moves the mouth, and publishes nothing. In
+the agent's program one line is enough: ``follow(session)``. Both are read by the names of their
+fields, so they fit several versions; the package ``livekit`` is only needed to join a room.
 """
 
 import asyncio
 import json
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from typing import Any
 
 import gazerig
 from gazerig.doors.door import Door, DoorLink, connect
+from gazerig.doors.spoken_sound import Mouth
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
 ATTRIBUTE = "lk.agent.state"
 TRANSCRIPTION = "lk.transcription"
+RATE_HZ = 16_000
+"""Rate of the samples that move the mouth."""
+_AUDIO = 1
+"""``TrackKind.KIND_AUDIO``."""
 _URL, _TOKEN = "LIVEKIT_URL", "LIVEKIT_TOKEN"
 
 
@@ -97,14 +102,21 @@ def plain_text(part: str) -> str:
         return part
 
 
-async def follow_room(link: DoorLink, room: Any, token: str) -> None:
+async def follow_room(
+    link: DoorLink, room: Any, token: str, options: Any = None,
+    listen: Callable[[Any], AsyncIterator[bytes]] | None = None,
+) -> None:  # fmt: skip
     """Join a room and follow its agent until the room is closed.
 
     Args:
         link: The head.
         room: A ``livekit.rtc.Room``.
         token: Access token of a participant who may subscribe.
+        options: ``RoomOptions`` without automatic subscription.
+        listen: Returns the samples of a track as they are heard, at RATE_HZ, one channel; None:
+            the mouth does not move.
     """
+    mouth = Mouth(link)
     states, closed, reading = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
 
     def take(message: Mapping[str, str]) -> None:
@@ -117,12 +129,37 @@ async def follow_room(link: DoorLink, room: Any, token: str) -> None:
         if ATTRIBUTE in attributes:
             take({ATTRIBUTE: attributes[ATTRIBUTE]})
 
+    def subscribe(participant: Any) -> None:
+        """Subscribe to the sound of an agent."""
+        if listen is not None and participant is not None and ATTRIBUTE in participant.attributes:
+            for publication in participant.track_publications.values():
+                if publication.kind == _AUDIO and not publication.subscribed:
+                    publication.set_subscribed(True)
+
+    def begin(work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.ensure_future(work)
+        reading.add(task)
+        task.add_done_callback(reading.discard)
+
+    async def move_mouth(sounds: AsyncIterator[bytes]) -> None:
+        async for pcm in sounds:
+            if states.talk.state == "speaking":
+                mouth.add(pcm, RATE_HZ)
+            else:
+                mouth.shut()
+
     def transcribe(stream: Any, identity: str) -> None:
         participant = room.remote_participants.get(identity)
         if participant is not None and ATTRIBUTE in participant.attributes:
-            task = asyncio.ensure_future(read(stream))
-            reading.add(task)
-            task.add_done_callback(reading.discard)
+            begin(read(stream))
+
+    def change(changed: Mapping[str, str], participant: Any) -> None:
+        follow(changed)
+        subscribe(participant)
+
+    def join(participant: Any) -> None:
+        follow(participant.attributes)
+        subscribe(participant)
 
     async def read(stream: Any) -> None:
         async for part in stream:
@@ -132,19 +169,23 @@ async def follow_room(link: DoorLink, room: Any, token: str) -> None:
         if ATTRIBUTE in participant.attributes:
             take({ATTRIBUTE: "idle"})
 
-    room.on("participant_attributes_changed", lambda changed, participant: follow(changed))
-    room.on("participant_connected", lambda participant: follow(participant.attributes))
+    room.on("participant_attributes_changed", change)
+    room.on("participant_connected", join)
+    room.on("track_published", lambda publication, participant: subscribe(participant))
+    if listen is not None:
+        room.on("track_subscribed", lambda track, *of: begin(move_mouth(listen(track))))
     room.on("participant_disconnected", leave)
     room.on("disconnected", lambda *reason: closed.set())
     room.register_text_stream_handler(TRANSCRIPTION, transcribe)
     try:
-        await room.connect(link.address, token)
+        await room.connect(link.address, token, *([options] if options is not None else []))
         link.report(f"connected to {link.address}")
         for participant in room.remote_participants.values():
-            follow(participant.attributes)
+            join(participant)
         await closed.wait()
     finally:
         link.send(states.talk.end())
+        mouth.shut()
         for task in reading:
             task.cancel()
         await room.disconnect()
@@ -167,8 +208,14 @@ async def serve(link: DoorLink) -> None:
         from livekit import rtc
     except ImportError as error:
         raise gazerig.Error(f"livekit is missing ({error}): pip install livekit") from None
+
+    async def listen(track: Any) -> AsyncIterator[bytes]:
+        async for event in rtc.AudioStream(track, sample_rate=RATE_HZ, num_channels=1):
+            yield bytes(event.frame.data)
+
+    options = rtc.RoomOptions(auto_subscribe=False)
     await link.keep(
-        lambda: follow_room(link, rtc.Room(), token),
+        lambda: follow_room(link, rtc.Room(), token, options, listen),
         "a LiveKit room with an agent",
         f"a token lasts for hours only: check {_TOKEN}",
         (OSError, TimeoutError, rtc.ConnectError),

@@ -7,6 +7,7 @@ brackets: ``response.output_audio.delta`` (``response.audio.delta``).
 """
 
 import asyncio
+import base64
 import contextlib
 import json
 from collections.abc import Mapping
@@ -15,6 +16,7 @@ from typing import Any
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType, web
 
 from gazerig.doors.door import Door, DoorLink
+from gazerig.doors.spoken_sound import Mouth
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
 from gazerig.doors.web_socket import ERRORS, Intake, listen
 
@@ -23,6 +25,8 @@ _PCM, _PCM_HZ = ("audio/pcm", "pcm16"), 24_000
 """16 bits a sample, the default."""
 _G711, _G711_HZ = ("audio/pcmu", "audio/pcma", "g711_ulaw", "g711_alaw"), 8_000
 """8 bits a sample."""
+_AUDIO = ("response.output_audio.delta", "response.audio.delta")
+_AUDIO_DONE = ("response.output_audio.done", "response.audio.done")
 _PASSED_ON = ("authorization", "openai-", "api-key", "user-agent", "x-")
 """Beginnings of the headers that the server needs."""
 _LOOK_S = 0.1
@@ -33,11 +37,14 @@ class OpenAIRealtime:
 
     The audio of an answer usually arrives faster than it is played, so the end of speech is
     computed from its length.
+
+    Attributes:
+        rate_hz: Rate of the audio's samples, 0 if they are those of a telephone.
     """
 
     def __init__(self) -> None:
         self.talk = TurnTaking("listening", streams_text=True)
-        self._bytes_per_s = 2 * _PCM_HZ
+        self._bytes_per_s, self.rate_hz = 2 * _PCM_HZ, _PCM_HZ
         self._audio_s = 0.0
         self._complete = False
 
@@ -56,14 +63,14 @@ class OpenAIRealtime:
                 if talk.state != "speaking":  # otherwise the answers follow each other
                     self._audio_s = 0.0
                 return talk.partner_pauses()
-            case "response.output_audio.delta" | "response.audio.delta":
+            case kind if kind in _AUDIO:
                 # Base64: four characters for three bytes.
                 length = len(field(message, "delta", str, "")) * 3 // 4
                 self._audio_s += length / self._bytes_per_s
                 return talk.speak(now_s) if length else ()
             case "response.output_audio_transcript.delta" | "response.audio_transcript.delta":
                 return talk.add_text(field(message, "delta", str, ""), now_s)
-            case "response.output_audio.done" | "response.audio.done":
+            case kind if kind in _AUDIO_DONE:
                 return talk.speak(now_s, self._audio_s) if talk.state == "speaking" else ()
             case "output_audio_buffer.stopped" | "output_audio_buffer.cleared":
                 return talk.end_speech()
@@ -72,6 +79,15 @@ class OpenAIRealtime:
                 if talk.state == "thinking":  # an answer without speech
                     return talk.end()
         return ()
+
+    def sound(self, message: Mapping[str, Any]) -> bytes:
+        """Return the samples of a server event, b"" without any or if they are a telephone's."""
+        if not self.rate_hz or message.get("type") not in _AUDIO:
+            return b""
+        try:
+            return base64.b64decode(field(message, "delta", str, ""), validate=True)
+        except ValueError:
+            return b""
 
     def due(self, now_s: float) -> Orders:
         """Return the orders for an answer that has been played to its end."""
@@ -83,9 +99,10 @@ class OpenAIRealtime:
         audio = field(output, "format", dict, {})
         name = str(audio.get("type") or session.get("output_audio_format"))
         if name in _G711:
-            self._bytes_per_s = _G711_HZ
+            self._bytes_per_s, self.rate_hz = _G711_HZ, 0
         elif name in _PCM:
-            self._bytes_per_s = 2 * (field(audio, "rate", int, 0) or _PCM_HZ)
+            self.rate_hz = field(audio, "rate", int, 0) or _PCM_HZ
+            self._bytes_per_s = 2 * self.rate_hz
 
 
 async def serve(link: DoorLink) -> None:
@@ -123,7 +140,7 @@ async def _relay(
 ) -> None:
     """Relay a session until one side ends it."""
     events = OpenAIRealtime()
-    intake = Intake(link, events)
+    intake, mouth = Intake(link, events), Mouth(link)
 
     async def upwards() -> None:
         async for message in program:
@@ -137,6 +154,12 @@ async def _relay(
                 with contextlib.suppress(ValueError, RecursionError):
                     if isinstance(event := json.loads(message.data), dict):
                         intake.translate(event)
+                        if pcm := events.sound(event):
+                            mouth.add(pcm, events.rate_hz)
+                        elif event.get("type") in _AUDIO_DONE:
+                            mouth.end()
+                        elif events.talk.state != "speaking":
+                            mouth.shut()
         await program.close(code=server.close_code or 1000)
 
     async def look() -> None:
@@ -152,6 +175,7 @@ async def _relay(
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         intake.end()
+        mouth.shut()
 
 
 async def _pass(

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from gazerig.doors.door import Door, DoorLink, connect
+from gazerig.doors.spoken_sound import Mouth
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage, field
 from gazerig.doors.web_socket import receive_sockets
 
@@ -38,6 +39,8 @@ FRAMES: Mapping[str, str] = {
     "CancelFrame": "end",
 }
 """Name of a frame's class -> the RTVI message with the same meaning."""
+_SOUND = "TTSAudioRawFrame"
+_SILENCES = ("bot-interrupted", "bot-stopped-speaking", "end")
 
 
 class Pipecat:
@@ -102,10 +105,15 @@ class HeadObserver(BaseObserver):  # type: ignore[misc]
         self._head, self._link = head, link
         self._messages = Pipecat()
         self._seen: int | None = None
+        self._mouth: Mouth | None = None
 
     async def on_push_frame(self, data: Any) -> None:
         """Read a frame that one processor has pushed to the next."""
         frame = data.frame
+        if type(frame).__name__ == _SOUND and getattr(data, "first_push", False):
+            link = self._start()
+            self._mouth = self._mouth or Mouth(link)
+            self._mouth.add(frame.audio, frame.sample_rate, frame.num_channels)
         kind = FRAMES.get(type(frame).__name__)
         number = getattr(frame, "id", None)
         # A frame is reported at each processor that it passes; a broadcast one, in both directions.
@@ -116,9 +124,13 @@ class HeadObserver(BaseObserver):  # type: ignore[misc]
         link = self._start()
         message = {"label": "rtvi-ai", "type": kind, "data": {"text": getattr(frame, "text", "")}}
         link.send(self._messages.take(message, link.now_s()))
+        if self._mouth is not None and kind in _SILENCES:
+            self._mouth.shut()
 
     async def cleanup(self) -> None:
         """Disconnect from the head."""
+        if self._mouth is not None:
+            self._mouth.shut()
         if self._link is not None:
             await self._link.close()
         if hasattr(super(), "cleanup"):

@@ -380,6 +380,7 @@ def test_realtime_sessions_are_relayed_with_their_key() -> None:
             await sockets[0].send_json(event("response.output_audio.done"))
             await sockets[0].send_json(event("response.done"))
             await until(lambda: head.last == "listening")
+            assert head.mouths == [(24_000, 1, bytes(4800))] and not head.sounds
             await sockets[0].close(code=4000)
             while not program.closed:
                 await program.receive()
@@ -547,18 +548,24 @@ def test_an_agent_s_session_steers_the_head() -> None:
 def test_an_agent_in_a_room_steers_the_head() -> None:
     head, room = TalkingHead(), Emitter()
 
-    async def stream(text: str) -> AsyncIterator[str]:
-        yield text
+    subscribed: list[bool] = []
+
+    async def stream(part: Any) -> AsyncIterator[Any]:
+        yield part
 
     async def scenario() -> None:
         link = DoorLink(head.connect, head.said.append, "ws://room")
         link.start()
-        room.remote_participants = {"a": SimpleNamespace(attributes=agent("thinking"))}
-        following = asyncio.ensure_future(livekit.follow_room(link, room, "token"))
+        sound = SimpleNamespace(kind=1, subscribed=False, set_subscribed=subscribed.append)
+        known = SimpleNamespace(attributes=agent("thinking"), track_publications={"s": sound})
+        room.remote_participants = {"a": known}
+        work = livekit.follow_room(link, room, "token", "options", lambda track: stream(track))
+        following = asyncio.ensure_future(work)
         await until(lambda: head.states == ["thinking"])
-        assert room.joined == ("ws://room", "token")
+        assert room.joined == ("ws://room", "token", "options") and subscribed == [True]
         room.handlers["participant_attributes_changed"](agent("speaking"), None)
         await until(lambda: head.last == "speaking")
+        room.handlers["track_subscribed"](bytes(640), sound, known)
         for identity in ("someone", "a"):
             room.streams["lk.transcription"](stream(SAID), identity)
         await until(lambda: ("speaking", None, SAID) in head.orders)
@@ -569,6 +576,7 @@ def test_an_agent_in_a_room_steers_the_head() -> None:
         await link.close()
 
     asyncio.run(scenario())
+    assert head.mouths == [(16_000, 1, bytes(640))] and "speech" in head.ended_tracks
     assert room.joined == () and not any("token" in line for line in head.said)
 
 

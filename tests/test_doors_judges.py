@@ -135,6 +135,7 @@ def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
     sent = (
         frames.UserStartedSpeakingFrame(), frames.UserStoppedSpeakingFrame(),
         frames.LLMFullResponseStartFrame(), frames.LLMTextFrame(SAID),
+        frames.TTSAudioRawFrame(bytes(640), 16_000, 1),
         frames.BotStartedSpeakingFrame(), frames.UserStartedSpeakingFrame(),
         frames.UserStoppedSpeakingFrame(), frames.UserStartedSpeakingFrame(),
         frames.InterruptionFrame(), frames.BotStoppedSpeakingFrame(),
@@ -149,6 +150,7 @@ def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
         "listening", "thinking", "speaking", "interrupt", "speaking", "interrupt", "idle"
     ]  # fmt: skip
     assert head.orders[2] == ("speaking", None, SAID) and not head.said
+    assert head.mouths == [(16_000, 1, bytes(640))] and not head.sounds
 
 
 # LiveKit
@@ -235,10 +237,13 @@ def room() -> Iterator[Any]:
 @pytest.mark.own_timeouts
 def test_livekit_s_room_has_our_events(room: Any) -> None:
     head = TalkingHead()
+    from livekit import rtc
     from livekit.rtc.room import EventTypes
 
     async def scenario() -> None:
         one, link = room(), link_to(head)
+        options = rtc.RoomOptions(auto_subscribe=False)
+        assert rtc.TrackKind.KIND_AUDIO == 1
         names, register = list[str](), one.on
 
         def on(name: str, handler: Any) -> None:
@@ -249,8 +254,9 @@ def test_livekit_s_room_has_our_events(room: Any) -> None:
         link.address = f"ws://127.0.0.1:{free_port()}"
         link.start()
         with pytest.raises(Exception, match="engine|connect|signal|refused"):
-            await livekit.follow_room(link, one, "token")
+            await livekit.follow_room(link, one, "token", options, rtc.AudioStream)
         assert set(names) <= set(get_args(EventTypes))
+        assert {"kind", "subscribed", "set_subscribed"} <= set(dir(rtc.RemoteTrackPublication))
         one.emit("participant_attributes_changed", {livekit.ATTRIBUTE: "thinking"}, None)
         await until(lambda: head.last == "thinking")
         await link.close()

@@ -258,6 +258,28 @@ def test_a_posted_order_ends_by_its_time_or_after_its_request(rig: Rig) -> None:
     rig.until(lambda now: not now["controlled_by"])
 
 
+def test_posted_speech_lasts_for_its_seconds_and_other_states_for_one(rig: Rig) -> None:
+    """A request has no connection that could be lost; times are those of the head's clock."""
+
+    def talk(**message: object) -> dict[str, Any]:
+        assert "ok" in rig.post({"do": "talk", **message}, "?wait_s=0")[1]
+        return conversation()
+
+    def conversation() -> dict[str, Any]:
+        now = rig.get("/state")[1]["ok"]["state"]
+        return {"t_s": now["t_s"], **now["conversation"]}
+
+    spoken = talk(state="speaking", seconds=2.0)
+    while (now := conversation())["t_s"] < spoken["since_s"] + 1.5:
+        assert now["state"] == "speaking" and now["ends_s"] == spoken["since_s"] + 2.0
+    for message in ({"state": "listening"}, {"state": "speaking", "text": "x" * 90}):
+        begun = talk(**message)
+        while (now := conversation())["state"] != "idle":
+            pass
+        assert now["end_reason"] == "not renewed"
+        assert now["since_s"] - begun["since_s"] == pytest.approx(1.0, abs=0.1)
+
+
 def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
     """A leaving program of the network does not disturb the client in control on this computer."""
     with rig.dial() as end:

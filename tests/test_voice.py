@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -261,6 +262,28 @@ def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_mes
         line = "the sound's process has ended (SIGKILL): the next sound starts it again"
         wait_for(lambda: [one.text for one in head.events(0.0)].count(line) == 1)
         assert head.say("short.wav").wait(20.0) == "arrived"
+
+
+@pytest.mark.own_timeouts
+def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder: Path) -> None:
+    text, rig = (folder / "rig.yaml").read_text("utf-8"), folder / "elsewhere.yaml"
+    rig.write_text(text.replace("device: silent", "device: none such"), "utf-8")
+    with gazerig.open(str(rig), mock=True, say=lambda line: None) as head:
+        pieces = [speech(1.0)[i : i + 1280] for i in range(0, 32000, 1280)]
+        with pytest.raises(Refused, match="none such"):
+            head.say(pieces, rate_hz=RATE)
+        with pytest.raises(Refused, match="the volume is 2: give 0..1"):
+            head.say(pieces, rate_hz=RATE, volume=2.0)
+        thread = threading.Thread(target=lambda: head.say(pieces, rate_hz=RATE, volume=0.0))
+        thread.start()
+        wait_for(lambda: head.state.joints["jaw"].commanded_deg > 0.3 * JAW_DEG)
+        thread.join()
+        wait_for(lambda: not [one for one in head.state.tracks if one.is_playing])
+    with (
+        gazerig.open("desk", mock=True, say=lambda line: None) as head,
+        pytest.raises(Refused, match="no level 'mouth'"),
+    ):
+        head.say(pieces, rate_hz=RATE, volume=0.0)
 
 
 @pytest.mark.own_timeouts

@@ -19,7 +19,7 @@ import numpy as np
 
 from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.rig import Rig
-from gazerig.drivers.sound.params import KINDS
+from gazerig.drivers.sound.params import KINDS, SILENT_DEVICE
 from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
@@ -93,6 +93,7 @@ class RunVoice:
         self._command, self._rig, self._clock = command, rig, clock
         self._folder, self._latencies_s, self._fast = folder, latencies_s, fast
         self._player: SoundPlayer | None = None
+        self._device = rig().sound.device
         self._lock = threading.RLock()
         self._wake = threading.Event()
         self._thread: threading.Thread | None = None
@@ -216,12 +217,12 @@ class RunVoice:
         write_wav(path, pcm, rate_hz, channels)
         return path
 
-    def _open_loudspeaker(self) -> None:
+    def _open_loudspeaker(self, muted: bool = False) -> None:
         """Open the loudspeaker, so that the sound begins with the motion."""
         if self._fast:
             return
         with self._lock:
-            player = self._require_player()
+            player = self._use_device(SILENT_DEVICE if muted else self._rig().sound.device)
             player.prepare()
         end_s = self._clock.now_s() + _OPEN_S
         while not player.is_open and self._clock.now_s() < end_s:
@@ -231,11 +232,19 @@ class RunVoice:
             if failed:
                 raise SoundError(failed[0])
 
+    def _use_device(self, device: str) -> SoundPlayer:
+        """Return the player on a device, instead of that on another one."""
+        if self._player is not None and self._device != device:
+            self._player.close()
+            self._player = None
+        self._device = device
+        return self._require_player()
+
     def _require_player(self) -> SoundPlayer:
         if self._closed:
             raise SoundError("the run has ended")
         if self._player is None:
-            self._player = SoundPlayer(self._rig().sound.device)
+            self._player = SoundPlayer(self._device)
         self._start_thread()
         return self._player
 
@@ -246,13 +255,15 @@ class RunVoice:
 
     # --- streams
 
-    def feed(self, pcm: bytes, rate_hz: int, channels: int) -> float:
+    def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float = 1.0) -> float:
         """Say a piece of a stream; the first one starts it.
 
         Args:
             pcm: Samples, signed, 16 bits, channels interleaved.
             rate_hz: Rate of the stream.
             channels: 1 or 2.
+            volume: Factor 0..1, of the first piece; 0: the sound is heard from elsewhere, and only
+                the mouth moves, without a loudspeaker.
 
         Returns:
             Length of the part that has not been heard yet, s.
@@ -262,7 +273,14 @@ class RunVoice:
             ValueError: the head does not accept the speech.
         """
         if self._stream is None:
-            self._open_loudspeaker()
+            if not 0.0 <= volume <= 1.0:
+                raise SoundError(f"the volume is {volume:g}: give 0..1")
+            if not volume and self._rig().gaze.mouth.level not in self._rig().levels:
+                raise SoundError(
+                    f"this head has no level {self._rig().gaze.mouth.level!r} that a sound without "
+                    "volume could move"
+                )
+            self._open_loudspeaker(muted=not volume)
         now_s = self._clock.now_s()
         with self._lock:
             tick = self._tick
@@ -271,7 +289,7 @@ class RunVoice:
             player = self._require_player()
             begins = self._stream is None
             if begins:
-                self._start_stream(player, rate_hz, channels)
+                self._start_stream(player, rate_hz, channels, volume)
             stream = self._stream
             assert stream is not None
             if (rate_hz, channels) != (stream.rate_hz, stream.channels):
@@ -289,7 +307,9 @@ class RunVoice:
             stream.mouth.add(_mono(pcm, channels))
             return player.ahead_s(now_s)
 
-    def _start_stream(self, player: SoundPlayer, rate_hz: int, channels: int) -> None:
+    def _start_stream(
+        self, player: SoundPlayer, rate_hz: int, channels: int, volume: float
+    ) -> None:
         rig = self._rig()
         check_format(rate_hz, channels)
         ticket = self._command(self._speak("", _STREAM_TRACK_S))
@@ -298,7 +318,7 @@ class RunVoice:
             raise SoundError(reply.refused if reply is not None else "the control loop hangs")
         now_s = self._clock.now_s()
         self._played = None  # the stream replaces it; to stop it later would stop the stream
-        player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, rig.sound.volume)
+        player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, volume * rig.sound.volume)
         mouth = StreamMouth(rate_hz, rig.gaze.mouth.quiet_db)
         level = rig.levels.get(rig.gaze.mouth.level)
         lead_s = self._latencies_s()[rig.names.index(level.joint)] if level else 0.0
@@ -403,7 +423,7 @@ class RunVoice:
         track_s = wanted.position_s + now_s - tick.t_s
         if self._played is None or self._played.number != wanted.number:
             self._end_stream(tick)
-            self._start_sound(player, wanted, tick)
+            self._start_sound(wanted, tick)
             return
         self._played = wanted
         heard_s = player.position_s(now_s)
@@ -412,16 +432,16 @@ class RunVoice:
         error_s = heard_s - self._latency_s - track_s
         if abs(error_s) > _RESTART_ERROR_S and (not self._over or error_s > 0.0):  # a seek
             if now_s - self._started_s > 5.0 * _RESTART_ERROR_S:
-                self._start_sound(player, wanted, tick)
+                self._start_sound(wanted, tick)
         elif not self._over and now_s - self._synced_s >= _SYNC_EVERY_S:
             self._synced_s = now_s
             if abs(error_s) > _SYNC_ERROR_S:
                 self._try(SyncTrack(wanted.number, track_s + error_s, "sound"))
 
-    def _start_sound(self, player: SoundPlayer, wanted: TrackState, tick: Tick) -> None:
+    def _start_sound(self, wanted: TrackState, tick: Tick) -> None:
         self._played, self._over, self._started_s = wanted, False, self._clock.now_s()
         start_s = tick.t_s - wanted.position_s - self._latency_s
-        player.play(
+        self._use_device(self._rig().sound.device).play(
             wanted.sound, wanted.position_s, start_s, wanted.volume * self._rig().sound.volume
         )
 

@@ -39,7 +39,7 @@ CHANGES: dict[str, tuple[str, dict[str, Any]]] = {
     "character": ("Apply another character to the rig", {"name": str}),
     "say_piece": (
         "Say a piece of a stream, base64 of signed 16 bits; returns the unheard length in s",
-        {"pcm": str, "rate_hz": int, "channels": int, "last": bool},
+        {"pcm": str, "rate_hz": int, "channels": int, "last": bool, "volume": float},
     ),
     "fault": ("Execute a fault command of emulated servos (gazerig emulate)", {"text": str}),
 }
@@ -142,7 +142,7 @@ class Speaker(Protocol):
         """
         ...
 
-    def feed(self, pcm: bytes, rate_hz: int, channels: int, /) -> float:
+    def feed(self, pcm: bytes, rate_hz: int, channels: int, volume: float, /) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
         ...
 
@@ -264,9 +264,10 @@ class CommandHandler:
                 return QuestionAnswer(self._fault(text))
             case {
                 "do": "say_piece", "pcm": str(text), "rate_hz": int(rate_hz),
-                "channels": int(channels), "last": bool(last), **rest,
+                "channels": int(channels), "last": bool(last), "volume": int() | float() as volume,
+                **rest,
             } if not rest:  # fmt: skip
-                return QuestionAnswer(self._say_piece(text, rate_hz, channels, last))
+                return QuestionAnswer(self._say_piece(text, rate_hz, channels, last, volume))
             case {"do": str(name)} if name in COMMANDS:
                 return self.queue_command(sign(from_json(request)))
         return self._handle_params(request)
@@ -283,14 +284,16 @@ class CommandHandler:
             command = self._require_voice().prepare(command, self._paths is not None)
         return PendingCommand(command, self._robot.command(command))
 
-    def _say_piece(self, text: str, rate_hz: int, channels: int, last: bool) -> float:
+    def _say_piece(
+        self, text: str, rate_hz: int, channels: int, last: bool, volume: float
+    ) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
         voice = self._require_voice()
         try:
             pcm = b64decode(text, validate=True)
         except binascii.Error:
             raise ValueError("pcm must be base64") from None
-        ahead_s = voice.feed(pcm, rate_hz, channels)
+        ahead_s = voice.feed(pcm, rate_hz, channels, volume)
         if last:
             voice.finish()
         return ahead_s

@@ -432,7 +432,9 @@ class RobotClient:
         """
         return self._command(Say(what, volume, sway, (), self.who))
 
-    def say_piece(self, pcm: bytes, rate_hz: int, channels: int = 1, last: bool = False) -> float:
+    def say_piece(
+        self, pcm: bytes, rate_hz: int, channels: int = 1, last: bool = False, volume: float = 1.0
+    ) -> float:
         """Say a piece of a stream; return the length that has not been heard, s.
 
         Args:
@@ -440,12 +442,18 @@ class RobotClient:
             rate_hz: Rate of the stream.
             channels: 1 or 2.
             last: Whether it is the last piece.
+            volume: Factor 0..1 of the first piece; 0: only the mouth moves.
 
         Raises:
             RequestRejected: too much is waiting, or nothing can be played.
         """
         said = self._connection.ask(
-            "say_piece", pcm=b64encode(pcm).decode(), rate_hz=rate_hz, channels=channels, last=last
+            "say_piece",
+            pcm=b64encode(pcm).decode(),
+            rate_hz=rate_hz,
+            channels=channels,
+            last=last,
+            volume=volume,
         )
         return float(cast(float, said))
 

@@ -16,6 +16,8 @@ class TalkingHead:
     def __init__(self) -> None:
         self.orders: list[tuple[Any, ...]] = []
         self.sounds: list[tuple[int, int, bytes]] = []
+        self.mouths: list[tuple[int, int, bytes]] = []
+        self.ended_tracks: list[str] = []
         self.connected = self.refuses = ""
         self.ended = False
         self.said: list[str] = []
@@ -56,8 +58,15 @@ class TalkingHead:
     def interrupt(self) -> Any:
         return self._order("interrupt")
 
-    def say(self, pieces: Iterable[bytes], *, rate_hz: int, channels: int) -> Any:
-        self.sounds.append((rate_hz, channels, b"".join(pieces)))
+    def say(
+        self, pieces: Iterable[bytes], *, rate_hz: int, channels: int, volume: float = 1.0
+    ) -> Any:
+        sounds = self.sounds if volume else self.mouths
+        sounds.append((rate_hz, channels, b"".join(pieces)))
+        return self._order()
+
+    def end_track(self, track: str = "") -> Any:
+        self.ended_tracks.append(track)
         return self._order()
 
     @property
