@@ -17,7 +17,6 @@ from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.commands import (
-    NO_TRACK,
     Ask,
     Command,
     ControlCommand,
@@ -128,9 +127,6 @@ class CommandExecutor:
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Execute a command; return its reply."""
         match command:
-            case Ask("track", name):
-                play = Play("" if name == NO_TRACK else name)
-                return self.execute(self._tracks.measure_sound(play), t_s)
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
             case _ if isinstance(command, ControlCommand):

@@ -32,7 +32,16 @@ from gazerig.robot.control.track_choices import TrackChoices, TrackInfo
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import check_command
-from gazerig.robot.model.commands import Ask, Command, Jog, MoveOpponent, Play, Speak, Tune
+from gazerig.robot.model.commands import (
+    NO_TRACK,
+    Ask,
+    Command,
+    Jog,
+    MoveOpponent,
+    Play,
+    Speak,
+    Tune,
+)
 from gazerig.robot.model.conversation import Conversation
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
@@ -343,6 +352,8 @@ class Robot:
         taken = []
         for waiting in self._commands.take() if self._commands else ():
             command = self._looks.resolve_pixel(waiting.command)
+            if isinstance(command, Ask) and command.menu == "track":
+                command = Play("" if command.choice == NO_TRACK else command.choice)
             if isinstance(command, Play | Speak):
                 command = self._tracks.measure_sound(command)
             taken.append(command)
