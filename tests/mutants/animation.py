@@ -21,7 +21,7 @@ ANIMATION = (
            "the first pose is passed at speed", FILES),
     Mutant("features/bringup/hand_recording.py", "        if not rows or row[0] > rows[-1][0]:\n            rows.append(row)\n",
            "        rows.append(row)\n", "a lost head's last angle is recorded twice", ("live_recording",)),
-    Mutant("robot/control/joint_latency.py", "            error += speed * (read_s - times[1:-1])\n", "",
+    Mutant("robot/control/joint_latency.py", "np.where(valid, read_s, times_s[0])", "np.where(valid, times_s[used, None], times_s[0])",
            "the time of the reading is no part of the latency", ("joint_latency",)),
     Mutant("gaze/track/track_motion.py", "curve.state_at(max(0.0, t_s - delay_s))", "curve.state_at(max(0.0, t_s))",
            "joints of faster buses are too early", ("joint_latency",)),
