@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
-from math import inf, nan
+from math import inf, nan, radians
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,10 +14,11 @@ from commanded_robot import Running, running_desk
 import gazerig
 from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
+from gazerig.gaze.angles import angle_between
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
 from gazerig.gaze.attention.turn_gaze import NOD, TurnGaze, TurnParams
 from gazerig.gaze.attention.turn_state import TurnState
-from gazerig.gaze.types import Target
+from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
@@ -298,6 +299,15 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
                 onset = (speaks[0], -1.0)
     assert on / alone > 0.8
     assert len(shifts) > 5 and sorted(shifts)[len(shifts) // 2] < 0.4
+    # The partner who interrupts is looked at, whoever's mouth has moved before.
+    rig.do(Talk("speaking", addressee, seconds=60.0, stay=True))
+    for tick in rig.go(30.0):
+        assert tick.percept is not None
+        seen = {face.id: face.speaks for face in tick.percept.faces}
+        if tick.target.id not in (-1, addressee) and addressee in seen and any(seen.values()):
+            break
+    rig.do(Talk("interrupt", stay=True), 0.1)
+    assert {tick.target.id for tick in rig.go(1.0)} == {addressee}
     made.robot.stop()
     made.close()
 
@@ -352,6 +362,24 @@ def test_a_websocket_renews_what_its_program_controls() -> None:
     ):
         program.hold(message, reply)
         assert program.held == held and program.who == message["who"]
+
+
+def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
+    aversion = Aversion(AversionParams(), np.random.default_rng(2))
+    head, still = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+    def look(at_m: Vec3, t_s: float) -> Target:
+        face = Target(at_m, still, t_s, "face", 1, 1.0, True, None, 0, "a person")
+        return aversion.step(face, head, t_s)
+
+    ahead = (1.0, 0.0, 0.0)
+    look(ahead, 0.0)
+    aversion.converse("thinking", 0.0, averts=True)
+    away = look(ahead, 0.1)
+    assert away.kind == "away" and look(ahead, 0.2).p_world_m == away.p_world_m
+    moved = look(away.p_world_m, 0.3)  # the face is where the gaze was
+    assert moved.kind == "away" and moved.shift > away.shift
+    assert angle_between(moved.p_world_m, away.p_world_m) > radians(7.0)
 
 
 def test_a_look_over_two_turns_is_no_stare() -> None:

@@ -287,11 +287,15 @@ class Attention:
         least = self._focus[1] * (_URGENT if t_s - self._reported_s < _TURNS_S else 1.0)
         return rule_target._replace(salience=max(rule_target.salience, least))
 
-    def _favoured(self, ids: list[int]) -> tuple[frozenset[int], float]:
-        """Return the people who have a share of the looks together, and that share."""
+    def _favoured(self, ids: list[int], t_s: float) -> tuple[frozenset[int], float]:
+        """Return the people who have a share of the looks together, and that share.
+
+        A mouth shows late who speaks, so a partner just reported is favoured above speakers.
+        """
         share, partner = self._params.speaker_share, [id for id in ids if id == self._partner]
         found = self._speakers.intersection(ids)
-        if self._focus is not None and partner and (self._focus[0] > 0.0 or not found):
+        reported = t_s - self._reported_s < _TURNS_S
+        if self._focus is not None and partner and (self._focus[0] > 0.0 or reported or not found):
             return frozenset(partner), self._focus[0] or share
         return found, share
 
@@ -330,20 +334,20 @@ class Attention:
         moved = self._gestures
         mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
         weights = [near * one for near, one in zip(rule_target.nearness, mine, strict=True)]
-        weights = self._favour_speakers(named, weights)
+        weights = self._favour_speakers(named, weights, t_s)
         factors = self._habituation.share(named, weights, attended, t_s, self._stay)
         shares = [
             factor * one * (rule_target.stay if id == self._stay.id else 1.0)
             for id, factor, one in zip(named, factors, mine, strict=True)
         ]
-        if t_s - self._turned_s < _TURNS_S and (favoured := self._favoured(named)[0]):
+        if t_s - self._turned_s < _TURNS_S and (favoured := self._favoured(named, t_s)[0]):
             shares = [one if id in favoured else 0.0 for id, one in zip(named, shares, strict=True)]
         most = max(*shares, 1e-9)
         return [one / most for one in shares]
 
-    def _favour_speakers(self, ids: list[int], weights: list[float]) -> list[float]:
+    def _favour_speakers(self, ids: list[int], weights: list[float], t_s: float) -> list[float]:
         """Return the weights of people, in which those who may speak have their share."""
-        speaking, share = self._favoured(ids)
+        speaking, share = self._favoured(ids, t_s)
         spoken = sum(one for id, one in zip(ids, weights, strict=True) if id in speaking)
         mute = sum(weights) - spoken
         if share == 0.0 or spoken <= 0.0 or mute <= 0.0:

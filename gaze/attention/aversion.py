@@ -21,7 +21,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.angles import add, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import AWAY, Target, Vec3
 from gazerig.params import Bounds
 
@@ -35,6 +35,8 @@ DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
 _UP = 2
 _SIDE_SPREAD_DEG = 35.0
 """Largest angle between a role's look away and level, or straight up or down."""
+_DRIFT_DEG = 0.75
+"""Motion of a person during a look away of a reported turn, which must stay beside the face."""
 _MODE_TEXT = {"none": "no conversation"}
 
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
@@ -75,9 +77,9 @@ class AversionParams:
         "smallest angle between a look away and the outline of the face, which for a near face is farther out than least_deg"] = 2.0
     talk_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while talking or thinking"] = 27.5
     listen_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while listening or without a conversation"] = 22.7
-    speaking_mutual_s: Annotated[float, Bounds(0.1, 60), "reported speech: mean time on the face"] = 2.4
+    speaking_mutual_s: Annotated[float, Bounds(0.1, 60), "reported speech: mean time on the face"] = 3.2
     speaking_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "reported speech: standard deviation of the time on the face"] = 1.6
-    speaking_away_s: Annotated[float, Bounds(0.1, 60), "reported speech: mean time away"] = 1.6
+    speaking_away_s: Annotated[float, Bounds(0.1, 60), "reported speech: mean time away"] = 2.0
     speaking_away_sd_s: Annotated[float, Bounds(0.1, 60), "reported speech: standard deviation of the time away"] = 0.9
     listening_mutual_s: Annotated[float, Bounds(0.1, 60), "reported listening: mean time on the face"] = 14.0
     listening_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "reported listening: standard deviation of the time on the face"] = 3.0
@@ -249,6 +251,9 @@ class Aversion:
             self._turn(target, p_world_head_m, t_s)
         if self._away is not None:
             self._away_s = t_s
+            centre = _centre_of_target(target)
+            if self._mode in _ROLES and self._is_on_face(self._away, centre, p_world_head_m):
+                self._avert(target, p_world_head_m)  # the person has moved into the look away
             return self._away_target(target, self._away, t_s)
         if self._shifts == 0:
             return target
@@ -274,13 +279,17 @@ class Aversion:
             self._return()
             self._until_s = t_s + self._mutual_s()
             return
-        self._away = self._draw_place(_centre_of_target(target), p_world_head_m)
-        self._shifts += 1
-        self._away_shift = target.shift + self._shifts
+        self._avert(target, p_world_head_m)
         away_s, self._averts_s = self._averts_s, None
         if away_s is None:
             away_s = self._time_s(*self._times[self._mode][2:])
         self._until_s = t_s + away_s
+
+    def _avert(self, target: Target, p_world_head_m: Vec3) -> None:
+        """Look at a new place next to the face."""
+        self._away = self._draw_place(_centre_of_target(target), p_world_head_m)
+        self._shifts += 1
+        self._away_shift = target.shift + self._shifts
 
     def _return(self) -> None:
         if self._away is not None:
@@ -304,21 +313,29 @@ class Aversion:
     def _draw_place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
         """Draw a point next to the face, at the distance of the face."""
         rel = sub(face, p_world_head_m)
-        ahead = unit(rel)
-        right = unit(cross(ahead, (0.0, 0.0, 1.0)))
-        up = cross(right, ahead)
+        ahead, right, up = _axes_to(rel)
         way = radians(self._draw_direction_deg())
         angle = radians(self._angle_deg(face_extent_deg(way, norm(rel))))
         aside = add(scale(right, cos(way)), scale(up, sin(way)))
         looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
         return add(p_world_head_m, scale(looking, norm(rel)))
 
+    def _is_on_face(self, away: Vec3, face: Vec3, p_world_head_m: Vec3) -> bool:
+        """Return whether a place is closer to the outline of a face than a look away may be."""
+        rel, to_away = sub(face, p_world_head_m), sub(away, p_world_head_m)
+        ahead, right, up = _axes_to(rel)
+        x, y, z = dot(to_away, ahead), dot(to_away, right), dot(to_away, up)
+        edge_deg = face_extent_deg(atan2(z, y), norm(rel))
+        return degrees(atan2(hypot(y, z), x)) < edge_deg + self._params.beside_deg - _DRIFT_DEG
+
     def _angle_deg(self, edge_deg: float) -> float:
         """Draw the amplitude of an aversion past the edge of the face, in degrees."""
         par = self._params
         near = self._mode in ("listen", "listening", "none")
-        least = par.role_least_deg if self._mode in _ROLES else par.least_deg
-        least = max(least, edge_deg + par.beside_deg)
+        least, drift = par.least_deg, 0.0
+        if self._mode in _ROLES:
+            least, drift = par.role_least_deg, _DRIFT_DEG
+        least = max(least, edge_deg + par.beside_deg + drift)
         most = max(least, par.listen_most_deg if near else par.talk_most_deg)
         # The law's P, restricted to amplitudes of at least the required one; never 0.
         p_most = min(_P_MOST, _P_TOP * exp(-least / _SCALE_DEG))
@@ -369,6 +386,13 @@ def face_extent_deg(way_rad: float, distance_m: float) -> float:
     """Return the extent of a face from its centre, degrees, in a direction (0 right, pi/2 up)."""
     across, up = cos(way_rad) / _HALF_WIDE_M, sin(way_rad) / _HALF_HIGH_M
     return degrees(atan2(1.0 / hypot(across, up), distance_m))
+
+
+def _axes_to(rel: Vec3) -> tuple[Vec3, Vec3, Vec3]:
+    """Return the unit vectors towards a point, to the right of it, and up."""
+    ahead = unit(rel)
+    right = unit(cross(ahead, (0.0, 0.0, 1.0)))
+    return ahead, right, cross(right, ahead)
 
 
 def _centre_of_target(target: Target) -> Vec3:

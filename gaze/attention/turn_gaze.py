@@ -47,7 +47,7 @@ class TurnParams:
         "aversion in reported turns: people: as measured in remote talk, mostly aside; eyes_alive: as in the modes talk, listen and "
         "think, which looks up"] = "people"
     long_turn_s: Annotated[float, Bounds(0, 60), "shortest planned turn that begins averted"] = 3.5
-    starts_averted_share: Annotated[float, Bounds(0, 1), "share of the long turns that begin averted"] = 0.85
+    starts_averted_share: Annotated[float, Bounds(0, 1), "share of the long turns that begin averted"] = 0.95
     start_away_s: Annotated[float, Bounds(0.1, 10), "time into a turn until the gaze returns to the face, mean"] = 1.2
     start_away_sd_s: Annotated[float, Bounds(0, 5), "its standard deviation"] = 0.25
     yield_s: Annotated[float, Bounds(0, 10), "time before the planned end at which the gaze is on the face again, mean"] = 2.3

@@ -1,7 +1,7 @@
 """Conversation beside people: looks away by role, begin and end of turns, latencies.
 
 ``python tests/lab/bench_conversation.py [MODEL_MINUTES [RIG_MINUTES]]`` prints the measures of
-the model alone and of the whole product, for three seeds. docs/measurements/conversation.md has
+the model alone and of the whole product, for six seeds. docs/measurements/conversation.md has
 the results.
 """
 
@@ -17,7 +17,7 @@ from gazerig.features.lab.report.statistics import measured_value
 from gazerig.features.lab.report.turns import Role, TurnLooks, TurnTrace, measures
 from gazerig.robot.analysis.human_norms import BY_KEY
 
-SEEDS = (1, 2, 3)
+SEEDS = range(6)
 
 
 def show(name: str, role: Script, runs: list[TurnTrace]) -> None:

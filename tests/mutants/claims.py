@@ -706,7 +706,7 @@ CLAIMS = (
     Mutant("gaze/attention/aversion.py", "leaves = self._away is not None or t_s >= rests_until_s", "leaves = True",
            "a look away leaves in the middle of a rest",
            ("aversion",), ("Idle behaviour and gaze aversion",)),
-    Mutant("gaze/attention/aversion.py", "least = max(least, edge_deg + par.beside_deg)", "pass",
+    Mutant("gaze/attention/aversion.py", "least = max(least, edge_deg + par.beside_deg + drift)", "pass",
            "looks away end on the face",
            ("aversion",), ("Idle behaviour and gaze aversion",)),
 )  # fmt: skip

@@ -19,7 +19,7 @@ Role = Literal["speaking", "listening", "dialogue"]
 
 STATES: tuple[TurnState, ...] = get_args(TurnState)
 AVERTED_DEG = 6.0
-_CLEAR_DEG = 1.0
+CLEAR_DEG = 1.0
 _, _LISTENS, _THINKS, _SPEAKS, _INTERRUPTED = range(5)
 _BRIDGED_S = 0.1
 """Shorter looks, and shorter times between two, do not count."""
@@ -82,7 +82,7 @@ class TurnLooks:
         self.run = run
         off = run.off_deg
         far = np.nan_to_num(np.hypot(off[:, 0], off[:, 1])) > np.maximum(
-            AVERTED_DEG, np.nan_to_num(run.edge_deg) + _CLEAR_DEG
+            AVERTED_DEG, np.nan_to_num(run.edge_deg) + CLEAR_DEG
         )
         self.known = ~np.isnan(off[:, 0])
         self.averted = _bridge(run.t_s, _bridge(run.t_s, far, True), False)
