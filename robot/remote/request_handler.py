@@ -129,6 +129,7 @@ class LoopMonitor:
             "camera": list(camera_conditions(tick)),
             "level": tick.guard_result.level,
             "reasons": list(tick.guard_result.reasons),
+            "limp": list(tick.guard_result.limp),
             "target": does.target,
             "why": does.reason,
             "phase": does.phase,
