@@ -31,11 +31,13 @@ if TYPE_CHECKING:
     from gazerig.robot.control.head_state import HeadState as HeadState
     from gazerig.robot.control.head_state import JointReading as JointReading
     from gazerig.robot.control.head_state import Person as Person
+    from gazerig.robot.model.conversation import CHARACTERS_PER_S as CHARACTERS_PER_S
     from gazerig.robot.model.outcome import Outcome as Outcome
 
     __version__: str
 
 _HOME = {
+    "CHARACTERS_PER_S": "gazerig.robot.model.conversation",
     "ConfigError": "gazerig.config.faults",
     "Error": "gazerig.errors",
     "GazeReading": "gazerig.robot.control.head_state",
@@ -62,9 +64,10 @@ _HOME = {
 """Name -> module, imported at first use: a short command must not wait for all of them."""
 
 __all__ = [  # noqa: F822
-    "ConfigError", "Error", "GazeReading", "Head", "HeadEnded", "HeadEvent", "HeadPose",
-    "HeadState", "JointReading", "JointSolution", "NotFound", "Order", "Outcome", "Person",
-    "Refused", "SetupError", "SimulatedHead", "connect", "forward", "inverse", "load_rig", "open",
+    "CHARACTERS_PER_S", "ConfigError", "Error", "GazeReading", "Head", "HeadEnded", "HeadEvent",
+    "HeadPose", "HeadState", "JointReading", "JointSolution", "NotFound", "Order", "Outcome",
+    "Person", "Refused", "SetupError", "SimulatedHead", "connect", "forward", "inverse", "load_rig",
+    "open",
 ]  # fmt: skip
 
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any, Literal, NamedTuple
 
-CHARACTERS_PER_S = 15.0
-"""Rate of synthetic speech in English: about 150 words a minute."""
+import gazerig
+
 _REPLAN_S = 0.3
 """A change of the planned end by less than this gives no order."""
 _AHEAD_S = 1.0
@@ -125,7 +125,7 @@ class TurnTaking:
         if self._seconds is not None:
             return self._begin_s + self._seconds
         known = len(self._text) >= self._least_characters
-        return self._begin_s + len(self._text) / CHARACTERS_PER_S if known else inf
+        return self._begin_s + len(self._text) / gazerig.CHARACTERS_PER_S if known else inf
 
     def _correct(self, now_s: float) -> Orders:
         """Return the orders for a planned end that has changed during own speech."""
@@ -139,7 +139,7 @@ class TurnTaking:
         self._end_s = self._planned_end_s()
         if self._seconds is not None:
             return TurnOrder("speaking", max(_LEAST_S, round(self._end_s - now_s, 3)), self._text)
-        spoken = int((now_s - self._begin_s) * CHARACTERS_PER_S)
+        spoken = int((now_s - self._begin_s) * gazerig.CHARACTERS_PER_S)
         return TurnOrder("speaking", None, self._text[spoken:] if self._end_s < inf else "")
 
     def _change(self, state: OrderName, order: OrderName | None = None) -> Orders:

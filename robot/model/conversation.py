@@ -7,7 +7,7 @@ from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.lease import Lease
 
 CHARACTERS_PER_S = 15.0
-"""Speed of speech, for the end of a text without times."""
+"""Rate of speech, for the end of a text without times: about 150 English words a minute."""
 LAST_WORD_S = 0.4
 """Assumed duration of the last word."""
 GIVEN, TIMED, ESTIMATED = 0.9, 0.8, 0.3
