@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from mixed_rig import mixed_text
 
 import gazerig
 from gazerig.config.load import ConfigError, shipped_path
@@ -226,3 +227,21 @@ def test_status_line_and_page_show_it() -> None:
         Servos(*row, limp=("jaw",)), ("jaw",)
     )
     assert "<div class='quiet'>torque off</div>" in servo_table(Servos(*row), ("jaw",))
+
+
+def test_on_a_rig_of_several_buses_only_the_jaw_is_limp(tmp_path: Path) -> None:
+    jaw = """
+  jaw: {id: 2, model: sts3215, bus: tilt, min_deg: -2.0, max_deg: 25.0, limp_when_idle_s: 1.0,
+    max_speed_deg_s: 300.0, max_accel_deg_s2: 12000.0, gains: [32, 0, 64]}
+"""
+    path = tmp_path / "mixed.yaml"
+    path.write_text(
+        mixed_text().replace("\nlid_joints:", f"{jaw}\nlid_joints:")
+        + "\nlevels:\n  mouth: {joint: jaw, low_deg: 0, high_deg: 12}\n"
+    )
+    with gazerig.open(str(path), fast=True) as head:
+        head.step(2.5)
+        limp = [name for name, one in head.state.joints.items() if not one.torque]
+        assert limp == ["jaw"] and Jaw(head).now.limited == "limp"
+        assert Jaw(head).open_wide()[-1] == pytest.approx(6.0, abs=0.5)
+        assert all(one.torque for one in head.state.joints.values())
