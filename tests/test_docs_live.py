@@ -9,6 +9,8 @@ from pathlib import Path
 from shutil import which
 
 import pytest
+from branch import Branch
+from branch import gazerig as gazerig_branch
 from command_line import GAZERIG, invoked
 from features_there import needs_all_features
 from papers import COMMANDS, blocks
@@ -64,12 +66,14 @@ def works(words: str, answers: str = "") -> str:
     return done.out + done.err
 
 
-def works_until_ctrl_c(words: str, first: str) -> None:
-    """Type a command that goes on, and press Ctrl-C once it has written ``first``."""
-    process = subprocess.Popen(
-        [*GAZERIG, *shlex.split(words)],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
+def typed_alone(words: str) -> subprocess.Popen[str]:
+    """Type a command in a process that has no thread of a head."""
+    pipe, both = subprocess.PIPE, subprocess.STDOUT
+    return subprocess.Popen([*GAZERIG, *shlex.split(words)], stdout=pipe, stderr=both, text=True)
+
+
+def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
+    """Press Ctrl-C once a command that goes on has written ``first``."""
     try:
         assert process.stdout is not None
         written = ""
@@ -90,7 +94,7 @@ def test_commands_to_a_running_head_work(folder: Path) -> None:
     """Of one head for all: the expressive one with the track of the tutorial."""
     [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
     (folder / "agree.yaml").write_text(agree, encoding="utf-8")
-    own = "\ntrack_files: [agree.yaml]\nsound: {device: silent}\n"
+    own = "\ntrack_files: [agree.yaml]\nsound: {device: silent}\nloop: {rate_hz: 40.0}\n"
     copy("expressive", folder / "head.yaml", own)
     write_wav(folder / "hello.wav", b"\0\0" * 4800, 16000)
     with gazerig.open("head.yaml", mock=True, scene="face-to-face", say=lambda line: None):
@@ -105,7 +109,7 @@ def _works_on_a_head(words: str) -> None:
     elif re.match(r"ctl look (?!.*--stay)", words):
         if "person" in words:
             wait_for(lambda: invoked(*words.split(), "--stay").code == 0, "somebody to be seen")
-        works_until_ctrl_c(words, "Ctrl-C")
+        works_until_ctrl_c(typed_alone(words), "Ctrl-C")
     elif "--person" in words:
         wait_for(lambda: invoked(*shlex.split(words)).code == 0, "somebody to be seen")
     else:
@@ -140,4 +144,6 @@ def test_a_command_on_a_recording_works(words: str, recording: Path) -> None:
 @pytest.mark.parametrize("words", ENDLESS)
 def test_a_command_that_runs_until_it_is_ended_works(words: str, folder: Path) -> None:
     copy("desk", folder / "my.yaml")
-    works_until_ctrl_c(words.replace("/tmp/", f"{folder}/"), "/")
+    work = gazerig_branch(*shlex.split(words.replace("/tmp/", f"{folder}/")))
+    pipe, both = subprocess.PIPE, subprocess.STDOUT
+    works_until_ctrl_c(Branch(work, stdout=pipe, stderr=both, text=True), "/")

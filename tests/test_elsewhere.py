@@ -59,7 +59,17 @@ def test_the_hiding_hides_and_only_from_us(tmp_path: Path) -> None:
 
 
 def test_an_emulated_head_runs_in_real_time(tmp_path: Path) -> None:
-    words = ("run", "six_hobby", "--mock", "--no-page", "--seconds", "1", "--summary", "-")
+    words = (
+        "run",
+        "six_hobby",
+        "--mock",
+        "--no-page",
+        "--rate=40",
+        "--seconds",
+        "1",
+        "--summary",
+        "-",
+    )
     out, said = elsewhere(*words, folder=tmp_path).communicate()
     assert '"stopped_by"' in out, said
     figures = json.loads(out)
@@ -127,9 +137,8 @@ def told(process: subprocess.Popen[str], pattern: str) -> re.Match[str]:
 
 
 def test_the_page_shows_an_emulated_head_and_stops_it(tmp_path: Path) -> None:
-    running = elsewhere(
-        *("run", "--mock", "--seconds", "60", "--page", f"127.0.0.1:{free_port()}"), folder=tmp_path
-    )
+    words = ("run", "--mock", "--rate=40", "--seconds", "60", "--page", f"127.0.0.1:{free_port()}")
+    running = elsewhere(*words, folder=tmp_path)
     try:
         url, address = told(running, r"(http://([\d.:]+)/\?token=\S+)").groups()
         asking = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())

@@ -2,13 +2,14 @@
 
 import os
 import signal
-import subprocess
 import urllib.error
 import urllib.request
 from pathlib import Path
 
 import pytest
-from command_line import GAZERIG, invoked
+from branch import Branch
+from branch import gazerig as gazerig_branch
+from command_line import invoked
 from shown_page import free_port, wait_for
 
 import gazerig
@@ -75,7 +76,7 @@ def test_a_run_is_refused_in_one_line_before_anything_is_done(tmp_path: Path) ->
 
 
 @pytest.mark.pty
-@pytest.mark.slow
+@pytest.mark.usefixtures("branched_children_here")
 def test_a_program_keeps_its_token_when_the_head_is_started_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,7 +92,7 @@ def test_a_program_keeps_its_token_when_the_head_is_started_again(
     words.append(f"--token-file={path}")
     for _ in range(2):
         with (tmp_path / "log").open("w+", encoding="utf-8") as log:
-            process = subprocess.Popen([*GAZERIG, *words], stdout=log, stderr=log)
+            process = Branch(gazerig_branch(*words), stdout=log, stderr=log)
             try:
                 wait_for(lambda: f"/?token={GOOD}\n" in (tmp_path / "log").read_text(), "the page")
                 assert state(GOOD) == 200
