@@ -39,7 +39,9 @@ from gazerig.robot.model.command_json import as_json, from_json  # noqa: E402
 from gazerig.robot.model.commands import OPPONENT_BOX_M, MoveOpponent  # noqa: E402
 from gazerig.robot.recording.read import RunRecording  # noqa: E402
 
-BOXING = RunOptions(mock=True, fast=True, seed=1, rig="desk", world="boxing", no_pictures=True)
+BOXING = RunOptions(
+    mock=True, fast=True, seed=1, rig="desk", world="boxing", no_pictures=True, bus="ideal"
+)
 READY, HIT, LOW = (0.7, 0.0, 0.05), (0.36, 0.0, 0.12), (0.7, 0.0, -0.3)
 
 
