@@ -669,7 +669,7 @@ def test_a_board_that_swings_is_refused() -> None:
 def test_a_place_that_is_not_sure_is_refused() -> None:
     scene = scene_of(0)
     small = [(0.3 * y, 0.45 * p, 0.3 * r) for y, p, r in planned(scene)]
-    views = neck_views(scene, 1.0, angles=small)
+    views = neck_views(scene, 0.6, angles=small)
     with pytest.raises(CameraCalibrationRefused, match="sure to .* mm and .* deg only"):
         found_in(scene, views, least_turn_deg=1.0, most_position_std_mm=0.5)
 
