@@ -249,7 +249,8 @@ def head_share(shown: Shown) -> float:
 # At 640x480 the camera's picture, which changes, covers a corner of the head's.
 @pytest.mark.parametrize("size", [size for size in SIZES if size != "least"], indirect=True)
 def test_the_head_fills_most_of_its_canvas(shown: Shown, size: str) -> None:
-    assert 0.6 <= head_share(shown) <= 0.8
+    # Parts come one after the other: before the last, two pictures of a slow computer may agree.
+    wait_for(lambda: 0.6 <= head_share(shown) <= 0.8, "the whole head in its size")
 
 
 def test_picture_and_head_change_places_with_one_click(shown: Shown, size: str) -> None:

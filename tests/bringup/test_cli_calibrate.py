@@ -233,6 +233,7 @@ def test_what_cannot_be_is_said(
 # --- on a port that another program serves, from a process of its own
 
 
+@pytest.mark.own_timeouts
 @pytest.mark.pty
 def test_by_hand_over_a_port_with_answers_through_a_pipe(
     rig: Path, bus: tuple[PtyBus, str]
