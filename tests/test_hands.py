@@ -278,6 +278,13 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
 
 
+def test_an_arm_that_moved_before_it_touched_the_side_does_not_reach_in() -> None:
+    hands = Hands()
+    for k, one in enumerate([reaching(0.17, from_side=False)] * 2 + [reaching(0.17)] * 4):
+        (found,) = hands.label([one], [FACE], EYE, k / 30)
+    assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
+
+
 def test_nor_is_it_the_persons_arm_because_it_moves_before_their_shoulder() -> None:
     hands, seen = Hands(), reaching(0.17, p=(2.0, 0.68, -0.24))
     for k in range(3):
@@ -297,7 +304,7 @@ def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
     seen: LocalisedDetection,
 ) -> None:
     hands = Hands()
-    for k, one in enumerate([patch()] * 2 + [seen] * 4):
+    for k, one in enumerate([patch(from_side=True)] * 2 + [seen] * 4):
         (found,) = hands.label([one], [FACE], EYE, k / 30)
     assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.07)
 

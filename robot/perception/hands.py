@@ -82,6 +82,8 @@ class _MovingPatch:
 
     at_s: last time of a hand's motion; p_face: face of its person; frames: number of such frames
     hand: the hand at that time
+    entered: whether it touched the side of the image at its first motion; an arm of the person that
+        moves there later does not reach in
     large_frames: successive frames in which it was too large for a hand at the person's distance
     wide_frames: number of frames in which it entered at the side and was too wide for that
     distance_share: its distance relative to the person's, from its size or that of the palm
@@ -91,6 +93,7 @@ class _MovingPatch:
     at_s: float
     p_face: Vec3
     hand: LocalisedDetection
+    entered: bool
     frames: int = 0
     large_frames: int = 0
     wide_frames: int = 0
@@ -107,7 +110,7 @@ class _MovingPatch:
         if thing.depth_measured:
             return
         radius_m, wide_m = arm.ratio * thing.radius_m, arm.ratio * thing.thickness_m
-        if arm.comes_in:
+        if arm.comes_in and self.entered:
             # The first frames decide. An arm that slows down looks thinner, as less of it moves,
             # but does not recede; a later change of its distance would look like motion along the
             # view.
@@ -260,7 +263,8 @@ class Hands:
             or comes
             or speed > (_STAYS_M_S if named else max(begins, norm(v_face)))
         ):
-            known = self._moving.setdefault(thing.mark, _MovingPatch(t_s, p_face, thing))
+            new = _MovingPatch(t_s, p_face, thing, thing.from_side)
+            known = self._moving.setdefault(thing.mark, new)
             before_s, known.at_s, known.p_face = known.at_s, t_s, p_face
             if palm is not None:
                 palms.remove(palm)
