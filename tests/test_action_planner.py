@@ -302,6 +302,21 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     assert looks(model, later)[-1].plan.startswith("guard: hand 3 arrives")
 
 
+@pytest.mark.parametrize("counts", [True, False])
+def test_a_sinking_hand_is_watched_if_every_motion_counts(counts: bool) -> None:
+    model = planned_attention(counts_every_motion=counts)
+    sinks = [
+        seen(
+            k * DT_S,
+            fist(2, LEFT),
+            fist(3, (0.88, -0.3, 0.2 - 0.03 * max(0, k - 30)), (0.0, 0.0, -0.9 * (k > 30))),
+        )
+        for k in range(44)
+    ]
+    kinds = {one.kind for one in looks(model, [with_face(one) for one in sinks])}
+    assert ("hand" in kinds) == counts
+
+
 def test_without_a_planner_nothing_is_planned_and_planned_is_no_choice() -> None:
     model = attention()
     targets = looks(model, [with_face(punch(k * DT_S)) for k in range(6)])

@@ -65,6 +65,9 @@ class ActionPlannerParams:
     rest_ms: Annotated[float, Bounds(0, 60000), "shortest time between the end of an attack and the next"] = 800.0
     hand_memory_ms: Annotated[float, Bounds(0, 60000),
         "an unseen hand is remembered for this long: where it was, or lowered if it moved away from the face"] = 600.0
+    counts_every_motion: Annotated[bool,
+        "with the planner, hands that repeat their motion or move down keep their salience, as fists must be watched; "
+        "false: as rhythm_ratio and sinking_ratio define"] = True
     # fmt: on
 
 

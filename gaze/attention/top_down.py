@@ -213,7 +213,7 @@ class TopDown:
     @property
     def counts_every_motion(self) -> bool:
         """Return whether repeated and sinking motion counts in full, as that of fists does."""
-        return self.plans
+        return self.plans and self._params.planner.counts_every_motion
 
     @property
     def plan_text(self) -> str:
