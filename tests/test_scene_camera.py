@@ -78,6 +78,17 @@ def test_a_thing_is_seen_late_and_only_inside_the_field() -> None:
     assert "thing" in {blob.kind for blob in shown.blobs}
 
 
+@pytest.mark.parametrize(
+    ("aside_deg", "radius_m", "seen"), [(37.0, 0.07, 1), (37.0, 0.02, 0), (39.0, 0.07, 0)]
+)
+def test_a_hand_is_seen_while_a_part_of_it_is_in_the_picture(
+    aside_deg: float, radius_m: float, seen: int
+) -> None:
+    aside = Thing(0, "hand", (0.5, 0.5 * np.tan(np.radians(aside_deg)), 0.0), radius_m)
+    made = camera(Still((aside,)), horizontal_field_deg=69.0)
+    assert len(seen_at(made, 0.2).blobs) == 1 + seen  # and the person's own hand
+
+
 def test_depth_is_noisy_along_the_line_of_view_alone() -> None:
     ball = Thing(0, "thing", (1.0, 0.2, 0.0), 0.05)
     made = camera(Still((ball,)), depth_noise_mm=5.0)

@@ -26,6 +26,8 @@ from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 _FARTHEST_FACE_M = 4.0
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
+_LEAST_SEEN_PX = 15.0
+"""Width of the part of a thing that must be in the picture, unless its centre is."""
 _FACE_BOX_M = 0.17
 _LIPS_HZ, _LIPS_M = 4.5, 0.004
 """Frequency and amplitude of the gap between the lips of a person who speaks."""
@@ -184,7 +186,8 @@ class SceneCamera:
         x, y, z = point
         lens = self._lens
         x, y = (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
-        if not self._is_inside(x, y, 0.0):
+        seen_px = thing.radius_m / z * lens.fx_px - _LEAST_SEEN_PX
+        if not self._is_inside(x, y, -max(0.0, seen_px)):
             return ()
         place = scale(point, 1.0 + noise / norm(point))
         return (MovingBlob(thing.id, thing.kind, place, thing.radius_m, thing.spin_rad_s),)
