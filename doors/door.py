@@ -108,16 +108,17 @@ class DoorLink:
 
     async def run(self) -> None:
         """Pass orders on for ever."""
-        wait_s = FIRST_WAIT_S
+        wait_s, reported = FIRST_WAIT_S, False
         while True:
             try:
                 head = await asyncio.to_thread(self.connect)
             except gazerig.Error as error:
-                self.report(f"waiting for a head: {error}")
+                if not reported:
+                    self.report(f"waiting for a head: {error}")
                 await asyncio.sleep(wait_s)
                 wait_s = min(2.0 * wait_s, LONGEST_WAIT_S)
                 continue
-            wait_s = FIRST_WAIT_S
+            wait_s, reported = FIRST_WAIT_S, False
             if self._last is not None and self._last.state != "idle":
                 self.send((self._last,))
             try:
@@ -125,6 +126,7 @@ class DoorLink:
             except gazerig.HeadEnded as error:
                 self.report_again()
                 self.report(f"waiting for the head, which has ended: {error}")
+                reported = True
             finally:
                 await asyncio.to_thread(head.__exit__, None, None, None)
             await asyncio.sleep(wait_s)
