@@ -25,11 +25,14 @@ class SpokenSound:
         rate_hz: Rate of the samples.
         channels: 1 or 2.
         volume: Factor 0..1; 0: only the mouth moves.
+
+    Attributes:
+        is_cut: Whether it has ended at once.
     """
 
     def __init__(self, rate_hz: int, channels: int, volume: float = 1.0) -> None:
         self._rate_hz, self._channels, self._volume = rate_hz, channels, volume
-        self._is_cut = False
+        self.is_cut = False
         self._pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def split(self, pcm: bytes) -> Iterator[tuple[bytes, float]]:
@@ -50,7 +53,7 @@ class SpokenSound:
 
     def cut(self) -> None:
         """End the sound at once, without the pieces that wait."""
-        self._is_cut = True
+        self.is_cut = True
         with contextlib.suppress(queue.Empty):
             while True:
                 self._pieces.get_nowait()
@@ -69,8 +72,9 @@ class SpokenSound:
                     self._read(), rate_hz=self._rate_hz, channels=self._channels,
                     volume=self._volume,
                 )  # fmt: skip
-                if self._is_cut:
-                    head.end_track("speech")
+                if self.is_cut:
+                    with contextlib.suppress(gazerig.Refused):  # it has ended
+                        head.end_track("speech")
                 for _ in range(round(_LONGEST_END_S / _LOOK_S)):
                     if not any(
                         track.name == "speech" and not track.end_reason

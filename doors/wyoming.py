@@ -17,8 +17,8 @@ from gazerig.doors.turn_taking import Orders, TurnTaking, field
 
 _MAX_CHUNKS = 64
 """Chunks of sound that wait; a neighbour that sends more is slowed down."""
-_PLAYED_AHEAD_S = 0.3
-"""Sound that the head has before it is heard; an interruption cannot take it back."""
+_AHEAD_S = 1.0
+"""Sound that the head has before it is heard."""
 _MAX_BYTES, _MAX_LINE = 1_000_000, 65_536
 _MAX_NEIGHBOURS = 8
 
@@ -81,7 +81,7 @@ class Satellite:
     def __init__(self, link: DoorLink) -> None:
         self._link, self._events = link, Wyoming()
         self._sounds: list[asyncio.Queue[Any]] = []
-        self._interruptions = 0
+        self._said = set[SpokenSound]()
         self._opening: asyncio.Future[str] | None = None
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -158,7 +158,8 @@ class Satellite:
             orders = self._events.take(message, self._link.now_s())
             self._link.send(orders)
             if any(order.state == "interrupt" for order in orders):
-                self._interruptions += 1
+                for sound in self._said:
+                    sound.cut()
                 for waiting in self._sounds:
                     while not waiting.empty():
                         waiting.get_nowait()
@@ -179,23 +180,26 @@ class Satellite:
             sound = SpokenSound(start.rate, channels)
             if self._opening is not None:
                 self._report_sound(await asyncio.shield(self._opening))
+            self._said.add(sound)
             saying = asyncio.ensure_future(asyncio.to_thread(sound.say, link.connect))
-            begin_s, sent_s, interruptions = link.now_s(), 0.0, self._interruptions
+            begin_s, sent_s = link.now_s(), 0.0
             try:
                 while (chunk := await sounds.get()) is not None:
                     if not isinstance(chunk, AudioChunk):
                         continue
                     for piece, seconds in sound.split(convert(chunk).audio):
-                        if self._interruptions == interruptions:
+                        if not sound.is_cut:
                             sound.feed(piece)
                             sent_s += seconds
-                            await asyncio.sleep(begin_s + sent_s - _PLAYED_AHEAD_S - link.now_s())
+                            await asyncio.sleep(begin_s + sent_s - _AHEAD_S - link.now_s())
             finally:
                 sound.end()
+                self._said.discard(sound)
             self._report_sound(await saying)
             if not sent_s:  # an event of a satellite that has another loudspeaker
                 continue
-            await asyncio.sleep(begin_s + sent_s - link.now_s())
+            if not sound.is_cut:
+                await asyncio.sleep(begin_s + sent_s - link.now_s())
             if sounds.empty():
                 link.send(self._events.take({"type": "played"}, link.now_s()))
             with suppress(ConnectionError):

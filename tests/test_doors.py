@@ -436,6 +436,7 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played() -> None:
             await until(lambda: head.last == "speaking")
             await events.write_event(VoiceStarted().event())
             await until(lambda: "interrupt" in head.states)
+            await until(lambda: head.ended_tracks == ["speech"])  # and is silent at once
         await until(lambda: head.last == "idle")
 
     head = run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
