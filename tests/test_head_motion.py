@@ -125,6 +125,20 @@ def test_the_head_comes_to_face_a_person_in_spite_of_short_looks_elsewhere(
     assert np.diff(yaws).max() / DT <= 12.1
 
 
+@pytest.mark.parametrize(
+    ("salience", "top_down", "turns"), [(0.9, True, True), (0.5, True, False), (0.9, False, False)]
+)
+def test_the_head_recentres_soon_before_what_it_is_most_interested_in(
+    salience: float, top_down: bool, turns: bool
+) -> None:
+    head, place, yaw = model(), (radians(15.0), 0.0), 0.0
+    for k in range(round(2.0 / DT)):
+        t = k * DT
+        seen = target(t, kind="attack_target", top_down=top_down)._replace(salience=salience)
+        yaw = head.step(seen, place, place, abs(place[0] - yaw), 1.0, t)[0]
+    assert (degrees(yaw) > 5.0) == turns
+
+
 def shifts(seed: int | None) -> Floats:
     """Return how far the head turned for 40 deg, 40 times; degrees."""
     head, turned = model(seed, recentre_after_ms=60_000.0), []

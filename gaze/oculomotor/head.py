@@ -363,6 +363,8 @@ class HeadModel:
         if aside_rad <= comfort_rad:
             self._aside_since_s = t_s
         recentre_ms = par.recentre_after_ms + self._later * par.recentre_spread_ms
+        if target.top_down and target.salience > par.recentre_now_above:
+            recentre_ms = 0.0
         if t_s - self._aside_since_s >= recentre_ms / 1e3 and not moving:
             self._follows, self._relieves = False, True
         elif eccentricity >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
