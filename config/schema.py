@@ -143,10 +143,10 @@ def _servo_ids(rig: Rig) -> Iterable[tuple[str, str]]:
 def _models(rig: Rig) -> Iterable[tuple[str, str]]:
     for name, joint in rig.joints.items():
         if joint.model not in SERVOS:
-            known = ", ".join(sorted(SERVOS))
+            near, known = suggestion_text(joint.model.lower(), SERVOS), ", ".join(sorted(SERVOS))
             yield (
                 f"joints.{name}.model",
-                f"unknown servo model {joint.model!r}; known models: {known}",
+                f"unknown servo model {joint.model!r}{near}; known models: {known}",
             )
 
 

@@ -159,7 +159,7 @@ def test_the_newer_of_two_agents_has_the_conversation(rig: Running) -> None:
     rig.do(Talk("speaking", seconds=5.0, who="a"))
     ticks = rig.do(Talk("listening", who="b"))[1]
     assert [text for one in ticks for text in one.events] == ["conversation: b takes over from a"]
-    assert rig.do(Renew("a"))[0].refused == "a no longer control the head"
+    assert rig.do(Renew("a"))[0].refused == "the head is no longer controlled by a"
     rig.go(0.9)
     rig.do(Renew("b"))
     assert rig.go(0.5)[-1].conversation.who == "b"

@@ -238,10 +238,12 @@ def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
     sts.bus.enable_torque()
     enabled, sts.inner.enable_torque = sts.inner.enable_torque, _refuse
     sts.guardian.other.set_state(0, RELEASED)
-    readings = sts.run(0.2, [2300] * 4)
+    readings = sts.run(2.5 * RETRY_S, [2300] * 4)
     assert not any(r.torque for r in readings if r is not None)
     lines = sts.bus.events()
-    assert [line for line in lines if "torque stays off" in line], lines
+    assert [line for line in lines if "too hot" in line] == [
+        "torque could not be switched on again: servo 1: too hot"
+    ], lines
     sts.inner.enable_torque = enabled
     sts.run(RETRY_S + 0.05, [2300] * 4)
     assert any("torque on again" in line for line in sts.bus.events())

@@ -128,6 +128,7 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
     [
         (r"^    id: 9 ", "    id: 1 ", "joints.neck_roll.id", "id 1 is already used by"),
         (r"model: xc330-m288", "model: xc330", "joints.neck_yaw.model", "unknown servo model"),
+        (r"model: xc330-m288", "model: XC330-M288", "joints.neck_yaw.model", "mean 'xc330-m288'?"),
         (r"^  neck_roll:", "  neck_rol:", "joints", "neck_roll"),
         (r"left_shut_deg: -25.0", "left_shut_deg: -80.0", "lid_joints.left_shut_deg", "outside"),
         (r"neck_pitch: -12.0", "neck_pitch: -90.0", "park_deg.neck_pitch", "outside"),

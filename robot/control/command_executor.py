@@ -156,7 +156,9 @@ class CommandExecutor:
             case Renew():
                 talks = self._conversation.renew(command.who, t_s)
                 if not self._lead.renew(command, t_s) and not talks:
-                    return CommandReply(f"{command.who or 'you'} no longer control the head")
+                    return CommandReply(
+                        f"the head is no longer controlled by {command.who or 'you'}"
+                    )
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
                 self._tracks.drop_present(t_s)

@@ -55,8 +55,9 @@ REQUESTS = (
     *ORDERS,
 )
 """Names of all requests, with their fields."""
+_KINDS = {str: "text", int: "a whole number", bool: "true or false", str | None: "text or null"}
 
-REAL = "these servos are real: only emulated servos accept fault commands (gazerig run --mock)"
+REAL = "only servos emulated byte by byte accept fault commands: gazerig run --mock, without --bus ideal"
 
 FIXED = "these parameters cannot be changed while the rig runs"
 
@@ -331,6 +332,12 @@ class CommandHandler:
                 if self._paths is not None and name not in params.characters():
                     name = self._paths.check_file(name, "characters")
                 return ParamsChanged(_notes(params.apply_character(name)))
+            case {"do": str(name)} if name in QUESTIONS | CHANGES:
+                kinds = (QUESTIONS | CHANGES)[name][1].items()
+                fields = [f"{field} ({_KINDS.get(kind, 'an object')})" for field, kind in kinds]
+                raise ValueError(
+                    f"{name} has {', '.join(fields) or 'no fields'}{', and no others' if fields else ''}"
+                )
         raise ValueError(f"unknown request; available: {'; '.join(REQUESTS)}")
 
     def _require_params(self) -> ParamAccess:

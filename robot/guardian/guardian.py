@@ -233,7 +233,7 @@ class GuardedBus:
         self._beat = guardian.beat
         self._silent = Feedback.create_missing(count)
         self._holding = self._lost_hold = False
-        self._retry_s = 0.0
+        self._retry_s, self._refusal = 0.0, ""
         self._rearmed: set[int] = set()
         self._events: list[str] = []
 
@@ -345,7 +345,7 @@ class GuardedBus:
             self._guardian.acknowledge(self._plan)
             if not self._holding:
                 return
-            self._lost_hold, self._retry_s = True, now_s
+            self._lost_hold, self._retry_s, self._refusal = True, now_s, ""
             self._events.append("the control loop did not run: the guardian switched torque off")
         if now_s < self._retry_s:
             return
@@ -355,7 +355,9 @@ class GuardedBus:
             self._bus.disable_torque()
             self._bus.enable_torque()
         except DriverError as error:
-            self._events.append(f"torque stays off: {error}")
+            if str(error) != self._refusal:  # once, not with every attempt
+                self._refusal = str(error)
+                self._events.append(f"torque could not be switched on again: {error}")
             return
         self._lost_hold = False
         self._rearmed = set(self._silent.missing)

@@ -62,6 +62,8 @@ MAX_MOUTH_KEYS = 40_000
 """Largest number of keys of a speech."""
 MAX_PIXEL = 20000.0
 """Largest coordinate of a pixel."""
+MAX_NUMBER = 2**53
+"""Largest number of a person or a track: every client and recording can hold it."""
 _MAX_TIME_S = 1e12
 
 
@@ -114,11 +116,11 @@ def check_command(command: Command) -> None:
                 actions = ", ".join(get_args(TrackAction))
                 raise ValueError(f"action {action!r:.40}: expected one of {actions}")
             _check_track(track, value if action == "speed" else 1.0)
-            if action == "seek" and not (isinstance(value, str) and len(value) <= MAX_WORDS):
+            if action != "speed" and not (isinstance(value, str) and len(value) <= MAX_WORDS):
                 _check_position(value)
             _check_who(who)
         case SyncTrack(number, position_s, clock):
-            if type(number) is not int or number < 1:
+            if type(number) is not int or not 1 <= number <= MAX_NUMBER:
                 raise ValueError("number must be that of a track that plays, from 1 on")
             _check_position(position_s)
             if clock not in ("sound", "external"):
@@ -241,7 +243,7 @@ def _check_talk(command: Talk) -> None:
 
 
 def _check_person(person: object) -> None:
-    if isinstance(person, bool) or not isinstance(person, int) or person < 0:
+    if type(person) is not int or not 0 <= person <= MAX_NUMBER:
         raise ValueError(f"a person must be given by a whole number from 0 on, not {person!r:.40}")
 
 
