@@ -15,7 +15,7 @@ from typing import Any
 
 import gazerig
 from gazerig.doors.door import Door, DoorLink, connect
-from gazerig.doors.spoken_sound import Mouth
+from gazerig.doors.spoken_sound import MouthSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
 ATTRIBUTE = "lk.agent.state"
@@ -116,7 +116,7 @@ async def follow_room(
         listen: Returns the samples of a track as they are heard, at RATE_HZ, one channel; None:
             the mouth does not move.
     """
-    mouth = Mouth(link)
+    mouth = MouthSound(link)
     states, closed, reading = LiveKit(), asyncio.Event(), set[asyncio.Task[None]]()
 
     def take(message: Mapping[str, str]) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType, web
 
 from gazerig.doors.door import Door, DoorLink
-from gazerig.doors.spoken_sound import Mouth
+from gazerig.doors.spoken_sound import MouthSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
 from gazerig.doors.web_socket import ERRORS, Intake, listen
 
@@ -140,7 +140,7 @@ async def _relay(
 ) -> None:
     """Relay a session until one side ends it."""
     events = OpenAIRealtime()
-    intake, mouth = Intake(link, events), Mouth(link)
+    intake, mouth = Intake(link, events), MouthSound(link)
 
     async def upwards() -> None:
         async for message in program:

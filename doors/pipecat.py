@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from gazerig.doors.door import Door, DoorLink, connect
-from gazerig.doors.spoken_sound import Mouth
+from gazerig.doors.spoken_sound import MouthSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage, field
 from gazerig.doors.web_socket import receive_sockets
 
@@ -105,14 +105,14 @@ class HeadObserver(BaseObserver):  # type: ignore[misc]
         self._head, self._link = head, link
         self._messages = Pipecat()
         self._seen: int | None = None
-        self._mouth: Mouth | None = None
+        self._mouth: MouthSound | None = None
 
     async def on_push_frame(self, data: Any) -> None:
         """Read a frame that one processor has pushed to the next."""
         frame = data.frame
         if type(frame).__name__ == _SOUND and getattr(data, "first_push", False):
             link = self._start()
-            self._mouth = self._mouth or Mouth(link)
+            self._mouth = self._mouth or MouthSound(link)
             self._mouth.add(frame.audio, frame.sample_rate, frame.num_channels)
         kind = FRAMES.get(type(frame).__name__)
         number = getattr(frame, "id", None)

@@ -93,7 +93,7 @@ class SpokenSound:
             yield piece
 
 
-class Mouth:
+class MouthSound:
     """Moves the head's mouth by speech that the neighbour plays itself; nothing waits for it.
 
     Args:

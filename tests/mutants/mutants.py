@@ -155,7 +155,7 @@ MUTANTS = (
     Mutant("drivers/servo_bus/read_plan.py",
            "return values if self._intact(self._parts(raw), values[self._checks]) else None",
            "return values", "damaged bytes are taken for values", ("servo_sync_read",)),
-    Mutant("drivers/servo_bus/feedback.py", "self._expect()\n        self.now", "self.now",
+    Mutant("drivers/servo_bus/feedback.py", "on, frozenset()\n        self._expect()", "on, frozenset()",
            "torque that is off passes for torque that is on",
            ("servo_sync_read", "dynamixel_care", "dynamixel_faults")),
     Mutant("drivers/serial/port.py", "if self._poll(0):", "if False:",
