@@ -30,17 +30,19 @@ def skip_without_part(part: str) -> None:
         pytest.skip(f"the feature of {part} is not there")
 
 
+def has_command(command: str) -> bool:
+    """Return whether the feature of a command is there, or it is the core's."""
+    return is_there(SHIPPED[COMMAND].get(command, ""))
+
+
 def skip_without(command: str) -> None:
     """Skip a test of a command whose feature is not there; those of the core always are."""
     skip_without_part(SHIPPED[COMMAND].get(command, ""))
 
 
-def need_every_feature() -> None:
-    """Skip a test of the whole program if a feature was deleted."""
-    for part in _PARTS:
-        skip_without_part(part)
-
+EVERY_FEATURE = all(map(is_there, _PARTS))
+"""Whether no feature was deleted."""
 
 needs_all_features: Callable[[Any], Any] = pytest.mark.skipif(
-    not all(map(is_there, _PARTS)), reason="a feature is not there"
+    not EVERY_FEATURE, reason="a feature is not there"
 )

@@ -3,9 +3,7 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import pytest
+from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 PAPERS = [
@@ -42,10 +40,6 @@ def prose(paper: Path) -> str:
 def spans(paper: Path) -> list[str]:
     """Return the texts between single back-ticks, each on one line."""
     return [" ".join(span.split()) for span in re.findall(r"`([^`]+)`", prose(paper))]
-
-
-def each_of_papers(values: str) -> Any:
-    return pytest.mark.parametrize(values, PAPERS, ids=lambda path: path.name)
 
 
 def written_commands() -> dict[str, str]:

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 import typer
 from command_line import gazerig, parse, typed
-from features_there import needs_all_features, skip_without
+from features_there import has_command, needs_all_features, skip_without
 from typer.core import TyperGroup
 
 from gazerig import __version__
@@ -153,12 +153,10 @@ def test_every_command_has_examples_and_no_example_is_without_command() -> None:
         assert f"gazerig {'stop' if name == 'stop' else f'ctl {name}'}" in str(order.epilog), name
 
 
-@pytest.mark.parametrize(
-    "words", [words for examples in all_examples().values() for words, _ in examples]
-)
-def test_every_example_names_options_that_there_are(words: str) -> None:
-    skip_without(words.split()[0])
-    parse(shlex.split(words))
+def test_every_example_names_options_that_there_are() -> None:
+    for words in (words for examples in all_examples().values() for words, _ in examples):
+        if has_command(words.split()[0]):
+            parse(shlex.split(words))
 
 
 @pytest.mark.parametrize("words", ["run --nonsense", "fly", "run --seed many", "jog neck_yaw"])

@@ -6,11 +6,10 @@ import re
 from collections.abc import Iterator
 from dataclasses import fields
 from functools import cache
-from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, spans
+from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, spans
 from ruamel.yaml import YAML
 
 import gazerig
@@ -79,15 +78,15 @@ def is_key(dotted: str) -> bool:
     return False
 
 
-@each_of_papers("paper")
-def test_keys_named_are_keys(paper: Path) -> None:
-    if paper == PARAMETERS:
-        return  # compared with the declarations below
+def test_keys_named_are_keys() -> None:
     sections = set(shapes_of(Rig))
-    for span in spans(paper):
-        key = re.match(r"([a-z_]+(?:\.[a-z_0-9]+)+)(: \S+)?$", span)
-        if key and key[1].split(".")[0] in sections and not key[1].endswith((".py", ".yaml")):
-            assert is_key(key[1]), f"{paper.name}: {span}"
+    for paper in PAPERS:
+        if paper == PARAMETERS:
+            continue  # compared with the declarations below
+        for span in spans(paper):
+            key = re.match(r"([a-z_]+(?:\.[a-z_0-9]+)+)(: \S+)?$", span)
+            if key and key[1].split(".")[0] in sections and not key[1].endswith((".py", ".yaml")):
+                assert is_key(key[1]), f"{paper.name}: {span}"
 
 
 def test_values_set_in_the_papers_are_allowed() -> None:
@@ -182,15 +181,15 @@ def file_names() -> set[str]:
     return {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
 
 
-@each_of_papers("paper")
-def test_files_named_exist(paper: Path) -> None:
+def test_files_named_exist() -> None:
     names = file_names()
-    for span in spans(paper):
-        if re.fullmatch(r"(?:[\w-]+/)+(?:[\w-]+\.(?:py|yaml|md))?", span):
-            inside = (ROOT, ROOT / "robot")
-            assert any((base / span).exists() for base in inside), f"{paper.name}: {span}"
-        elif re.fullmatch(r"[\w-]+\.(?:py|yaml)", span) and span not in READERS_OWN:
-            assert span in names, f"{paper.name}: {span}"
+    for paper in PAPERS:
+        for span in spans(paper):
+            if re.fullmatch(r"(?:[\w-]+/)+(?:[\w-]+\.(?:py|yaml|md))?", span):
+                inside = (ROOT, ROOT / "robot")
+                assert any((base / span).exists() for base in inside), f"{paper.name}: {span}"
+            elif re.fullmatch(r"[\w-]+\.(?:py|yaml)", span) and span not in READERS_OWN:
+                assert span in names, f"{paper.name}: {span}"
 
 
 @cache
@@ -223,15 +222,15 @@ def _names(node: ast.stmt, over: str = "") -> Iterator[str]:
                 yield over + target.id
 
 
-@pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
-def test_tests_and_functions_named_exist(paper: Path) -> None:
+def test_tests_and_functions_named_exist() -> None:
     known = defined()
-    text = paper.read_text(encoding="utf-8")
-    for name in set(re.findall(r"\b(test_[a-z0-9_]+)\b", text)):
-        if name != "test_e17_":
+    for paper in [*PAPERS, ROOT / "CHANGELOG.md"]:
+        text = paper.read_text(encoding="utf-8")
+        for name in set(re.findall(r"\b(test_[a-z0-9_]+)\b", text)):
+            if name != "test_e17_":
+                assert name in known, f"{paper.name}: {name}"
+        for name in set(re.findall(r"`([A-Z]\w+\.\w+)`", text)):
             assert name in known, f"{paper.name}: {name}"
-    for name in set(re.findall(r"`([A-Z]\w+\.\w+)`", text)):
-        assert name in known, f"{paper.name}: {name}"
 
 
 OUTCOMES = get_args(gazerig.Outcome)
@@ -290,10 +289,7 @@ SAID = {
 """Spans that name nothing which could be looked up."""
 
 
-@each_of_papers("paper")
-def test_every_span_names_something_that_is_there(paper: Path) -> None:
-    if paper in (EMULATOR, PARAMETERS):
-        return  # their tables are compared with the emulator and the declarations
+def test_every_span_names_something_that_is_there() -> None:
     words = {*keys(), *defined(), *SERVOS, *scene_names(), *all_examples(), *_modes(), *LOWER_NECK}
     words |= {field.name for field in fields(script.WorldCameraParams)}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
@@ -314,25 +310,30 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     )
     words |= {field.name for form in forms for field in fields(form)}
     words |= {*shipped_names("studies", HOME), *shipped_names("questionnaires", HOME)}
-    for span in spans(paper):
-        if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
-            continue
-        messages = r"/api/v1/|\?|\{|\"stay|\$XDG|/tmp/|Auth"
-        if paper.name == "connect-your-program.md" and re.match(messages, span):
-            continue  # read by test_programs
-        if named := re.match(r"(?:PYTHONPATH=\S+ )?python (\S+\.py)", span):
-            assert (ROOT / named[1]).exists(), f"{paper.name}: {span}"
-            continue
-        if call := re.match(r"(gazerig|head)\.([a-z]\w*)(?=[(]|$)", span):
-            place: object = gazerig if call[1] == "gazerig" else gazerig.SimulatedHead
-            if hasattr(place, call[2]):
+    for paper in PAPERS:
+        if paper in (EMULATOR, PARAMETERS):
+            continue  # their tables are compared with the emulator and the declarations
+        for span in spans(paper):
+            if span.startswith(
+                ("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")
+            ):
                 continue
-        first = re.split(r"[ (:]", span)[0]
-        within = re.sub(r"^[a-z_.]+\.(?=[A-Z])", "", span)  # a module's
-        looked_up = {span, first, span.rpartition(".")[0], within}
-        assert span in SAID or looked_up & words or is_key(first) or _is_file(span), (
-            f"{paper.name}: `{span}`: mend the paper, or add it to SAID"
-        )
+            messages = r"/api/v1/|\?|\{|\"stay|\$XDG|/tmp/|Auth"
+            if paper.name == "connect-your-program.md" and re.match(messages, span):
+                continue  # read by test_programs
+            if named := re.match(r"(?:PYTHONPATH=\S+ )?python (\S+\.py)", span):
+                assert (ROOT / named[1]).exists(), f"{paper.name}: {span}"
+                continue
+            if call := re.match(r"(gazerig|head)\.([a-z]\w*)(?=[(]|$)", span):
+                place: object = gazerig if call[1] == "gazerig" else gazerig.SimulatedHead
+                if hasattr(place, call[2]):
+                    continue
+            first = re.split(r"[ (:]", span)[0]
+            within = re.sub(r"^[a-z_.]+\.(?=[A-Z])", "", span)  # a module's
+            looked_up = {span, first, span.rpartition(".")[0], within}
+            assert span in SAID or looked_up & words or is_key(first) or _is_file(span), (
+                f"{paper.name}: `{span}`: mend the paper, or add it to SAID"
+            )
 
 
 def _modes() -> Iterator[str]:
@@ -367,6 +368,6 @@ def test_every_numbered_check_listed_is_a_test() -> None:
     assert listed == sorted(tested) and len(listed) >= 19
 
 
-@pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
-def test_the_project_speaks_of_itself_alone(paper: Path) -> None:
-    assert "/shared" not in paper.read_text(encoding="utf-8")
+def test_the_project_speaks_of_itself_alone() -> None:
+    for paper in [*PAPERS, ROOT / "CHANGELOG.md"]:
+        assert "/shared" not in paper.read_text(encoding="utf-8")
