@@ -29,6 +29,11 @@ AversionMode = Literal["none", "talk", "listen", "think", "speaking", "listening
 MODES: tuple[AversionMode, ...] = ("none", "talk", "listen", "think")
 """Modes that a user can choose; the others are those of reported turns."""
 _ROLES = ("speaking", "listening", "thinking")
+_TIMES_OF: dict[AversionMode, str] = {
+    "none": "silent", "talk": "talk", "listen": "listen", "think": "think",
+    "speaking": "speaking", "listening": "listening", "thinking": "think",
+}  # fmt: skip
+"""Mode -> beginning of the names of its times in ``AversionParams``."""
 
 # Share of gaze shifts, percent, to 0, 45, ... 315 deg; 0 is right, 90 up (Eyes Alive).
 DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
@@ -116,51 +121,8 @@ class Aversion:
 
     def retune(self, params: AversionParams) -> None:
         """Change durations and angles, from the next aversion on."""
-        par = self._params = params
-        self._times: dict[AversionMode, tuple[float, float, float, float]] = {
-            "none": (
-                par.silent_mutual_s,
-                par.silent_mutual_sd_s,
-                par.silent_away_s,
-                par.silent_away_sd_s,
-            ),
-            "talk": (
-                par.talk_mutual_s,
-                par.talk_mutual_sd_s,
-                par.talk_away_s,
-                par.talk_away_sd_s,
-            ),
-            "listen": (
-                par.listen_mutual_s,
-                par.listen_mutual_sd_s,
-                par.listen_away_s,
-                par.listen_away_sd_s,
-            ),
-            "think": (
-                par.think_mutual_s,
-                par.think_mutual_sd_s,
-                par.think_away_s,
-                par.think_away_sd_s,
-            ),
-            "thinking": (
-                par.think_mutual_s,
-                par.think_mutual_sd_s,
-                par.think_away_s,
-                par.think_away_sd_s,
-            ),
-            "speaking": (
-                par.speaking_mutual_s,
-                par.speaking_mutual_sd_s,
-                par.speaking_away_s,
-                par.speaking_away_sd_s,
-            ),
-            "listening": (
-                par.listening_mutual_s,
-                par.listening_mutual_sd_s,
-                par.listening_away_s,
-                par.listening_away_sd_s,
-            ),
-        }
+        self._params = params
+        self._times = {mode: _times_s(params, of) for mode, of in _TIMES_OF.items()}
 
     def reset(self, t_s: float) -> None:
         """Forget the face; the conversation mode stays."""
@@ -380,6 +342,15 @@ class Aversion:
         sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
         drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
         return max(drawn, self._params.min_dwell_s)
+
+
+def _times_s(params: AversionParams, of: str) -> tuple[float, float, float, float]:
+    """Return mean and standard deviation of the times on the face, and of those away."""
+    mutual_s, mutual_sd_s, away_s, away_sd_s = (
+        float(getattr(params, f"{of}_{name}"))
+        for name in ("mutual_s", "mutual_sd_s", "away_s", "away_sd_s")
+    )
+    return mutual_s, mutual_sd_s, away_s, away_sd_s
 
 
 def face_extent_deg(way_rad: float, distance_m: float) -> float:
