@@ -12,6 +12,8 @@ from gazerig.doors.door import DoorLink
 WIDTH = 2
 """Bytes of a sample."""
 _PIECE_S = 0.04
+_MOST_PIECES = 15_000
+"""Pieces that wait: ten minutes."""
 _RETRY_S = 10.0
 """Time without further attempts after a failure."""
 _LONGEST_END_S, _LOOK_S = 3.0, 0.05
@@ -44,8 +46,9 @@ class SpokenSound:
             yield piece, len(piece) / frame / self._rate_hz
 
     def feed(self, piece: bytes) -> None:
-        """Add a piece of samples: signed, 16 bits, channels interleaved."""
-        self._pieces.put(piece)
+        """Add a piece of samples: signed, 16 bits, channels interleaved; of a flood, none."""
+        if self._pieces.qsize() < _MOST_PIECES:
+            self._pieces.put(piece)
 
     def end(self) -> None:
         """End the sound."""

@@ -19,6 +19,7 @@ pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 import gazerig
 from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
+from gazerig.doors.spoken_sound import SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.app.door_processes import load_door
@@ -468,6 +469,19 @@ def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent: bytes) -> None
         assert "no Wyoming event" in head.said[1] and "check the neighbour" in head.said[1]
 
     run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
+
+
+def test_of_a_flood_of_sound_ten_minutes_wait_and_a_cut_drops_them() -> None:
+    sound, head = SpokenSound(8000, 1), TalkingHead()
+    for _ in range(16_000):
+        sound.feed(b"ab")
+    sound.end()
+    assert sound.say(head.connect) == "" and len(head.sounds[0][2]) == 30_000
+    sound = SpokenSound(8000, 1, volume=0.0)
+    sound.feed(b"ab")
+    sound.cut()
+    assert sound.say(head.connect) == ""
+    assert head.mouths == [(8000, 1, b"")] and head.ended_tracks == ["speech"]
 
 
 # In the neighbour's own process
