@@ -129,7 +129,7 @@ def test_e76_glances_are_human_in_length_size_place_and_number() -> None:
     rests = [s for t, s in found if t.kind == "rest"]
     assert {t.kind for t, _ in found} == {"glance", "rest"}
     assert 1.0 <= len(found) / 900.0 <= 2.0
-    assert np.mean([s for _, s in glances]) == pytest.approx(0.75, rel=0.1)
+    assert np.mean([s for _, s in glances]) == pytest.approx(0.9, rel=0.1)
     assert np.mean(rests) == pytest.approx(1.5, rel=0.2)
     assert min(s for _, s in found) >= 0.25 - DT
     yaws, pitches = np.degrees([yaw_pitch(sub(t.p_world_m, EYE)) for t, _ in glances]).T

@@ -30,7 +30,7 @@ from gazerig.gaze.oculomotor.head import HeadShare
 from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.track.breathing import Breathing, BreathingParams
-from gazerig.gaze.types import Angles2, GazeState, Target, Vec3
+from gazerig.gaze.types import ORDERED, Angles2, GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
 
@@ -67,12 +67,23 @@ def test_e16_every_target_is_reached_with_a_small_eye_range(size: float) -> None
 
 
 @pytest.mark.parametrize("distance_m", [0.22, 0.3, 0.4, 0.8])
-@pytest.mark.parametrize("model", ["stahl", "attention", "align"])
-def test_the_head_leaves_room_for_both_eyes_to_converge(model: str, distance_m: float) -> None:
+@pytest.mark.parametrize(
+    ("model", "margin_deg", "kind"),
+    [
+        ("stahl", 2.0, "thing"),
+        ("attention", 2.0, "thing"),
+        ("align", 2.0, "thing"),
+        ("align", 0.0, ORDERED),
+    ],
+)
+def test_the_head_leaves_room_for_both_eyes_to_converge(
+    model: str, margin_deg: float, kind: str, distance_m: float
+) -> None:
     """A head that stops short for one line of sight would hold an eye at its limit."""
     head = HeadParams(
         goal_model=model,  # type: ignore[arg-type]
         align=0.0,
+        eye_margin_deg=margin_deg,
         recentre_after_ms=60_000.0,
         pursue_above_deg_s=0.0,
     )
@@ -80,17 +91,15 @@ def test_the_head_leaves_room_for_both_eyes_to_converge(model: str, distance_m: 
         rig = Rig(eye_deg=25.0, geometry=DESK, head=head)
         middle = rig.kinematics.forward(rig.joints).p_world_head_m
         aside = add(middle, scale(direction((radians(yaw), 0.0)), distance_m))
-        there = still(0.0, salience=0.2)(0.2)._replace(p_world_m=aside)
+        there = still(0.0, salience=0.2)(0.2)._replace(p_world_m=aside, kind=kind)
         last = rig.run(lambda t, there=there: there, 2.0).commands[-1]  # type: ignore[misc]
         assert last.phase == "fixate" and last.limited == (), yaw
 
 
-def test_a_head_without_a_margin_leaves_no_room() -> None:
-    """The paper's trigger is the eyes' limit itself."""
-    exact = HeadShare(HeadParams(eye_margin_deg=0.0), radians(20.0))
-    assert exact.for_near_target(radians(15.0)) is exact
-    share = HeadShare(HeadParams(), radians(20.0))
-    assert share.for_near_target(radians(18.1)) is share
+@pytest.mark.parametrize("margin_deg", [0.0, 2.0])
+def test_only_a_near_target_takes_range_of_the_eyes(margin_deg: float) -> None:
+    share = HeadShare(HeadParams(eye_margin_deg=margin_deg), radians(20.0))
+    assert share.for_near_target(radians(20.1 - margin_deg)) is share
     assert degrees(share.for_near_target(radians(15.0)).reach_rad) == pytest.approx(15.0)
 
 

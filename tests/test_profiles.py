@@ -1,6 +1,7 @@
 """Each paper's profile is its paper and nothing else, proved by running it (docs/profiles.md)."""
 
 import re
+from math import atan2, radians
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from human.row_03_rests import visits
 
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.robot.app.options import RunOptions
 
 CLAIMS = list(claims())
@@ -77,6 +79,14 @@ def test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands() -> None:
     assert not run.blink.any() and np.ptp(run.lids_goal) == 0.0
     assert set(run.part) <= {"N", ""} and (run.part == "N").mean() > 0.8
     assert not any("away" in name for name in run.target_name)
+
+
+def test_the_head_of_mitake_joins_in_before_the_camera_loses_a_face() -> None:
+    rig = load_rig("desk", profile="mitake")
+    lens = intrinsics_of_view(radians(rig.camera.horizontal_field_deg), 640, 400)
+    half_face_rad, lag_rad = atan2(0.11, 1.0), radians(4.0)  # a stroll of 10 deg/s for .4 s
+    seen_rad = atan2(200.0, lens.fy_px) - half_face_rad
+    assert radians(rig.gaze.head.max_offset_deg) < seen_rad - lag_rad
 
 
 def test_profiles_name_the_section_of_each_value() -> None:

@@ -226,7 +226,7 @@ def test_a_face_is_entered_at_the_part_nearest_to_the_gaze(
     gaze_m: tuple[float, float, float], part: str
 ) -> None:
     # The parts of FACE are in a row, the first in the middle, the last farthest to the left.
-    walk = walker(6, ONE_REST)
+    walk = walker(6, replace(ONE_REST, start="nearest"))
     wanted = {"first": PARTS[0], "last": PARTS[-1], "RE": PARTS[3]}[part]
     head = (0.0, 0.0, 0.2)
     assert walk.wander(TARGET, PERCEPT, 0.0, False, head, gaze_m).part == wanted
@@ -407,7 +407,17 @@ def test_the_average_observer_looks_at_the_eyes_most() -> None:
 
 def test_speech_draws_looks_to_the_mouth() -> None:
     quiet, loud = visited(face_at(0.8)), visited(face_at(0.8, speaks=True))
-    assert 1.35 < loud["M"] / quiet["M"] < 4.0
+    assert 1.8 < loud["M"] / quiet["M"] < 3.0
+
+
+def test_a_look_that_returns_from_the_side_begins_at_the_nose() -> None:
+    face = face_at(0.8)
+    percept = Percept(0.0, Bodies(), (face,))
+    target = TARGET._replace(p_world_m=face.p_world_m)
+    for aside in (-1.0, 1.0):
+        walk = Scanpath(ScanpathParams(), PEOPLE, np.random.default_rng(0))
+        look = walk.wander(target, percept, 0.0, True, gaze_world_m=(0.8, aside, -0.3))
+        assert look.part == "N"
 
 
 def test_a_spot_of_ones_own_draws_looks() -> None:

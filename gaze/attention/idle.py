@@ -62,7 +62,7 @@ class IdleParams:
     reach_deg: Annotated[float, Bounds(5, 180),
         "farthest search direction to the side; a lost target is followed one step farther"] = 70.0
     rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between series of glances"] = 1500.0
-    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 750.0
+    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 900.0
     spread: Annotated[float, Bounds(0, 3), "standard deviation of all these durations divided by their mean"] = 0.6
     again_share: Annotated[float, Bounds(0, 0.98), "share of glances that are followed by another one without a rest"] = 0.9
     glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 13.0

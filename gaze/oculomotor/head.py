@@ -37,7 +37,7 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
-from gazerig.gaze.types import AWAY, SEARCH, Angles2, Angles3, Target, Vec3
+from gazerig.gaze.types import AWAY, ORDERED, SEARCH, Angles2, Angles3, Target, Vec3
 
 OWN_LOOKS = ("glance", SEARCH, "rest")
 """Kinds of targets that are not caused by anything visible (gazerig.gaze.attention.idle)."""
@@ -77,11 +77,8 @@ class HeadShare:
             self.reach_rad = self.trigger_rad
 
     def for_near_target(self, limit_rad: float) -> "HeadShare":
-        """Return the share for a target on which both eyes converge up to an eccentricity.
-
-        It is the same without a margin: then the eyes' limit is the paper's trigger.
-        """
-        if limit_rad >= self._reachable_rad or self._margin_rad == 0.0:
+        """Return the share for a target on which both eyes converge up to an eccentricity."""
+        if limit_rad >= self._reachable_rad:
             return self
         return HeadShare(self._params, limit_rad + self._margin_rad)
 
@@ -250,6 +247,16 @@ class HeadModel:
         """Return the neck's ((yaw low, high), (pitch low, high))."""
         return self._neck
 
+    def _share_for(self, target: Target, both_eyes_rad: float) -> HeadShare:
+        """Return the share for a target on which both eyes converge up to an eccentricity.
+
+        Without a margin only an ordered point takes that room: for others the eyes' limit is the
+        paper's trigger (Nakamoto & Tsuruno 3.5).
+        """
+        if target.kind != ORDERED and self._params.eye_margin_deg == 0.0:
+            return self.share
+        return self.share.for_near_target(both_eyes_rad)
+
     def destination_rad(
         self, target: Target, facing_rad: Angles2, both_eyes_rad: float = inf
     ) -> Angles3:
@@ -258,7 +265,7 @@ class HeadModel:
         facing_rad: neck angles that would point the face straight at it
         both_eyes_rad: eccentricity up to which both eyes converge on it
         """
-        share, start = self.share.for_near_target(both_eyes_rad), self._goal_direction
+        share, start = self._share_for(target, both_eyes_rad), self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
         short_rad = share.undershoot_rad(target.salience, arc_rad)
         if min(short_rad, arc_rad) > self._comfort_rad:
@@ -274,7 +281,7 @@ class HeadModel:
 
         both_eyes_rad: eccentricity up to which both eyes converge on the target
         """
-        self._share = self.share.for_near_target(both_eyes_rad)
+        self._share = self._share_for(target, both_eyes_rad)
         par = self._params
         self._lead_s = par.lead_ms / 1e3 if target.top_down else -par.start_delay_ms / 1e3
         if self._rng is not None and par.lead_spread_ms > 0.0:
@@ -307,7 +314,7 @@ class HeadModel:
             does not move
         both_eyes_rad: eccentricity up to which both eyes converge on the target point
         """
-        self._share = self.share.for_near_target(both_eyes_rad)
+        self._share = self._share_for(target, both_eyes_rad)
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         soon_rad = facing_rad if soon_rad is None else soon_rad
         if self._pursues and target.kind == AWAY:

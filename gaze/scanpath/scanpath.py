@@ -90,7 +90,7 @@ class ScanpathParams:
         "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
     transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "people"
     start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
-        "first face part, named as in the matrix; nearest: the one nearest to the gaze; as_walk: that of the matrix file"] = "nearest"
+        "first face part, named as in the matrix; nearest: the one nearest to the gaze; as_walk: that of the matrix file"] = "as_walk"
     viewers_left: Annotated[bool,
         "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
     diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
