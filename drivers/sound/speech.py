@@ -42,7 +42,9 @@ def speak(text: str, params: SoundParams) -> SpokenText:
         SoundError: the text is empty or too long, or the program is missing or fails.
     """
     if not text.strip() or len(text) > MAX_CHARACTERS:
-        raise SoundError(f"a spoken text has 1 to {MAX_CHARACTERS} characters, not {len(text)}")
+        raise SoundError(
+            f"a spoken text has 1 to {MAX_CHARACTERS} characters, not {len(text.strip())}"
+        )
     program = params.speech
     if program == "auto":
         program = "piper" if params.voice.endswith(_MODEL) else "espeak-ng"
