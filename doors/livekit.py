@@ -125,16 +125,17 @@ async def follow_room(
         except UnknownMessage as error:
             link.report(str(error))
 
-    def follow(attributes: Mapping[str, str]) -> None:
+    def change(attributes: Mapping[str, str], participant: Any) -> None:
+        """Follow changed attributes, and subscribe to the sound of an agent."""
         if ATTRIBUTE in attributes:
             take({ATTRIBUTE: attributes[ATTRIBUTE]})
-
-    def subscribe(participant: Any) -> None:
-        """Subscribe to the sound of an agent."""
         if listen is not None and participant is not None and ATTRIBUTE in participant.attributes:
             for publication in participant.track_publications.values():
                 if publication.kind == _AUDIO and not publication.subscribed:
                     publication.set_subscribed(True)
+
+    def join(participant: Any) -> None:
+        change(participant.attributes, participant)
 
     def begin(work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.ensure_future(work)
@@ -153,14 +154,6 @@ async def follow_room(
         if participant is not None and ATTRIBUTE in participant.attributes:
             begin(read(stream))
 
-    def change(changed: Mapping[str, str], participant: Any) -> None:
-        follow(changed)
-        subscribe(participant)
-
-    def join(participant: Any) -> None:
-        follow(participant.attributes)
-        subscribe(participant)
-
     async def read(stream: Any) -> None:
         async for part in stream:
             take({"text": plain_text(part)})
@@ -171,7 +164,7 @@ async def follow_room(
 
     room.on("participant_attributes_changed", change)
     room.on("participant_connected", join)
-    room.on("track_published", lambda publication, participant: subscribe(participant))
+    room.on("track_published", lambda publication, participant: change({}, participant))
     if listen is not None:
         room.on("track_subscribed", lambda track, *of: begin(move_mouth(listen(track))))
     room.on("participant_disconnected", leave)
