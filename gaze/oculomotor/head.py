@@ -213,6 +213,9 @@ class HeadModel:
         self._facing = _Facing(-1, t_s, t_s, 0.0, 0.0)
         self._lead_s = 0.0
         self._drift, self._pursues = _NO_DRIFT, False
+        self._steeper: float
+        self._later: float
+        self._relief: float
         self._draw_variation()
         self._level = head_rad[2] == 0.0
         self._start = self._goal_direction
