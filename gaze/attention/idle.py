@@ -19,7 +19,7 @@ above the neck base at the resting height.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, degrees, exp, hypot, log, pi, radians, sin, sqrt
+from math import cos, degrees, exp, hypot, inf, log, pi, radians, sin, sqrt
 from typing import Annotated
 
 import numpy as np
@@ -37,6 +37,7 @@ _PLACES = 16
 """Largest number of remembered things."""
 _UPRIGHT = 0.5
 """Size of shifts up or down as a share of those to the side."""
+_ROUNDING_DEG = 1e-6
 _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make at most 3 to 4 per second
 
 
@@ -67,7 +68,8 @@ class IdleParams:
     again_share: Annotated[float, Bounds(0, 0.98), "share of glances that are followed by another one without a rest"] = 0.9
     glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 13.0
     glance_least_deg: Annotated[float, Bounds(0, 90), "smallest size of such a shift"] = 2.0
-    glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side; the middle is more frequent"] = 30.0
+    glance_yaw_deg: Annotated[float, Bounds(0, 90),
+        "largest angle of a glance to the side, and of its shift; the middle is more frequent"] = 30.0
     glance_pitch_deg: Annotated[float, Bounds(0, 60), "largest angle of a glance up or down"] = 12.0
     thing_share: Annotated[float, Bounds(0, 1), "share of glances at a thing in view or seen recently, if there is one"] = 0.5
     thing_memory_s: Annotated[float, Bounds(0, 3600), "time for which a place where something was seen gets glances"] = 20.0
@@ -246,9 +248,10 @@ class Idle:
         return radians(self._params.search_step_deg) * float(rng.uniform(2.0, 4.0)) / 3.0
 
     def _is_far_aside(self) -> bool:
-        """Return whether a search has ended more than one step from straight ahead."""
-        yaw = yaw_pitch(sub(self._now.p_world_m, self._eye))[0]
-        return self._now.kind == SEARCH and abs(degrees(yaw)) > self._params.search_step_deg
+        """Return whether a search or a look at a thing has ended far from straight ahead."""
+        par, yaw = self._params, yaw_pitch(sub(self._now.p_world_m, self._eye))[0]
+        most = {SEARCH: par.search_step_deg, "glance": par.glance_yaw_deg + _ROUNDING_DEG}
+        return abs(degrees(yaw)) > most.get(self._now.kind, inf)
 
     def _look_back(self, t_s: float, rng: np.random.Generator) -> None:
         """Take a step back from a far side."""
@@ -286,7 +289,7 @@ class Idle:
         self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")
 
     def _other_places(self, here: Angles2, t_s: float) -> list[Vec3]:
-        """Return the places of things within reach, except the present target."""
+        """Return the places of things within reach and one shift, except the present target."""
         par, way = self._params, direction(here)
         self._seen = {
             id: (place, at_s)
@@ -294,11 +297,12 @@ class Idle:
             if t_s - at_s <= par.thing_memory_s
         }
         most, least = radians(par.reach_deg), radians(par.glance_least_deg)
+        far = radians(par.glance_yaw_deg)
         return [
             place
             for place, _ in self._seen.values()
             if abs(yaw_pitch(sub(place, self._eye))[0]) <= most
-            and angle_between(sub(place, self._eye), way) > least
+            and least < angle_between(sub(place, self._eye), way) <= far
         ]
 
     def _draw_glance_point(self, here: Angles2, rng: np.random.Generator) -> Angles2:
@@ -313,7 +317,7 @@ class Idle:
             turn = 2.0 * pi * float(rng.random())
             to_yaw = yaw + size * cos(turn)
             to_pitch = pitch + _UPRIGHT * size * sin(turn)
-            if abs(to_yaw) > wide or abs(to_pitch) > high:
+            if max(size, abs(to_yaw)) > wide or abs(to_pitch) > high:
                 continue
             odds = exp(min(0.0, far - _eccentricity_cost(to_yaw / wide, to_pitch / high)))
             if rng.random() < odds and hypot(to_yaw - yaw, to_pitch - pitch) >= min(

@@ -120,8 +120,8 @@ _BRAKES_S = 0.12
 
 _ROUNDING_RAD = 1e-6
 _ROLLS_S = 0.5
-_FIRST_S = 0.01
-"""Mean lead of the head in self-initiated looks, so that it is first in half of them."""
+_FIRST_S = 0.0065
+"""Mean lead of the head in self-initiated looks: by more than 8 ms in 48 % of them."""
 _MOST_SD, _MOST_DURATION_SD = 2.0, 1.5
 """Bounds of the scatter, in standard deviations."""
 _PURSUES_S, _FORESEES_S = 0.6, 0.2
