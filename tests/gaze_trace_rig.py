@@ -24,7 +24,12 @@ from gazerig.robot.model.types import JointState
 DT = 0.005
 CENTRED = GeometryParams(0.0, 0.0, 0.0)
 DESK = GeometryParams(60.0, 40.0, 50.0)
-NO_RELIEF = HeadParams(goal_model="attention", recentre_after_ms=60_000.0, pursue_above_deg_s=0.0)
+NO_RELIEF = HeadParams(
+    goal_model="attention",
+    recentre_after_ms=60_000.0,
+    recentre_now_above=10.0,
+    pursue_above_deg_s=0.0,
+)
 """The paper's head: eq 7, and nothing after it."""
 
 EXACT = OculomotorParams(
