@@ -92,8 +92,10 @@ ABSENT = ("lid_joints.left_lower", "lid_joints.right_lower")
 
 
 def live_knobs() -> tuple[Parameter, ...]:
-    # The desk rig has no lower lids, so nothing obeys their angles.
-    there = (k for k in parameters(RIG, RIG) if not k.key.startswith(ABSENT))
+    # The desk rig has no lower lids, so nothing obeys their angles, and no joint that may be limp.
+    limp = ".limp_when_idle_s"
+    knobs = [k for k in parameters(RIG, RIG) if not k.key.endswith(limp)]
+    there = (k for k in knobs if not k.key.startswith(ABSENT))
     return tuple(k for k in there if not k.live.startswith(NEXT_START))
 
 
