@@ -283,7 +283,7 @@ def test_a_hand_that_reaches_in_is_noticed_and_the_head_turns_to_it(boxing: Live
         if event.name == "reach":
             side = 1.0 if event.place_world_m[1] > 0.0 else -1.0
             before, *_, last = boxing.within(event.start_s, event.end_s)
-            assert side * degrees(last.pose.head_rad[0] - before.pose.head_rad[0]) > 4.0
+            assert side * degrees(last.pose.head_rad[0] - before.pose.head_rad[0]) > 1.5
 
 
 def test_a_feint_draws_the_gaze_for_less_than_a_second(boxing: Lived) -> None:

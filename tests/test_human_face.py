@@ -34,9 +34,7 @@ def test_e63_a_floor_by_max_is_seen_by_the_measure() -> None:
     assert beyond_the_law(rests, ["RE"] * 200) > 0.3
 
 
-def test_e69_a_face_is_left_after_bouts_and_entered_where_the_gaze_comes_from(
-    run: MeasuredRun,
-) -> None:
+def test_e69_a_face_is_left_after_bouts_and_entered_at_eyes_or_nose(run: MeasuredRun) -> None:
     every = list(stays(run))
     bouts = [seconds for on, seconds, _ in every if on]
     away = [seconds for on, seconds, _ in every if not on]
@@ -44,7 +42,7 @@ def test_e69_a_face_is_left_after_bouts_and_entered_where_the_gaze_comes_from(
     assert 0.25 < np.median(away) < 1.2
     entries = [begin for on, _, begin in every if on]
     assert all(run.part[begin] in nearest(run, begin) for begin in entries)
-    assert len({run.part[begin] for begin in entries}) >= 3
+    assert len({run.part[begin] for begin in entries}) >= 2
 
 
 def test_e71_no_saccade_comes_sooner_than_100_ms_after_another(run: MeasuredRun) -> None:

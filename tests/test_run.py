@@ -57,7 +57,7 @@ def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:
     share = visitor["target_share"]
     nobody = sum(share.get(kind, 0.0) for kind in ("rest", "search", "glance"))
     assert share["face"] > 0.6 and share["hand"] > 0.02 and nobody > 0.02
-    assert len(visitor["part_share"]) == 8
+    assert len(visitor["part_share"]) >= 6
     assert visitor["gaze_error_deg"]["median"] < 0.3
     # A new target waits a reaction time and the gap after a saccade.
     assert visitor["gaze_error_deg"]["p95"] < 5.0

@@ -9,7 +9,7 @@ from gazerig.features.bringup.manual_control import ManualControl, MoveResult, S
 from gazerig.gaze.angles import angle_between, norm, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
-from gazerig.gaze.types import Target, Vec3
+from gazerig.gaze.types import ORDERED, Target, Vec3
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics, gaze_error
 from gazerig.robot.model.types import JointAngles, JointState
@@ -60,7 +60,7 @@ def look_at(
     """
     refuse_not_finite(p_world_m)
     fresh = True
-    target = Target(p_world_m, (0.0, 0.0, 0.0), 0.0, "point", 0, 1.0, True, None, 1, "asked for")
+    target = Target(p_world_m, (0.0, 0.0, 0.0), 0.0, ORDERED, 0, 1.0, True, None, 1, "ordered")
 
     def desired(joints: JointState, t_s: float, dt_s: float) -> JointAngles:
         nonlocal fresh

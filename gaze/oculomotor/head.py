@@ -137,8 +137,12 @@ _RELIEF = (0.4, 0.9)
 """Eccentricity to which the head recentres an eye, as a share of the one that is comfortable."""
 _BEFORE_FACE = 0.5
 """Comfortable eccentricity of a face, as a share of comfort_deg."""
-_SHORT_LOOK_S = 2.0
-"""Duration of a look elsewhere up to which the time to recentre a face continues."""
+_SHORT_LOOK_S = 6.0
+"""Duration of looks elsewhere up to which the time to recentre a face continues.
+
+Looks at each of several people last 2 to 5 s. The head comes between them, so that the camera sees
+those beside them.
+"""
 _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""
 
@@ -151,7 +155,6 @@ def _draw_bounded(rng: np.random.Generator, most: float) -> float:
 class _Facing(NamedTuple):
     """The last look at a face: when it ended, since when the face is aside, and deviates of it."""
 
-    id: int
     until_s: float
     since_s: float
     later: float
@@ -210,7 +213,7 @@ class HeadModel:
         self._follows = False
         self._relieves = False
         self._aside_since_s = self._stepped_s = t_s
-        self._facing = _Facing(-1, t_s, t_s, 0.0, 0.0)
+        self._facings: dict[int, _Facing] = {}
         self._lead_s = 0.0
         self._drift, self._pursues = _NO_DRIFT, False
         self._steeper: float
@@ -350,13 +353,15 @@ class HeadModel:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
                 self._drift, self._pursues = _NO_DRIFT, False
             if self._target is not None and self._target[0] in _FACES:
-                since_s, id = self._aside_since_s, self._target[1]
-                self._facing = _Facing(id, t_s, since_s, self._later, self._relief)
-            self._target, last = (target.kind, target.id), self._facing
+                now = _Facing(t_s, self._aside_since_s, self._later, self._relief)
+                self._facings[self._target[1]] = now
+            recent = self._facings.items()
+            self._facings = {i: one for i, one in recent if t_s - one.until_s <= _SHORT_LOOK_S}
+            self._target = target.kind, target.id
             self._aside_since_s = t_s
             self._draw_variation()
-            if is_face and target.id == last.id and t_s - last.until_s <= _SHORT_LOOK_S:
-                self._aside_since_s, self._later, self._relief = last[2:]
+            if is_face and (last := self._facings.get(target.id)):
+                self._aside_since_s, self._later, self._relief = last[1:]
             self._start = self._extrapolated_direction(t_s) if moving else self._goal_direction
             # The reason for the last movement ends when the eyes return from the target.
             self._follows, self._relieves = moving, False
@@ -373,7 +378,7 @@ class HeadModel:
         if aside_rad <= comfort_rad:
             self._aside_since_s = t_s
         recentre_ms = par.recentre_after_ms + self._later * par.recentre_spread_ms
-        if target.top_down and target.salience > par.recentre_now_above:
+        if self._is_urgent(target):
             recentre_ms = 0.0
         if t_s - self._aside_since_s >= recentre_ms / 1e3 and not moving:
             self._follows, self._relieves = False, True
@@ -391,6 +396,11 @@ class HeadModel:
             if target.kind == SEARCH:
                 short_rad = min(short_rad, self._search_rad)
             self._follow(target, facing, gaze, short_rad, t_s)
+
+    def _is_urgent(self, target: Target) -> bool:
+        """Return whether a rule's target matters so much that the head does not wait."""
+        is_rule = target.top_down and target.kind != ORDERED and target.kind not in _FACES
+        return is_rule and target.salience > self._params.recentre_now_above
 
     def _trigger_rad(self, target: Target) -> float:
         """Return the eccentricity of a target from which the head takes part."""

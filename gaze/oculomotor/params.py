@@ -136,7 +136,7 @@ class HeadParams:
         "after an eye has been eccentric for this long at least, the head turns slowly to recentre it"] = 3000.0
     recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of an additional random time (exponential)"] = 7000.0
     recentre_now_above: Annotated[float, Bounds(0, 10),
-        "the head does not wait before it recentres the target of a rule whose salience is above this; 10: always waits"] = 0.85
+        "the head recentres a rule's target, other than a face, at once if its salience is above this; 10: never at once"] = 0.85
     comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not recentred"] = 10.0
     recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it recentres the eyes"] = 12.0
     search_deg: Annotated[float, Bounds(0, 90),

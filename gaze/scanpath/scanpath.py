@@ -90,7 +90,7 @@ class ScanpathParams:
         "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
     transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "people"
     start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
-        "first face part, named as in the matrix; nearest: the one nearest to the gaze; as_walk: that of the matrix file"] = "as_walk"
+        "first face part, named as in the matrix; nearest: eye or nose nearest to the gaze; as_walk: that of the matrix file"] = "nearest"
     viewers_left: Annotated[bool,
         "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
     diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
@@ -281,13 +281,23 @@ class Scanpath:
         return self._face, known is None and self._face is not None
 
 
+ENTRY_PARTS = ("RE", "LE", "N")
+"""Parts at which people enter a face: the first look lands near its middle (Hsiao & Cottrell 2008).
+
+From chin and sides the walk would go on to the mouth, also of a silent person.
+"""
+
+
 def _nearest(face: Face, p_world_head_m: Vec3, gaze_world_m: Vec3 | None) -> str | None:
-    """Return the part of a face nearest to the gaze point, None if that is unknown."""
+    """Return the eye or nose of a face nearest to the gaze point, None if that is unknown."""
     if gaze_world_m is None:
         return None
     gaze = sub(gaze_world_m, p_world_head_m)
-    away = [angle_between(gaze, sub(part, p_world_head_m)) for part in face.parts_world_m]
-    return PARTS[away.index(min(away))]
+    angle = {
+        part: angle_between(gaze, sub(face.parts_world_m[PARTS.index(part)], p_world_head_m))
+        for part in ENTRY_PARTS
+    }
+    return min(angle, key=lambda part: angle[part])
 
 
 def _model(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:

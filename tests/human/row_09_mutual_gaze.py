@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from human.measured_run import MeasuredRun, Runner
 
-from gazerig.gaze.types import PARTS
+from gazerig.gaze.scanpath.scanpath import ENTRY_PARTS
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 SCENE = "face-to-face"
@@ -17,7 +17,7 @@ WANTED = {
     "longest bout, s": (4.0, 15.0),
     "median look away, s": (0.3, 1.2),
     "time on the face, %": (75.0, 92.0),
-    "entries at the nearest part, %": (85.0, 100.0),
+    "entries at the nearest of eyes and nose, %": (85.0, 100.0),
     "entries at the paper's first part, %": (0.0, 40.0),
 }
 
@@ -31,10 +31,12 @@ def stays(run: MeasuredRun) -> Iterator[tuple[bool, float, int]]:
 
 
 def nearest(run: MeasuredRun, begin: int) -> set[str]:
-    """Return the parts that are nearest to the gaze of a tick, within the camera's error."""
+    """Return the eyes or the nose nearest to the gaze of a tick, within the camera's error."""
     face = run.target_deg[begin] - _part_deg(run, begin, str(run.part[begin]))
     gaze = run.plan_deg[begin - 1]
-    away = {part: float(np.hypot(*(face + _part_deg(run, begin, part) - gaze))) for part in PARTS}
+    away = {
+        part: float(np.hypot(*(face + _part_deg(run, begin, part) - gaze))) for part in ENTRY_PARTS
+    }
     return {part for part, angle in away.items() if angle < min(away.values()) + 0.7}
 
 
@@ -59,7 +61,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "longest bout, s": float(bouts.max()),
         "median look away, s": float(np.median(away)),
         "time on the face, %": 100.0 * float(np.mean([(one.part != "").mean() for one in runs])),
-        "entries at the nearest part, %": 100.0
+        "entries at the nearest of eyes and nose, %": 100.0
         * float(np.mean([one.part[begin] in nearest(one, begin) for one, begin in entries])),
         "entries at the paper's first part, %": 100.0
         * float(np.mean([one.part[begin] == "FR" for one, begin in entries])),
