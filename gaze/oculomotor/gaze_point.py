@@ -6,7 +6,7 @@ Wolpert 1998).
 Re-fixations are small saccades within a target during a long look. People's eyes never rest for
 seconds: they make one to two small saccades per second, more than 90 % of them below 1 deg
 (Otero-Millan et al. 2013). A servo shows those that are larger than its steps and its play. So the
-gaze moves between points near the middle of a target after rests of .6 to 1.5 s: one such step a
+gaze moves between points near the middle of a target after rests of .35 to 1.45 s: one such step a
 second, and few in the shorter rests of a face or a room that is explored.
 """
 

@@ -143,6 +143,8 @@ _SHORT_LOOK_S = 6.0
 Looks at each of several people last 2 to 5 s. The head comes between them, so that the camera sees
 those beside them.
 """
+_FARTHEST_AWAY_RAD = radians(22.0)
+"""Eccentricity of a look away from a walker up to which the head goes on with the walker."""
 _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""
 
@@ -323,7 +325,7 @@ class HeadModel:
         self._share = self._share_for(target, both_eyes_rad)
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         soon_rad = facing_rad if soon_rad is None else soon_rad
-        if self._pursues and target.kind == AWAY:
+        if self._pursues and target.kind == AWAY and eccentricity_rad < _FARTHEST_AWAY_RAD:
             ahead = add(direction(facing_rad), scale(self._drift, self.foresees_s))
             soon_rad = yaw_pitch(ahead)
         if self._is_in_sustained_motion(facing_rad, soon_rad, since_eye_onset_s, t_s):

@@ -22,8 +22,8 @@ class OculomotorParams:
     refixation_deg: Annotated[float, Bounds(0, 5),
         "largest re-fixation, a small saccade within the target; 0: none"] = 1.7
     refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest re-fixation; smaller ones are hidden by servo steps and play"] = 1.15
-    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 600.0
-    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is extended by a random time of up to this"] = 900.0
+    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
+    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is extended by a random time of up to this"] = 1100.0
     undershoot: Annotated[float, Bounds(0, 0.3),
         "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people: .05-.10"] = 0.08
     endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
