@@ -5,7 +5,8 @@ their sources.
 """
 
 from collections.abc import Callable
-from math import degrees, radians
+from functools import partial
+from math import degrees, pi, radians, sin
 from pathlib import Path
 from typing import Literal
 
@@ -137,7 +138,7 @@ def followed(
             seen = None
         R = rotation((radians(head(max(0.0, t))), 0.0, 0.0))
         if k == 0:
-            controller.hold(eyes(*start), None if seen is None else eyes(*seen), R, t)
+            controller.adopt(eyes(*start), None if seen is None else eyes(*seen), R, t)
         left, right = controller.step(None if seen is None else eyes(*seen), R, t, TICK_S)
         if t >= 0.0:
             version, vergence = 0.5 * (left[0] + right[0]), right[0] - left[0]
@@ -145,16 +146,31 @@ def followed(
     return np.array(rows)
 
 
+def ramp(deg_s: float, t_s: float) -> tuple[float, float]:
+    """Return version and vergence of a target in steady motion, deg."""
+    return deg_s * t_s, 0.0
+
+
+def sine(hz: float, t_s: float) -> tuple[float, float]:
+    """Return version and vergence of a target that swings by 5 deg."""
+    return 5.0 * sin(2.0 * pi * hz * t_s), 0.0
+
+
+def in_depth(vergence_deg: float, t_s: float) -> tuple[float, float]:
+    """Return version and vergence of a target straight ahead."""
+    return 0.0, vergence_deg
+
+
 def pursuit() -> None:
     """Following a ramp and a sine that are seen 0.1 s late."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.4))
     for speed in (10.0, 20.0, 30.0):
-        t, version, _ = followed(lambda t, v=speed: (v * t, 0.0), 0.8).T
+        t, version, _ = followed(partial(ramp, speed), 0.8).T
         left.plot(t, np.gradient(version, t), label=f"{speed:.0f} deg/s")
     left.axvline(0.1, color=HUMAN, ls="--", label="human latency, 100 ms (Robinson 1986)")
     left.set(xlabel="s", ylabel="eye speed, deg/s", title="ramps")
     for hz, style in ((0.2, "-"), (0.5, "--")):
-        t, version, _ = followed(lambda t, f=hz: (5 * np.sin(2 * np.pi * f * t), 0.0), 5.0).T
+        t, version, _ = followed(partial(sine, hz), 5.0).T
         right.plot(t, version, INK, ls=style, label=f"eye, {hz} Hz")
         right.plot(t, 5 * np.sin(2 * np.pi * hz * t), HUMAN, ls=style, lw=0.8, label="target")
     right.set(xlabel="s", ylabel="deg", title="sines")
@@ -167,7 +183,7 @@ def vergence() -> None:
     """Steps in depth: converging and diverging by 4 deg."""
     figure, axes = plt.subplots(figsize=(4.8, 3.2))
     for start, step in ((2.0, 4.0), (8.0, -4.0)):
-        t, _, values = followed(lambda t, v=start + step: (0.0, v), 2.0, start=(0.0, start)).T
+        t, _, values = followed(partial(in_depth, start + step), 2.0, start=(0.0, start)).T
         axes.plot(t, values, label=f"{start:.0f} to {start + step:.0f} deg")
     axes.set(xlabel="s", ylabel="vergence, deg", title="vergence: slower apart than together")
     axes.legend(fontsize=7)
@@ -231,7 +247,8 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
     rig = load_rig("desk")
     made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
     assert made.scene is not None
-    people, rows = made.scene.people, []
+    people = made.scene.people
+    rows: list[tuple[float, ...]] = []
     kinematics, _ = kinematics_and_oculomotor(rig, 0)
 
     def watch(tick: Tick) -> None:
@@ -258,10 +275,11 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
 def capture_time() -> None:
     """Pictures placed by the pose at their capture and by the newest: a quick step, a walk."""
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12.0, 3.8))
-    for placed_by, colour, name in (
+    ways: tuple[tuple[Literal["capture", "newest"], str, str], ...] = (
         ("capture", INK, "pose at the capture"),
         ("newest", HUMAN, "newest pose"),
-    ):
+    )
+    for placed_by, colour, name in ways:
         t, person, gaze, facing, head, _ = watched("steps-aside", STEP_AT_S + 2.1, placed_by).T
         if placed_by == "capture":
             left.plot(t - STEP_AT_S, facing, "k", lw=0.8, label="straight at the person")

@@ -81,7 +81,7 @@ class PursuitParams:
     velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye adopts; people: .95"] = 0.95
     vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
     divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv instead of Kd if the target is farther away than the gaze point"] = 3.0
-    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, including the closing of the error; people: 63 deg/s"] = 56.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, including the closing of the error; people: 63 deg/s"] = 58.0
     reject_deg_s: Annotated[float, Bounds(1, 1000), "a target reported as faster than this is taken as a jump and not pursued"] = 100.0
     max_error_deg: Annotated[float, Bounds(0.1, 90),
         "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0

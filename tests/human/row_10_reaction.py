@@ -115,7 +115,9 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "appears: 90th percentile, ms": float(np.percentile(still, 90)),
         "appears: between 150 and 250 ms, %": 100.0
         * float(((still >= 150) & (still <= 250)).mean()),
-        "appears: logarithms' standard deviation": float(np.log(still).std()),
+        "appears: logarithms' standard deviation": float(
+            np.log(still[still > 0.0]).std()  # a shift may begin there as a hand appears
+        ),
         "comes nearer fast: answered, %": 100.0 * len(near) / max(1, count[True]),
         "comes nearer fast: median, ms": float(np.median(near)),
         "express (below 120 ms), %": 100.0 * float((both < _EXPRESS_MS).mean()),
