@@ -221,7 +221,7 @@ def test_any_reading_begins_at_the_shortest_dwell_and_keeps_the_means_above(diag
 
 
 @pytest.mark.parametrize(
-    ("gaze_m", "part"),
+    ("gaze_m", "end"),
     [((1.0, -0.5, 0.2), min), ((1.0, 0.9, 0.2), max)],
 )
 def test_a_face_is_entered_at_the_eye_or_the_nose_nearest_to_the_gaze(

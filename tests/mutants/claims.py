@@ -183,7 +183,7 @@ CLAIMS = (
            ("profiles::test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands",), ("E68",)),
     Mutant("gaze/attention/aversion.py", "if self._face is not None and t_s >= self._until_s and leaves:", "if False:",
            "a face is never left",
-           ("human_face::test_e69_a_face_is_left_after_bouts_and_entered_where_the_gaze_comes_from",), ("E69",)),
+           ("human_face::test_e69_a_face_is_left_after_bouts_and_entered_at_eyes_or_nose",), ("E69",)),
     Mutant("gaze/attention/reaction.py", "1e-3 * par.median_ms", "0.5e-3 * par.median_ms",
            "reactions are twice as quick",
            ("reaction::test_e70_reactions_are_those_of_people",), ("E70",)),

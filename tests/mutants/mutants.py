@@ -115,7 +115,7 @@ MUTANTS = (
     Mutant("gaze/scanpath/dwell.py", "rests: Floats = shortest_s + np.maximum(least, low * above)",
            "rests: Floats = shortest_s + np.maximum(least, above)",
            "what short parts gain is not taken from the others", ("scanpath",)),
-    Mutant("gaze/scanpath/scanpath.py", "return PARTS[away.index(min(away))]", "return PARTS[0]",
+    Mutant("gaze/scanpath/scanpath.py", "return min(angle, key=lambda part: angle[part])", "return ENTRY_PARTS[0]",
            "a face is entered anywhere", ("scanpath",)),
     Mutant("gaze/oculomotor/binocular.py", "view.in_range(wanted) == wanted", "True",
            "eyes turn beyond their range", ("opposite_angles",)),
