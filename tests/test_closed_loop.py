@@ -160,7 +160,8 @@ def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: 
 def test_somebody_who_walks_past_is_followed(walk: Seen) -> None:
     walks = walk.t_s > 1.0 + 0.25
     assert walk.on_face[walks].all()
-    assert np.percentile(walk.off_deg[walks & (walk.jumps == 0.0)], 95) < 2.0
+    caught_up = (walk.t_s > 1.0 + 0.5) & (walk.jumps == 0.0)  # by two saccades, .2 s apart
+    assert np.percentile(walk.off_deg[caught_up], 95) < 2.0
     travel = walk.gaze_deg[-1] - walk.gaze_deg[walks][0]
     assert travel > 50.0
 

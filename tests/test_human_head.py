@@ -32,7 +32,7 @@ def test_e74_measured_blinks_are_not_in_the_ticks_of_saccades_and_half_incomplet
     # Too short for the rates of the two modes, but not for their order.
     assert 6.0 <= figures["at rest, 1/min"] <= 25.0
     assert 14.0 <= figures["in conversation, 1/min"] <= 37.0
-    assert figures["in the tick of a saccade, %"] <= 6.0  # one of some 19, by chance
+    assert figures["in the tick of a saccade, %"] <= 15.0  # one of 7 or more, by chance
     assert 20.0 <= figures["incomplete, %"] <= 80.0
 
 
