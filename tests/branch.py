@@ -40,11 +40,17 @@ _SIGNALS = (
 
 
 class Branch(subprocess.Popen[Any]):
-    """A program in a fork of this process, with all that subprocess.Popen has."""
+    """A program in a fork of this process, with all that subprocess.Popen has.
+
+    One starts at a time: another fork meanwhile would keep the ends of its pipes open.
+    """
+
+    starting = threading.Lock()
 
     def __init__(self, work: Callable[[], object], **options: Any) -> None:
         self._work = work
-        super().__init__(["branch"], **options)
+        with Branch.starting:
+            super().__init__(["branch"], **options)
 
     def _execute_child(self, *given: Any) -> None:
         """Fork; the parent goes on as after a program has been started."""
@@ -105,6 +111,7 @@ def become(
 
 def _begin_afresh() -> None:
     """Leave behind what the parent, a run of tests, has that a fresh process has not."""
+    Branch.starting = threading.Lock()  # the fork was made while it was held
     gc.freeze()
     gc.unfreeze = lambda: None  # a full pass would copy all of the parent's memory
     for number in _SIGNALS:

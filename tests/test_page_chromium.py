@@ -53,6 +53,8 @@ def opened(tab: Browser) -> Iterator[tuple[Rig, Person]]:
         wait_for(lambda: person.reads("STOP", "Steer"), "the page")
         person.open("Steer")
         wait_for(lambda: person.reads("behaviour", "joints", "neck yaw"), "the controls")
+        # On a rig that may be real the pointer takes control only on request.
+        assert person.run(POINTER_ON) is False
         yield rig, person
 
 
@@ -63,6 +65,21 @@ def at_the_rig(opened: tuple[Rig, Person]) -> tuple[Rig, Person]:
     if rig.robot.stopped:
         resumed(rig, person)
     return rig, person
+
+
+POINTER = "document.querySelector('#pointer')"
+POINTER_ON = f"{POINTER}.getAttribute('aria-pressed') === 'true'"
+
+
+def follow(person: Person, *, on: bool) -> None:
+    """Press the button until the head looks at the pointer, or no longer does."""
+
+    def is_set() -> bool:
+        if person.run(POINTER_ON) is not on:
+            person.click(POINTER)
+        return person.run(POINTER_ON) is on
+
+    wait_for(is_set, f"the pointer {'on' if on else 'off'}")
 
 
 def test_stop_takes_the_torque_off_until_it_is_asked_back(at_the_rig: tuple[Rig, Person]) -> None:
@@ -210,10 +227,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
 def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     person.run("document.querySelector('#view').scrollIntoView()")
-    toggle = "document.querySelector('#pointer')"
-    # On a rig that may be real it takes control only on request.
-    assert person.run(f"{toggle}.getAttribute('aria-pressed')") == "false"
-    person.click(toggle)
+    follow(person, on=True)
     width, height, left, top = cast(
         Any,
         person.run(
@@ -236,7 +250,7 @@ def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Per
     wait_for(lambda: not present(rig.newest).client_control.active, "the pointer letting go")
     assert present(rig.newest).client_control.end_reason == "not renewed"
     rig.pace_s = PACE_S
-    person.click(toggle)
+    follow(person, on=False)
     before = len(rig.orders)
     person._mouse("mouseMoved", left + 0.5 * width, top + 0.4 * height, "none")
     person.wait_for_frames(UNHURRIED_FRAMES)
@@ -247,7 +261,6 @@ def test_the_head_follows_a_finger_and_the_view_does_not_turn(
     at_the_rig: tuple[Rig, Person],
 ) -> None:
     rig, person = at_the_rig
-    toggle = "document.querySelector('#pointer')"
     box = "document.querySelector('#view').getBoundingClientRect()"
     width, height = cast(Any, person.run(f"[{box}.width, {box}.height]"))
     left, top = cast(Any, person.run(f"[{box}.x, {box}.y]"))
@@ -256,7 +269,7 @@ def test_the_head_follows_a_finger_and_the_view_does_not_turn(
         points = [{"x": left + x * width, "y": top + 0.5 * height} for x in across]
         person.tab.ask("Input.dispatchTouchEvent", type=kind, touchPoints=points)
 
-    person.click(toggle)
+    follow(person, on=True)
     touch("touchStart", 0.45)
     before, shifts = len(rig.orders), itertools.cycle((0.0, 0.004))
 
@@ -294,7 +307,7 @@ def test_the_head_follows_a_finger_and_the_view_does_not_turn(
         return len(rig.orders) == count
 
     wait_for(rests, "the finger being gone")
-    person.click(toggle)
+    follow(person, on=False)
 
 
 def test_the_space_bar_stops_in_the_frame_of_the_view_too(at_the_rig: tuple[Rig, Person]) -> None:
