@@ -154,7 +154,7 @@ class DoorLink:
 
         Args:
             attempt: Connects, follows the neighbour, and returns when it disconnects.
-            neighbour: What the door waits for.
+            neighbour: Name of the awaited program, for reports.
             remedy: What to do if it does not come.
             errors: Errors of a lost connection.
         """

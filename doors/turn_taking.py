@@ -40,7 +40,7 @@ class UnknownMessage(Exception):
 
 
 class TurnTaking:
-    """Who has the turn in a conversation. Each method returns the orders for a change.
+    """The turns of a conversation. Each method returns the orders for a change.
 
     Events may come in any order and more than once: an event that changes nothing gives no order.
 

@@ -155,7 +155,12 @@ def _draw_bounded(rng: np.random.Generator, most: float) -> float:
 
 
 class _Facing(NamedTuple):
-    """The last look at a face: when it ended, since when the face is aside, and deviates of it."""
+    """The last look at a face.
+
+    until_s: its end
+    since_s: time from which the face has been aside
+    later, relief: random deviates of the time until the head recentres, and of how far
+    """
 
     until_s: float
     since_s: float

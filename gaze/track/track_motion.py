@@ -61,6 +61,16 @@ class TrackEvents(NamedTuple):
 NO_EVENTS = TrackEvents()
 
 
+class _ChannelCurve(NamedTuple):
+    """A curve that moves one channel, by its index; ``rest``: value of the channel at rest."""
+
+    channel: int
+    curve: MinimumJerkCurve
+    rest: float
+    gain: float = 1.0
+    delay_s: float = 0.0
+
+
 class TrackMotion:
     """Curves of one track on one rig, at its original speed and size.
 
@@ -91,21 +101,18 @@ class TrackMotion:
         channels = (*POSE_CHANNELS, *joints)
         self._rests = [rest_value(name) for name in channels]
         self.rest = np.array(self._rests)
-        # Index, curve, value at rest, factor and delay in s.
         self._curves = [
-            (
+            _ChannelCurve(
                 channels.index(name),
                 MinimumJerkCurve(rest_value(name), found.times_s, found.values),
                 rest_value(name),
-                1.0,
-                0.0,
             )
             for name, found in keys.items()
         ]
         for level in levels:
             curve = MinimumJerkCurve(0.0, level.keys.times_s, level.keys.values)
             self._curves += [
-                (i, curve, 0.0, gain, 0.0) for i, gain in enumerate(level.gain) if gain
+                _ChannelCurve(i, curve, 0.0, gain) for i, gain in enumerate(level.gain) if gain
             ]
         self.owned = frozenset(channels.index(name) for name in owned)
         self._follow = eyes_follow_head and not self.owned & {_FIRST_EYE, _FIRST_EYE + 1}
@@ -133,7 +140,7 @@ class TrackMotion:
         if most_s == 0.0:
             return self
         later = copy(self)
-        later._curves = [(*one[:4], delays_s[one[0]]) for one in self._curves]
+        later._curves = [one._replace(delay_s=delays_s[one.channel]) for one in self._curves]
         later.duration_s = self.duration_s + most_s
         return later
 

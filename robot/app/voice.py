@@ -521,7 +521,7 @@ def _has_ended(number: int, tick: Tick) -> bool:
 
 
 def _has_finished(number: int, tick: Tick | None) -> bool:
-    """Return whether a track has ended by itself, and its sound at the same time."""
+    """Return whether a track has reached its end, and its sound with it."""
     return tick is not None and any(
         one.number == number and one.end_reason == FINISHED for one in tick.tracks
     )

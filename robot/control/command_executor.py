@@ -52,7 +52,7 @@ class CommandExecutor:
 
     Args:
         body: The joints on their bus.
-        lead: The client that controls gaze or joints.
+        lead: Control of gaze or joints by a client.
         stop: Switches the torque off and on.
         menus: Menus of the models.
         attention: Target chooser with the behaviours.

@@ -76,7 +76,7 @@ class TrackChoices:
         tables: Expressions and levels of the rig.
         latency_s: Latency of joints that has not been measured yet.
         sound_s: Returns the duration of a track's sound.
-        latency: Measures the latencies of the joints; None: not.
+        latency: Measures the latencies of the joints; None: as of joints on one bus.
     """
 
     def __init__(
