@@ -7,17 +7,15 @@ is held low, if its driver can.
 import errno
 import fcntl
 import os
-import stat
 import time
 from collections.abc import Callable
-from grp import getgrgid
-from pathlib import Path
 from typing import Any
 
 from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, commands
+from gazerig.drivers.serial.list_ports import open_failure_text
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
@@ -180,32 +178,3 @@ class I2cPort:
 
     def _lost(self, reason: object) -> BusLost:
         return BusLost(f"{self.port_name} is gone ({reason}): check the adapter and its cable")
-
-
-def open_failure_text(path: str, code: int | None) -> str:
-    """Return in one line why an I2C bus cannot be opened, with the remedy."""
-    here = ", ".join(sorted(map(str, Path("/dev").glob("i2c-*")))) or "none"
-    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return (
-            f"no I2C bus {path}: switch I2C on (on a Raspberry Pi: sudo raspi-config, Interface "
-            f"Options), or plug the adapter in; buses here: {here}"
-        )
-    if code in (errno.EACCES, errno.EPERM):
-        return (
-            f"no permission to open {path}: join its group with "
-            f"'sudo usermod -aG {device_group(path)} $USER' and log in again"
-        )
-    if code in (errno.EBUSY, errno.EAGAIN):
-        return f"{path} is busy: close the other program that moves servos on it"
-    return (
-        f"{path} is not an I2C bus ({os.strerror(code) if code else 'unknown'}); buses here: {here}"
-    )
-
-
-def device_group(path: str) -> str:
-    """Return the group that may use a device, "i2c" if it is unknown."""
-    try:
-        status = os.stat(path)
-        return getgrgid(status.st_gid).gr_name if stat.S_ISCHR(status.st_mode) else "i2c"
-    except (OSError, KeyError):
-        return "i2c"

@@ -163,26 +163,43 @@ def set_latency(file: Path, ms: int = RECOMMENDED_LATENCY_MS) -> bool:
 
 
 def open_failure_text(port_name: str, code: int | None) -> str:
-    """Return in one line why a port cannot be opened, with the remedy."""
-    if code == errno.ENOENT or code == errno.ENODEV or code == errno.ENXIO:
+    """Return in one line why a port or an I2C bus cannot be opened, with the remedy."""
+    i2c = is_i2c(port_name)
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        if i2c:
+            return f"no I2C bus {port_name}: {ABSENT_I2C_REMEDY}; buses here: {i2c_names_text()}"
         return f"no serial port {port_name}: plug the adapter in; ports here: {port_names_text()}"
     if code in (errno.EACCES, errno.EPERM):
+        found = access(port_name)
+        group = found.group if found.is_device else "i2c" if i2c else "dialout"
         return (
             f"no permission to open {port_name}: join its group with "
-            "'sudo usermod -aG dialout $USER' and log in again"
+            f"'sudo usermod -aG {group} $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
         held = ", ".join(port_users(port_name))
         who = f", {held}," if held else ""
-        return f"{port_name} is busy: close the other program{who} that uses it"
+        what = "moves servos on it" if i2c else "uses it"
+        return f"{port_name} is busy: close the other program{who} that {what}"
+    if i2c:
+        reason = os.strerror(code) if code else "unknown"
+        return f"{port_name} is not an I2C bus ({reason}); buses here: {i2c_names_text()}"
     reason = os.strerror(code) if code else "not a serial port"
     return f"cannot open {port_name} ({reason}); ports here: {port_names_text()}"
+
+
+ABSENT_I2C_REMEDY = "switch I2C on (on a Raspberry Pi: sudo raspi-config, Interface Options), or plug the adapter in"
 
 
 def port_names_text() -> str:
     """Return the names of the serial ports as text."""
     ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
     return ", ".join(ports) or "none"
+
+
+def i2c_names_text() -> str:
+    """Return the names of the kernel's I2C buses as text."""
+    return ", ".join(sorted(map(str, Path("/dev").glob("i2c-*")))) or "none"
 
 
 POLOLU = "1ffb:"

@@ -12,11 +12,14 @@ from typing import NamedTuple
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, PortError, SetupError
 from gazerig.drivers.serial.list_ports import (
+    ABSENT_I2C_REMEDY,
     RECOMMENDED_LATENCY_MS,
     Access,
     Host,
     SerialPort,
     access,
+    i2c_names_text,
+    is_i2c,
     latency_file,
     latency_ms,
     port_users,
@@ -252,6 +255,8 @@ PORT_ADVICE = {
         "write {name} into the YAML's bus.port"),
     "absent": Advice("error", "there is no such port", "plug the adaptor in; ports here: {ports}; "
         "then name one with --port or in the YAML's bus.port"),
+    "no bus": Advice("error", "there is no such I2C bus", "{switch}; buses here: {buses}; then name "
+        "one with --port or in the YAML's bus.port"),
     "no port": Advice("error", "is no serial port", "name one of gazerig scan"),
     "joined": Advice("error", "may be used by the group {group} only",
         "log out and in again, this session began before you joined the group"),
@@ -290,6 +295,10 @@ def examine_port(facts: PortFacts) -> list[Diagnostic]:
     device, access = facts.device, facts.access
     trouble = ""
     if not access.exists:
+        if is_i2c(device):
+            return [
+                PORT_ADVICE["no bus"].at(device, switch=ABSENT_I2C_REMEDY, buses=i2c_names_text())
+            ]
         trouble = "absent"
     elif not access.is_device:
         trouble = "no port"
