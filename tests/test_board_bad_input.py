@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.i2c import port as i2c
+from gazerig.drivers.serial import list_ports
 from gazerig.robot.cli.main import app
 from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.client import PtyBus
@@ -80,7 +81,8 @@ def test_a_board_that_is_not_the_one(
 def test_a_bus_without_the_right_to_open_it_names_the_group(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(i2c, "device_group", lambda path: "gpio")
+    known = list_ports.Access(True, True, False, "gpio", False)
+    monkeypatch.setattr(list_ports, "access", lambda path: known)
 
     def refused(path: str) -> None:
         raise PermissionError(errno.EACCES, "Permission denied")

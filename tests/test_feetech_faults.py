@@ -12,6 +12,7 @@ from sts_rig import Rig
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.torque import read_positions
 from gazerig.drivers.types import ServoConfig
@@ -307,9 +308,13 @@ def test_mishap_upon_mishap(seed):
 @pytest.mark.parametrize(("again", "well"), [(2003, True), (1000, False)])
 def test_a_place_to_begin_from_is_taken_only_if_two_answers_agree(again, well):
     answers = iter([{1: 2000}, {1: again}])
-    port = SimpleNamespace(port_name="port")
+    port = SimpleNamespace(port_name="port", now_s=lambda: 0.0)
     line: Any = SimpleNamespace(
-        family=FEETECH, port=port, label=str, ask=lambda ids, name: next(answers)
+        family=FEETECH,
+        port=port,
+        label=str,
+        ask=lambda ids, name: next(answers),
+        lateness=HostLateness(),
     )
     if well:
         assert read_positions(line, (1,)) == (again,)

@@ -167,6 +167,8 @@ FEETECH = Family(
 
 
 MIDDLE = STEPS_PER_TURN // 2
+UNANSWERED = "check its cable and servo power"
+
 NEAR_STEPS = 8
 """Motion of the joint caused by a hand's tremor during the setting."""
 
@@ -187,11 +189,15 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     where = f"{port.port_name}: servo {servo_id}"
     torque = registers.read(servo_id, "torque_enable")
     if torque is None:
-        raise ServoMissing(f"{where} does not answer: check its cable and servo power")
+        raise ServoMissing(
+            registers.lateness.blame(f"{where} does not answer", UNANSWERED, port.now_s())
+        )
     if torque:
         raise ServoFault(f"{where} has its torque on: switch it off before its middle is set")
     if not registers.write(servo_id, "lock", 0):
-        raise ServoMissing(f"{where} does not answer: check its cable and servo power")
+        raise ServoMissing(
+            registers.lateness.blame(f"{where} does not answer", UNANSWERED, port.now_s())
+        )
     registers.write(servo_id, "torque_enable", SET_MIDDLE)
     # Some firmware leaves torque on.
     off = registers.write(servo_id, "torque_enable", 0)

@@ -23,7 +23,7 @@ from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.start import HoldResult, enable_channels, hold_channel
-from gazerig.drivers.hobby_board.supervisor import BoardSupervisor, SilenceMonitor
+from gazerig.drivers.hobby_board.supervisor import CHECK_SUPPLY, BoardSupervisor, SilenceMonitor
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -126,10 +126,9 @@ class HobbyBoardBus(PortBus):
             # If any byte arrives the board is present, and noise corrupts its answers.
             silent_s = min(self._silence.silent_for_s(now_s), now_s - self._byte_s)
             if silent_s >= self._board.timing.give_up_s:
-                raise BusLost(
-                    f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s: "
-                    "check its power and the cable"
-                )
+                fault = f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s"
+                lateness = self._line.lateness
+                raise BusLost(lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
             return self._nothing
         # All positions are estimated, none is measured.
         at_s = self._heard_s

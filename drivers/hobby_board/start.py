@@ -57,12 +57,19 @@ def refusal_text(board: Board, channel: Channel) -> str:
     """Return why a channel's pulse differs from the commanded one, with the remedy."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
-        return f"{channel.setup.label('channel')} has no pulses: {board.texts.no_pulses_remedy}"
+        fault = f"{channel.setup.label('channel')} has no pulses"
+        return _blame(board, fault, board.texts.no_pulses_remedy)
     sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
-    return (
-        f"{channel.setup.label('channel')} is sent to {sent} and gets {got}: "
-        f"{board.texts.other_pulse_remedy}"
+    return _blame(
+        board,
+        f"{channel.setup.label('channel')} is sent to {sent} and gets {got}",
+        board.texts.other_pulse_remedy,
     )
+
+
+def _blame(board: Board, fault: str, remedy: str) -> str:
+    """Return a fault with its remedy, or with this computer as its cause if it was late."""
+    return board.line.lateness.blame(fault, remedy, board.line.port.now_s())
 
 
 def read_every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
@@ -80,10 +87,9 @@ def read_every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, 
     where = board.line.port.port_name
     for setup in setups:
         if board.read_pulses((setup.id,)) is None:
-            raise ServoMissing(
-                f"{where}: no answer about {setup.label('channel')}: {board.texts.no_answer_remedy}"
-            )
-    raise ServoMissing(f"{where}: answers are lost: {board.texts.noise_remedy}")
+            fault = f"{where}: no answer about {setup.label('channel')}"
+            raise ServoMissing(_blame(board, fault, board.texts.no_answer_remedy))
+    raise ServoMissing(_blame(board, f"{where}: answers are lost", board.texts.noise_remedy))
 
 
 def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
@@ -118,7 +124,6 @@ def _enable_channel(board: Board, channel: Channel, pulse: int) -> None:
             break
     where = board.line.port.port_name
     if outcome is HoldResult.NO_ANSWER:
-        raise ServoMissing(
-            f"{where}: no answer about {channel.setup.label('channel')}: check its cable"
-        )
+        fault = f"{where}: no answer about {channel.setup.label('channel')}"
+        raise ServoMissing(_blame(board, fault, "check its cable"))
     raise ServoMissing(f"{where}: {refusal_text(board, channel)}")

@@ -252,9 +252,13 @@ class BoardSupervisor:
         if now_s - self._reported_s < WITHIN_S and often != 1:
             return
         self._reported_s = now_s
-        again = f" again and again: held once the line is quiet; {self._board.texts.noise_remedy}"
-        rest = again if often > 0 else ": set up again"
-        self._log.add(f"{who} was sent home by an error ({named}){rest}")
+        fault = f"{who} was sent home by an error ({named})"
+        if often > 0:
+            fault += " again and again: held once the line is quiet"
+            remedy = self._board.texts.noise_remedy
+            self._log.add(self._line.lateness.blame(fault, remedy, now_s))
+        else:
+            self._log.add(f"{fault}: set up again")
 
     def _mark_for_recovery(self, channel: Channel) -> None:
         if channel.held:
@@ -315,6 +319,11 @@ OWED_S = 0.1
 """Time after the first answer by which the pending ones have arrived."""
 
 
+DAMAGED, CHECK_LINE = "the board's answers arrive damaged", "check cable, ground and baud rate"
+LATE = "the board's answers arrive late"
+SILENT, CHECK_SUPPLY = "the board does not answer", "check its power and the cable"
+
+
 class SilenceMonitor:
     """Monitor of missing answers.
 
@@ -348,11 +357,10 @@ class SilenceMonitor:
         damaged = self._damaged_answers >= IN_A_ROW
         if not self._reported and now_s - self._since_s >= (SILENCE_S if damaged else BLAME_S):
             self._reported = True
-            self._log.add(
-                "the board's answers arrive damaged: check cable, ground and baud rate"
-                if damaged
-                else "the board does not answer: check its power and the cable"
-            )
+            fault, remedy = (DAMAGED, CHECK_LINE) if damaged else (SILENT, CHECK_SUPPLY)
+            if damaged and self._lateness.was_late_since(self._since_s):
+                fault = LATE  # an answer that comes in two parts looks damaged
+            self._log.add(self._lateness.blame(fault, remedy, now_s, self._since_s))
 
     def record_answer(self, now_s: float) -> None:
         """Record an answer."""
@@ -361,15 +369,12 @@ class SilenceMonitor:
         if self._back_s is None or now_s - self._back_s < OWED_S:
             return
         silent_s = self._back_s - self._since_s
-        noise = self._damaged_answers >= IN_A_ROW
-        if silent_s >= SILENCE_S and not noise and self._lateness.was_late_since(self._since_s):
+        if silent_s >= SILENCE_S and self._lateness.was_late_since(self._since_s):
             self._log.add(STOOD_STILL.format(silent_s))
         elif self._reported:
             self._log.add(f"the board answers again after {silent_s:.1f} s")
         elif silent_s >= SILENCE_S:
-            self._log.add(
-                f"the board did not answer for {silent_s:.1f} s: check its power and the cable"
-            )
+            self._log.add(f"the board did not answer for {silent_s:.1f} s: {CHECK_SUPPLY}")
         self._reported, self._back_s = False, None
 
     def silent_for_s(self, now_s: float) -> float:

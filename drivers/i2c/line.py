@@ -29,6 +29,7 @@ class I2cLine:
         self._byte_s = BITS_PER_BYTE / baud
         self._reply_timeout_s = reply_timeout_ms / 1000.0
         self._late = False
+        self._owed_bytes = 0
 
     def send(self, packet: bytes) -> None:
         """Send transfers that only write, without reading their status."""
@@ -42,10 +43,13 @@ class I2cLine:
             transfers: Transfers, each with the number of bytes that it reads.
         """
         port = self.port
-        if self._late:
+        if self._late or self._owed_bytes:
+            # Owed are whole answers; a late one of a failed transfer is its status alone.
             dropped = port.drain()
-            if dropped and self.failure == "timeout":
+            if 0 < dropped <= self._owed_bytes:
                 self.lateness.record_late_answer(port.now_s())
+            if not self._late and not dropped:
+                self._owed_bytes = 0
         packet = b"".join([transfer + READ_STATUS for transfer, _ in transfers])
         lengths = [length for _, length in transfers]
         wanted = sum(lengths) + len(lengths)
@@ -56,6 +60,9 @@ class I2cLine:
         self.rx_bytes += len(answer)
         self.failure = self._answer_error(answer, lengths)
         self._late = self.failure in ("timeout", "incomplete", "damaged")
+        if self._late:
+            self._owed_bytes += wanted - len(answer)
+            self.lateness.record_wait(deadline_s, port.now_s())
         if self.failure:
             self.errors[self.failure] += 1
             return None

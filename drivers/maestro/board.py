@@ -62,11 +62,13 @@ class MaestroBoard:
         if register is None:
             params = self.params
             number = f", its device number {params.device}" if params.protocol == "pololu" else ""
-            raise ServoMissing(
-                f"{where}: no Maestro answers: on USB take the first of its two ports and set it to "
+            remedy = (
+                "on USB take the first of its two ports and set it to "
                 "'USB Dual Port' in Pololu's program; on its serial pins check TX, RX, ground and "
                 f"{params.baud} bit/s{number}; its CRC must be {'on' if params.crc else 'off'}"
             )
+            lateness, now_s = self.line.lateness, self.line.port.now_s()
+            raise ServoMissing(lateness.blame(f"{where}: no Maestro answers", remedy, now_s))
         if not self.line.expects_crc():
             raise ServoMissing(
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "

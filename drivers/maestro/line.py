@@ -70,6 +70,7 @@ class MaestroLink:
         self._late = len(answer) < length
         self._owed_bytes += length - len(answer)
         if self._late:
+            self.lateness.record_wait(deadline_s, port.now_s())
             self.errors["incomplete" if answer else "timeout"] += 1
             return None
         return answer

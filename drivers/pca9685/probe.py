@@ -52,22 +52,21 @@ def check_board(line: I2cLine, address: int) -> None:
     tries = (_registers(line, address) for _ in range(TRIES))
     found = next((one for one in tries if one is not None), None)
     if found is None:
+        fault = f"{where}no PCA9685 answers at {address:#x}"
         if line.failure == "bus stuck":
-            silence_reason = (
-                "the I2C bus is stuck, its data or clock line is held low: switch the "
-                "supply of its devices off and on, check SDA and SCL for a short"
-            )
+            fault = f"{where}the I2C bus is stuck, its data or clock line is held low"
+            remedy = "switch the supply of its devices off and on, check SDA and SCL for a short"
         elif line.failure != "not acknowledged":
-            silence_reason = (
-                f"no answer as an I2C bus ({line.failure}): a PCA9685 is reached over "
-                "an I2C bus such as /dev/i2c-1: write it under bus.port"
+            fault = f"{where}no answer as an I2C bus ({line.failure})"
+            remedy = (
+                "a PCA9685 is reached over an I2C bus such as /dev/i2c-1: write it under bus.port"
             )
         else:
-            silence_reason = (
-                f"no PCA9685 answers at {address:#x}: does the board have its logic supply (VCC, "
-                "not only V+)? check SDA, SCL and ground; its jumpers set the address"
+            remedy = (
+                "does the board have its logic supply (VCC, not only V+)? check SDA, SCL and "
+                "ground; its jumpers set the address"
             )
-        raise ServoMissing(f"{where}{silence_reason}")
+        raise ServoMissing(line.lateness.blame(fault, remedy, line.port.now_s()))
     first_six, outputs, prescale = found
     if not are_plausible(first_six, outputs, prescale):
         raise ServoMissing(

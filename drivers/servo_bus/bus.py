@@ -14,7 +14,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.faults import ServoHealth
+from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
 from gazerig.drivers.servo_bus.params import BusParams
@@ -98,7 +98,7 @@ class SmartServoBus(PortBus):
         self._poll_list = PollList(self._ids)
         self._health = ServoHealth(by_id, log)
         plan = self._plan = self._family.read_plan(self._setups, self._params, firmware)
-        single = Registers(self._port, self._family, 1)
+        single = Registers(self._port, self._family, 1, self._line.lateness)
         self._provisioning = Provisioning(line, single, self._setups, log, plan.indirect_block)
         self._recovery = Recovery(
             line, self._provisioning, by_id, self._watchdog, self._health, log
@@ -206,7 +206,7 @@ class SmartServoBus(PortBus):
             raise PortError(
                 f"{where} cannot run at {baud} bit/s: choose {self._family.recommended_bauds}"
             )
-        registers = Registers(self._port, self._family)
+        registers = Registers(self._port, self._family, lateness=self._line.lateness)
         try:
             firmware = find(self._line, registers, self._setups, self._log)
             self._assemble(firmware)
@@ -258,10 +258,8 @@ class SmartServoBus(PortBus):
         if self._poll_list.is_troubled:
             silent_s = self._health.silent_for_s(now_s)
             if silent_s >= self._params.give_up_s:
-                raise BusLost(
-                    f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
-                    "check servo power and the cable"
-                )
+                fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
+                raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
         return feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:

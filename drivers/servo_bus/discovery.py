@@ -240,7 +240,7 @@ def find(
         ServoMissing: some are absent, of another model or too old; the message names all of them,
             and the unexpected servos.
     """
-    family = line.family
+    family, began_s = line.family, line.port.now_s()
     identified = identities(line) if family.broadcast_ping else {}
     found = {
         # Two servos with one id, or a noisy line, corrupt a broadcast answer: also read alone.
@@ -256,7 +256,14 @@ def find(
     strangers = {i: identity for i, identity in identified.items() if i not in found}
     where = line.port.port_name
     if not any(found.values()) and not strangers:
-        raise ServoMissing(f"{where}: no servo answers: check servo power, cable and baud rate")
+        raise ServoMissing(
+            line.lateness.blame(
+                f"{where}: no servo answers",
+                "check servo power, cable and baud rate",
+                line.port.now_s(),
+                began_s,
+            )
+        )
     if problems:
         there = "; ".join(problems)
         if strangers:
@@ -268,7 +275,11 @@ def find(
         swapped = (
             "; is one of them the missing one?" if strangers and None in found.values() else ""
         )
-        raise ServoMissing(f"{where}: {there}: check cables and ids{swapped}")
+        raise ServoMissing(
+            line.lateness.blame(
+                f"{where}: {there}", f"check cables and ids{swapped}", line.port.now_s(), began_s
+            )
+        )
     for servo_id, identity in sorted(strangers.items()):
         model = family.model_name(identity.model_number)
         log.add(f"servo {servo_id} ({model}) belongs to no joint: not used")

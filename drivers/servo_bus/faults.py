@@ -11,12 +11,16 @@ MOST_RESTARTS, WITHIN_S = 3, 10.0
 
 AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
 
-GARBLES = "answers, but its bytes arrive damaged: a second servo with its id, or a bad cable"
+GARBLES = "answers, but its bytes arrive damaged"
 
 BUSY_S = 2.0
 """Silence after which a servo is reported while answers arrive late."""
 
-NOT_SET_UP = "cannot be set up again: a second servo with its id, or a bad cable"
+NOT_SET_UP = "cannot be set up again"
+
+BAD_LINE = "a second servo with its id, or a bad cable"
+
+CHECK_SUPPLY = "check servo power and cable"
 
 FAILED_IN_A_ROW = 2
 """Consecutive failures after which a servo alone is reported: one lost answer is not an event."""
@@ -86,11 +90,12 @@ class ServoHealth:
         self._restarts.setdefault(servo_id, []).append(now_s)
         self._log.add(f"{self._setups[servo_id].label()} restarted: set up again")
 
-    def record_not_set_up(self, servo_id: int) -> None:
+    def record_not_set_up(self, servo_id: int, now_s: float, lateness: HostLateness) -> None:
         """Record that a servo, alone, could not be set up again."""
         self._failed[servo_id] = failed = self._failed.get(servo_id, 0) + 1
         if failed == FAILED_IN_A_ROW:
-            self._log.add(f"{self._setups[servo_id].label()} {NOT_SET_UP}")
+            fault = f"{self._setups[servo_id].label()} {NOT_SET_UP}"
+            self._log.add(lateness.blame(fault, BAD_LINE, now_s))
 
     def record_set_up(self, servo_id: int) -> None:
         """Record that a servo has been set up again."""
@@ -136,11 +141,16 @@ class ServoHealth:
                 silent_s = now_s - self._silent_since[servo_id]
                 if servo_id not in self._reported and silent_s >= SAY_SILENT_S:
                     self._reported.add(servo_id)
-                    what = GARBLES if servo_id in garbling else "does not answer"
-                    self._log.add(f"{self._setups[servo_id].label()} {what}")
+                    who = self._setups[servo_id].label()
+                    if servo_id in garbling:
+                        text = lateness.blame(f"{who} {GARBLES}", BAD_LINE, now_s)
+                    else:
+                        text = f"{who} does not answer"
+                    self._log.add(text)
         elif not self._all_silent and now_s - self.all_silent_since_s >= BLAME_S:
             self._all_silent = True
-            self._log.add("no servo answers: check servo power and cable")
+            since_s = self.all_silent_since_s
+            self._log.add(lateness.blame("no servo answers", CHECK_SUPPLY, now_s, since_s))
 
     def record_answered_again(self, now_s: float, lateness: HostLateness) -> None:
         """Report the cause of a silence of all servos, after late answers have arrived."""
@@ -157,7 +167,8 @@ class ServoHealth:
             who = "servos" if self._silent_since else "all servos"
             self._log.add(f"{who} answer again after {silent_s:.1f} s")
         elif silent_s >= SILENCE_S:
-            self._log.add(f"no servo answered for {silent_s:.1f} s: check servo power and cable")
+            fault = f"no servo answered for {silent_s:.1f} s"
+            self._log.add(lateness.blame(fault, CHECK_SUPPLY, now_s))
         self.all_silent_since_s = self._back_s = None
         self._all_silent = False
 

@@ -169,10 +169,12 @@ class Provisioning:
     def _raise_missing(self, ids: Iterable[int], found: Mapping[int, object], what: str) -> None:
         missing = [self._setups[i].label() for i in ids if i not in found]
         if missing:
-            raise ServoMissing(
+            fault = (
                 f"{self._port_name}: {', '.join(missing)} does not answer when asked for its "
-                f"{register_label(what)}: check its cable, restart its power"
+                f"{register_label(what)}"
             )
+            remedy, now_s = "check its cable, restart its power", self._line.port.now_s()
+            raise ServoMissing(self._line.lateness.blame(fault, remedy, now_s))
 
     @property
     def _port_name(self) -> str:

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
-from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
+from gazerig.drivers.process.host_lateness import HostLateness
+from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from gazerig.drivers.servo_bus.family import Family, Identity, Register, Status
 
 TRIES = 3
@@ -25,13 +26,21 @@ class Registers:
         port: Port, open at the servos' baud rate.
         family: Family of the servos.
         tries: Number of attempts for a silent servo.
+        lateness: Delays of this computer, which are recorded there.
 
     error: error byte of the newest answer
     refusal: error number of the newest exchange if it was refused, otherwise 0
     """
 
-    def __init__(self, port: BusPort, family: Family, tries: int = TRIES) -> None:
+    def __init__(
+        self,
+        port: BusPort,
+        family: Family,
+        tries: int = TRIES,
+        lateness: HostLateness | None = None,
+    ) -> None:
         self._port, self._family = port, family
+        self.lateness = lateness or HostLateness()
         self._tries = tries
         self._late_until_s: dict[int, float] = {}
         self.error = self.refusal = 0
@@ -118,14 +127,13 @@ class Registers:
             # address of its register.
             until_s = self._late_until_s.pop(servo_id, None)
             if until_s is not None:
-                while self._port.read_until(ROOM, until_s):
-                    pass
+                self._drop_late(servo_id, until_s)
             self._port.clearPort()
             self.refusal = 0
-            _, status = transact(self._port, self._family, request, length, REPLY_S, servo_id)
+            raw, status = transact(self._port, self._family, request, length, REPLY_S, servo_id)
             if status is None:
                 self._late_until_s[servo_id] = self._port.now_s() + LATE_S
-                self._port.drain()
+                self._drop_late(servo_id, self._port.now_s() + QUIET_S, raw)
                 continue
             self.error = status.error
             self.refusal = status.error & self._family.codec.REFUSAL
@@ -134,6 +142,18 @@ class Registers:
             if not insist:
                 return None
         return None
+
+    def _drop_late(self, servo_id: int, until_s: float, raw: bytes = b"") -> None:
+        """Discard bytes that arrive until a time; a good answer among them is a late one.
+
+        raw: bytes that arrived before the time-out
+        """
+        end_s = self._port.now_s() + BABBLE_S
+        while (more := self._port.read_until(ROOM, until_s)) and self._port.now_s() < end_s:
+            raw += more
+        statuses = self._family.codec.parse_statuses(raw)
+        if any(one.intact and one.id == servo_id for one in statuses):
+            self.lateness.record_late_answer(self._port.now_s())
 
 
 def group_adjacent(family: Family, names: Iterable[str]) -> list[list[Register]]:

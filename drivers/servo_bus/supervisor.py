@@ -154,7 +154,7 @@ class Supervisor(ABC):
         found = self._recovery.recover(ids, self.engaged, now_s)
         if found is None:
             if self._failures:
-                self._health.record_not_set_up(ids[0])
+                self._health.record_not_set_up(ids[0], now_s, self._line.lateness)
             self._failures += 1
             return
         self._suspects.difference_update(ids)

@@ -224,4 +224,5 @@ def rearm_tripped(
 def _raise_missing(line: Transactions, missing: Sequence[int]) -> None:
     if missing:
         named = ", ".join(line.label(servo_id) for servo_id in missing)
-        raise ServoMissing(f"{line.port.port_name}: no answer from {named}: check its cable")
+        fault = f"{line.port.port_name}: no answer from {named}"
+        raise ServoMissing(line.lateness.blame(fault, "check its cable", line.port.now_s()))

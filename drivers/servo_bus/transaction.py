@@ -128,7 +128,7 @@ class Transactions:
         self.starving_s = inf
         self.starved = False
         self.lateness = HostLateness()
-        self._silent = self._reply_owed = False
+        self._silent = self._reply_owed = self._answer_owed = False
         self.quiet = True
         self.whole_s, self._reserved = 0.0, True
         self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
@@ -206,6 +206,7 @@ class Transactions:
             timeout.update(at_s - whole_s)
         else:
             timeout.consume_reserve(at_s - whole_s - prompt_s, at_s)
+            self.lateness.record_wait(self.deadline_s, at_s)
         return raw, at_s
 
     @property
@@ -228,10 +229,12 @@ class Transactions:
             raw += more
         return raw
 
-    def drain(self, quiet_s: float = QUIET_S) -> int:
+    def drain(self, quiet_s: float = QUIET_S, raw: bytes | None = None) -> int:
         """Discard received bytes until the line is quiet; return their number.
 
         It stops after a while on a line that never falls silent.
+
+        raw: bytes that arrived in time, if more are owed: late ones may complete them
         """
         end_s = self.port.now_s() + BABBLE_S
         dropped = b""
@@ -243,11 +246,18 @@ class Transactions:
                 if dropped and self._reply_owed:
                     self._record_late(dropped)
                     self._silent = False
+                elif dropped and raw is not None:
+                    self._record_late(dropped, raw)
                 return len(dropped)
 
-    def _record_late(self, raw: bytes) -> None:
-        """Record answers that arrived after their time-outs; noise does not count."""
-        if any(status.intact for status in self.family.codec.parse_statuses(raw)):
+    def _record_late(self, raw: bytes, before: bytes = b"") -> None:
+        """Record answers that arrived after their time-outs; noise does not count.
+
+        before: bytes that arrived in time, and may be the begin of the first answer
+        """
+        parse = self.family.codec.parse_statuses
+        intact = sum(status.intact for status in parse(before + raw))
+        if intact > sum(status.intact for status in parse(before)):
             self.lateness.record_late_answer(self.port.now_s())
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
@@ -301,8 +311,10 @@ class Transactions:
 
     def _ask_once(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Send one request and return the bytes of good answers by id."""
-        codec = self.family.codec
-        self.port.clearPort()
+        codec, port = self.family.codec, self.port
+        if self._answer_owed and port.getBytesAvailable():
+            self._record_late(port.read_until(_ROOM, port.now_s()))
+        port.clearPort()
         self.send(self.family.request(ids, address, length))
         # In the loop other servos wait, and the delay of answers has been measured.
         answer_bytes = len(ids) * (length + codec.STATUS_OVERHEAD)
@@ -324,7 +336,9 @@ class Transactions:
             done = len(found.keys() | refused) >= len(ids)
             return 0 if done else codec.bytes_missing(raw, len(ids) + others, length)
 
-        self.wait_for_rest(b"", missing, deadline_s)
-        if len(found) < len(ids):
-            self.drain()
+        raw = self.wait_for_rest(b"", missing, deadline_s)
+        self._answer_owed = len(found) < len(ids)
+        if self._answer_owed:
+            self.lateness.record_wait(deadline_s, port.now_s())
+            self.drain(raw=raw)
         return found
