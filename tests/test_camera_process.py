@@ -15,7 +15,13 @@ from present import present
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.process import FIRST_FRAME_S, CameraProcess, FrameWatchdog
+from gazerig.drivers.camera.process import (
+    FIRST_FRAME_S,
+    CameraProcess,
+    FrameWatchdog,
+    ProcessorDemand,
+    wanted_s,
+)
 from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, SlotWriter
 from gazerig.drivers.camera.source import Shot
@@ -154,6 +160,42 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     assert any("starting the camera's process again" in line for line in reported)
     assert present(camera._process).pid != first
     camera.close()
+
+
+class Slow:
+    """A detector that a busy computer does not let run: from the 20th picture on it needs 4 s."""
+
+    def __init__(self):
+        self.pictures = 0
+
+    def find(self, picture):
+        self.pictures += 1
+        end_s = time.process_time() + 4.0
+        while self.pictures == 20 and time.process_time() < end_s:
+            pass
+        return ()
+
+
+@forked
+@pytest.mark.skipif(wanted_s(os.getpid()) is None, reason="Linux tells who waits for a processor")
+def test_pictures_that_are_not_processed_in_time_are_no_lost_camera(recording):
+    care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
+    camera = CameraProcess(
+        CameraParts(partial(CameraReplay, recording), Slow), time.monotonic, care
+    )
+    camera.open()
+    wait_for(lambda: camera.frames > 25)
+    busy, again = camera.events()
+    assert busy.startswith("this computer is too busy for the camera: no picture processed for 1.")
+    assert again.startswith("pictures are processed again after ")
+    assert camera._starts == 1, "a new process would load its networks again"
+    camera.close()
+
+
+def test_a_process_is_busy_that_wants_to_run_for_most_of_its_silence():
+    wanted = [5.0, 5.6, 5.6, None]
+    demand = ProcessorDemand(lambda: wanted.pop(0))
+    assert [demand.is_busy(now_s) for now_s in (1.0, 2.0, 3.0, 4.0)] == [False, True, False, False]
 
 
 @forked

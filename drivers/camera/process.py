@@ -13,8 +13,10 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from select import select
 from typing import Literal, NamedTuple
 
@@ -35,6 +37,16 @@ from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, FaceDetector
 
 FIRST_FRAME_S = 15.0
 """Longest time to the first frame: exposure settles, networks are loaded."""
+
+BUSY_SHARE = 0.5
+"""Share of a silence for which a process runs, or waits for a processor, if this computer is too
+busy: one that waits for its camera sleeps."""
+
+BUSY_RESTART_S = 30.0
+"""Silence after which a process that still runs is restarted, which costs a busy computer more."""
+
+BUSY = "this computer is too busy"
+"""Words of events about pictures that are not processed in time."""
 
 LOST_PERIODS, HUNG_PERIODS = 5.0, 15.0
 """Smallest number of usual frame periods before either: films and weak computers are slow."""
@@ -69,13 +81,17 @@ class FrameWatchdog:
             self._period_s += _SHARE * (period_s - self._period_s)
         self._last_s = now_s
 
+    def silent_s(self, now_s: float) -> float:
+        """Return the time since the last frame."""
+        return now_s - self._last_s
+
     def record_activity(self, now_s: float) -> None:
         """Record that the process is busy with other tasks than frames."""
         self._last_s = now_s
 
     def verdict(self, now_s: float) -> Silence:
         """Return "lost" if no frame has arrived for too long, "hung" if none is expected."""
-        silent_s = now_s - self._last_s
+        silent_s = self.silent_s(now_s)
         if self._first:
             return "hung" if silent_s >= FIRST_FRAME_S else ""
         lost_s = self._lost_after_s()
@@ -86,8 +102,49 @@ class FrameWatchdog:
         return max(self._recovery.silent_s, LOST_PERIODS * (self._period_s or 0.0))
 
 
+class ProcessorDemand:
+    """Demand of a silent process for a processor.
+
+    Args:
+        read_s: Returns the time for which the process has run or waited for a processor; None if
+            that is unknown.
+    """
+
+    def __init__(self, read_s: Callable[[], float | None]) -> None:
+        self._read_s = read_s
+        self._begin: tuple[float, float] | None = None
+
+    def forget(self) -> None:
+        """Begin anew with the next call, after a frame."""
+        self._begin = None
+
+    def is_busy(self, now_s: float) -> bool:
+        """Return whether the process has wanted to run for most of its silence."""
+        wanted_s = self._read_s()
+        if wanted_s is None:
+            return False
+        if self._begin is None:
+            self._begin = now_s, wanted_s
+        began_s, before_s = self._begin
+        return now_s > began_s and wanted_s - before_s >= BUSY_SHARE * (now_s - began_s)
+
+
+def wanted_s(pid: int | None) -> float | None:
+    """Return the time for which a process's main thread has run or waited for a processor.
+
+    The result is None except on Linux, and if the process has ended.
+    """
+    try:
+        run_ns, waited_ns = Path(f"/proc/{pid}/schedstat").read_text("ascii").split()[:2]
+        return 1e-9 * (int(run_ns) + int(waited_ns))
+    except (OSError, ValueError):
+        return None
+
+
 _LONGEST_START_S = 60.0
 _POLL_S = 0.1
+_RELIEF = "close other programs, or lower detector.work_width_px"
+_AGAIN = "pictures are processed again"
 _STABLE_S = 10.0
 """Lifetime after which a process counts as stable: its next end is reported and it is restarted
 quickly."""
@@ -148,6 +205,7 @@ class CameraProcess:
         self._back_s = 0.0
         self._losses = 0  # losses without a stable period between them
         self._owes_back = False
+        self._over = BACK
 
     def open(self) -> None:
         """Start the process and wait until its source is open.
@@ -285,7 +343,7 @@ class CameraProcess:
                 wait_s = self._recovery.retry_ms / 1e3
             while not self._closing.is_set():
                 if self._lost_s is None:
-                    self._lose(end.reason, "starting its process again")
+                    self._lose(f"({end.reason})", "starting its process again")
                 gone_s = self._now_s() - (self._lost_s or 0.0)
                 if end.final or gone_s >= self._recovery.give_up_s:
                     self._failure = end.reason
@@ -302,15 +360,19 @@ class CameraProcess:
                 with suppress(OSError):
                     self._pipe.send(Retune(None, self._motion))
 
-    def _lose(self, reason: str, remedy: str) -> None:
-        """Record that no frames arrive; losses in quick succession are reported once."""
+    def _lose(self, reason: str, remedy: str, fault: str = LOST, over: str = BACK) -> None:
+        """Record that no frames arrive; losses in quick succession are reported once.
+
+        fault, over: first words of the events about the loss and its end
+        """
+        self._over = over
         self._lost_s = self._now_s()
         self._losses += 1
         if self._recovery.give_up_s > 0.0 and self._losses == 1:
             self._owes_back = True
-            self._events.append(f"{LOST} ({reason}): {remedy}")
+            self._events.append(f"{fault} {reason}: {remedy}")
         elif self._losses == 2:
-            self._events.append(f"{LOST} again ({reason}): further attempts are not reported")
+            self._events.append(f"{fault} again {reason}: further attempts are not reported")
 
     def _receive(self) -> _End:
         """Receive results of a process until it ends or hangs; return the reason."""
@@ -318,18 +380,21 @@ class CameraProcess:
         assert pipe is not None
         slots = SlotReader(), SlotReader()
         silence = FrameWatchdog(self._recovery, self._now_s())
+        process = self._process
+        demand = ProcessorDemand(partial(wanted_s, process.pid if process is not None else None))
         retrying = False  # the process itself keeps reopening a lost source
         self._counted = self._number
         try:
             while True:
                 if not pipe.poll(_POLL_S):
-                    process = self._process
                     if self._closing.is_set() and (process is None or not process.is_alive()):
                         return _End("closed")
-                    if not retrying and self._is_hung(silence):
-                        return _End("no new frame, and its process hangs")
+                    busy = demand.is_busy(self._now_s())
+                    if not retrying and self._is_hung(silence, busy):
+                        return _End(BUSY if busy else "no new frame, and its process hangs")
                     continue
                 message = pipe.recv()
+                demand.forget()
                 if isinstance(message, ProcessEnd):
                     return _End(message.reason, message.final)
                 if isinstance(message, str):
@@ -348,14 +413,24 @@ class CameraProcess:
             for slot in slots:
                 slot.forget()
 
-    def _is_hung(self, silence: FrameWatchdog) -> bool:
-        """Report a camera without new frames; return whether its process must be ended."""
-        verdict = silence.verdict(self._now_s())
-        if verdict and self._lost_s is None:
-            self._lose("no new frame", "waiting for it")
-        if verdict == "hung" and self._owes_back:
-            self._events.append("still no frame: starting the camera's process again")
-        return verdict == "hung"
+    def _is_hung(self, silence: FrameWatchdog, busy: bool) -> bool:
+        """Report a camera without new frames; return whether its process must be ended.
+
+        busy: whether the process wants to run, so that no picture is processed in time
+        """
+        now_s = self._now_s()
+        verdict, silent_s = silence.verdict(now_s), silence.silent_s(now_s)
+        hung = verdict == "hung" and (not busy or silent_s >= BUSY_RESTART_S)
+        if verdict and self._lost_s is None and busy:
+            self._lose(
+                f"for the camera: no picture processed for {silent_s:.1f} s", _RELIEF, BUSY, _AGAIN
+            )
+        elif verdict and self._lost_s is None:
+            self._lose("(no new frame)", "waiting for it")
+        if hung and self._owes_back:
+            what = "still no picture processed" if busy else "still no frame"
+            self._events.append(f"{what}: starting the camera's process again")
+        return hung
 
     def _publish(self, message: DetectionMessage, slots: tuple[SlotReader, SlotReader]) -> None:
         """Publish detections, which copy the frame from its slot on request."""
@@ -372,7 +447,7 @@ class CameraProcess:
         now_s = self._now_s()
         if self._lost_s is not None:
             if self._owes_back:
-                self._events.append(f"{BACK} after {now_s - self._lost_s:.1f} s")
+                self._events.append(f"{self._over} after {now_s - self._lost_s:.1f} s")
             self._lost_s, self._owes_back, self._back_s = None, False, now_s
         elif self._losses and now_s - self._back_s >= _STABLE_S:
             self._losses = 0
