@@ -2,6 +2,7 @@
 
 import sys
 
+from gazerig.drivers.process.visible_text import visible
 from gazerig.errors import Error
 from gazerig.robot.app.door_processes import DoorEntry, load_door
 
@@ -23,7 +24,7 @@ def main(text: str, pid: str) -> int:
 
 
 def _say(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
+    sys.stderr.write(f"{visible(line)}\n")
     sys.stderr.flush()
 
 

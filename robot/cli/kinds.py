@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from gazerig.drivers.errors import PluginError
@@ -18,6 +17,7 @@ from gazerig.drivers.plugins import (
     name_conflicts,
     registrations,
 )
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import clear_errors
 
 app = typer.Typer()

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.vision.model_download import fetch
 from gazerig.drivers.vision.model_files import MODEL_FILES, models_folder
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.terminal import clear_errors
 from gazerig.robot.model.clock import RealClock

@@ -9,13 +9,13 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.robot.app.options import parse_host_port
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     FAULT,

@@ -32,6 +32,7 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError, extra_hint
 from gazerig.drivers.process.bounded_call import BoundedCall
+from gazerig.drivers.process.visible_text import VisibleStream, visible
 from gazerig.robot.control.interrupts import ENDING, Interrupts
 
 _OF_REPORTS = ("jinja2", "scipy")
@@ -277,6 +278,8 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
     again: remedy for an unexpected error
     """
     threading.excepthook, before = _report_thread_error, threading.excepthook
+    streams = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = (None if s is None else VisibleStream(s) for s in streams)
     code: str | int | None = None
     try:
         try:
@@ -311,6 +314,7 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
         code = FAULT
     finally:
         threading.excepthook = before
+        sys.stdout, sys.stderr = streams
     sys.exit(code)
 
 
@@ -352,18 +356,18 @@ def exit_on_signals() -> Iterator[None]:
 
 def say(line: str) -> None:
     """Write a message line and clear the status line before it. Never waits, never raises."""
-    _write(f"{complete_suggestions(line)}\n", wiped=True)
+    _write(f"{visible(complete_suggestions(line))}\n", wiped=True)
 
 
 def status(line: str) -> None:
     """Rewrite the status line. Never waits, never raises."""
     width = shutil.get_terminal_size().columns - 1
-    _write(f"\r\x1b[K{line[:width]}", status=True)
+    _write(f"\r\x1b[K{visible(line)[:width]}", status=True)
 
 
 def _write(text: str, wiped: bool = False, status: bool = False) -> None:
     """Write to standard error, in the writer's thread if that is a file, a pipe or a tty."""
-    stderr = sys.stderr
+    stderr = getattr(sys.stderr, "rich_proxied_file", sys.stderr)
     if stderr is None:  # closed before this program started
         return
     try:

@@ -26,6 +26,7 @@ from typing import Any
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.process.visible_text import visible
 from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, HangDetector, Heartbeat
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
@@ -194,7 +195,7 @@ def say(line: str) -> None:
     """Write a line to standard error, which may be closed, for example with the terminal."""
     with contextlib.suppress(OSError):
         wipe = "\r\x1b[K" if os.isatty(2) else ""
-        os.write(2, f"{wipe}{line}\n".encode())
+        os.write(2, f"{wipe}{visible(line)}\n".encode(errors="replace"))
 
 
 def main(heartbeat_fd: int, plans: str) -> None:

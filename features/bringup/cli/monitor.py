@@ -7,7 +7,6 @@ from math import inf
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
@@ -34,6 +33,7 @@ from gazerig.features.bringup.telemetry import (
     as_json,
 )
 from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, record_signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling_params import coupled_pairs

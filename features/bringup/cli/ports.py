@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, NamedTuple
 
 import typer
-from rich.console import Console
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PortError, SetupError
@@ -16,6 +15,7 @@ from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import say, status
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated

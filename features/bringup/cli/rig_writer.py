@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from gazerig.config.rig import Rig
 from gazerig.config.save import copy_shipped, rig_file, save_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.prompts import TerminalPerson
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import say
 
 OutOption = Annotated[

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
@@ -38,6 +37,7 @@ from gazerig.features.bringup.cli.ports import (
 )
 from gazerig.features.bringup.doctor.examination import name_ports
 from gazerig.features.bringup.servo_kinds import KINDS, servo_kind
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, complete_suggestions, say
 

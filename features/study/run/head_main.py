@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 
+from gazerig.drivers.process.visible_text import visible
 from gazerig.errors import Error
 from gazerig.features.study.run.head_process import decode_options
 from gazerig.robot.app import session
@@ -42,7 +43,7 @@ def main() -> int:
 
 
 def _print_line(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
+    sys.stderr.write(f"{visible(line)}\n")
     sys.stderr.flush()
 
 

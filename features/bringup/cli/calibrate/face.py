@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from gazerig.config.rig import Rig
@@ -45,6 +44,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
 from gazerig.robot.app.session import prepare_shutdown
+from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
 from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
