@@ -16,7 +16,7 @@ from gazerig.drivers.sound.player import SoundError
 from gazerig.errors import Error, HeadEnded, Refused
 from gazerig.head import Head
 from gazerig.order import Order
-from gazerig.program_signals import SIGNALS
+from gazerig.program_signals import SIGNALS, interrupt, is_left_waiting_for
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.app.options import RunOptions
@@ -159,7 +159,8 @@ class RunningHead(LocalHead):
 
     The head parks and switches the torque off, as ``gazerig run`` does, after each of these: the
     end of the block, an exception, Ctrl-C, SIGTERM and SIGHUP (``ProgramSignals``), the end of the
-    thread that opened it or of the interpreter. Further signals skip the rest of parking. If the
+    thread that opened it or of the interpreter, also where they wait for that thread
+    (``is_left_waiting_for``). Further signals skip the rest of parking. If the
     program ends abruptly (SIGKILL, a crash), the guardian switches the torque off.
 
     Attributes:
@@ -260,6 +261,9 @@ class RunningHead(LocalHead):
         finally:
             self._ended = ended
             self._finished.set()
+            # Otherwise a worker that does not look at the head would keep the program from ending.
+            if not self.closing and is_left_waiting_for(self._owner):
+                interrupt(self._owner)
 
     def _update(self, tick: Tick) -> None:
         self._feed.update(tick)
@@ -268,7 +272,7 @@ class RunningHead(LocalHead):
 
     def _abandonment_reason(self) -> str | None:
         """Return why the block cannot end the head any more, None if it can."""
-        if not threading.main_thread().is_alive():
+        if not threading.main_thread().is_alive() or is_left_waiting_for(self._owner):
             return "the end of the program"
         return None if self._owner.is_alive() else "the end of the thread that opened it"
 

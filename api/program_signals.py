@@ -1,8 +1,12 @@
 """Signal handlers of a program with open heads: the heads park before the program ends."""
 
+import ctypes
 import os
 import signal
+import sys
 import threading
+from concurrent.futures import Executor
+from concurrent.futures import thread as pool_threads
 from types import FrameType
 from typing import Protocol
 
@@ -11,6 +15,53 @@ from gazerig.robot.model.clock import RealClock
 
 _ENDING = available_signals("SIGTERM", "SIGHUP")
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+
+
+def is_left_waiting_for(worker: threading.Thread) -> bool:
+    """Return whether the program is ending, and waits for a thread of a pool to end first.
+
+    A pool (``concurrent.futures``, ``asyncio.to_thread``) is joined where its block is left, and by
+    the interpreter before the main thread counts as ended. Ctrl-C, which only the main thread
+    gets, therefore never reaches the work of such a thread.
+    """
+    if worker not in pool_threads._threads_queues:
+        return False
+    if pool_threads._shutdown:
+        return True
+    frame = sys._current_frames().get(threading.main_thread().ident or 0)
+    while frame is not None:
+        if frame.f_code.co_name == "__exit__" and _leaves_pool_of(worker, frame):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _leaves_pool_of(worker: threading.Thread, frame: FrameType) -> bool:
+    """Return whether a frame leaves the block of a worker's pool because of Ctrl-C or alike."""
+    runners = sys.modules.get("asyncio.runners")
+    runner_exit = getattr(getattr(runners, "Runner", None), "__exit__", None)
+    words = frame.f_locals
+    if frame.f_code is Executor.__exit__.__code__:
+        pool = words.get("self")
+    elif runner_exit is not None and frame.f_code is runner_exit.__code__:
+        pool = getattr(getattr(words.get("self"), "_loop", None), "_default_executor", None)
+    else:
+        return False
+    kind = words.get("exc_type")
+    # An exception that the program may handle ends neither the program nor the work.
+    ends = isinstance(kind, type) and not issubclass(kind, Exception)
+    return ends and worker in tuple(getattr(pool, "_threads", ()))
+
+
+def interrupt(worker: threading.Thread) -> None:
+    """Raise KeyboardInterrupt in a thread, as Ctrl-C does in the main thread.
+
+    It arrives with the next line of Python that the thread executes.
+    """
+    if worker.ident is not None and worker.is_alive():
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(worker.ident), ctypes.py_object(KeyboardInterrupt)
+        )
 
 
 class OpenHead(Protocol):

@@ -6,7 +6,7 @@ import sys
 from typing import Any
 
 import pytest
-from attack.exits import EXITS, INTERFACES, case, meets
+from attack.exits import EXITS, INTERFACES, POOLS, case, meets
 from branch import Branch
 from features_there import skip_without
 
@@ -34,6 +34,10 @@ def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[byte
         ("feetech", "python", "guardian suspended, then SIGKILL"),
         ("feetech", "python", "2x SIGINT, .3 s"),
         ("maker", "daemon thread", "the main thread ends"),
+        ("desk", "to_thread", "SIGINT"),
+        ("maker", "thread pool", "SIGINT"),
+        ("desk", "thread pool, left open", "SIGINT"),
+        ("desk", "thread pool", "SIGTERM"),
         ("maker", "two heads", "SIGUSR1"),
         ("pca9685", "study", "the study's program killed"),
     ],
@@ -44,6 +48,8 @@ def test_no_servo_keeps_its_torque(kind: str, interface: str, exit_: str) -> Non
     row = case(kind, interface, exit_, begin)
     assert row.void == "" and row.of > 0
     assert row.powered == 0
+    if interface in POOLS:
+        assert row.code is not None, "the program waits for its thread"
 
 
 def test_the_table_meets_every_interface_and_exit() -> None:

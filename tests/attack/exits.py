@@ -83,6 +83,40 @@ over.wait()
 """
 )
 
+POOLS = {
+    "to_thread": """
+import asyncio
+
+async def main():
+    await asyncio.to_thread(work)
+
+asyncio.run(main())
+""",
+    "thread pool": """
+from concurrent.futures import ThreadPoolExecutor
+with ThreadPoolExecutor() as pool:
+    pool.submit(work).result()
+""",
+    "thread pool, left open": """
+from concurrent.futures import ThreadPoolExecutor
+ThreadPoolExecutor().submit(work).result()
+""",
+}
+"""Threads that the program waits for before it ends."""
+
+POOL = (
+    HEADS
+    + """
+from contextlib import ExitStack
+
+def work():
+    with ExitStack() as stack:
+        hold(stack)
+        while True:
+            time.sleep(1.0)
+"""
+)
+
 STUDY = """
 import sys, time
 from pathlib import Path
@@ -194,7 +228,7 @@ OWN = {"all descriptors closed", "os._exit", "sys.exit", "exception"}
 STAYS = {"SIGSTOP", "all descriptors closed"}
 """The program itself does not end."""
 
-INTERFACES = ("command", "python", "daemon thread", "two heads", "study")
+INTERFACES = ("command", "python", "daemon thread", *POOLS, "two heads", "study")
 
 
 def meets(interface: str, exit_: str) -> bool:
@@ -231,7 +265,7 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
         (at,) = benches[:1]
         code = {
             "command": START, "python": PYTHON, "daemon thread": DAEMON, "two heads": PYTHON,
-            "study": STUDY,
+            "study": STUDY, **{name: POOL + rest for name, rest in POOLS.items()},
         }[interface]  # fmt: skip
         words = {
             "command": ["run", at.file, "--port", at.port, "--scene", "visitor", "--page", "127.0.0.1:8911"],
