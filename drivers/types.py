@@ -107,6 +107,7 @@ class ServoConfig(NamedTuple):
     own_speed_steps_s: speed of such a servo, from its data sheet; None: max_speed_steps_s
     entry_speed_steps_s: speed at which it moves into its limits from outside; None: 30 deg/s at its
         own shaft
+    far_steps: distance outside its limits beyond which it gets no torque again after a restart
     """
 
     id: int
@@ -122,6 +123,7 @@ class ServoConfig(NamedTuple):
     rest_steps: int | None = None
     own_speed_steps_s: float | None = None
     entry_speed_steps_s: float | None = None
+    far_steps: float = inf
 
     def label(self, noun: str = "servo") -> str:
         """Return its label for messages: its joint and id, or its id alone."""

@@ -12,6 +12,7 @@ from stand_in import StandIn
 
 from gazerig.drivers.bus.bus_plugins import DYNAMIXEL, FEETECH, MAESTRO, PCA9685
 from gazerig.robot.control.body import Body, servo_setups
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, Pca9685Line, build
@@ -53,7 +54,7 @@ def test_a_tick_calls_few_functions(kind):
     now = [1.0]
     calls: Counter[str] = Counter()
     body = body_of(kind, now)
-    body.start()
+    body.start(SimulatedClock(now[0]))
 
     def count(frame, event, arg):
         path = frame.f_code.co_filename

@@ -264,7 +264,7 @@ class Bench:
 
     def start(self) -> None:
         """Switch torque on at the present positions."""
-        goals = self.body.start()
+        goals = self.body.start(self.shafts)
         self.guard.reset(self.shafts.now_s(), goals)
         self._began_s = self.shafts.now_s()
 

@@ -153,7 +153,7 @@ class Machine:
 
     def start(self) -> None:
         """Switch the torque on, and move until slow motion is over."""
-        goals = self.body.start()
+        goals = self.body.start(self.clock)
         self._begin_s = self._last_s = self.clock.now_s()
         self._slot = 0
         self.guard.reset(self._last_s, goals)

@@ -33,6 +33,12 @@ def _nearest_limit(goal: float, low: int, high: int) -> int:
 ENTRY_DEG_S = 30.0
 """Speed of a joint that returns into its limits."""
 
+FAR_DEG = 10.0
+"""Distance of a joint outside its range from which its measured angle is not believed."""
+
+FAR_CAUSES = "a slipped horn, a changed homing offset or extended position mode?"
+"""Likely causes of such an angle, for messages."""
+
 NEAR_STEPS = 6
 """Distance from its goal at which friction may stop a servo."""
 
@@ -100,6 +106,14 @@ class LimitRecovery:
     def _is_outside(self, servo_id: int, steps: float, room_steps: int = 0) -> bool:
         setup = self._setups[servo_id]
         return not setup.min_steps - room_steps <= steps <= setup.max_steps + room_steps
+
+
+def far_outside_steps(setup: ServoConfig, steps: float) -> str:
+    """Return where a servo is, if it is too far outside its limits for torque; else ""."""
+    if setup.min_steps - setup.far_steps <= steps <= setup.max_steps + setup.far_steps:
+        return ""
+    limits = f"{setup.min_steps}..{setup.max_steps}"
+    return f"is at step {steps:.0f}, far outside its range {limits}: {FAR_CAUSES}"
 
 
 def entry_speed_steps_s(setup: ServoConfig, steps_per_turn: float) -> float:

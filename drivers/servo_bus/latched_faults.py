@@ -45,6 +45,8 @@ class LatchedFaultSupervisor(Supervisor):
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
         """Check one servo's answer for faults and for lost torque or limits."""
+        if self.engaged and servo_id in self._recovery.astray:
+            self._check_turned_back(servo_id, sample)
         if sample.status:
             # Damaged bytes may look like a fault, which ends a run: read the servo once more.
             if servo_id in self._health.latches:

@@ -6,7 +6,7 @@ present position, and only then is torque switched on.
 
 from collections.abc import Collection, Mapping, Sequence
 
-from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
+from gazerig.drivers.bus.goal_limits import entry_speed_steps_s, far_outside_steps
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.servo_bus.faults import ServoHealth
@@ -35,6 +35,8 @@ class Recovery:
         watchdog: Value of Bus Watchdog, in its units; 0 for none.
         health: Records the faults found.
         log: Records events.
+
+    astray: servos without torque because of where they are
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Recovery:
         self._health = health
         self._log = log
         self._last_reported = ""
+        self.astray: set[int] = set()
 
     def recover(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
         """Set servos up as at the start, holding their positions if ``engaged``.
@@ -81,7 +84,7 @@ class Recovery:
                     if torque[i] or not engaged or not health.has_exhausted_restarts(i, now_s)
                 )
                 if engaged:
-                    well = self._release_lost(well)
+                    well = self._release_astray(well)
                     self.enable(well)
                 found = dict(zip(well, read_positions(line, well), strict=True))
             except ServoMissing:
@@ -142,21 +145,29 @@ class Recovery:
         denied = {i for i, bits in found.items() if bits & family.torque_faults}
         return tuple(i for i in ids if i not in denied or torque.get(i, 1))
 
-    def _release_lost(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Switch servos off that would move in the wrong direction; return the others."""
-        if not self._family.single_turn:
-            return ids
-        present = dict(zip(ids, read_positions(self._line, ids), strict=True))
-        astray = [i for i in ids if self.is_lost(i, present[i])]
+    def _release_astray(self, ids: tuple[int, ...]) -> tuple[int, ...]:
+        """Switch servos off that are where no torque must move them from; return the others."""
+        astray = self._find_astray(ids)
+        # Damaged bytes may look like such a position.
+        astray = self._find_astray(tuple(astray)) if astray else {}
+        for servo_id, text in astray.items():
+            self._health.record_fault(servo_id, text)
+        self.astray.update(astray)
         if astray:
-            # Damaged bytes may look like such a position.
-            again = dict(zip(astray, read_positions(self._line, astray), strict=True))
-            astray = [i for i in astray if self.is_lost(i, again[i])]
-        for servo_id in astray:
-            self._health.record_fault(servo_id, FAR_SIDE)
-        if astray:
-            switch_off(self._line, astray)
+            switch_off(self._line, tuple(astray))
         return tuple(i for i in ids if i not in astray)
+
+    def _find_astray(self, ids: Sequence[int]) -> dict[int, str]:
+        """Return the servos far outside their limits, or that would move in the wrong direction."""
+        positions = zip(ids, read_positions(self._line, ids), strict=True)
+        found = {servo_id: self.astray_text(servo_id, steps) for servo_id, steps in positions}
+        return {servo_id: text for servo_id, text in found.items() if text}
+
+    def astray_text(self, servo_id: int, steps: int) -> str:
+        """Return why a servo at ``steps`` must get no torque, "" if it may."""
+        if self._family.single_turn and self.is_lost(servo_id, steps):
+            return FAR_SIDE
+        return far_outside_steps(self._setups[servo_id], steps)
 
     def is_lost(self, servo_id: int, steps: int) -> bool:
         """Return whether a servo at ``steps`` would move into its range in the wrong direction."""

@@ -76,6 +76,8 @@ class Supervisor(ABC):
     def start_supervision(self, entering: Collection[int]) -> None:
         """Start supervision under torque; ``entering``: servos outside their limits."""
         self.engaged, self.limp = True, frozenset()
+        for servo_id in tuple(self._recovery.astray):
+            self._end_astray(servo_id)
         self.entering.begin(entering)
         self._suspects.clear()
         unit = self._family.watchdog_unit_s or 0.0
@@ -176,6 +178,19 @@ class Supervisor(ABC):
             if self.engaged:
                 self._rearmed.add(servo_id)
                 self.entering.add_if_outside(servo_id, position)
+
+    def _check_turned_back(self, servo_id: int, sample: Sample) -> None:
+        """Set a servo without torque up again that was turned back into its range by hand."""
+        if not sample.is_blank and not self._recovery.astray_text(servo_id, sample.position):
+            self._end_astray(servo_id)
+            self.mark_for_recovery((servo_id,))
+
+    def _end_astray(self, servo_id: int) -> None:
+        self._recovery.astray.discard(servo_id)
+        if servo_id in self._health.faults:
+            self._health.latches.add(servo_id)
+            self._health.record_cleared(servo_id)
+            self._name_fault(servo_id)
 
     def _clear_state(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
         """Clear the state of a servo that works again."""

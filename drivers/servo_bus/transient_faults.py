@@ -5,7 +5,6 @@ from typing import Any
 
 from gazerig.drivers.bus.plausibility import DISTURBED_S
 from gazerig.drivers.servo_bus.read_plan import Sample
-from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 
 CHECK_S = 0.1
@@ -102,13 +101,8 @@ class TransientFaultSupervisor(Supervisor):
                 del self._seen_s[servo_id]
         if not self.engaged:
             return
-        far = self._health.faults.get(servo_id) == FAR_SIDE
-        if far and not self._recovery.is_lost(servo_id, sample.position):
-            # The joint was turned back into its range by hand.
-            self._health.latches.add(servo_id)
-            self._health.record_cleared(servo_id)
-            self._name_fault(servo_id)
-            self._suspects.add(servo_id)
+        if servo_id in self._recovery.astray:
+            self._check_turned_back(servo_id, sample)
         if sample.torque is not None and servo_id not in self.limp:
             # A servo that seems no longer armed is read once more.
             if sample.torque == 1 and self._is_armed(servo_id, sample):

@@ -249,7 +249,7 @@ class ManualControl:
         Raises:
             SetupError: port or servos are not as configured.
         """
-        self._goal = self.body.start()
+        self._goal = self.body.start(self._clock)
         self._guard.reset(self._clock.now_s(), self._goal)
         return self._goal
 

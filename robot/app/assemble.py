@@ -202,6 +202,7 @@ def assemble(
             gentle_deg_s,
             coupled_pairs(rig.couplings),
             None if options.bus == "ideal" else sag_compensation(rig),
+            messages.append if options.recover else None,
         )
         # A recorded camera was mounted on other joints: its gyro is not fused with these.
         parts = _build_components(

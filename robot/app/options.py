@@ -42,6 +42,7 @@ class RunOptions:
         heatmap: PNG to write; heatmap_face: image of a face behind it.
         record: file to record to; record_pictures: camera frames per second in it.
         force: overwrite older files.
+        recover: move joints that are far outside their ranges inside, instead of refusing to start.
         no_browser: leave opening the page to the user.
         verbose: also print details.
         summary: file of the figures, "-" for standard output.
@@ -81,6 +82,7 @@ class RunOptions:
     record: Path | None = None
     record_pictures: float = 2.0
     force: bool = False
+    recover: bool = False
     no_browser: bool = False
     verbose: bool = False
     summary: str | None = None

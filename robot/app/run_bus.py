@@ -218,7 +218,12 @@ def _hobby_spec(rig: Rig, name: str) -> HobbySpec:
 
 def start_angles_rad(rig: Rig) -> dict[str, float]:
     """Return the start angles of a rig's emulated joints."""
-    crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
+    crooked = {
+        # No farther than the mechanical stops of a joint with a small range.
+        name: radians(min(max(_CROOKED_DEG.get(name, 0.0), joint.min_deg - STOP_BEYOND_DEG),
+                          joint.max_deg + STOP_BEYOND_DEG))
+        for name, joint in rig.joints.items()
+    }  # fmt: skip
     for first, second, _ in coupled_pairs(rig.couplings):
         # Push rods have no angles far outside their range.
         for name in (first, second):

@@ -70,6 +70,7 @@ def run(
     record: options.Record = None,
     record_pictures: options.RecordPictures = 2.0,
     force: options.Force = False,
+    recover: options.Recover = False,
     summary: options.Summary = None,
 ) -> None:
     """Run the head: gazerig run --mock, then open the page at the printed address."""

@@ -146,6 +146,14 @@ Force = Annotated[
     bool,
     typer.Option("--force", help="Overwrite an existing recording, heat map or summary."),
 ]
+Recover = Annotated[
+    bool,
+    typer.Option(
+        "--recover",
+        help="Move a joint that is more than 10 deg outside its range slowly inside, at 30 deg/s at "
+        "most; without this option the torque stays off.",
+    ),
+]
 Summary = Annotated[
     str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
 ]

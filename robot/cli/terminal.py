@@ -131,8 +131,8 @@ class LineWriter:
 
 
 _SUGGESTED = re.compile(
-    r"\bgazerig (?P<command>doctor|setup|calibrate|reboot|scan|home)\b"
-    r"(?P<words>(?: --fix\b| --joint \w+| --kind \w+|(?<=reboot) \d+)*)"
+    r"\bgazerig (?P<command>doctor|setup|calibrate|reboot|scan|home|run(?= --recover))\b"
+    r"(?P<words>(?: --fix\b| --recover\b| --joint \w+| --kind \w+|(?<=reboot) \d+)*)"
 )
 _given: list[Mapping[str, object]] = [{}]
 """Parameters of the current command (last item). Shared by all threads, as monitor threads also

@@ -1,18 +1,27 @@
 """Conversion between joints and servos; the only place that converts steps to joint angles."""
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import isfinite, radians
 from operator import add, mul, sub
 
 from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
-from gazerig.drivers.errors import BusLost, DriverError
+from gazerig.drivers.errors import BusLost, DriverError, ServoMissing, SetupError
 from gazerig.drivers.types import Feedback, LimpableBus, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.control.limp_joints import LimpJoints
 from gazerig.robot.control.sag import SagCompensation
+from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
 from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
 from gazerig.robot.model.types import JointAngles, JointState, order_joints
+from gazerig.robot.safety.start_range import find_far_outside
+
+_FIRST_S = 0.5
+"""Longest time until every servo has reported its position before torque is switched on."""
+_AGAIN_S = 0.02
+_INSIDE_RAD = radians(1.0)
+"""Distance from its range at which friction may stop a joint that has moved inside."""
 
 
 def servo_setups(
@@ -51,6 +60,8 @@ class Body:
         gentle_deg_s: As in ``servo_setups``.
         pairs: As in ``servo_setups``.
         sag: Changes of the goals that make up for the weight; None: none.
+        recover: Receives a line about each joint that is far outside its range, which then moves
+            inside slowly; None: such a joint prevents the torque of all.
     """
 
     def __init__(
@@ -61,9 +72,11 @@ class Body:
         gentle_deg_s: float = ENTRY_DEG_S,
         pairs: Sequence[CoupledPair] = (),
         sag: SagCompensation | None = None,
+        recover: Callable[[str], object] | None = None,
     ) -> None:
         self.bus = bus
         self._sag, self._read_s = sag, 0.0
+        self._recover, self._recovering = recover, set[int]()
         self.names = order_joints(joints)
         self._pairs = tuple(pairs)
         self._coupled = CoupledServos(pairs, self.names) if pairs else None
@@ -120,18 +133,45 @@ class Body:
         """Return the ranges and speeds of the servos' configuration, in present joint angles."""
         return tuple(map(_configured_limit, self._set_up, self._joints))
 
-    def start(self) -> JointAngles:
+    def start(self, clock: Clock) -> JointAngles:
         """Open the bus and switch the torque on at the present angles; return the goals.
 
         Raises:
-            SetupError: The port or the servos do not match the configuration.
+            SetupError: The port or the servos do not match the configuration, or a joint is far
+                outside its range.
         """
         self.bus.open()
         try:
+            self._read_first(clock)
             return self.enable_torque()
         except BaseException:
             self.stop()
             raise
+
+    def _read_first(self, clock: Clock) -> None:
+        """Read every servo that measures its position.
+
+        Raises:
+            ServoMissing: One does not answer.
+        """
+        if True not in self._last.measured:
+            return
+        end_s = clock.now_s() + _FIRST_S
+        while True:
+            now_s = clock.now_s()
+            self.read(now_s)
+            unread = [
+                name
+                for name, measured, at_s in zip(
+                    self.names, self._last.measured, self._last.at_s, strict=True
+                )
+                if measured and not isfinite(at_s)
+            ]
+            if not unread:
+                return
+            if now_s >= end_s:
+                raise ServoMissing(f"no position from {', '.join(unread)}: check its cable")
+            clock.sleep_until(now_s + _AGAIN_S)
 
     def read(self, t_s: float) -> JointState:
         """Read all joints; a joint that does not answer keeps its last value and its age.
@@ -162,6 +202,8 @@ class Body:
             rates = tuple(right if self._coupled is None else self._coupled.speeds(angles, right))
         else:
             angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
+        if self._recovering:
+            self._report_recovered(angles)
         missing = tuple([self.names[i] for i in gone]) if gone else ()
         # Avoids the call of the class's constructor, a Python function.
         return tuple.__new__(
@@ -255,17 +297,58 @@ class Body:
         """Switch the torque on again at the present angles; return the goals.
 
         Raises:
-            SetupError: A servo does not answer, refuses or has latched a fault.
+            SetupError: A servo does not answer, refuses or has latched a fault, or a joint is far
+                outside its range.
             BusLost: The port is gone.
         """
+        self._refuse_far_outside()
         if self._sag is not None:
             self._sag.restart()
         goals = self.bus.enable_torque()
         self._torque_off = False
+        # A servo that has not answered since then has torque.
+        self._last = self._last._replace(torque=(True,) * len(self.names))
         if self._coupled is not None:
             self._coupled.set_goals(self._shafts(goals))
         self._set_up = self._joints
         return self.angles(goals)
+
+    def _refuse_far_outside(self) -> None:
+        """Refuse torque if a joint is far outside its range, or report that it moves inside.
+
+        A joint within the range of the last torque-on is not refused: its range was changed.
+
+        Raises:
+            SetupError: A joint is far outside, and its recovery was not requested.
+        """
+        rows = zip(self.names, self._last.measured, self._last.position_steps, strict=True)
+        steps = {name: at for name, measured, at in rows if measured}
+        far, before = (
+            find_far_outside(dict(zip(self.names, joints, strict=True)), self._pairs, steps)
+            for joints in (self._joints, self._set_up)
+        )
+        far = {name: text for name, text in far.items() if name in before}
+        self._recovering.clear()
+        if not far:
+            return
+        where = [f"{name} {text}" for name, text in far.items()]
+        if self._recover is None:
+            raise SetupError(
+                f"{'; '.join(where)} Torque stays off: gazerig doctor examines it, gazerig run "
+                "--recover moves it slowly into its range"
+            )
+        self._recovering = {self.names.index(name) for name in far}
+        for text in where:
+            self._recover(f"{text} It moves slowly into its range")
+
+    def _report_recovered(self, angles: JointAngles) -> None:
+        """Report the joints that have arrived in their ranges."""
+        for i in tuple(self._recovering):
+            limit = self._joints[i].limit()
+            if limit.low_rad - _INSIDE_RAD <= angles[i] <= limit.high_rad + _INSIDE_RAD:
+                self._recovering.discard(i)
+                if self._recover is not None:
+                    self._recover(f"{self.names[i]} is in its range again")
 
     def stop(self) -> tuple[str, ...]:
         """Switch the torque off and close the bus; return the bus's messages about it.

@@ -215,7 +215,7 @@ class Robot:
         try:
             if ready is not None:
                 ready()
-            goals = self.body.start()
+            goals = self.body.start(clock)
         except BaseException:
             self.camera.close()
             raise

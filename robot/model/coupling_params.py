@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil, degrees, floor, radians
 from typing import Annotated, Literal, NamedTuple
 
-from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S, FAR_DEG
 from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.types import Vec3
 from gazerig.params import Bounds, Unit
@@ -174,6 +174,7 @@ def pair_setups(
             max_accel_steps_s2=quickest * linkage.steepest,
             rest_steps=None if config.rest_steps is None else round(linkage.steps(rest[k])),
             entry_speed_steps_s=gentle * linkage.steepest,
+            far_steps=radians(FAR_DEG) * steepest * linkage.steepest,
         )
     return found
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import ceil, floor, inf, pi, radians
 from typing import Annotated, Literal, NamedTuple, Protocol
 
-from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S, FAR_DEG
 from gazerig.drivers.bus.servo_models import SERVOS, ServoModelInfo
 from gazerig.drivers.types import ServoConfig
 from gazerig.params import Bounds, Unit
@@ -302,4 +302,5 @@ class JointParams:
             None if rest_rad is None or facts.measures_position else round(linkage.steps(rest_rad)),
             None if own is None else own * facts.steps_per_turn / 360.0,
             radians(min(ENTRY_DEG_S, gentle_deg_s)) * linkage.steepest,
+            radians(FAR_DEG) * linkage.steepest,
         )

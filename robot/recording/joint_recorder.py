@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.control.body import Body
+from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.recording.tick_record import (
@@ -74,9 +75,9 @@ class JointRecorder(ForwardingBody):
         super().__init__(body)
         self._note = note
 
-    def start(self) -> JointAngles:
+    def start(self, clock: Clock) -> JointAngles:
         """Start the machine and record the goals."""
-        goals = self._body.start()
+        goals = self._body.start(clock)
         self._note(TorqueEnabled(goals))
         return goals
 

@@ -7,6 +7,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
+from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import JointAngles, JointState
@@ -50,9 +51,9 @@ class PlaybackBody(ForwardingBody):
         self._records.clear()
         self._newest = None
 
-    def start(self) -> JointAngles:
+    def start(self, clock: Clock) -> JointAngles:
         """Start the wrapped body; return the recorded goals."""
-        goals = self._body.start()
+        goals = self._body.start(clock)
         said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
 

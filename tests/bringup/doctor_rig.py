@@ -1,5 +1,7 @@
 """Servos for the doctor to examine, well ones and others."""
 
+from math import pi
+
 import pytest
 
 from gazerig.drivers.feetech.memory_table import REGISTERS
@@ -8,6 +10,8 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.examination import apply_fixes, examine_bus, examine_ports
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.safety.start_range import far_outside
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -81,7 +85,19 @@ class Rig:
 
     def check(self):
         self.reported.clear()
-        return examine_bus(self.port, self.kind, self.setups, BAUD, self.reported.append)
+        return examine_bus(
+            self.port, self.kind, self.setups, BAUD, self.reported.append, self.find_far
+        )
+
+    def find_far(self, steps):
+        """Judge by the same rule as a run, for joints whose range is that of their servos."""
+        found = {}
+        for setup in self.setups:
+            low, high = ((s - 2048) * pi / 2048 for s in (setup.min_steps, setup.max_steps))
+            if setup.name in steps:
+                angle = (steps[setup.name] - 2048) * pi / 2048
+                found[setup.name] = far_outside(angle, JointLimit(low, high, 1.0, 1.0))
+        return {name: text for name, text in found.items() if text}
 
     def fix(self, findings):
         return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))

@@ -97,6 +97,18 @@ def servo_state(kind, setup=None, found=None, corrupt=0, **values):
     )
 
 
+@each
+def test_a_joint_far_outside_its_range_is_an_error_with_the_text_of_a_refused_run(kind):
+    specs = [ServoSpec(1, EYE[kind.name], 4050), ServoSpec(2, EYE[kind.name], 2500)]
+    findings = Rig(kind, [*specs, ServoSpec(7, NECK[kind.name], 2048)]).check()
+    far = one(findings, "error", PAN, "141 deg outside its range -34.98..34.98 deg: a slipped horn")
+    assert "gazerig run --recover" in far.remedy and "gazerig calibrate --joint" in far.remedy
+    assert not [
+        f for f in findings if f.where == PAN and "is at step" in f.what and f.level != "ok"
+    ]
+    one(findings, "warn", TILT, "is at step 2500, outside")
+
+
 BOTH_RULES = [
     ({"torque_enable": 1}, "warn", "torque is on", "hold the joint"),
     ({"present_temperature": 60}, "warn", "60 degC, it switches off above 70", "cool"),

@@ -5,8 +5,8 @@ is off, and moves nothing.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
@@ -34,9 +34,11 @@ from gazerig.drivers.servo_bus.discovery import (
     ping,
     scan_ids,
 )
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst_level
-from gazerig.features.bringup.doctor.servo_rules import examine_servo
+from gazerig.features.bringup.doctor.servo_checks import CHECKS
+from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
 from gazerig.features.bringup.servo_kinds import ServoKind, Tell
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
@@ -112,9 +114,16 @@ def examine_ports(
 
 
 def examine_bus(
-    port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
+    port: BusPort,
+    kind: ServoKind,
+    setups: Sequence[ServoConfig],
+    baud: int,
+    tell: Tell,
+    find_far: Callable[[Mapping[str, float]], Mapping[str, str]],
 ) -> list[Diagnostic]:
     """Examine every servo of a bus, including unexpected ones; torque is not changed.
+
+    find_far: returns the joints that would get no torque, with the reason, from measured positions
 
     Raises:
         PortError: the port cannot be opened.
@@ -131,11 +140,15 @@ def examine_bus(
         findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
     findings += [ADVICE["new"].at("the bus", found=found) for found in at.values()]
     findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.unexpected]
+    states, registers = [], Registers(port, kind.family)
     for setup in setups:
         if setup.id in presence.present:
             tell(f"reading {servo_label(setup)}")
             found, spoilt = presence.present[setup.id], presence.corrupt.get(setup.id, 0)
-            findings += examine_servo(port, kind, setup, found, spoilt)
+            states.append(read_state(registers, CHECKS[kind.family.name], setup, found, spoilt))
+    far = find_far({s.setup.name: s.position for s in states if s.position is not None})
+    for state in states:
+        findings += apply_rules(replace(state, far=far.get(state.setup.name, "")))
     if presence.present:
         findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
     return findings

@@ -12,10 +12,11 @@ from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import SHARED, FoundServo
 from gazerig.drivers.servo_bus.family import Model
+from gazerig.drivers.servo_bus.feedback import nearest_turn
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
-from gazerig.features.bringup.doctor.servo_checks import CHECKS, FIX, ServoChecks
+from gazerig.features.bringup.doctor.servo_checks import FIX, ServoChecks
 from gazerig.features.bringup.servo_kinds import ServoKind
 
 MOST_NAMED = 6
@@ -53,6 +54,9 @@ ADVICE = {
         "update it with {checks.maker_program}"),
     "baud": Advice("warn", "answers at {found.baud} bit/s, but its Baud Rate is {rate}: after its "
         "next start it will not be heard here", "gazerig setup --joint {setup.name}"),
+    "far": Advice("error", "{far} No torque is switched on there",
+        "look at the joint: if it is there, turn it inside by hand or let gazerig run --recover "
+        "move it slowly; if not, correct that cause, then gazerig calibrate --joint {setup.name}"),
     "unlimited": Advice("warn", "has no position limits of its own and many turns", FIX),
     "narrow": Advice("warn",
         "its own position limits {low}..{high} cut the YAML's range {least}..{most}", FIX),
@@ -80,6 +84,7 @@ class ServoState:
 
     values: registers by name, None without a valid answer
     corrupt: number of incomplete answers out of six
+    far: why no torque would be switched on where its joint is, "" if it would
     """
 
     checks: ServoChecks
@@ -87,6 +92,16 @@ class ServoState:
     found: FoundServo
     values: Mapping[str, int | None]
     corrupt: int = 0
+    far: str = ""
+
+    @property
+    def position(self) -> int | None:
+        """Return its position as a run counts it, None if it was not read."""
+        steps, family = self.values.get("present_position"), self.checks.kind.family
+        if steps is None or not family.single_turn:
+            return steps
+        low, high = self.setup.min_steps, self.setup.max_steps
+        return nearest_turn(steps, low, high, family.steps_per_turn)
 
     @property
     def model(self) -> Model:
@@ -127,18 +142,6 @@ class RegisterRule:
         values = [state.values.get(name) for name in self.registers]
         if None not in values and self.applies(state, *values):
             yield state.finding(self.advice, *self.fixes)
-
-
-def examine_servo(
-    port: BusPort, kind: ServoKind, setup: ServoConfig, found: FoundServo, corrupt: int
-) -> list[Diagnostic]:
-    """Read one servo and examine it; its torque is not changed.
-
-    Raises:
-        BusLost: the port has disappeared.
-    """
-    checks = CHECKS[kind.family.name]
-    return apply_rules(read_state(Registers(port, kind.family), checks, setup, found, corrupt))
 
 
 def read_state(
@@ -227,6 +230,11 @@ def _too_high(state: ServoState, volts: int) -> str:
                 f"is it the {model.rated_v:g} V version, {raised.format(model.max_voltage)}"
             )
     return ""
+
+
+def _far_outside(state: ServoState) -> Iterator[Diagnostic]:
+    if state.far:
+        yield state.finding(ADVICE["far"], far=state.far)
 
 
 def _firmware(state: ServoState) -> Iterator[Diagnostic]:
@@ -335,8 +343,9 @@ RULES: tuple[Rule, ...] = (
         Advice("warn",
             "its memory is open (Lock 0): whatever is written to its settings stays for good", FIX),
         (("lock", 1),)),
+    _far_outside,
     RegisterRule(("present_position",),
-        lambda s, at: not s.setup.min_steps <= at <= s.setup.max_steps,
+        lambda s, at: not s.far and not s.setup.min_steps <= at <= s.setup.max_steps,
         Advice("warn",
             "is at step {present_position}, outside its range {setup.min_steps}..{setup.max_steps}",
             "turn it inside by hand (torque off); if it is inside already, gazerig calibrate --joint "
