@@ -75,14 +75,15 @@ def validate(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]
 
 
 def fill_stand_ins(
-    into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool
+    into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool, misspelt: bool
 ) -> T:
     """Return the dataclass with placeholder values at faulty paths, without checking its rules.
 
-    A placeholder is the lowest or the highest allowed value. Lists and mappings have none: reading
-    such a field raises AttributeError.
+    A placeholder is the lowest or the highest allowed value. With ``misspelt``, a key that is
+    absent beside an unknown one has one too, otherwise its default. Lists and mappings have none:
+    reading such a field raises AttributeError.
     """
-    return typing.cast(T, _fill(Shape("params", params=into), data, (), faulty, high))
+    return typing.cast(T, _fill(Shape("params", params=into), data, (), faulty, high, misspelt))
 
 
 @cache
@@ -265,8 +266,9 @@ _LEFT_OUT: Any = object()
 
 
 def _fill(
-    shape: Shape, data: Any, path: tuple[Step, ...], faulty: Container[tuple[Step, ...]], high: bool
-) -> Any:
+    shape: Shape, data: Any, path: tuple[Step, ...], faulty: Container[tuple[Step, ...]], high: bool,
+    misspelt: bool,
+) -> Any:  # fmt: skip
     """Return the value at a path from ``data``, except for its faulty parts."""
     if path in faulty:
         return _stand_in(shape, high)
@@ -278,13 +280,17 @@ def _fill(
             parts = {f.name: _default(f) for f in dataclasses.fields(params)}
             for name, field in shapes_of(params).items():
                 if name in data or (*path, name) in faulty:
-                    parts[name] = _fill(field, data.get(name), (*path, name), faulty, high)
-                elif set(data) - set(parts):  # an unknown key may be a misspelling of this one
+                    parts[name] = _fill(
+                        field, data.get(name), (*path, name), faulty, high, misspelt
+                    )
+                elif misspelt and set(data) - set(
+                    parts
+                ):  # an unknown key may be a misspelling of this one
                     parts[name] = _stand_in(field, high)
             return _without_post_init(params, parts)
         case Shape(inner=Shape() as inner):
             steps = data.items() if isinstance(data, dict) else enumerate(data)
-            parts = {k: _fill(inner, item, (*path, k), faulty, high) for k, item in steps}
+            parts = {k: _fill(inner, item, (*path, k), faulty, high, misspelt) for k, item in steps}
             if any(part is _LEFT_OUT for part in parts.values()):
                 return _LEFT_OUT
             return parts if isinstance(data, dict) else tuple(parts.values())

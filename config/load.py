@@ -273,11 +273,15 @@ def _certain_findings(
     root: Entry, into: type[T], wrong: set[tuple[Step, ...]], checks: Sequence[Check[T]]
 ) -> list[tuple[str, str]]:
     """Return the findings of the checks that hold for any correct values of the faulty fields."""
-    low, high = (fill_stand_ins(into, root.to_plain(), wrong, end) for end in (False, True))
+    # An unknown key may be a misspelt one, or one that must not exist.
+    low, *others = (
+        fill_stand_ins(into, root.to_plain(), wrong, high, misspelt)
+        for high, misspelt in ((False, True), (True, True), (False, False))
+    )
     found: list[tuple[str, str]] = []
     for check in checks:
-        also = set(_findings_until_failure(check, high))
-        found += [one for one in _findings_until_failure(check, low) if one in also]
+        also = [set(_findings_until_failure(check, other)) for other in others]
+        found += [one for one in _findings_until_failure(check, low) if all(one in a for a in also)]
     named = [tuple(map(str, path)) for path in wrong]
     return [one for one in found if not any(_steps(one[0])[: len(p)] == p for p in named)]
 

@@ -214,7 +214,7 @@ def test_stand_ins_lie_at_the_ends_of_what_may_stand_there(
 ) -> None:
     faulty = {("id",), ("name",), ("kind",), ("lid", "shut_ms"), ("gains", "a"), ("offset_m", 1)}
     data = {"lid": {"shut_ms": 0}, "gains": {"a": "x", "b": 0}, "offset_m": (1, "y", 3)}
-    eye = fill_stand_ins(Eye, data, faulty, high)
+    eye = fill_stand_ins(Eye, data, faulty, high, True)
     assert (eye.id, eye.name, eye.kind, eye.lid.shut_ms) == (id_, name, kind, shut_ms)
     assert eye.gains == {"a": gain, "b": 0.0}
     assert eye.offset_m == (1.0, float(high), 3.0)
@@ -222,7 +222,9 @@ def test_stand_ins_lie_at_the_ends_of_what_may_stand_there(
 
 
 def test_a_faulty_list_or_mapping_has_no_stand_in() -> None:
-    eye = fill_stand_ins(Eye, {"matrix": ((1,), 3), "gains": 5}, {("matrix", 1), ("gains",)}, False)
+    eye = fill_stand_ins(
+        Eye, {"matrix": ((1,), 3), "gains": 5}, {("matrix", 1), ("gains",)}, False, True
+    )
     for name in ("matrix", "gains"):
         with pytest.raises(AttributeError):
             getattr(eye, name)
@@ -230,11 +232,16 @@ def test_a_faulty_list_or_mapping_has_no_stand_in() -> None:
 
 def test_beside_an_unknown_key_what_is_absent_may_have_been_meant() -> None:
     low, high = (
-        fill_stand_ins(Eye, {"id": 1, "lid": {"shut": 60, "blinks": True}}, {("lid", "shut")}, end)
+        fill_stand_ins(
+            Eye, {"id": 1, "lid": {"shut": 60, "blinks": True}}, {("lid", "shut")}, end, True
+        )
         for end in (False, True)
     )
     assert (low.lid.shut_ms, high.lid.shut_ms) == (40.0, 200.0)
     assert (low.lid.blinks, high.lid.blinks) == (True, True)
+    data = {"id": 1, "lid": {"shut": 60, "blinks": True}}
+    absent = fill_stand_ins(Eye, data, {("lid", "shut")}, False, misspelt=False)
+    assert absent.lid.shut_ms == Lid().shut_ms
 
 
 # ---- JSON Schema ------------------------------------------------------------------------

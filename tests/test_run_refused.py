@@ -65,6 +65,16 @@ def test_a_point_of_two_numbers_names_the_missing_one(
     assert "Y (Metres to the left), Z (Metres up): Z is missing" in said
 
 
+def test_an_unknown_key_of_a_joint_is_the_only_error(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, text = tmp_path / "my.yaml", DESK.read_text(encoding="utf-8")
+    path.write_text(text.replace("    zero_step:", "    zero_stepp:", 1), encoding="utf-8")
+    assert typed("check", str(path)) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "left_eye_pan.zero_stepp: unknown key 'zero_stepp'; did you mean 'zero_step'" in line
+
+
 def test_no_option_is_a_double_negation() -> None:
     assert not [option for option in options() if option.startswith("--no-no-")]
 
