@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gazerig.drivers.errors import DriverError, SetupError
-from gazerig.robot.cli.terminal import FAULT, clear_errors, say
+from gazerig.robot.cli.terminal import FAULT, clear_errors, confirm, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import (
     FAR_M,
@@ -131,7 +131,7 @@ def resume(
             return
         if not yes:
             say(f"stopped: {now['stopped']}")
-            typer.confirm(
+            confirm(
                 "Torque will be switched on and the head will move. Is no hand in the mechanism?",
                 abort=True,
             )

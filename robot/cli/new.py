@@ -21,7 +21,7 @@ from gazerig.config.new_rig import (
 )
 from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, finish_lines, say
 
 app = typer.Typer()
 
@@ -187,6 +187,7 @@ def _plugged_in(board: str) -> str:
 
 
 def _missing_answer(what: str, usual: str, option: str) -> str:
+    finish_lines()
     try:
         return input(f"{what} [{usual}]: ").strip() or usual
     except EOFError:

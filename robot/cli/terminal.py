@@ -24,7 +24,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -357,6 +357,17 @@ def exit_on_signals() -> Iterator[None]:
 def say(line: str) -> None:
     """Write a message line and clear the status line before it. Never waits, never raises."""
     _write(f"{visible(complete_suggestions(line))}\n", wiped=True)
+
+
+def finish_lines() -> None:
+    """Wait until the message lines are written, so that a prompt that follows is below them."""
+    _writer.flush(_FLUSH_S)
+
+
+def confirm(question: str, **options: Any) -> bool:
+    """Ask a question with the answers yes or no below all message lines; as ``typer.confirm``."""
+    finish_lines()
+    return typer.confirm(question, **options)
 
 
 def status(line: str) -> None:

@@ -16,7 +16,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.console import Console
-from gazerig.robot.cli.terminal import say, status
+from gazerig.robot.cli.terminal import confirm, say, status
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
@@ -172,4 +172,4 @@ def confirm_safe(why: str, remedy: str, question: str, yes: bool) -> None:
         raise SetupError(f"{why}: {remedy} and say --yes")
     say(why)
     if not yes:
-        typer.confirm(question, abort=True)
+        confirm(question, abort=True)

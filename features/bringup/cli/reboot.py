@@ -27,7 +27,7 @@ from gazerig.features.bringup.cli.ports import (
 from gazerig.features.bringup.servo_kinds import KINDS, ServoKind, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, confirm, say
 from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
@@ -104,7 +104,7 @@ def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, y
     before = servo_reboot.read_snapshot(line, kind, servo_id)
     say(f"{name}: {before}")
     question = f"{name}: torque goes off: hold what it carries. Restart it?"
-    if before.torque and not yes and not typer.confirm(question, err=True):
+    if before.torque and not yes and not confirm(question, err=True):
         say(f"{name}: left as it is")
         return False
     result = servo_reboot.reboot_servo(line, kind, servo_id, baud, RealClock().sleep_until)
@@ -122,7 +122,7 @@ def _maestro(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
         "errors can be cleared, and all its channels sent home, which is what Pololu's program "
         "set for 'On startup or error': no pulses, or a place to which servos go at once"
     )
-    if not yes and not typer.confirm("Keep fingers away. Do that?", err=True):
+    if not yes and not confirm("Keep fingers away. Do that?", err=True):
         say(f"{label}: left as it is")
         return
     held = send_home(MaestroLink(line, rig.bus_named(bus).maestro))

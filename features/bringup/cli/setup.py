@@ -32,7 +32,7 @@ from gazerig.features.bringup.cli.setup_boards import (
 from gazerig.features.bringup.servo_kinds import ServoKind, servo_kind
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.run_bus import CHAINS
-from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
+from gazerig.robot.cli.terminal import RigArgument, clear_errors, confirm, say
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
@@ -126,7 +126,7 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"
-    if not yes and not typer.confirm(question, default=True, err=True):
+    if not yes and not confirm(question, default=True, err=True):
         return False
     result = servo_setup.assign_servo(line, kind, found, wanted, baud, progress)
     clear_progress()

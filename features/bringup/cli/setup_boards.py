@@ -44,7 +44,7 @@ from gazerig.features.bringup.channel_test import (
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import clipping_text, instructions, settings_file
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.cli.terminal import record_signals, say
+from gazerig.robot.cli.terminal import confirm, finish_lines, record_signals, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
 
@@ -94,6 +94,7 @@ class SetupTask(NamedTuple):
 
 def press_enter(question: str) -> str:
     """Wait for Enter; return the text typed before it."""
+    finish_lines()
     answer = typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
     return str(answer)
 
@@ -157,7 +158,7 @@ def _try_channel(
     low, high = (min(max(round(made.steps(end)), setup.min_steps), setup.max_steps) for end in ends)
     while True:
         at = f"it goes to {rest / US_STEPS:g} us at once, then {WIGGLE_DEG:g} deg to and fro"
-        if not yes and not typer.confirm(f"   move it? {at}", default=False, err=True):
+        if not yes and not confirm(f"   move it? {at}", default=False, err=True):
             return False
         try:
             gone = _walk_channel(board, setup, (rest, low, high, rest))
@@ -173,7 +174,7 @@ def _try_channel(
                 say(f"   {explain(setup, one)}")
                 break
         name = setup.name.replace("_", " ")
-        if yes or typer.confirm(f"   did the {name} move, and nothing else?", err=True):
+        if yes or confirm(f"   did the {name} move, and nothing else?", err=True):
             return True
         say(
             f"   then plug its servo into channel {setup.id}, or write the channel that it is on "
@@ -249,7 +250,7 @@ def _test_ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) 
         "   Switch the SERVO SUPPLY OFF (the board lives on USB) to try the channels' ranges "
         "out. Is it off?"
     )
-    if not typer.confirm(question, default=False, err=True):
+    if not confirm(question, default=False, err=True):
         say("   the channels' ranges are not tried out")
         return
     cut: dict[str, None] = {}
@@ -389,7 +390,7 @@ def _write_clocks(params: Pca9685Params, task: SetupTask) -> None:
     if params.further_oscillators_hz:
         wanted[f"{key}.further_oscillators_hz"] = params.further_oscillators_hz
     named = ", ".join(f"{name}: {value}" for name, value in wanted.items())
-    if not typer.confirm(f"   write {named} into {task.rig_name}?", default=True, err=True):
+    if not confirm(f"   write {named} into {task.rig_name}?", default=True, err=True):
         return
     try:
         saved = save_rig(task.rig_name, wanted, datetime.now())

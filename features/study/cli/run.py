@@ -13,7 +13,7 @@ from gazerig.robot.app.options import RunOptions, parse_camera, parse_host_port
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.progress_bar import progress_bar
-from gazerig.robot.cli.terminal import clear_errors, record_signals, say
+from gazerig.robot.cli.terminal import clear_errors, confirm, record_signals, say
 
 if TYPE_CHECKING:
     from gazerig.features.study.data_folder import StudyData
@@ -121,7 +121,7 @@ def delete(
 
         code = participant_code(participant)
         question = f"Delete all data of {code} in {data}? This cannot be undone."
-        if not yes and not typer.confirm(question, err=True):
+        if not yes and not confirm(question, err=True):
             raise typer.Exit(1)
         count = StudyData(data).delete(participant)
         print(f"{code}: {count} files deleted; make the report again: gazerig study analyse {data}")
