@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from gazerig.config.rig import Rig
+from gazerig.config.tracks import radians_hint
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.animation import bottango, gltf_reader, servo_positions, table
@@ -48,7 +49,9 @@ def read_animation(
             "Bottango or of Blender's add-on Servo Animation, or CSV"
         )
     else:
-        found = ImportedAnimation(table.read_table(path, data, fps, names), poses=False)
+        series = table.read_table(path, data, fps, names)
+        hint = radians_hint(abs(angles).max() for _, angles in series.values())
+        found = ImportedAnimation(series, (hint,) if hint else (), poses=False)
     if not found.series:
         raise SetupError(
             f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"

@@ -91,6 +91,16 @@ def test_bad_rows_are_named_with_their_line(text: str, tmp_path: Path) -> None:
     assert BAD[text] in str(caught.value)
 
 
+@pytest.mark.parametrize(("largest", "hinted"), [("0.349", True), ("20", False)])
+def test_a_table_in_radians_gets_a_hint(largest: str, hinted: bool, tmp_path: Path) -> None:
+    path = tmp_path / "turn.csv"
+    text = f"time,neck_yaw,neck_pitch\n0,0,0.1396\n1,{largest},-0.1\n2,0,0.1396\n"
+    path.write_text(text, encoding="utf-8")
+    rig = load_rig("desk")
+    notes = read_animation(path, rig, joint_map(rig, [])).notes
+    assert any("degrees? these look like radians" in note for note in notes) == hinted
+
+
 def test_all_bad_rows_are_named_at_once(tmp_path: Path) -> None:
     rows = "\n".join(f"{t},x" for t in range(15))
     with pytest.raises(SetupError) as caught:
