@@ -29,10 +29,12 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
+from gazerig import open as open_head
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.control.gaze_events import EVENT_KINDS
 from gazerig.robot.dashboard.door import programs
+from gazerig.robot.model.command_json import from_json
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.client import RobotClient
@@ -540,6 +542,18 @@ def test_every_message_of_the_docs_is_one() -> None:
         message = json.loads(text.replace('"who": ...', '"who": "me"'))
         whole = {"$ref": f"#/components/schemas/{message['do']}", "components": components}
         jsonschema.Draft202012Validator(whole).validate(message)
+
+
+def test_the_messages_to_a_voice_agent_s_head_name_what_the_shipped_rig_has() -> None:
+    found = re.findall(
+        r'\{"do": "(?:set_level|express|play)".*?\}', DOCS.read_text(encoding="utf-8")
+    )
+    with open_head("expressive", mock=True, fast=True) as head:
+        for text in found:
+            order = head._send(from_json(json.loads(text)))
+            head.sleep(0.1)
+            assert order.reply is not None and not order.reply.refused, text
+    assert {json.loads(text)["do"] for text in found} == {"set_level", "express", "play"}
 
 
 def blocks(language: str) -> list[str]:
