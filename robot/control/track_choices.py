@@ -341,6 +341,8 @@ class TrackChoices:
         if not voices and command.track:
             there = ", ".join(voice.played.name for voice in self._player.voices) or "none"
             return CommandReply(f"{command.track} is not playing; playing: {there}")
+        if not voices and command.action != "end":  # to end all tracks is done with none
+            return CommandReply(f"no track is playing: play one first, then {command.action}")
         if command.action == "end":
             return self._end(voices, t_s, limits, command.who)
         try:
