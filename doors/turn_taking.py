@@ -88,7 +88,7 @@ class TurnTaking:
 
         Text that arrives while it is spoken reveals no end and gives no order.
         """
-        self._text = (self._text + text)[:_MAX_CHARACTERS]
+        self._text = (self._text + text).lstrip()[:_MAX_CHARACTERS]  # spaces alone are no speech
         return self._correct(now_s) if self._planned_end_s() > now_s + _AHEAD_S else ()
 
     def speak(self, now_s: float, seconds: float | None = None) -> Orders:
@@ -140,7 +140,8 @@ class TurnTaking:
         if self._seconds is not None:
             return TurnOrder("speaking", max(_LEAST_S, round(self._end_s - now_s, 3)), self._text)
         spoken = int((now_s - self._begin_s) * gazerig.CHARACTERS_PER_S)
-        return TurnOrder("speaking", None, self._text[spoken:] if self._end_s < inf else "")
+        rest = self._text[spoken:] if self._end_s < inf else ""
+        return TurnOrder("speaking", None, rest if rest.strip() else "")
 
     def _change(self, state: OrderName, order: OrderName | None = None) -> Orders:
         if self.state == state:

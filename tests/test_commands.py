@@ -79,6 +79,9 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
         ({"do": "jog", "angles_rad": "neck"}, "pairs"),
         ({"do": "stop", "why": None}, "text"),
         ({"do": "tune", "changes": [["a", 1, 2]]}, "pairs"),
+        ({"do": "say", "what": " \n"}, "a text without a word is no speech"),
+        ({"do": "say", "what": ""}, "a text without a word is no speech"),
+        ({"do": "talk", "state": "speaking", "text": "  "}, "a text without a word is no speech"),
     ],
 )
 def test_what_is_no_order_is_refused_with_the_rule(data: object, words: str) -> None:

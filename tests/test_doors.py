@@ -20,7 +20,7 @@ import gazerig
 from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.spoken_sound import SpokenSound
-from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
+from gazerig.doors.turn_taking import Orders, TurnOrder, TurnTaking, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.app.door_processes import load_door
 from gazerig.robot.cli import door as cli_door
@@ -239,6 +239,17 @@ def test_added_text_moves_the_planned_end_once() -> None:
     assert brief(talk.add_text("xx", 2.0)) == []
     assert brief(talk.add_text("x" * 28, 2.0)) == [("speaking", "45 characters")]  # 15 are spoken
     assert brief(talk.add_text("x" * 9000, 2.0)) == [("speaking", "4985 characters")]
+
+
+def test_a_text_of_spaces_is_no_speech() -> None:
+    talk = TurnTaking()
+    talk.add_text(" " * 60, 0.0)
+    assert talk.speak(0.0) == (TurnOrder("speaking"),)
+    assert talk.speak(1.0, 4.0) == (TurnOrder("speaking", 3.0),)
+    talk = TurnTaking()
+    talk.add_text("Yes." + " " * 60, 0.0)
+    assert talk.speak(0.0)[0].text.strip() == "Yes."
+    assert talk.add_text(" " * 90, 3.0) == (TurnOrder("speaking"),)  # what is left of it
 
 
 # A neighbour on this computer

@@ -39,12 +39,10 @@ def speak(text: str, params: SoundParams) -> SpokenText:
     """Return a text as speech.
 
     Raises:
-        SoundError: the text is empty or too long, or the program is missing or fails.
+        SoundError: the text is too long, or the program is missing or fails.
     """
-    if not text.strip() or len(text) > MAX_CHARACTERS:
-        raise SoundError(
-            f"a spoken text has 1 to {MAX_CHARACTERS} characters, not {len(text.strip())}"
-        )
+    if len(text) > MAX_CHARACTERS:
+        raise SoundError(f"a spoken text has at most {MAX_CHARACTERS} characters, not {len(text)}")
     program = params.speech
     if program == "auto":
         program = "piper" if params.voice.endswith(_MODEL) else "espeak-ng"

@@ -64,6 +64,7 @@ MAX_PIXEL = 20000.0
 """Largest coordinate of a pixel."""
 MAX_NUMBER = 2**53
 """Largest number of a person or a track: every client and recording can hold it."""
+NO_SPEECH = "a text without a word is no speech: give the words, or the name of a sound file"
 _MAX_TIME_S = 1e12
 
 
@@ -220,6 +221,8 @@ def _check_talk(command: Talk) -> None:
     for name, text in (("text", command.text), ("sound", command.sound)):
         if not isinstance(text, str) or len(text) > MAX_TALK_CHARACTERS:
             raise ValueError(f"{name} must be text of at most {MAX_TALK_CHARACTERS} characters")
+    if command.text and not command.text.strip():
+        raise ValueError(NO_SPEECH)
     pairs = isinstance(words, tuple) and len(words) <= MAX_TALK_WORDS
     last_s = 0.0
     for pair in words if pairs else ():
@@ -261,6 +264,8 @@ def _check_speech(command: Say | Speak) -> None:
             raise ValueError(
                 "say a file or a text; spoken must be pairs of a word and its begin in s"
             )
+        if not command.what.strip():
+            raise ValueError(NO_SPEECH)
         return
     if not isinstance(command.sound, str) or not isinstance(command.level, str):
         raise ValueError("sound and level of a speech must be names")
