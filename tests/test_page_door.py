@@ -305,14 +305,31 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
         with suppress(ConnectionError):
             assert silent[0].recv(1) == b""
         for _ in range(400):
-            if near.door._connections.count <= MOST_CONNECTIONS:
+            if near.door._connections.count <= MOST_CONNECTIONS + MOST_LINES:
                 break
             time.sleep(0.05)
-        assert near.door._connections.count <= MOST_CONNECTIONS
+        assert near.door._connections.count <= MOST_CONNECTIONS + MOST_LINES
         for one in silent:
             one.close()
         for line in greedy:
             line.close()
+
+
+def test_neither_websockets_nor_silent_connections_shut_out_a_stop(near: Rig) -> None:
+    """Websockets have limits of their own, and a request that has just begun is not closed."""
+    host, port = near.address.split(":")
+    with ExitStack() as stack:
+        for path in ("/rig/line", "/rig/panels", f"/api/v1/socket?token={TOKEN}"):
+            for _ in range(32):
+                stack.enter_context(near.knock(path))
+        near.stops.clear()
+        for number in range(20):
+            assert near.post(b'{"do": "stop", "why": "many websockets"}')[0] == 204, number
+        for _ in range(300):
+            stack.enter_context(socket.create_connection((host, int(port))))
+        for number in range(20):
+            assert near.post(b'{"do": "stop", "why": "and silent ones"}')[0] == 204, number
+        assert len(near.stops) == 40
 
 
 # --- by the back ----------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
@@ -430,6 +431,66 @@ def test_a_flood_is_refused_and_costs_the_loop_nothing(rig: Rig) -> None:
     rig.until(lambda now: now["stopped"])
     rate_hz = (rig.ticks() - ticks) / (time.monotonic() - began_s)
     assert rate_hz > 0.75 * usual_hz
+
+
+@pytest.mark.parametrize("message", ['{"do": "set_level", "level": "jaw", "value": 1}', "rubbish"])
+def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig: Rig, message: str) -> None:
+    with rig.dial() as flood:
+        heard(flood, "tag", "hello")
+        for _ in range(3000):
+            flood.send(message)
+        sent_s = time.monotonic()
+        ask(flood, do="stop", why="at last", tag="s")
+        assert rig.until(lambda now: now["stopped"])["stopped"] == "at last"
+        assert time.monotonic() - sent_s < 3.0  # at most .3 on a quiet machine
+
+
+def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig) -> None:
+    with rig.dial() as flood:
+
+        def read() -> None:
+            with contextlib.suppress(ConnectionClosed):
+                for _ in flood:
+                    pass
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        began_s, stops = time.monotonic(), False
+        with pytest.raises(ConnectionClosed) as closed:
+            while time.monotonic() < began_s + PATIENCE_S:
+                flood.send("rubbish")
+                if not stops and time.monotonic() > began_s + 1.0:
+                    stops = True
+                    ask(flood, do="stop", why="before the end")
+                time.sleep(0.0005)
+        reader.join()
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
+    assert closed.value.rcvd.reason.startswith("too many requests: more than 200 refused in 1 s")
+    assert rig.until(lambda now: now["stopped"])["stopped"] == "before the end"
+
+
+def test_a_program_that_sends_a_little_too_much_stays(rig: Rig) -> None:
+    with rig.dial() as end:
+        for _ in range(400):
+            ask(end, do="status")
+            time.sleep(1.0 / 120.0)
+        assert "too many requests" in heard(end, "refused")["refused"]
+        time.sleep(1.0)
+        ask(end, do="status", tag="still there")
+        assert "ok" in heard(end, "tag", "still there")
+
+
+def test_commands_that_wait_are_refused_by_a_stop_and_questions_are_not() -> None:
+    async def stop() -> list[Any]:
+        program, orders = programs.ProgramSocket(0.0, False), asyncio.Queue[dict[str, Any]]()
+        for message in ({"do": "resume", "tag": 1}, {"do": "status"}, {"do": "look_at"}):
+            orders.put_nowait(message)
+        programs._refuse_commands(program, orders)
+        said = [json.loads(text) for text in iter(program.outgoing, "")]
+        return [*said, orders.get_nowait(), orders.empty()]
+
+    refused = {"refused": "it has been stopped meanwhile"}
+    assert asyncio.run(stop()) == [{**refused, "tag": 1}, refused, {"do": "status"}, True]
 
 
 def test_a_slow_reader_loses_states_and_delays_nobody(rig: Rig) -> None:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from math import radians
 from pathlib import Path
@@ -672,6 +673,93 @@ def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
         greedy.stop("all the same")
     assert rig.status()["stopped"] == "all the same"
     rig.resume(confirmed=True)
+
+
+LEVEL = b'{"do": "set_level", "level": "mouth", "value": 0.5}\n'
+STOP = b'{"do": "stop", "why": "at last"}\n'
+
+
+def lines_until(end: socket.socket, right: Callable[[dict[str, Any]], bool]) -> list[Any]:
+    end.settimeout(20.0)
+    found: list[Any] = []
+    with end.makefile("rb") as file:
+        while not found or not right(found[-1]):
+            found.append(json.loads(file.readline()))
+    return found
+
+
+def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(
+    rig: RobotClient, folder: Path, beat: Beat
+) -> None:
+    """A resume before the stop does not follow it, and all is answered in its order."""
+    with raw(folder) as end:
+        ticks, count = len(beat.ticks), 2000
+        sender = threading.Thread(
+            target=end.sendall, args=(count * LEVEL + b'{"do": "resume", "tag": "r"}\n' + STOP,)
+        )
+        sender.start()
+        answers = lines_until(
+            end, lambda answer: "notes" in answer.get("ok", ()) and bool(beat.ticks[-1].stopped)
+        )
+        sender.join()
+        stopped = next(k for k, tick in enumerate(beat.ticks[ticks:]) if tick.stopped)
+        assert stopped < count / 2  # each of the messages before would take a tick
+    assert rig.status()["stopped"] == "at last"
+    assert any("64 wait for their answers" in answer.get("refused", "") for answer in answers)
+    rig.resume(confirmed=True)
+
+
+def test_a_resume_from_before_a_stop_is_not_executed_after_it(
+    rig: RobotClient, folder: Path, beat: Beat
+) -> None:
+    rig.stop("a hand")
+    with raw(folder) as end:
+        resume = b'{"do": "resume", "confirmed": true, "tag": "r"}\n'
+        end.sendall(20 * LEVEL + resume + STOP + b'{"do": "characters"}\n')
+        answers = lines_until(end, lambda answer: answer.get("ok") == ["bold", "shy"])
+    assert len(answers) == 23 and answers[20] == {
+        "refused": "it has been stopped meanwhile", "tag": "r",
+    }  # fmt: skip
+    assert rig.status()["stopped"] == "at last"
+    rig.resume(confirmed=True)
+
+
+def test_who_sends_far_too_much_is_hung_up_on_after_his_stop(
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server_module, "REST_S", 3.0)
+    with raw(folder) as end:
+        over = threading.Event()
+
+        def flood() -> None:
+            while not over.wait(0.002):
+                end.sendall(20 * LEVEL)
+            end.sendall(STOP)
+
+        sender = threading.Thread(target=flood)
+        sender.start()
+        closes = "more than 200 refused in 1 s; this connection closes"
+        answers = lines_until(end, lambda answer: answer.get("refused", "").endswith(closes))
+        assert {"refused": "too many requests: 64 wait for their answers"} in answers
+        over.set()
+        sender.join()
+        with contextlib.suppress(ConnectionError):
+            while end.recv(1 << 16):
+                pass
+    assert rig.status()["stopped"] == "at last"
+    rig.resume(confirmed=True)
+
+
+def test_an_answer_does_not_end_the_wait_for_the_next_request(
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two threads have a connection, each with timeouts of its own."""
+    monkeypatch.setattr(server_module, "_TAKES_S", 0.02)
+    with raw(folder) as end:
+        for _ in range(20):
+            end.sendall(b'{"do": "characters"}\n')
+            assert "ok" in line_of(end)
+            time.sleep(0.03)
 
 
 def test_a_client_of_another_version_is_told_so_once_and_may_stop(

@@ -30,6 +30,7 @@ ANSWER_BYTES = 1 << 23
 _PATH_BYTES = 107
 """Longest path of a Unix socket on Linux (unix(7), sun_path), without its ending zero."""
 _CHUNK_BYTES = 1 << 16
+_LONGEST_S = 1e6
 HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX") and hasattr(socket, "SO_PEERCRED")
 """Whether this system has sockets with paths and identifies their peers: Linux."""
 _LOOPBACK = "127.0.0.1"
@@ -54,6 +55,20 @@ def parse_json(text: str | bytes) -> Any:
         raise ValueError(f"{word} is not a number in JSON")
 
     return json.loads(text, parse_constant=refuse)
+
+
+def parse_line(line: bytes) -> Any:
+    """Return the value of a line.
+
+    Raises:
+        MalformedMessage: it is not JSON.
+    """
+    try:
+        return parse_json(line)
+    except RecursionError:
+        raise MalformedMessage("nested too deeply", over=False) from None
+    except ValueError as error:
+        raise MalformedMessage(f"not a line of JSON: {error}", over=False) from None
 
 
 class MalformedMessage(ValueError):
@@ -293,10 +308,11 @@ def remove_dead_sockets(path: Path) -> tuple[int, ...]:
 
 
 class Wire:
-    """One end of a connection."""
+    """One end of a connection; one thread may read while another one writes."""
 
     def __init__(self, end: socket.socket, longest: int) -> None:
         self._end = end
+        self._writing_end = end.dup()  # with a timeout of its own
         self._longest = longest
         self._clock = RealClock()
         self._rest = b""
@@ -309,11 +325,11 @@ class Wire:
             OSError: the other end is gone, or accepts nothing for ``within_s``.
         """
         line = json.dumps(value, allow_nan=False, separators=(",", ":")).encode() + b"\n"
-        self._end.settimeout(within_s)
-        self._end.sendall(line)
+        self._writing_end.settimeout(within_s)
+        self._writing_end.sendall(line)
 
     def read(self, first_s: float | None, rest_s: float) -> object:
-        """Wait for one value: ``first_s`` for its start (None: without limit), then ``rest_s``.
+        """Wait for one value: ``first_s`` for its start (None: 11 days), then ``rest_s``.
 
         Raises:
             EOFError: the other end has closed.
@@ -321,22 +337,22 @@ class Wire:
             MalformedMessage: the message is not a line of JSON.
             OSError: the connection broke.
         """
-        line = self._line(first_s, rest_s)
-        try:
-            return parse_json(line)
-        except RecursionError:
-            raise MalformedMessage("nested too deeply", over=False) from None
-        except ValueError as error:
-            raise MalformedMessage(f"not a line of JSON: {error}", over=False) from None
+        return parse_line(self.read_line(first_s, rest_s))
+
+    @property
+    def has_line(self) -> bool:
+        """Return whether a line has been received that was not read yet."""
+        return b"\n" in self._rest
 
     def close(self) -> None:
         """Close the connection; readers at both ends get its end."""
         with contextlib.suppress(OSError):
             self._end.shutdown(socket.SHUT_RDWR)
         self._end.close()
+        self._writing_end.close()
 
-    def _line(self, first_s: float | None, rest_s: float) -> bytes:
-        """Return one line without its end."""
+    def read_line(self, first_s: float | None, rest_s: float) -> bytes:
+        """Return one line without its end; arguments and exceptions are those of ``read``."""
         held = self._rest or self._receive(first_s)
         due_s = self._clock.now_s() + rest_s
         while b"\n" not in held:
@@ -357,7 +373,8 @@ class Wire:
         return line
 
     def _receive(self, within_s: float | None) -> bytes:
-        self._end.settimeout(within_s)
+        # Without a timeout it would block, and so would the writing end, which shares that state.
+        self._end.settimeout(_LONGEST_S if within_s is None else within_s)
         data = self._end.recv(_CHUNK_BYTES)
         if not data:
             raise EOFError

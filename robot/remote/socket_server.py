@@ -1,4 +1,6 @@
-"""Server of a running rig's remote control: a thread for each connected program.
+"""Server of a running rig's remote control: two threads for each connected program.
+
+One receives the requests and executes stops at once, the other one answers the rest in order.
 
 The threads never touch the control loop: they use the tuning and queue commands, which the loop
 executes at its next tick. A program that sends malformed data, stops within a request or reads no
@@ -9,14 +11,23 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Container
 from pathlib import Path
 from typing import NamedTuple
 
+from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_io as remote_socket
+from gazerig.robot.remote.excess import CLOSED, REST_S, STOPPED, TOO_MANY, ExcessCount
 from gazerig.robot.remote.request_handler import RequestHandler, is_stop
-from gazerig.robot.remote.socket_io import REQUEST_BYTES, Listener, MalformedMessage, Wire
+from gazerig.robot.remote.socket_io import (
+    REQUEST_BYTES,
+    Listener,
+    MalformedMessage,
+    Wire,
+    parse_line,
+)
 
 
 class RequestRate(NamedTuple):
@@ -70,6 +81,76 @@ _LONGEST_WAIT_S = 0.25
 """Longest delay of a program that has used up its processor time, s."""
 _MOST = 16
 """Largest number of programs; for one more the least recently active is disconnected."""
+
+
+MOST_AHEAD = 64
+"""Largest number of requests of one program that wait for their answers; more are refused."""
+_PAUSE_S = 0.005
+"""Pause between two packets of a program that sends more."""
+
+
+class WaitingRequest(NamedTuple):
+    """A request, or the answer to one that is already decided, in the order of arrival."""
+
+    request: object
+    answer: dict[str, object] | None = None
+
+
+class RequestsAhead:
+    """The requests of one program that were received and not answered yet; thread-safe."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._waiting: deque[WaitingRequest] = deque()
+        self._requests, self._over = 0, False
+
+    @property
+    def is_full(self) -> bool:
+        """Return whether no further request can be added."""
+        return self._requests >= MOST_AHEAD
+
+    def add_request(self, request: object) -> None:
+        """Add a request."""
+        with self._changed:
+            self._requests += 1
+            self._waiting.append(WaitingRequest(request))
+            self._changed.notify()
+
+    def add_answer(self, answer: dict[str, object]) -> None:
+        """Add an answer, which is sent after those of the earlier requests."""
+        with self._changed:
+            self._waiting.append(WaitingRequest(None, answer))
+            self._changed.notify()
+
+    def refuse(self, reason: str, names: Container[str]) -> None:
+        """Refuse all requests with these names that wait."""
+        with self._changed:
+            kept = list(self._waiting)
+            self._waiting.clear()
+            for one in kept:
+                match one.request:
+                    case {"do": str(name), **rest} if name in names:
+                        tag = {"tag": rest["tag"]} if "tag" in rest else {}
+                        self._requests -= 1
+                        self._waiting.append(WaitingRequest(None, {"refused": reason, **tag}))
+                    case _:
+                        self._waiting.append(one)
+
+    def end(self) -> None:
+        """Mark the end: no request follows."""
+        with self._changed:
+            self._over = True
+            self._changed.notify()
+
+    def take(self) -> WaitingRequest | None:
+        """Wait for the next request and remove it; return None after the last one."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._over)
+            if not self._waiting:
+                return None
+            taken = self._waiting.popleft()
+            self._requests -= taken.answer is None
+            return taken
 
 
 _NAMING = threading.Lock()
@@ -170,41 +251,92 @@ class RemoteServer:
         self._start(self._serve, wire, peer)
 
     def _serve(self, wire: Wire, peer: str) -> None:
-        """Answer one program until it disconnects or its data cannot be parsed."""
+        """Receive the requests of one program until it disconnects; a second thread answers them.
+
+        So a stop is executed at once, whatever the program has sent before it.
+        """
+        ahead = RequestsAhead()
+        if not self._start(self._answer_all, wire, peer, ahead):
+            wire.close()
+            return
+        excess = ExcessCount()
+        try:
+            while not excess.is_over and self._receive(wire, peer, ahead, excess):
+                pass
+            if excess.is_over:
+                ahead.refuse(CLOSED, QUESTIONS | CHANGES | ORDERS)
+                ahead.add_answer({"refused": CLOSED})
+                end_s = self._clock.now_s() + REST_S
+                while (left_s := end_s - self._clock.now_s()) > 0.0:
+                    if not self._receive(wire, peer, ahead, excess, left_s):
+                        break
+        finally:
+            ahead.end()
+        while excess.is_over and self._receive(wire, peer, ahead, excess):
+            pass  # stops, until the other thread has sent the last answer
+
+    def _receive(
+        self,
+        wire: Wire,
+        peer: str,
+        ahead: "RequestsAhead",
+        excess: ExcessCount,
+        within_s: float | None = None,
+    ) -> bool:
+        """Receive one line, and execute a stop; return whether another line can follow."""
+        if ahead.is_full and not wire.has_line:  # let other threads work between two packets
+            self._clock.sleep_until(self._clock.now_s() + _PAUSE_S)
+        try:
+            line = wire.read_line(within_s, _REST_S)
+            late = ahead.is_full or excess.is_over
+            excess.add(late, self._clock.now_s())
+            with self._lock:
+                if wire in self._wires:
+                    self._wires[wire] = self._wires.pop(wire)
+            request = parse_line(line) if not late or b'"stop"' in line else None
+        except MalformedMessage as error:
+            ahead.add_answer({"refused": str(error)})
+            return not error.over
+        except (EOFError, OSError) as error:
+            return isinstance(error, TimeoutError)
+        if is_stop(request):
+            # A resume from before a stop must not be executed after it.
+            ahead.refuse(STOPPED, ORDERS)
+            ahead.add_answer(self._execute(request, peer))
+        elif not late:
+            ahead.add_request(request)
+        elif not excess.is_over:
+            ahead.add_answer({"refused": f"{TOO_MANY}: {MOST_AHEAD} wait for their answers"})
+        return True
+
+    def _answer_all(self, wire: Wire, peer: str, ahead: "RequestsAhead") -> None:
+        """Answer the requests of one program in their order."""
         own = ProcessorBudget(EACH, self._clock.now_s())
         try:
-            while self._serve_request(wire, peer, own):
-                pass
+            while (waiting := ahead.take()) is not None:
+                answer = waiting.answer
+                if answer is None and (text := self._delay(own)):
+                    answer = {"refused": text}
+                began_s = time.thread_time()
+                if not self._answer(wire, answer or self._execute(waiting.request, peer)):
+                    return
+                used_s, now_s = time.thread_time() - began_s, self._clock.now_s()
+                own.spend(used_s, now_s)
+                self._budget.spend(used_s, now_s)
         finally:
             with self._lock:
                 self._wires.pop(wire, None)
             wire.close()
 
-    def _serve_request(self, wire: Wire, peer: str, own: ProcessorBudget) -> bool:
-        """Answer one request; return whether another can follow."""
+    def _execute(self, request: object, peer: str) -> dict[str, object]:
+        """Execute a request; return its answer."""
         try:
-            request = wire.read(None, _REST_S)
-        except MalformedMessage as error:
-            return self._answer(wire, {"refused": str(error)}) and not error.over
-        except (EOFError, OSError):
-            return False
-        with self._lock:
-            if wire in self._wires:
-                self._wires[wire] = self._wires.pop(wire)
-        if not is_stop(request) and (text := self._delay(own)):
-            return self._answer(wire, {"refused": text})
-        began_s = time.thread_time()
-        try:
-            answer = self._requests.answer(request, peer)
+            return self._requests.answer(request, peer)
         except Exception as error:
             # An internal error in one request must not end the remote control, which stops need.
-            answer = {"failed": f"{type(error).__name__}: {error}"}
-            self._say(f"remote control: {request!r:.200} failed: {answer['failed']}")
-        taken = self._answer(wire, answer)
-        used_s, now_s = time.thread_time() - began_s, self._clock.now_s()
-        own.spend(used_s, now_s)
-        self._budget.spend(used_s, now_s)
-        return taken
+            failed = f"{type(error).__name__}: {error}"
+            self._say(f"remote control: {request!r:.200} failed: {failed}")
+            return {"failed": failed}
 
     def _delay(self, own: ProcessorBudget) -> str:
         """Delay a program that uses too much time; return the reason if it is refused."""

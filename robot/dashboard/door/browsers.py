@@ -2,7 +2,8 @@
 
 A browser needs a handful of connections. A client that opens hundreds and sends nothing, or sends
 one byte per second, must not prevent others from pressing STOP. So a new connection over the limit
-closes the one that has been idle longest.
+closes the one that has been idle longest, and a request has a second before it can be closed.
+Websockets do not count: each kind has a limit of its own.
 """
 
 import asyncio
@@ -17,7 +18,9 @@ from aiohttp import web
 from aiohttp.web_protocol import RequestHandler
 
 MOST = 96
-"""Largest number of connections of all browsers together."""
+"""Largest number of connections of all browsers together, without websockets."""
+RESERVE = 64
+"""Number of further connections that are younger than a second."""
 IDLE_S = 15.0
 """Longest time of a connection without a request, s."""
 BUSY_S = 20.0
@@ -25,6 +28,7 @@ BUSY_S = 20.0
 _LOOK_EVERY_S = 1.0
 _TRIM_AFTER_S = 0.02
 _BEGINS_WITHIN_S = 5.0
+_YOUNG_S = 1.0
 _DIGITS = 4
 
 
@@ -128,11 +132,16 @@ class Connections:
     def _trim(self) -> None:
         self._trimming = False
         self._forget_gone()
-        begun = [(h, s) for h, s in self._states.items() if s.begun]
-        begun.sort(key=lambda one: (one[1].lasting, one[1].busy, one[1].since_s))
-        for handler, _ in begun[: max(0, len(begun) - MOST)]:
+        young_s = asyncio.get_running_loop().time() - _YOUNG_S
+        counted = [
+            (one.since_s > young_s, one.busy, one.since_s, handler)
+            for handler, one in self._states.items()
+            if one.begun and not one.lasting
+        ]
+        counted.sort(key=lambda one: one[:3])
+        too_many, old = len(counted) - MOST, sum(not young for young, *_ in counted)
+        for *_, handler in counted[: max(0, min(too_many, old), too_many - RESERVE)]:
             self._end(handler)
-        self._trim_soon()
 
     @contextmanager
     def mark_busy(self, request: web.BaseRequest) -> Iterator[None]:
@@ -158,7 +167,7 @@ class Connections:
         loop = asyncio.get_running_loop()
         while True:
             await asyncio.sleep(_LOOK_EVERY_S)
-            self._forget_gone()
+            self._trim()
             now_s = loop.time()
             for handler, state in tuple(self._states.items()):
                 longest_s = BUSY_S if state.busy else IDLE_S

@@ -12,6 +12,7 @@ import json
 import os
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import aiohttp
@@ -24,7 +25,6 @@ from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_on
 from gazerig.robot.dashboard.requests.outbox import TokenBucket, takes_control
 from gazerig.robot.dashboard.requests.rig_relay import (
     BUSY,
-    BUSY_WORDS,
     NEWEST,
     Answer,
     HeadNews,
@@ -35,6 +35,7 @@ from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED
 from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.remote.excess import CLOSED, REST_S, STOPPED, TOO_MANY, ExcessCount
 from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
 
@@ -45,7 +46,6 @@ _EVENTS_HZ = 20.0
 """Rate at which the state of the head is read for events and outcomes."""
 _PER_S, _BURST = 50.0, 100.0
 _ALL_PER_S, _ALL_BURST = 100.0, 200.0
-_FLOOD_PAUSE_S = 0.01
 _READ_S = 5.0
 _MOST_QUEUED = 16
 _MOST_OUT = 256
@@ -54,6 +54,8 @@ _MOST_OPEN = 64
 _WHO_CHARACTERS = 60
 _TAG_CHARACTERS = 100
 _NO_OUTCOME = {name for name, kind in ORDERS.items() if kind in REPEATED}
+_ENDS = (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.CLOSED,
+         aiohttp.WSMsgType.ERROR)  # fmt: skip
 _STATUS = {"ok": 200, "refused": 409, "failed": 503}
 
 
@@ -118,6 +120,7 @@ class ProgramSocket:
 
     Attributes:
         news: set when a message waits; alive: set when the program has answered a ping.
+        ping: the newest ping of the program that is not answered yet.
         held: what the program controls: "gaze" (or joints), "talk" (the conversation).
         who: name under which it does.
     """
@@ -130,6 +133,7 @@ class ProgramSocket:
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
         self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
         self.news, self.alive = asyncio.Event(), asyncio.Event()
+        self.ping: bytes | None = None
         self.held: set[str] = set()
         self.who = ""
 
@@ -327,11 +331,12 @@ class ProgramRoutes:
         orders: asyncio.Queue[dict[str, Any]] = asyncio.Queue(_MOST_QUEUED)
         orders.put_nowait({"do": "hello", "version": VERSION, "tag": "hello"})
         self.feed.add(program.add_news, program.wanted_hz)
+        excess = ExcessCount()
         try:
             with self._limits.occupy(request.remote or "") as leave:
                 await until_one_ends(
                     self._send(socket, program),
-                    self._receive(socket, program, orders, request),
+                    self._receive(socket, program, orders, request, excess),
                     self._carry_out(program, orders),
                     self._renew(socket, program),
                     self._over.wait(),
@@ -339,13 +344,17 @@ class ProgramRoutes:
                 )
         finally:
             self.feed.remove(program.add_news)
-        await close_socket(socket, request)
+        await close_socket(socket, request, CLOSED if excess.is_over else "")
         return socket
 
     async def _send(self, socket: web.WebSocketResponse, program: ProgramSocket) -> None:
         while not socket.closed:
             await program.news.wait()
             program.news.clear()
+            async with asyncio.timeout(TAKES_S):
+                if (ping := program.ping) is not None:
+                    program.ping = None
+                    await socket.pong(ping)
             while text := program.outgoing():
                 async with asyncio.timeout(TAKES_S):
                     await socket.send_str(text)
@@ -356,28 +365,52 @@ class ProgramRoutes:
         program: ProgramSocket,
         orders: "asyncio.Queue[dict[str, Any]]",
         request: web.Request,
+        excess: ExcessCount,
     ) -> None:
+        """Receive messages; nothing here waits except a stop, so that a stop never waits.
+
+        A program that sends far too many messages is disconnected, after the stops among those
+        that it has sent.
+        """
         loop = asyncio.get_running_loop()
         rate = TokenBucket(_PER_S, _BURST)
-        async for frame in socket:
-            if frame.type is aiohttp.WSMsgType.PING:
-                async with asyncio.timeout(TAKES_S):
-                    await socket.pong(frame.data)
-                continue
-            if frame.type is aiohttp.WSMsgType.PONG:
-                program.alive.set()
-                continue
-            if frame.type is not aiohttp.WSMsgType.TEXT:
-                program.queue_message({"refused": "not text: one JSON object in each message"})
-                continue
-            late = not rate.take(loop.time())
-            if late and '"stop"' not in frame.data[:REQUEST_BYTES]:
-                program.queue_message({"refused": BUSY})
-                await asyncio.sleep(_FLOOD_PAUSE_S)
-                continue
+        while not excess.is_over:
+            frame = await socket.receive()
+            if frame.type in _ENDS:
+                return
+            late = frame.type is aiohttp.WSMsgType.TEXT and not rate.take(loop.time())
+            await self._receive_frame(frame, program, orders, request, late)
+            excess.add(late, loop.time())
+        program.queue_message({"refused": CLOSED})
+        with suppress(TimeoutError):
+            async with asyncio.timeout(REST_S):
+                while (frame := await socket.receive()).type not in _ENDS:
+                    if _may_stop(frame):
+                        await self._receive_frame(frame, program, orders, request, late=True)
+
+    async def _receive_frame(
+        self,
+        frame: aiohttp.WSMessage,
+        program: ProgramSocket,
+        orders: "asyncio.Queue[dict[str, Any]]",
+        request: web.Request,
+        late: bool,
+    ) -> None:
+        """Receive one message; of one that is too many only a stop is carried out."""
+        if frame.type is aiohttp.WSMsgType.PING:
+            program.ping = frame.data  # answered by the sender, as the program may not read
+            program.news.set()
+        elif frame.type is aiohttp.WSMsgType.PONG:
+            program.alive.set()
+        elif frame.type is not aiohttp.WSMsgType.TEXT:
+            program.queue_message({"refused": "not text: one JSON object in each message"})
+        elif late and not _may_stop(frame):
+            program.queue_message({"refused": BUSY})
+        else:
             try:
                 message = _add_client(parse_message(frame.data), request)
                 if message.get("do") == "stop":
+                    _refuse_commands(program, orders)
                     program.queue_message(await self._send_to_rig(message))
                 elif late or orders.full() or not self._is_within_rate():
                     program.queue_message({"refused": BUSY, **_tag(message)})
@@ -417,7 +450,7 @@ class ProgramRoutes:
                 await socket.ping()
                 await program.alive.wait()
             answer = await self._relay.ask({"do": "renew", "who": program.who})
-            if "refused" in answer and BUSY_WORDS not in answer["refused"]:
+            if "refused" in answer and TOO_MANY not in answer["refused"]:
                 program.held.clear()  # another client, or no client, is in control
 
     # --- the rig ------------------------------------------------------------------------
@@ -446,6 +479,20 @@ def _add_client(message: dict[str, Any], request: web.Request) -> dict[str, Any]
         return message
     name = "".join(filter(str.isprintable, str(message.get("who") or "a program")))
     return {**message, "who": f"{name[:_WHO_CHARACTERS]} at {request.remote}"}
+
+
+def _may_stop(frame: aiohttp.WSMessage) -> bool:
+    return frame.type is aiohttp.WSMsgType.TEXT and '"stop"' in frame.data[:REQUEST_BYTES]
+
+
+def _refuse_commands(program: ProgramSocket, orders: "asyncio.Queue[dict[str, Any]]") -> None:
+    """Refuse the commands that wait: a resume from before a stop must not be carried out after."""
+    for _ in range(orders.qsize()):
+        message = orders.get_nowait()
+        if message.get("do") in ORDERS:
+            program.queue_message({"refused": STOPPED, **_tag(message)})
+        else:
+            orders.put_nowait(message)
 
 
 def _tag(message: Mapping[str, object]) -> dict[str, object]:

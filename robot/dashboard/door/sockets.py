@@ -58,11 +58,14 @@ async def until_one_ends(*works: Awaitable[object]) -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def close_socket(socket: web.WebSocketResponse, request: web.Request) -> None:
+async def close_socket(
+    socket: web.WebSocketResponse, request: web.Request, refusal: str = ""
+) -> None:
     """Close a browser's websocket, also one that does not read the closing message."""
+    code = aiohttp.WSCloseCode.POLICY_VIOLATION if refusal else aiohttp.WSCloseCode.OK
     with suppress(TimeoutError, ConnectionError):
         async with asyncio.timeout(_CLOSES_WITHIN_S):
-            await socket.close()
+            await socket.close(code=code, message=refusal.encode())
     if request.transport is not None:
         request.transport.abort()
 

@@ -18,6 +18,7 @@ from gazerig.robot.control.head_state import tracks_from_json
 from gazerig.robot.model.control_source import ControlState
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import CONNECT_S
+from gazerig.robot.remote.excess import TOO_MANY
 from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, connect_to_socket
 
 _THREADS = 4
@@ -28,9 +29,7 @@ _AGAIN_S = 0.5
 
 Answer = dict[str, Any]
 NO_RIG = "no head takes requests here: it shows a recording, starts or has ended"
-BUSY_WORDS = "too many requests"
-"""Prefix of the refusals of the rig and of the page if a program sends too much."""
-BUSY = f"{BUSY_WORDS}; try again"
+BUSY = f"{TOO_MANY}; try again"
 NEWEST = 10**15
 """Number greater than that of any event."""
 
