@@ -173,7 +173,7 @@ class Unattended(Guardian):
 def sts():
     rig, guardian = StsRig(), Unattended()
     rig.inner = rig.bus  # type: ignore[attr-defined]
-    rig.bus = GuardedBus(rig.inner, 4, guardian, 0)  # type: ignore[attr-defined]
+    rig.bus = GuardedBus(rig.inner, rig.setups, guardian, 0)  # type: ignore[attr-defined]
     rig.guardian = guardian  # type: ignore[attr-defined]
     rig.bus.open()
     return rig
@@ -247,6 +247,26 @@ def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
     sts.inner.enable_torque = enabled
     sts.run(RETRY_S + 0.05, [2300] * 4)
     assert any("torque on again" in line for line in sts.bus.events())
+
+
+def test_a_joint_far_outside_its_range_gets_no_torque_again(sts):
+    sts.bus.retune([setup._replace(far_steps=100.0) for setup in sts.setups])
+    sts.bus.enable_torque()
+    sts.run(0.3, [2000] * 4)
+    sts.bus.events()
+    for i in (1, 2, 3, 4):  # the guardian's work
+        sts.chain.find_servo(i).write(TORQUE_ENABLE, b"\0")
+    sts.command("turn 2 1500")
+    sts.guardian.other.set_state(0, RELEASED)
+    sts.run(2.5 * RETRY_S, [2000] * 4)
+    assert not any(sts.get(i, TORQUE_ENABLE) for i in (1, 2, 3, 4))
+    line = sts.bus.events()[-1]
+    assert line.startswith(
+        "torque could not be switched on again: jaw (servo 2) is at step 3500, far"
+    )
+    sts.command("turn 2 -1500")
+    sts.run(RETRY_S + 0.1, [2000] * 4)
+    assert all(sts.get(i, TORQUE_ENABLE) for i in (1, 2, 3, 4))
 
 
 def test_servos_that_nobody_held_stay_limp(sts):

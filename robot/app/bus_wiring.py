@@ -83,7 +83,8 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     for name in bus_names(rig):
         share = _bus_share(rig, name, port_at_path(paths[name], on_traffic=beat))
         if guardian is not None and name in plans:
-            bus = GuardedBus(share.bus, len(share.servo_indices), guardian, guarded.index(name))
+            own = [servo_configs(rig)[i] for i in share.servo_indices]
+            bus = GuardedBus(share.bus, own, guardian, guarded.index(name))
             share = share._replace(bus=bus)
         shares.append(share)
     return _join_buses(shares)

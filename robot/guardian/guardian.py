@@ -6,7 +6,8 @@ import subprocess
 from collections.abc import Collection, Sequence
 from math import inf
 
-from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.drivers.bus.goal_limits import far_outside_steps
+from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.drivers.process import child_process
 from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
 from gazerig.robot.guardian.heartbeat import (
@@ -21,6 +22,9 @@ from gazerig.robot.guardian.release_plan import ReleasePlan, encode
 
 RETRY_S = 1.0
 """Time between attempts to switch the torque of servos on again, s."""
+
+_READINGS = 3
+"""Attempts to read every position before the torque is switched on again."""
 
 _MODULE = "gazerig.robot.guardian.process"
 
@@ -223,15 +227,18 @@ class GuardedBus:
 
     Args:
         bus: Bus of the servos.
-        count: Number of servos.
+        setups: Its servos.
         guardian: Guardian of the rig.
         plan: Index of the release plan of this bus's port.
     """
 
-    def __init__(self, bus: ServoBus, count: int, guardian: Guardian, plan: int) -> None:
+    def __init__(
+        self, bus: ServoBus, setups: Sequence[ServoConfig], guardian: Guardian, plan: int
+    ) -> None:
         self._bus, self._guardian, self._plan = bus, guardian, plan
         self._beat = guardian.beat
-        self._silent = Feedback.create_missing(count)
+        self._setups = tuple(setups)
+        self._silent = Feedback.create_missing(len(self._setups))
         self._holding = self._lost_hold = False
         self._retry_s, self._refusal = 0.0, ""
         self._rearmed: set[int] = set()
@@ -333,6 +340,7 @@ class GuardedBus:
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Store setups that take effect when the torque is switched on next."""
+        self._setups = tuple(setups)
         self._bus.retune(setups)
 
     def health(self) -> BusHealth:
@@ -353,6 +361,7 @@ class GuardedBus:
         try:
             # Goals that were being sent when the loop stopped may have arrived after the release.
             self._bus.disable_torque()
+            self._refuse_far_outside(now_s)
             self._bus.enable_torque()
         except DriverError as error:
             if str(error) != self._refusal:  # once, not with every attempt
@@ -362,3 +371,23 @@ class GuardedBus:
         self._lost_hold = False
         self._rearmed = set(self._silent.missing)
         self._events.append("torque on again at the present angles: continuing slowly")
+
+    def _refuse_far_outside(self, now_s: float) -> None:
+        """Refuse torque while a servo is far outside its limits, or its position is unknown.
+
+        Raises:
+            ServoMissing: a servo does not answer.
+            ServoFault: a servo is far outside its limits.
+        """
+        for _ in range(_READINGS):
+            feedback = self._bus.read(now_s)
+            if not feedback.missing:
+                break
+        rows = zip(self._setups, feedback.measured, feedback.position_steps, strict=True)
+        for i, (setup, measured, steps) in enumerate(rows):
+            if not measured:
+                continue
+            if i in feedback.missing:
+                raise ServoMissing(f"no position from {setup.label()}: check its cable")
+            if text := far_outside_steps(setup, steps):
+                raise ServoFault(f"{setup.label()} {text}")

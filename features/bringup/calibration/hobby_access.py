@@ -67,7 +67,9 @@ class HobbyServoAccess:
             bus = MaestroBus(port, [self._setup], params)
         else:
             bus = Pca9685Bus(port, [self._setup], params)
-        self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
+        self._bus: ServoBus = (
+            bus if guardian is None else GuardedBus(bus, [self._setup], guardian, 0)
+        )
         self._goal = self._pulse = 0
         self._on = False
         self._said: list[str] = []
