@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from ipaddress import ip_address
 from typing import Any, NamedTuple
 
 import gazerig
@@ -20,7 +21,14 @@ _LOOK_S = 2.0
 """Time without orders after which the door checks that the head still runs."""
 _MAX_LINES = 40
 """Different messages that are reported about one neighbour."""
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host's name or address is reached from this computer only."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 class Address(NamedTuple):
@@ -234,7 +242,7 @@ class Door:
             gazerig.Error: the door cannot open; the message has the remedy.
         """
         bind = bind or self.bind
-        if bind and Address.parse(bind).host not in LOOPBACK:
+        if bind and not is_loopback(Address.parse(bind).host):
             say(f"listening on {bind}: every program on this network can steer the conversation")
 
         link = DoorLink(

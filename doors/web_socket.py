@@ -9,7 +9,8 @@ from urllib.parse import urlsplit
 
 from aiohttp import ClientError, ClientSession, ClientWebSocketResponse, WSMsgType, web
 
-from gazerig.doors.door import LOOPBACK, Address, DoorLink
+from gazerig.doors.admission import Neighbours, page_refusal, user_refusal
+from gazerig.doors.door import Address, DoorLink
 from gazerig.doors.turn_taking import Orders, TurnTaking, UnknownMessage
 
 MAX_BYTES = 4_000_000
@@ -17,7 +18,6 @@ MAX_BYTES = 4_000_000
 _MAX_PER_S = 500
 """Messages per second that are read; of a flood, the rest waits at its sender."""
 _HEARTBEAT_S = 20.0
-_MAX_NEIGHBOURS = 8
 ERRORS = (OSError, TimeoutError, ClientError)
 """Errors of a connection."""
 
@@ -41,10 +41,13 @@ class Intake:
     Args:
         link: The head.
         translator: What the messages mean.
+        hear: Notes each message.
     """
 
-    def __init__(self, link: DoorLink, translator: Translator) -> None:
-        self._link, self._translator = link, translator
+    def __init__(
+        self, link: DoorLink, translator: Translator, hear: Callable[[], None] = lambda: None
+    ) -> None:
+        self._link, self._translator, self._hear = link, translator, hear
         self._second_s, self._count = link.now_s(), 0
 
     async def read(self, socket: ClientWebSocketResponse | web.WebSocketResponse) -> None:
@@ -52,6 +55,7 @@ class Intake:
         try:
             async for message in socket:
                 if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                    self._hear()
                     await self.take(message.data)
         finally:
             self.end()
@@ -131,41 +135,51 @@ async def receive_sockets(link: DoorLink, make: Callable[[], Translator], neighb
         neighbour: What the door waits for.
     """
 
-    async def handle(request: web.Request) -> web.WebSocketResponse:
+    async def handle(request: web.Request, hear: Callable[[], None]) -> web.WebSocketResponse:
         socket = web.WebSocketResponse(heartbeat=_HEARTBEAT_S, max_msg_size=MAX_BYTES)
         await socket.prepare(request)
-        await Intake(link, make()).read(socket)
+        await Intake(link, make(), hear).read(socket)
         return socket
 
     await listen(link, handle, neighbour)
 
 
 async def listen(
-    link: DoorLink, handle: Callable[[web.Request], Awaitable[web.WebSocketResponse]], neighbour: str
-) -> None:  # fmt: skip
+    link: DoorLink,
+    handle: Callable[[web.Request, Callable[[], None]], Awaitable[web.WebSocketResponse]],
+    neighbour: str,
+) -> None:
     """Accept WebSockets at the link's bind address, for ever.
 
-    A page of another site in a browser of this computer is refused.
+    Web pages and, on the loopback, other users of this computer are refused.
+
+    Args:
+        link: The head.
+        handle: Serves a request, and notes each message by its second argument.
+        neighbour: What the door waits for.
 
     Raises:
         OSError: the port is not free.
     """
-    neighbours = 0
+    neighbours = Neighbours(link)
 
     async def admit(request: web.Request) -> web.StreamResponse:
-        nonlocal neighbours
-        origin = urlsplit(request.headers.get("Origin", "")).hostname
-        if origin is not None and origin not in (*LOOPBACK, request.url.host):
-            link.report(f"a page of {origin} was refused; serve it from this computer")
-            raise web.HTTPForbidden
-        if neighbours >= _MAX_NEIGHBOURS:
-            link.report(f"more than {_MAX_NEIGHBOURS} connections at once: the newest is refused")
+        transport = request.transport
+        if transport is None:
+            raise web.HTTPForbidden  # it has disconnected
+        port = transport.get_extra_info("sockname")[1]
+        refused = page_refusal(link.bind, port, request.headers)
+        if refused := refused or user_refusal(link.bind, transport):
+            link.report(refused)
+            raise web.HTTPForbidden(text=refused)
+        if not web.WebSocketResponse().can_prepare(request):
+            raise web.HTTPUpgradeRequired
+        if not neighbours.admit(transport):
             raise web.HTTPServiceUnavailable
-        neighbours += 1
         try:
-            return await handle(request)
+            return await handle(request, lambda: neighbours.hear(transport))
         finally:
-            neighbours -= 1
+            neighbours.leave(transport)
 
     app = web.Application()
     app.router.add_get("/{path:.*}", admit)

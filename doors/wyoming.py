@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import Any
 
 import gazerig
+from gazerig.doors.admission import Neighbours, user_refusal
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.spoken_sound import WIDTH, SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnTaking, field
@@ -20,7 +21,6 @@ _MAX_CHUNKS = 64
 _AHEAD_S = 1.0
 """Sound that the head has before it is heard."""
 _MAX_BYTES, _MAX_LINE = 1_000_000, 65_536
-_MAX_NEIGHBOURS = 8
 
 
 class Wyoming:
@@ -80,15 +80,19 @@ class Satellite:
 
     def __init__(self, link: DoorLink) -> None:
         self._link, self._events = link, Wyoming()
+        self._neighbours = Neighbours(link)
         self._sounds: list[asyncio.Queue[Any]] = []
         self._said = set[SpokenSound]()
         self._opening: asyncio.Future[str] | None = None
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Read one connection to its end."""
-        if len(self._sounds) >= _MAX_NEIGHBOURS:
-            self._link.report(f"more than {_MAX_NEIGHBOURS} connections: the newest is refused")
-            writer.close()
+        if refused := user_refusal(self._link.bind, writer.transport):
+            self._link.report(refused)
+            await _refuse(writer, refused)
+            return
+        if not self._neighbours.admit(writer.transport):
+            await _refuse(writer, "too many connections")
             return
         sounds: asyncio.Queue[Any] = asyncio.Queue(_MAX_CHUNKS)
         if self._opening is None:  # so that the first sound does not wait for the loudspeaker
@@ -112,6 +116,7 @@ class Satellite:
         finally:
             player.cancel()
             await asyncio.gather(player, return_exceptions=True)
+            self._neighbours.leave(writer.transport)
             self._sounds.remove(sounds)
             if not self._sounds:
                 self._link.send(self._events.talk.end())
@@ -138,6 +143,7 @@ class Satellite:
                 if not reader.at_eof():
                     raise ValueError("not a line of JSON, or too long")
                 return
+            self._neighbours.hear(writer.transport)
             if event.type == "describe":
                 await async_write_event(_info(), writer)
                 continue
@@ -204,6 +210,16 @@ class Satellite:
                 link.send(self._events.take({"type": "played"}, link.now_s()))
             with suppress(ConnectionError):
                 await async_write_event(Played().event(), writer)
+
+
+async def _refuse(writer: asyncio.StreamWriter, reason: str) -> None:
+    """Tell a neighbour why it is disconnected."""
+    from wyoming.error import Error
+    from wyoming.event import async_write_event
+
+    with suppress(ConnectionError):
+        await async_write_event(Error(text=reason).event(), writer)
+    writer.close()
 
 
 def _check_audio(sound: Any) -> Any:

@@ -2,7 +2,10 @@
 
 import asyncio
 import base64
+import contextlib
+import os
 import socket
+import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +20,7 @@ from typer.testing import CliRunner
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
 import gazerig
-from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
+from gazerig.doors import admission, livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
 from gazerig.doors.spoken_sound import SpokenSound
 from gazerig.doors.turn_taking import Orders, TurnOrder, TurnTaking, UnknownMessage
@@ -331,25 +334,150 @@ def test_a_head_that_ends_is_found_again_with_its_state() -> None:
 
 
 @pytest.mark.own_timeouts
-def test_rtvi_messages_are_received_but_not_from_other_sites() -> None:
+@pytest.mark.parametrize("door", [pipecat.DOOR, openai_realtime.DOOR], ids=lambda one: one.name)
+def test_web_pages_are_refused_and_programs_are_not(door: Door) -> None:
+    """Also a page of this computer, a page in a frame without an address, and a rebound name."""
+    port = free_port()
+    refused: list[dict[str, str]] = [
+        {"Origin": origin}
+        for origin in (
+            "null", "file://", "", "http://localhost:5173", "http://localhost", "https://a.example",
+            f"https://127.0.0.1:{port}", f"http://127.0.0.1:{port}.a.example",
+            f"http://a.example:{port}",
+        )
+    ]  # fmt: skip
+    hosts = (f"a.example:{port}", f"127.0.0.1.a.example:{port}", "[", "")
+    refused += [{"Host": host} for host in hosts]
+    programs = [{}, {"Origin": f"http://localhost:{port}"}, {"Host": f"localhost:{port}"}]
+    programs += [{"Host": "[::1]:22"}]  # through a tunnel
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        async with ClientSession() as session:
+            for headers in refused:
+                with pytest.raises(WSServerHandshakeError, match="403"):
+                    await session.ws_connect(f"ws://127.0.0.1:{port}/v1", headers=headers)
+            for headers in programs:
+                try:
+                    await session.ws_connect(f"ws://127.0.0.1:{port}/v1", headers=headers)
+                except WSServerHandshakeError as error:  # there is no server behind the relay
+                    assert (error.status, door.name) == (502, "openai-realtime")
+            async with session.get(f"http://127.0.0.1:{port}/v1") as answer:  # a page's picture
+                assert answer.status == 426
+        assert len([line for line in head.said if "was refused" in line]) == len(refused)
+        assert any("a web page of null was refused; let a program" in line for line in head.said)
+
+    run(door, scenario, "ws://127.0.0.1:9", f"127.0.0.1:{port}")
+
+
+@pytest.mark.own_timeouts
+def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     bind = f"127.0.0.1:{free_port()}"
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:
         await until(lambda: head.said)
         async with ClientSession() as session:
-            with pytest.raises(WSServerHandshakeError, match="403"):
-                await session.ws_connect(f"ws://{bind}", origin="https://elsewhere.example")
             sockets = [await session.ws_connect(f"ws://{bind}/x?y=1") for _ in range(8)]
-            with pytest.raises(WSServerHandshakeError, match="503"):
-                await session.ws_connect(f"ws://{bind}")
-            await sockets[0].send_json(rtvi("user-started-speaking"))
+            for one in sockets[1:]:
+                await one.send_json(rtvi("user-started-speaking"))
             await until(lambda: head.states == ["listening"])
-            await sockets[0].send_json({"type": "x"})
-            await sockets[0].close()
-            await until(lambda: head.states == ["listening", "idle"])
+            sockets.append(await session.ws_connect(f"ws://{bind}"))
+            assert (await sockets[0].receive()).type.name in ("CLOSED", "CLOSE", "ERROR")
+            await sockets[-1].send_json(rtvi("bot-started-speaking"))
+            await until(lambda: head.last == "speaking")
+            with pytest.raises(WSServerHandshakeError, match="503"):  # all have spoken
+                await session.ws_connect(f"ws://{bind}")
+            monkeypatch.setattr(admission, "IDLE_S", 0.0)  # a long time later
+            await session.ws_connect(f"ws://{bind}")
+            assert not sockets[-1].closed  # the idlest one was closed
+            await sockets[-1].send_json({"type": "x"})
+            await sockets[-1].close()
+            await until(lambda: head.last == "idle")
 
     head = run(pipecat.DOOR, scenario, bind=bind)
-    assert [line.split(" ")[0] for line in head.said] == ["waiting", "a", "more", "a"]
+    assert [line.split(" at once")[0] for line in head.said[1:3]] == ["more than 8 connections"] * 2
+    assert "the idlest is closed" in head.said[1] and "the newest is refused" in head.said[2]
+
+
+@pytest.mark.own_timeouts
+def test_a_satellite_takes_the_place_of_an_idle_one() -> None:
+    pytest.importorskip("wyoming", reason="it is in the extra doors")
+    port = free_port()
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        idle = [await asyncio.open_connection("127.0.0.1", port) for _ in range(8)]
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(b'{"type": "describe"}\n')
+        await reader.readuntil(b"gazerig")
+        with contextlib.suppress(ConnectionError):
+            assert await idle[0][0].read() == b""
+        for _, one in (*idle, (reader, writer)):
+            one.close()
+
+    run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
+
+
+def open_as_a_stranger(port: int, monkeypatch: pytest.MonkeyPatch) -> socket.socket:
+    """Connect as another user than the door's."""
+    if os.getuid() != 0:
+        monkeypatch.setattr(os, "getuid", lambda: 4_000_000)
+        return socket.create_connection(("127.0.0.1", port))
+    os.seteuid(4_000_000)  # a socket is of the user that makes it
+    try:
+        one = socket.socket()
+    finally:
+        os.seteuid(0)
+    one.connect(("127.0.0.1", port))
+    return one
+
+
+@pytest.mark.own_timeouts
+@pytest.mark.skipif(sys.platform != "linux", reason="another system does not tell the user")
+@pytest.mark.parametrize("door", [pipecat.DOOR, wyoming.DOOR], ids=lambda one: one.name)
+def test_another_user_of_this_computer_cannot_speak(
+    door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("wyoming", reason="it is in the extra doors")
+    port = free_port()
+    request = (
+        f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+    )
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        stranger = open_as_a_stranger(port, monkeypatch)
+        reader, writer = await asyncio.open_connection(sock=stranger)
+        if door is pipecat.DOOR:
+            writer.write(request.encode())
+        await reader.readuntil(b"was refused; run it as the door's user")
+        writer.close()
+        assert "a program of user " in head.said[1]
+
+    run(door, scenario, bind=f"127.0.0.1:{port}")
+
+
+def test_the_user_of_a_connection_is_read_from_the_system_s_table() -> None:
+    mapped = "0000000000000000FFFF0000"
+    rows = [
+        # A server's end, the ends of two programs, one of them on IPv6, and one that has closed.
+        "0: 0100007F:17A8 0100007F:C635 01 0:0 00:0 0 7 0 11 1",
+        "1: 0100007F:C635 0100007F:17A8 01 0:0 00:0 0 1000 0 12 1",
+        f"2: {mapped}0100007F:C636 {mapped}0100007F:17A8 01 0:0 00:0 0 1001 0 13 1",
+        "3: 0100007F:C637 0100007F:17A8 05 0:0 03:1 0 0 0 0 3",
+        f"4: {'0' * 24}01000000:C638 {'0' * 24}01000000:17A8 01 0:0 00:0 0 1002 0 14 1",
+    ]
+    if sys.byteorder == "big":
+        pytest.skip("the rows are those of a little-endian computer")
+    own, users = ("127.0.0.1", 0x17A8), {0xC635: 1000, 0xC636: 1001, 0xC637: None, 0xC639: None}
+    for port, user in users.items():
+        assert admission.socket_user(rows, ("127.0.0.1", port), own) == user
+    own6 = ("::ffff:127.0.0.1", 0x17A8, 0, 0)
+    assert admission.socket_user(rows, ("::ffff:127.0.0.1", 0xC635, 0, 0), own6) == 1000
+    assert admission.socket_user(rows, ("::1", 0xC638, 0, 0), ("::1", 0x17A8, 0, 0)) == 1002
 
 
 @pytest.mark.own_timeouts
