@@ -281,6 +281,21 @@ def test_a_value_that_the_character_sets_is_not_saved_into_the_rig(mine: Path) -
     assert mine.read_bytes() == before and bench.tuning.unsaved()
 
 
+@pytest.mark.parametrize("copied", [False, True])
+def test_only_what_was_set_by_hand_is_saved_behind_another_character(
+    mine: Path, tmp_path: Path, copied: bool
+) -> None:
+    bench = Bench(str(mine))
+    bench.tuning.apply_character("shy")
+    assert bench.tuning.unsaved() == () and bench.tuning.save().changes == ()
+    bench.tuning.set({"gaze.lids.close_ms": 90.0})
+    bench.tuning.apply_character("bold")
+    saved = bench.tuning.save(tmp_path / "copy.yaml" if copied else None)
+    assert [change.key for change in saved.changes] == ["gaze.lids.close_ms"]
+    plain = values(load_rig("desk")) | {"gaze.lids.close_ms": 90.0}
+    assert values(load_rig(str(saved.path))) == plain
+
+
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
     bench = Bench(str(mine), scanpath="random", saccade="main_sequence")
     assert bench.tuning.unsaved() == ()
