@@ -22,6 +22,7 @@ from gazerig.config.save_text import EditRefused, Value, edit_text, format_value
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.model.parameter import ParamChange, SavedFile
 
 Check = Callable[[str], Any]
@@ -185,7 +186,7 @@ def _read_content(target: Path) -> bytes | None:
 
 def _document(text: bytes) -> Document:
     """Return a text parsed as a separate file."""
-    with tempfile.TemporaryDirectory() as folder:
+    with OwnFolder("config") as folder:
         file = Path(folder) / "new.yaml"
         file.write_bytes(text)
         return read_yaml(file)

@@ -18,6 +18,7 @@ import child_processes
 import pytest
 import shown_page
 from page_visitor import LOOKING, PATIENCE_S, Visitor, unpacked
+from present import present
 from shown_page import AHEAD, free_port, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess, encode_snapshot
@@ -178,14 +179,14 @@ def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> 
 def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
     with running_page() as (page, url):
         page.offer({"lids": ("wink", "blink")})
-        first, folder = page_here(), Path(page._folder)
+        first, folder = page_here(), present(page._folder).path
         assert first is not None and folder.exists()
         os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
         assert words.startswith("the page has stopped") and "started again" in words
         page.show(SNAPSHOT)  # has no effect
         assert wait_for(page.url, "the page") == url  # the same port and token
-        assert not folder.exists() and Path(page._folder).stat().st_mode & 0o077 == 0
+        assert not folder.exists() and present(page._folder).path.stat().st_mode & 0o077 == 0
         assert page_here() not in (None, first) and page.started == 2
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
         with Visitor(url).open("/rig/panels") as talk:

@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import tempfile
 import wave
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +9,7 @@ from typing import NamedTuple
 import msgspec
 
 from gazerig.drivers.process import child_process
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.drivers.sound.params import SoundParams
 from gazerig.drivers.sound.player import SoundError
 
@@ -88,7 +88,7 @@ def _run(words: list[str], text: str) -> SpokenText:
         OSError, wave.Error, EOFError: it cannot be started, or its file cannot be read.
         subprocess.TimeoutExpired: it takes too long.
     """
-    with tempfile.TemporaryDirectory(prefix="gazerig-speech-") as folder:
+    with OwnFolder("speech") as folder:
         file = Path(folder, "speech.wav")
         done = subprocess.run(
             [*words, str(file)], input=text.encode(), capture_output=True, timeout=_TIMEOUT_S,

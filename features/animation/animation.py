@@ -1,7 +1,8 @@
 """Animation files of other programs as joint angles over time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -19,6 +20,9 @@ Series = tuple[Floats, Floats]
 """Times in seconds and angles in degrees of one joint."""
 MOST_KEYS = 5_000_000
 """Keys of one file: twelve joints, 30 frames a second, for four hours."""
+MOST_CURVES = 10_000
+"""Curves of one file, and columns of a table: a scene with a crowd has hundreds."""
+_MOST_NAMES = 20
 SAMPLE_S = 0.02
 """Interval of the samples of a curve with handles."""
 LARGEST = 200_000_000
@@ -130,7 +134,7 @@ def check_keys(where: str, times_s: Floats, values: np.ndarray[Any, Any]) -> Non
         )
 
 
-def check_count(where: str, count: int) -> None:
+def check_count(where: str, count: int, what: str = "keys") -> None:
     """Refuse more keys than a track can be made of.
 
     Raises:
@@ -138,9 +142,29 @@ def check_count(where: str, count: int) -> None:
     """
     if count > MOST_KEYS:
         raise SetupError(
-            f"{where}: {count:,} keys; at most {MOST_KEYS:,} are read: export fewer frames a "
+            f"{where}: {count:,} {what}; at most {MOST_KEYS:,} are read: export fewer frames a "
             "second, or in parts"
         )
+
+
+def check_curves(where: str, count: int, what: str = "curves") -> None:
+    """Refuse more curves than any rig has joints.
+
+    Raises:
+        SetupError: states the number and the remedy.
+    """
+    if count > MOST_CURVES:
+        raise SetupError(
+            f"{where}: {count:,} {what}; at most {MOST_CURVES:,} are read: export the rig's "
+            "joints alone"
+        )
+
+
+def listed(names: Collection[str]) -> str:
+    """Return names as text, a long list shortened."""
+    more = len(names) - _MOST_NAMES
+    shown = [f"{name:.80}" for name in islice(names, _MOST_NAMES)]
+    return ", ".join(shown + ([f"and {more:,} more"] if more > 0 else []))
 
 
 def hold_steps(times_s: Floats, angles_deg: Floats, limit: JointLimit) -> Series:

@@ -22,6 +22,7 @@ from gazerig.features.animation.animation import (
     check_count,
     check_keys,
     decode,
+    listed,
 )
 from gazerig.gaze.types import Floats
 
@@ -65,7 +66,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
         raise SetupError(f"{path}: no animations: select them in Bottango's export")
     if clip not in there and (clip or len(there) > 1):
         wrong = f"no animation {clip!r}" if clip else "several animations"
-        raise SetupError(f"{path}: {wrong}: add --clip NAME with one of: {', '.join(there)}")
+        raise SetupError(f"{path}: {wrong}: add --clip NAME with one of: {listed(there)}")
     curves: dict[str, list[list[float]]] = {}
     events = 0
     for one in (one for one in clips if one.name == (clip or there[0])):

@@ -19,8 +19,10 @@ from gazerig.features.animation.animation import (
     JointMap,
     Series,
     check_count,
+    check_curves,
     check_keys,
     hold_steps,
+    listed,
 )
 from gazerig.features.animation.glb import Clip, GltfFile
 from gazerig.gaze.types import Floats
@@ -47,6 +49,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
     """
     file = GltfFile(path, data)
     links = {link.joint.name: link for link in description_of(rig, looks=False).links if link.joint}
+    check_curves(str(path), sum(len(one.channels) for one in file.tree.animations))
     series: dict[str, Series] = {}
     notes: list[str] = []
     ignored: dict[str, None] = {}
@@ -81,7 +84,7 @@ def read(path: Path, data: bytes, rig: Rig, names: JointMap, clip: str) -> Impor
                         "which is left out: lock the other axes in the animation program"
                     )
     if ignored:
-        notes.append(f"left out: {', '.join(ignored)}")
+        notes.append(f"left out: {listed(ignored)}")
     return ImportedAnimation(series, tuple(notes))
 
 
@@ -99,7 +102,7 @@ def _clips(file: GltfFile, clip: str) -> Sequence[Clip]:
 
 
 def _listed(file: GltfFile) -> str:
-    return ", ".join(one.name or "(no name)" for one in file.tree.animations)
+    return listed([one.name or "(no name)" for one in file.tree.animations])
 
 
 def _read_angles(

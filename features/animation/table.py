@@ -9,6 +9,7 @@ spreadsheets write it in half of the world.
 import csv
 import re
 from array import array
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 from math import isfinite
@@ -17,14 +18,17 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.animation.animation import JointMap, Series, check_count
+from gazerig.features.animation.animation import JointMap, Series, check_count, check_curves
 
 _TIMES = ("time", "time_s", "t", "seconds", "frame")
 _JOINTS = ("joint", "bone", "effector", "servo", "motor", "name")
 _ANGLES = ("angle", "angle_deg", "value", "degrees", "deg")
 _MOST_FAULTS = 10
-_PREFACE = re.compile(r"(?:(?:sep=.|#[^\r\n]*|[,; \t]*)(?:\r\n?|\n))*", re.IGNORECASE)
-"""Lines before the names of the columns: empty ones, comments, and Excel's own ``sep=;``."""
+_LAST_FAULT = 1000
+"""Faults after which a file is not read further."""
+_PREFACE = re.compile(r"(?:sep=.|#[^\r\n]*|[,; \t]*)(?:\r\n?|\n)", re.IGNORECASE)
+"""A line before the names of the columns: an empty one, a comment, or Excel's own ``sep=;``."""
+_MOST_PREFACE = 1000
 
 
 def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> dict[str, Series]:
@@ -39,15 +43,18 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
     Raises:
         SetupError: the file is no table, has bad rows, each with its line, or names no joint.
     """
+    check_count(str(path), max(data.count(b"\n"), data.count(b"\r")), "lines")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise SetupError(f"{path} is not UTF-8 text: export it as CSV in UTF-8") from None
-    preface = _PREFACE.match(text)
-    text, skipped = text[preface.end() :] if preface else text, preface[0] if preface else ""
-    line = 1 + len(skipped.splitlines())
-    separator = max(",;\t", key=text.partition("\n")[0].count)
-    check_count(str(path), data.count(b"\n"))
+    line, begin = 1, 0
+    while line <= _MOST_PREFACE and (preface := _PREFACE.match(text, begin)):
+        line, begin = line + 1, preface.end()
+    text = text[begin:]
+    first = text.partition("\n")[0]
+    separator = max(",;\t", key=first.count)
+    check_curves(f"{path}:{line}", first.count(separator), "columns")
     rows = _split_rows(path, text, separator, line)
     head = [name.strip().lower() for name in next(rows, [])]
     time = next((i for i, name in enumerate(head) if name in _TIMES), None)
@@ -58,7 +65,8 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
         )
     if head[time] == "frame" and fps is None:
         raise SetupError(f"{path}:{line}: times are frame numbers: give --fps, e.g. 24 or 30")
-    twice = next((name for name in head if name and head.count(name) > 1), None)
+    count = Counter(head)
+    twice = next((name for name in head if name and count[name] > 1), None)
     if twice is not None:
         raise SetupError(f"{path}:{line}: two columns are named {twice!r}: remove one")
     unit_s = 1.0 / fps if head[time] == "frame" and fps else 1.0
@@ -66,7 +74,8 @@ def read_table(path: Path, data: bytes, fps: float | None, names: JointMap) -> d
     found = table.read_keys(rows, line + 1)
     if table.faults:
         more = len(table.faults) - _MOST_FAULTS
-        shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
+        least = "at least " if len(table.faults) >= _LAST_FAULT else ""
+        shown = table.faults[:_MOST_FAULTS] + ([f"and {least}{more} more"] if more > 0 else [])
         raise SetupError("\n".join(shown))
     if not found:
         raise SetupError(f"{path}: no rows below the column names")
@@ -106,6 +115,8 @@ class _Table:
         for line, row in enumerate(rows, start=first_line):
             if not any(cell.strip() for cell in row):
                 continue
+            if len(self.faults) >= _LAST_FAULT:
+                break
             for joint, time_s, angle in self._row_keys(line, row):
                 times, angles = found.setdefault(joint, (array("d"), array("d")))
                 if times and time_s <= times[-1]:

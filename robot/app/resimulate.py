@@ -5,7 +5,6 @@ the recorded ones. After a change the recorded angles would belong to other comm
 servos follow the commands instead (ideal ones if they were ideal).
 """
 
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain
@@ -17,6 +16,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text, track_files
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -84,7 +84,7 @@ def rerun(
         raise SetupError(f"joints {joints}: unknown; choose recorded or emulated")
     changed = rig is not None or character is not None
     fed: Joints = "emulated" if joints == "emulated" or (joints is None and changed) else "recorded"
-    with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
+    with OwnFolder("rerun") as folder:
         with_rig = _resimulation_rig(recording, rig, character, Path(folder))
         # The scene is not needed: its percepts are in the recording.
         info = recording.info

@@ -8,7 +8,6 @@ nothing is played.
 """
 
 import contextlib
-import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -19,6 +18,7 @@ import numpy as np
 
 from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.rig import Rig
+from gazerig.drivers.process.own_folder import OwnFolder, sweep
 from gazerig.drivers.sound.params import KINDS, SILENT_DEVICE
 from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
@@ -106,8 +106,10 @@ class RunVoice:
         self._over = False
         self._stream: _Stream | None = None
         self._texts = deque[Path]()
-        self._scratch: tempfile.TemporaryDirectory[str] | None = None
+        self._scratch: OwnFolder | None = None
         self._lines = deque[str](maxlen=20)
+        if not fast:
+            sweep()  # what a killed run has said
 
     # --- speech
 
@@ -208,9 +210,9 @@ class RunVoice:
         """Write samples to a file that exists until the run ends, or some texts later."""
         with self._lock:
             if self._scratch is None:
-                self._scratch = tempfile.TemporaryDirectory(prefix="gazerig-voice-")
+                self._scratch = OwnFolder("voice")
             number = int(self._texts[-1].stem) + 1 if self._texts else 1
-            path = Path(self._scratch.name, f"{number}.wav")
+            path = Path(self._scratch.path, f"{number}.wav")
             self._texts.append(path)
             while len(self._texts) > _KEPT_FILES:
                 self._texts.popleft().unlink(missing_ok=True)
@@ -365,7 +367,7 @@ class RunVoice:
             if self._player is not None:
                 self._player.close()
             if self._scratch is not None:
-                self._scratch.cleanup()
+                self._scratch.remove()
         if self._thread is not None:
             self._thread.join(1.0)
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from math import radians
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,6 +13,7 @@ from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.app.options import parse_host_port
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.rig_command import RigCommand
@@ -231,7 +231,7 @@ def _recorded_rig(config_yaml: str) -> "ShownRig | None":
     from gazerig.robot.dashboard.feed.snapshot import ShownRig
     from gazerig.robot.model.frames import CameraMount
 
-    with TemporaryDirectory() as folder:
+    with OwnFolder("replay") as folder:
         file = Path(folder) / "recorded.yaml"
         file.write_text(config_yaml, encoding="utf-8")
         try:

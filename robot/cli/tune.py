@@ -1,7 +1,6 @@
 """Commands that tune and steer a rig in another terminal: get, set, save, stop ..."""
 
 import json
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +11,7 @@ from typer.core import TyperGroup
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import fault as cli_fault
 from gazerig.robot.cli import look_and_stop
@@ -295,7 +295,7 @@ def read_value(key: str, text: str) -> Any:
     Raises:
         SetupError: it is not a YAML value.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with OwnFolder("value") as folder:
         file = Path(folder) / "value.yaml"
         file.write_text(f"value: {text}\n", encoding="utf-8")
         try:

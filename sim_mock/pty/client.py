@@ -6,15 +6,13 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, device_data
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-if TYPE_CHECKING:
-    from gazerig.sim_mock.pty.served_folder import ServedFolder
 
 STOP_S = 2.0
 
@@ -49,7 +47,7 @@ class _ServerProcess:
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
-        self._folder: ServedFolder | None = None
+        self._folder: OwnFolder | None = None
         self._asking = threading.Lock()
         self.joints: list[dict[str, int]] = []
         """Index of each rig's joints in the state of the surroundings; [] without these."""
@@ -58,9 +56,7 @@ class _ServerProcess:
         self, buses: Sequence[Mapping[str, object]], surroundings: SentSurroundings | None = None
     ) -> list[str]:
         """Start it with these settings of buses; return the path of each."""
-        from gazerig.sim_mock.pty.served_folder import ServedFolder  # Linux only
-
-        self._folder = ServedFolder()
+        self._folder = OwnFolder("servos")
         folder = self._folder.path
         links = [str(folder / f"tty{k or ''}") for k in range(len(buses))]
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]

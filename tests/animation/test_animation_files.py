@@ -2,6 +2,7 @@
 
 import json
 import struct
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track, shipped_tracks
 from gazerig.drivers.errors import SetupError
-from gazerig.features.animation.animation import Series, joint_map
+from gazerig.features.animation.animation import Series, joint_map, listed
 from gazerig.features.animation.animation_file import read_animation
 from gazerig.features.animation.cli.export_track import app as export_app
 from gazerig.features.animation.cli.import_track import app
@@ -505,3 +506,44 @@ def test_every_key_beyond_the_limits_is_listed(tmp_path: Path) -> None:
     assert set(listed) == set(judged) and len(judged) > 6
     for key, asked in judged.items():
         assert listed[key].asked == pytest.approx(asked, rel=0.02), key
+
+
+CURVES = {
+    "asset": {"version": "2.0"},
+    "nodes": [{"name": "neck_yaw"}],
+    "animations": [
+        {
+            "channels": [{"sampler": 0, "target": {"path": "rotation", "node": 0}}] * 300_000,
+            "samplers": [],
+        }
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reported"),
+    [
+        ("wide.csv", "time" + ",c" * 200_000 + "\n0" + ",1" * 200_000, "200,000 columns; at most"),
+        ("empty.csv", "\n" * 30_000_000, "30,000,000 lines; at most"),
+        ("begins_empty.csv", "\n" * 4_000_000 + WIDE, "no column of times"),
+        ("cr.csv", "\r" * 30_000_000, "30,000,000 lines; at most"),
+        ("words.csv", "time,neck_yaw\n" + "a,b\n" * 2_000_000, "and at least 990 more"),
+        ("curves.gltf", json.dumps(CURVES), "300,000 curves; at most"),
+    ],
+)
+def test_a_file_far_too_large_is_refused_at_once(
+    name: str, content: str, reported: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    path.write_text(content, newline="")
+    began_s = time.process_time()
+    with pytest.raises(SetupError) as refused:
+        read(path)
+    assert time.process_time() - began_s < 2.0
+    assert reported in str(refused.value) and len(str(refused.value)) < 2000
+
+
+def test_what_is_left_out_of_a_large_scene_is_named_in_part() -> None:
+    names = [f"bone{i}" for i in range(500)]
+    text = listed(names)
+    assert text.startswith("bone0, bone1, ") and text.endswith("bone19, and 480 more")

@@ -2,11 +2,11 @@
 
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from gazerig.config.load import ConfigError, load
 from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError, extra_hint
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.run.run_world import mjcf_of, world_script
 from gazerig.features.world.shapes import ShapesInFrame, script_shapes
@@ -54,7 +54,7 @@ def recorded_shapes(info: WorldInfo, placement: tuple[float, ...]) -> WorldShape
 
 
 def _script(info: WorldInfo) -> SceneScript:
-    with TemporaryDirectory() as folder:
+    with OwnFolder("replay") as folder:
         file = Path(folder) / f"{info.name}.yaml"
         file.write_text(info.script_yaml, encoding="utf-8")
         try:

@@ -10,7 +10,6 @@ import json
 import os
 import pickle
 import secrets
-import shutil
 import subprocess
 import tempfile
 import threading
@@ -25,6 +24,7 @@ from urllib.parse import urlsplit
 
 from gazerig.drivers.process import child_process, message_link
 from gazerig.drivers.process.message_link import MessageLink
+from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.drivers.process.passed_image import CAN_PASS, send
 from gazerig.robot.dashboard.requests.inbox import (
     BEAT,
@@ -158,7 +158,7 @@ class PageProcess:
         self.started = 0
         self.gone = False
         self._errors: BinaryIO | None = None
-        self._folder = ""
+        self._folder: OwnFolder | None = None
         self._url: str | None = None
         self._notices: deque[str] = deque()
         self._pending_replies: deque[bytes] = deque(maxlen=_MAX_PENDING)
@@ -178,7 +178,7 @@ class PageProcess:
         # A file: the page's messages matter only if it dies, and a pipe without a reader would fill
         # up.
         self._errors = _errors_file()
-        self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
+        self._folder = OwnFolder("page")
         try:
             self._process = child_process.start(
                 "gazerig.robot.dashboard.page_main",
@@ -189,7 +189,7 @@ class PageProcess:
                 variables={
                     TOKEN_VARIABLE: self._token,
                     ONCE_VARIABLE: self._once if self.started == 0 else "",
-                    FOLDER_VARIABLE: self._folder,
+                    FOLDER_VARIABLE: str(self._folder.path),
                     COMMANDS_VARIABLE: str(self._commands() or ""),
                     **links.variables,
                 },
@@ -409,7 +409,8 @@ class PageProcess:
         if self._errors is not None:
             self._errors.close()
             self._errors = None
-        shutil.rmtree(self._folder, ignore_errors=True)  # close() may have killed it
+        if self._folder is not None:
+            self._folder.remove()  # close() may have killed the process
 
 
 def _errors_file() -> BinaryIO:

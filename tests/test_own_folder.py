@@ -1,4 +1,4 @@
-"""Folders of emulated terminals: nothing is left of a process that was killed."""
+"""Temporary folders: nothing is left of a process that was killed."""
 
 import os
 import signal
@@ -8,15 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from gazerig.drivers.process import own_folder
+
 if sys.platform != "linux":
     pytest.skip("terminals are emulated on Linux alone", allow_module_level=True)
 
-from gazerig.sim_mock.pty.served_folder import PREFIX, ServedFolder, sweep
+from gazerig.drivers.process.own_folder import PREFIX, OwnFolder, sweep
 
 HOLDS = (
     "import sys, time; from pathlib import Path;"
-    "from gazerig.sim_mock.pty.served_folder import ServedFolder;"
-    "folder = ServedFolder(Path(sys.argv[1])); (folder.path / 'state').touch();"
+    "from gazerig.drivers.process.own_folder import OwnFolder;"
+    "folder = OwnFolder('test', Path(sys.argv[1])); (folder.path / 'state').touch();"
     "print(folder.path, flush=True); time.sleep(60)"
 )
 
@@ -33,7 +35,7 @@ def test_what_a_killed_process_left_goes_with_the_next_start_and_no_sooner(tmp_p
         sweep(tmp_path)
         assert (left / "state").exists()  # its owner lives
         owner.send_signal(signal.SIGKILL)
-    mine = ServedFolder(tmp_path)
+    mine = OwnFolder("test", tmp_path)
     assert names(tmp_path) == {mine.path.name}
     mine.remove()
     mine.remove()
@@ -51,3 +53,30 @@ def test_what_is_not_ours_to_remove_stays(tmp_path: Path) -> None:
     before = names(tmp_path)
     sweep(tmp_path)
     assert names(tmp_path) == before and (other / "held").exists()
+
+
+@pytest.mark.parametrize("kind", ["page", "voice"])
+def test_a_start_leaves_the_folders_of_every_live_run(kind: str, tmp_path: Path) -> None:
+    first = OwnFolder(kind, tmp_path)
+    with OwnFolder(kind, tmp_path) as second:
+        assert names(tmp_path) == {first.path.name, second.name}
+    first.remove()
+
+
+def test_a_folder_that_is_swept_before_it_is_locked_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Path] = []
+    lock = own_folder.fcntl.flock
+
+    def swept_first(held: int, how: int) -> None:
+        if len(made) < 1:
+            made.extend(tmp_path.iterdir())
+            sweep(tmp_path)
+        lock(held, how)
+
+    monkeypatch.setattr(own_folder.fcntl, "flock", swept_first)
+    mine = OwnFolder("test", tmp_path)
+    assert not made[0].exists()
+    assert names(tmp_path) == {mine.path.name}
+    mine.remove()
