@@ -546,7 +546,7 @@ CLAIMS = (
     Mutant("docs/gaze.md", "`Robot.tick`", "`Robot.tock`",
            "a function that is not there is named",
            ("docs",), ("A14",)),
-    Mutant("drivers/process/host_lateness.py", "        if now_s - self._silent_until_s < AFTERMATH_S:", "        if False:",
+    Mutant("drivers/process/host_lateness.py", "        if self._silent_until_s > begin_s:", "        if False:",
            "a computer that stood still is not blamed",
            ("host_lateness",), ("A15", "A16")),
     Mutant("drivers/serial/port.py", "        if now not in (None, lasting):", "        if False:",
