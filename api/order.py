@@ -87,7 +87,7 @@ class Order:
     @property
     def why(self) -> str:
         """Return why the order was refused, taken over or out of reach, "" if it was not."""
-        return self._why
+        return self._why if self.outcome is not None else ""
 
     def wait(self, timeout_s: float | None = 10.0) -> Outcome:
         """Wait until the order has ended; step a head in simulated time until then.

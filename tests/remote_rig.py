@@ -121,9 +121,11 @@ class Beat:
                 continue
             slot += 1
             self.clock.sleep_until(slot * 0.005)
-            tick = self.robot.tick(slot * 0.005, 0.005)
-            self.ticks.append(tick)
-            self.pulse.update(tick)
+            self.robot.tick(slot * 0.005, 0.005, self._watch)
+
+    def _watch(self, tick: Tick) -> None:
+        self.ticks.append(tick)
+        self.pulse.update(tick)
 
 
 def server_closed(server: RemoteServer) -> bool:

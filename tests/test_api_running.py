@@ -232,10 +232,10 @@ def test_an_error_of_the_loop_reaches_the_program(
 ) -> None:
     tick, failed = Robot.tick, threading.Event()
 
-    def failing(self: Robot, t_s: float, dt_s: float) -> Tick:
+    def failing(self: Robot, *values: Any) -> Tick:
         if failed.is_set():
             raise RuntimeError("a bug")
-        return tick(self, t_s, dt_s)
+        return tick(self, *values)
 
     monkeypatch.setattr(Robot, "tick", failing)
     with pytest.raises(gazerig.HeadEnded, match="a bug") as caught, opened() as head:
@@ -249,7 +249,7 @@ def test_an_error_of_the_loop_reaches_the_program(
 def test_a_fault_that_nobody_asked_about_is_raised_at_the_end(
     said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def failing(self: Robot, t_s: float, dt_s: float) -> Tick:
+    def failing(self: Robot, *values: Any) -> Tick:
         raise RuntimeError("a bug")
 
     with pytest.raises(gazerig.HeadEnded, match="a bug"), opened():

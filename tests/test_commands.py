@@ -20,6 +20,8 @@ from gazerig.gaze.track.track import TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.command_choices import Menus
+from gazerig.robot.control.loop import run
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.command_json import as_json, check_command, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
@@ -158,7 +160,9 @@ def test_a_stop_while_parking_is_obeyed_at_once(running: Running) -> None:
     began_s = made.clock.now_s()
     robot.command(LookAt(None))
     robot.command(Stop("a hand"))
-    assert not robot.park(made.park_rad, made.clock, made.loop)
+    seen: list[Tick] = []
+    assert not robot.park(made.park_rad, made.clock, made.loop, watch=seen.append)
+    assert [tick.stopped for tick in seen] == ["a hand"]
     assert made.clock.now_s() - began_s < 0.011
     joints = robot.body.read(made.clock.now_s())
     assert not any(joints.torque) and degrees(joints.position_rad[YAW]) > 45.0
@@ -306,6 +310,23 @@ def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool) -> 
         events += [event for tick in running.go(0.006) for event in tick.events]
     assert running.made.robot.stopped == "a hand"
     assert len([event for event in events if "resume" in event]) < 10
+
+
+def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running) -> None:
+    robot, made = running.made.robot, running.made
+    for commands in (
+        [Stop("a hand")],
+        [LookAt((1.0, 0.2, 0.3)), Stop("again")],
+    ):
+        tickets = [robot.command(command) for command in commands]
+        seen = []
+
+        def watch(tick: Tick) -> None:
+            seen.append([ticket.wait(0.0) for ticket in tickets])  # noqa: B023
+
+        run(robot, made.clock, made.loop, lambda s: "s" if s >= 0.006 else None, watch)
+        assert seen[0] == [None] * len(tickets)
+        assert None not in [ticket.wait(0.0) for ticket in tickets]
 
 
 def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: Running) -> None:

@@ -132,10 +132,12 @@ class SlowRobot:
         self.times: list[tuple[float, float]] = []
         self.clock, self.cost_s = clock, cost_s
 
-    def tick(self, t_s: float, dt_s: float) -> Any:
+    def tick(self, t_s: float, dt_s: float, watch: Callable[[Any], None]) -> Any:
         self.times.append((t_s, dt_s))
         self.clock.sleep_until(t_s + self.cost_s(len(self.times)))
-        return SimpleNamespace(guard_result=GuardResult((), "ok", ()))
+        tick = SimpleNamespace(guard_result=GuardResult((), "ok", ()))
+        watch(tick)
+        return tick
 
 
 def test_slots_are_absolute_and_overruns_are_skipped_not_caught_up() -> None:

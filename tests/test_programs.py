@@ -298,7 +298,7 @@ def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
     with rig.dial() as end:
         ask(end, do="stop", why="a hand", who="a show", tag="s")
         assert heard(end, "tag", "s") == {"ok": {"notes": []}, "tag": "s"}
-        assert rig.until(lambda now: now["stopped"])["stopped"] == "a hand"
+        assert rig.client.status()["stopped"] == "a hand"
         time.sleep(2.1)
         ask(end, do="resume", who="another", tag="r")
         assert "no hand" in heard(end, "tag", "r")["refused"]
@@ -542,6 +542,30 @@ def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> No
             assert count == pytest.approx(10.0 * rate_hz, abs=2)
 
     asyncio.run(fill())
+
+
+def test_states_after_an_answer_are_not_older() -> None:
+    async def follow() -> list[Any]:
+        program = programs.ProgramSocket(60.0, False)
+        program.add_news(programs.HeadNews('"before"', (), Progress()), 5.0)
+        program.queue_answer({"do": "look_at"}, {"ok": 1}, 5.02)
+        program.add_news(programs.HeadNews('"read before the answer"', (), Progress()), 5.019)
+        program.add_news(programs.HeadNews('"after"', (), Progress()), 5.03)
+        return [json.loads(text) for text in iter(program.outgoing, "")]
+
+    assert asyncio.run(follow()) == ["before", {"ok": 1}, "after"]
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_a_state_after_the_answer_to_a_stop_shows_it(rig: Rig, number: int) -> None:
+    with rig.dial("&rate_hz=60") as end:
+        heard(end, "state")
+        why = f"stop {number}"
+        ask(end, do="stop", why=why, tag="s")
+        heard(end, "tag", "s")
+        assert heard(end, "state")["state"]["stopped"] == why
+    assert rig.post({"do": "stop", "why": "by post"})[0] == 200
+    assert rig.get("/state")[1]["ok"]["state"]["stopped"] == "by post"
 
 
 # The description

@@ -259,7 +259,7 @@ def test_no_memory_in_the_loop_leaves_by_the_door(
 ) -> None:
     tick, ticks = Robot.tick, []
 
-    def short_of_memory(self: Robot, *words: float) -> object:
+    def short_of_memory(self: Robot, *words: Any) -> object:
         ticks.append(on(devices[0]))
         if len(ticks) > 100:
             raise MemoryError

@@ -26,6 +26,7 @@ class CommandQueue:
     def __init__(self) -> None:
         self._commands: deque[QueuedCommand] = deque()
         self._stops: deque[QueuedCommand] = deque()
+        self._replies: list[tuple[Ticket, CommandReply]] = []
 
     def __bool__(self) -> bool:
         """Return whether any command is queued."""
@@ -53,6 +54,16 @@ class CommandQueue:
         self._commands.append(waiting)
         return waiting.ticket
 
+    def reply(self, waiting: QueuedCommand, reply: CommandReply) -> None:
+        """Store the reply to a command until ``give_replies``."""
+        self._replies.append((waiting.ticket, reply))
+
+    def give_replies(self) -> None:
+        """Give the stored replies; called when others can see the tick that executed them."""
+        replies, self._replies = self._replies, []
+        for ticket, reply in replies:
+            ticket.answer(reply)
+
     def take_stops(self) -> list[QueuedCommand]:
         """Remove and return all stops; refuse queued commands that would move the head."""
         taken: list[QueuedCommand] = []
@@ -71,27 +82,26 @@ class CommandQueue:
             if tunes > 1:
                 break
             taken.append(self._commands.popleft())
-        return _drop_superseded(taken)
+        return self._drop_superseded(taken)
 
     def _refuse_motions(self) -> None:
         """Refuse commands before a stop that would move the head; keep the others."""
         for _ in range(len(self._commands)):
             waiting = self._commands.popleft()
             if isinstance(waiting.command, ControlCommand | Resume):
-                waiting.ticket.answer(CommandReply("it has been stopped meanwhile"))
+                self.reply(waiting, CommandReply("it has been stopped meanwhile"))
             else:
                 self._commands.append(waiting)
 
-
-def _drop_superseded(taken: list[QueuedCommand]) -> list[QueuedCommand]:
-    """Return the commands without levels that a later command of this tick sets again."""
-    kept: list[QueuedCommand] = []
-    seen: set[str] = set()
-    for waiting in reversed(taken):
-        if isinstance(waiting.command, SetLevel):
-            if waiting.command.level in seen:
-                waiting.ticket.answer(CommandReply())
-                continue
-            seen.add(waiting.command.level)
-        kept.append(waiting)
-    return kept[::-1]
+    def _drop_superseded(self, taken: list[QueuedCommand]) -> list[QueuedCommand]:
+        """Return the commands without levels that a later command of this tick sets again."""
+        kept: list[QueuedCommand] = []
+        seen: set[str] = set()
+        for waiting in reversed(taken):
+            if isinstance(waiting.command, SetLevel):
+                if waiting.command.level in seen:
+                    self.reply(waiting, CommandReply())
+                    continue
+                seen.add(waiting.command.level)
+            kept.append(waiting)
+        return kept[::-1]

@@ -242,12 +242,27 @@ class Robot:
         self._executor.reset()
         self._executor.commanded_rad = goals
 
-    def tick(self, t_s: float, dt_s: float) -> Tick:
-        """Read, perceive, choose, plan, guard, write.
+    def tick(self, t_s: float, dt_s: float, watch: Callable[[Tick], None] | None = None) -> Tick:
+        """Read, perceive, choose, plan, guard, write; then reply to the commands.
+
+        Args:
+            t_s: Present time.
+            dt_s: Time since the last tick.
+            watch: Called with the tick before the replies, so that a client that has its reply
+                finds the tick, or a newer one.
 
         Raises:
             DriverError: The bus or the camera is lost.
         """
+        try:
+            tick = self._tick(t_s, dt_s)
+            if watch is not None:
+                watch(tick)
+            return tick
+        finally:
+            self._commands.give_replies()
+
+    def _tick(self, t_s: float, dt_s: float) -> Tick:
         commands = self._execute_commands(t_s)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
@@ -327,7 +342,10 @@ class Robot:
                 return False
             if stops := self._commands.take_stops():
                 for stop in stops:
-                    stop.ticket.answer(self._executor.execute(stop.command, t_s))
+                    self._commands.reply(stop, self._executor.execute(stop.command, t_s))
+                if watch is not None and isinstance(newest, Tick):
+                    watch(newest.stopped_tick(t_s, self._stop.stop_reason, self.body.bus.events()))
+                self._commands.give_replies()
                 return False
             joints = self.body.read(t_s)
             guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
@@ -357,7 +375,7 @@ class Robot:
             if isinstance(command, Play | Speak):
                 command = self._tracks.measure_sound(command)
             taken.append(command)
-            waiting.ticket.answer(self._executor.execute(command, t_s))
+            self._commands.reply(waiting, self._executor.execute(command, t_s))
         self._executor.end_expired(t_s)
         return tuple(taken)
 
@@ -413,10 +431,9 @@ class TickLoop:
         if reason is not None:
             return reason
         try:
-            tick = self._robot.tick(t_s, t_s - self._last_s)
+            tick = self._robot.tick(t_s, t_s - self._last_s, self._watch)
         except DriverError as error:
             return f"fault: {error}"
-        self._watch(tick)
         if tick.guard_result.level == "torque_off" and not tick.stopped:
             return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
         self._last_s = t_s

@@ -62,6 +62,16 @@ class Tick(NamedTuple):
             desired_rad, guard_result, events, parking=True,
         )  # fmt: skip
 
+    def stopped_tick(self, t_s: float, stopped: str, events: tuple[str, ...]) -> "Tick":
+        """Return a later tick in which a client has stopped the parking head."""
+        guard_result = stopped_result(
+            self.joints, self.desired_rad, stopped, self.guard_result.joints
+        )
+        parking = self.parking_tick(
+            t_s, self.joints, self.pose, self.desired_rad, guard_result, events
+        )
+        return parking._replace(stopped=stopped, parking=False)
+
 
 def stopped_result(
     joints: JointState, desired_rad: JointAngles, why: str, names: tuple[str, ...]

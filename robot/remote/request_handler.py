@@ -39,7 +39,7 @@ from gazerig.robot.control.tick_text import (
 )
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import set_client
-from gazerig.robot.model.commands import REPEATED, Command
+from gazerig.robot.model.commands import Command
 from gazerig.robot.model.control_source import control_sentence
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import LoopFigures
@@ -77,7 +77,7 @@ class LoopMonitor:
         return self._feed.update
 
     def wait_for_commands(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
-        """Wait until all previous commands are executed; return whether they are.
+        """Wait until all previous changes are applied; return whether they are.
 
         Args:
             within_s: Timeout, s.
@@ -249,7 +249,7 @@ class RequestHandler:
                 backup = None if saved.backup is None else str(saved.backup)
                 changes = as_changes(saved.changes)
                 return {"path": str(saved.path), "backup": backup, "changes": changes}
-            case PendingCommand(command, ticket):
+            case PendingCommand(_, ticket):
                 if ticket is None:
                     return self._wait_until_applied(())
                 reply = ticket.wait(_TAKEN_UP_S)
@@ -257,8 +257,6 @@ class RequestHandler:
                     raise ValueError(_HANGS)
                 if reply.refused:
                     raise _CommandRefused(reply)
-                if not isinstance(command, REPEATED):
-                    self._pulse.wait_for_commands(ticks=1)  # so that the status includes it
                 return {"notes": [], "reply": reply.as_json()}
 
     def _status(self) -> dict[str, object]:

@@ -128,7 +128,7 @@ class ProgramSocket:
     def __init__(self, rate_hz: float, events: bool) -> None:
         self._rate_hz, self._events = rate_hz, events
         self._period_s = 1.0 / rate_hz if rate_hz else 0.0
-        self._due_s = 0.0
+        self._due_s = self._answered_s = 0.0
         self._state = ""
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
         self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
@@ -142,10 +142,10 @@ class ProgramSocket:
         return max(self._rate_hz, _EVENTS_HZ if self._events or self._open else 0.0)
 
     def add_news(self, news: HeadNews, now_s: float) -> None:
-        """Store the news that the program wants."""
+        """Store the news that the program wants; now_s: before the state was read."""
         period_s = self._period_s
-        # A little early is better than one period late.
-        if period_s and now_s >= self._due_s - 0.25 * period_s:
+        # A little early is better than one period late; a state may not be older than an answer.
+        if period_s and now_s >= max(self._due_s - 0.25 * period_s, self._answered_s):
             self._due_s = max(self._due_s, now_s - 0.5 * period_s) + period_s
             self._state = news.state
             self.news.set()
@@ -176,6 +176,17 @@ class ProgramSocket:
         """Send a message as soon as the program reads it."""
         self._out.append(json.dumps(message, separators=(",", ":")))
         self.news.set()
+
+    def queue_answer(
+        self, message: Mapping[str, object], answer: Mapping[str, object], now_s: float
+    ) -> None:
+        """Send the answer to a message; states that follow it are not older than an order's."""
+        if message.get("do") not in _NO_OUTCOME:
+            self._answered_s = now_s
+            if self._state:
+                self._out.append(self._state)
+                self._state = ""
+        self.queue_message(answer)
 
     def outgoing(self) -> str:
         """Return the next message to send, answers and events first, "" if there is none."""
@@ -411,7 +422,8 @@ class ProgramRoutes:
                 message = _add_client(parse_message(frame.data), request)
                 if message.get("do") == "stop":
                     _refuse_commands(program, orders)
-                    program.queue_message(await self._send_to_rig(message))
+                    answer = await self._send_to_rig(message)
+                    program.queue_answer(message, answer, asyncio.get_running_loop().time())
                 elif late or orders.full() or not self._is_within_rate():
                     program.queue_message({"refused": BUSY, **_tag(message)})
                 else:
@@ -426,7 +438,7 @@ class ProgramRoutes:
         while True:
             message = await orders.get()
             answer = await self._send_to_rig(message)
-            program.queue_message(answer)
+            program.queue_answer(message, answer, asyncio.get_running_loop().time())
             match answer:
                 case {"ok": {"reply": dict(reply)}}:
                     found = CommandReply.from_json(reply)

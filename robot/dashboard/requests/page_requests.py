@@ -16,10 +16,12 @@ from gazerig.robot.control.command_handler import (
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import set_client
-from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume
+from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume, Stop
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
 _REPLY_S = 1.0
+_STOP_S = 0.5
+"""Timeout of a stop, s; the page waits for a second, then sends it again."""
 _SAID_EVERY_S = 3.0
 _LATER = "next start"
 """Time of effect of the changes that are reported in a message; the controls show the others."""
@@ -123,9 +125,10 @@ class PageRequestHandler:
 
     def _reply_text(self, given: PendingCommand) -> str | None:
         """Return a command's restrictions as text, None if there are none or no client waits."""
-        if given.ticket is None or not isinstance(given.command, ControlCommand | Resume):
+        waits = isinstance(given.command, ControlCommand | Resume | Stop)
+        if given.ticket is None or not waits:
             return None
-        reply = given.ticket.wait(_REPLY_S)
+        reply = given.ticket.wait(_STOP_S if isinstance(given.command, Stop) else _REPLY_S)
         if reply is None:
             return "the control loop has not taken it up: it hangs, starts or ends"
         if reply.refused:
