@@ -20,7 +20,13 @@ _KIND_OF_KEY = {
     "oak.face_model": "",
 }
 """Keys of a rig that contain a shipped name or a file, and the kind of the names; "" for none."""
+_LOCAL_KEYS = re.compile(r"(doors|bus\.port|buses\..+\.port|sound\.voice)(\..+)?")
+"""Keys that start programs or open devices of this computer."""
 _MESH_FILE = re.compile(r"meshes\..+\.file")
+_LOCAL = (
+    "starts a program or opens a device of the head's computer, so it cannot be set over the network: "
+    "set it in the rig's file or with gazerig ctl set on that computer"
+)
 _YAML = (".yaml", ".yml")
 
 
@@ -81,15 +87,17 @@ class AllowedFolder:
             raise ConfigError([ConfigFault("", None, key, repr(given), str(error))]) from None
 
     def check_changes(self, changes: Mapping[str, object]) -> None:
-        """Check the files that are named by new values of a rig's keys.
+        """Check new values of a rig's keys: the files they name, and keys that stay with its owner.
 
         Relative paths start at the working folder, as when the files are opened.
 
         Raises:
-            gazerig.config.load.ConfigError: lists every file that may not be named.
+            gazerig.config.load.ConfigError: lists every key and file that may not be set or named.
         """
         faults: list[ConfigFault] = []
         for key, value in _assigned_values("", changes):
+            if _LOCAL_KEYS.fullmatch(key):
+                faults.append(ConfigFault("", None, key, repr(value), _LOCAL))
             files = (value,) if isinstance(value, str) else value
             kind = "" if _MESH_FILE.fullmatch(key) else _KIND_OF_KEY.get(key)
             if kind is None or not isinstance(files, list | tuple):

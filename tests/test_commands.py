@@ -314,10 +314,11 @@ def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool) -> 
 
 def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running) -> None:
     robot, made = running.made.robot, running.made
-    for commands in (
+    orders: tuple[list[Command], ...] = (
         [Stop("a hand")],
         [LookAt((1.0, 0.2, 0.3)), Stop("again")],
-    ):
+    )
+    for commands in orders:
         tickets = [robot.command(command) for command in commands]
         seen = []
 

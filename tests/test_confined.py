@@ -54,6 +54,21 @@ def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
             AllowedFolder(home).check_changes({"gaze.scanpath": {"transition_matrix": given}})
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"doors": ["wyoming"]}, {"bus.port": "/dev/ttyS0"}, {"bus": {"port": "/dev/ttyS0"}},
+        {"buses.eyes.port": "/dev/ttyS0"}, {"sound.voice": "rm -r"}, {"sound": {"voice": ["rm"]}},
+    ],
+)  # fmt: skip
+def test_what_starts_programs_or_opens_devices_is_not_set_from_the_network(
+    home: Path, changes: dict[str, object]
+) -> None:
+    with pytest.raises(ConfigError, match="cannot be set over the network") as caught:
+        AllowedFolder(home).check_changes({**changes, "gaze.lids.close_ms": 80.0})
+    assert len(caught.value.faults) == 1
+
+
 def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text(encoding="utf-8"), encoding="utf-8")

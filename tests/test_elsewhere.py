@@ -140,7 +140,10 @@ def test_the_page_shows_an_emulated_head_and_stops_it(tmp_path: Path) -> None:
     words = ("run", "--mock", "--rate=40", "--seconds", "60", "--page", f"127.0.0.1:{free_port()}")
     running = elsewhere(*words, folder=tmp_path)
     try:
-        url, address = told(running, r"(http://([\d.:]+)/\?token=\S+)").groups()
+        address = told(running, r"the page is at http://([\d.:]+)/;")[1]
+        rigs, _ = elsewhere("ctl", "rigs", "--json", folder=tmp_path).communicate()
+        url = json.loads(rigs)[0]["page"]
+        assert url.startswith(f"http://{address}/?token=")
         asking = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         assert b"<title>gazerig" in asking.open(url, timeout=20).read()
         assert b"viser" in asking.open(f"http://{address}/view/", timeout=20).read().lower()

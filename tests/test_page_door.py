@@ -212,6 +212,15 @@ def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> 
     )
 
 
+def test_a_resume_of_a_browser_needs_a_person_who_confirms(near: Rig) -> None:
+    near.asked.clear()
+    for body in (b'{"do": "resume"}', b'{"do": "resume", "confirmed": 1}'):
+        status, _, text = near.post(body)
+        assert status == 409 and text.startswith('resume needs "confirmed": true')
+    assert near.asked == []
+    assert near.post(b'{"do": "resume", "confirmed": true}')[0] == 204
+
+
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
     near.takes = False
     try:

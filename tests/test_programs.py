@@ -300,13 +300,24 @@ def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
         assert heard(end, "tag", "s") == {"ok": {"notes": []}, "tag": "s"}
         assert rig.client.status()["stopped"] == "a hand"
         time.sleep(2.1)
-        ask(end, do="resume", who="another", tag="r")
-        assert "no hand" in heard(end, "tag", "r")["refused"]
+        with rig.dial() as other:  # of the same host, and a name can be chosen
+            for number, who in enumerate(("a show", "a show at 127.0.0.1, websocket 1")):
+                time.sleep(1.1 * number)
+                ask(other, do="resume", who=who, tag=number)
+                assert "no hand" in heard(other, "tag", number)["refused"]
+        for query in ("", "?wait_s=0"):
+            status, answer = rig.post({"do": "resume", "who": "a show"}, query)
+            assert status == 409 and 'needs "confirmed": true' in answer["refused"]
+        assert rig.client.status()["stopped"]
         ask(end, do="resume", who="a show", tag="q")
         assert "ok" in heard(end, "tag", "q")
-    rig.until(lambda now: not now["stopped"])
+    assert not rig.client.status()["stopped"]
     assert rig.post({"do": "stop"})[0] == 200
-    rig.until(lambda now: now["stopped"])
+    assert rig.client.status()["stopped"]
+    time.sleep(2.1)
+    assert rig.post({"do": "resume", "confirmed": False})[0] == 409
+    assert rig.post({"do": "resume", "confirmed": True})[0] == 200
+    assert not rig.client.status()["stopped"]
 
 
 # Bad input
@@ -330,6 +341,8 @@ BAD = (
     (b'{"do": "hello", "version": 2}', 409, "version 2 of the messages: this rig has 1"),
     (b'{"do": "save", "path": "/etc/passwd.yaml"}', 409, "only files in"),
     (b'{"do": "character", "name": "/etc/passwd"}', 409, "and below can be named"),
+    (b'{"do": "set", "changes": {"doors": ["wyoming"]}}', 409, "cannot be set over the network"),
+    (b'{"do": "set", "changes": {"bus.port": "/dev/x"}}', 409, "cannot be set over the network"),
     (b" " * 70_000, 413, "longer than 65536 bytes"),
 )
 

@@ -15,6 +15,7 @@ from shown_page import free_port, wait_for
 import gazerig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.cli.run import StartLine
 from gazerig.robot.dashboard.door.token_file import read_token
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="files have other rights there")
@@ -82,10 +83,10 @@ def test_a_program_keeps_its_token_when_the_head_is_started_again(
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     path, port = written(tmp_path / "token", GOOD), free_port()
+    url = f"http://127.0.0.1:{port}"
 
     def state(token: str) -> int:
-        address = f"http://127.0.0.1:{port}/api/v1/state?token={token}"
-        with urllib.request.urlopen(address, timeout=20.0) as answer:
+        with urllib.request.urlopen(f"{url}/api/v1/state?token={token}", timeout=20.0) as answer:
             return int(answer.status)
 
     words = ["run", "--mock", "--rate=40", "--no-browser", f"--page=127.0.0.1:{port}"]
@@ -94,13 +95,34 @@ def test_a_program_keeps_its_token_when_the_head_is_started_again(
         with (tmp_path / "log").open("w+", encoding="utf-8") as log:
             process = Branch(gazerig_branch(*words), stdout=log, stderr=log)
             try:
-                wait_for(lambda: f"/?token={GOOD}\n" in (tmp_path / "log").read_text(), "the page")
+                wait_for(lambda: f"the page is at {url}/; " in (tmp_path / "log").read_text(), "it")
+                assert GOOD not in (tmp_path / "log").read_text()
                 assert state(GOOD) == 200
                 with pytest.raises(urllib.error.HTTPError, match="403"):
                     state(GOOD[:-1] + "z")
             finally:
                 process.send_signal(signal.SIGINT)
                 assert process.wait(60.0) == 0
+
+
+@pytest.mark.usefixtures("ideal_servos")
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_address_is_told_without_a_token_that_is_kept_or_would_be_logged(
+    tmp_path: Path, kept: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = "the page is at http://127.0.0.1:8080/?token=ab_c-D1"
+    StartLine("").say(line)
+    hidden = "the page is at http://127.0.0.1:8080/; gazerig ctl rigs shows it with its token\n"
+    assert capsys.readouterr().err == hidden
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    StartLine("").say(line)
+    assert capsys.readouterr().err.endswith(f"{line}\n")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    file, said = tmp_path / "token" if kept else None, list[str]()
+    page = f"127.0.0.1:{free_port()}"
+    with gazerig.open("desk", mock=True, page=page, token_file=file, say=said.append):
+        wait_for(lambda: any("the page is at" in one for one in said), "the page's address")
+    assert any("token=" in one for one in said) != kept
 
 
 def test_a_program_gives_the_page_a_token_file(tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.robot_group import RobotGroup
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
+from gazerig.robot.dashboard.door.token_file import hide_token
 from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
@@ -139,11 +140,13 @@ class RunObservers:
         self._page = self._make_page(address, options.page_token) if address is not None else None
         # Simulated time is faster than a page or a line can show.
         live = not options.fast
+        # Who keeps a token does not want it in a log.
+        tell = say if options.token_file is None else lambda line: say(hide_token(line))
         self._publisher = None
         if live and self._page:
             feed = ParamFeed(self._page.send, tuning) if tuning is not None else None
             self._publisher = Publisher(
-                self._page, self._live_rig, self._run_state, feed, say, browse
+                self._page, self._live_rig, self._run_state, feed, tell, browse
             )
         health = assembly.robot.body.bus.health
         self._status = (

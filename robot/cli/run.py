@@ -26,6 +26,7 @@ from gazerig.robot.cli.terminal import (
     status,
 )
 from gazerig.robot.control.joint_faults import JointFault, joints_text
+from gazerig.robot.dashboard.door.token_file import hide_token
 
 if TYPE_CHECKING:
     pass
@@ -126,9 +127,9 @@ class StartLine:
         self._line = line
 
     def say(self, line: str) -> None:
-        """Print a line, after the first one."""
+        """Print a line, after the first one; a log does not get the token of the page."""
         self.update(None)
-        say(line)
+        say(line if sys.stderr.isatty() else hide_token(line))
 
     def update(self, tick: object) -> None:
         """Print the first line once the head runs."""

@@ -225,18 +225,18 @@ class Rig:
             [sys.executable, "-u", "-c", code, *words],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
-        self.address = ""
+        self._there = threading.Event()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        while not self.address:
-            time.sleep(0.05)
+        self._there.wait()
         self.remote = RobotClient.connect(self._process.pid)
+        self.address = str(self.remote.status()["page"])
 
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
             if "the page is at " in line:
-                self.address = line.split("the page is at ")[1].split()[0]
+                self._there.set()
 
     def ticks(self) -> int:
         return int(str(self.remote.status()["ticks"]))

@@ -32,6 +32,8 @@ sys.path.insert(0, str(TESTS))
 from browser import browsing  # noqa: E402
 from page_layout import value  # noqa: E402
 
+from gazerig.robot.remote.client import RobotClient  # noqa: E402
+
 ALONE = [sys.executable, "-m", "gazerig.drivers.process.own_session"]
 USER = ["setpriv", "--inh-caps", "-sys_nice", "--bounding-set", "-sys_nice"]
 BUSY = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum(range(100000))"
@@ -143,7 +145,8 @@ def row(load: int, args: argparse.Namespace) -> str:
         start_s = time.monotonic() - began_s
         bars: set[str] = set()
         looks = barred = 0
-        url = next(line for line in lines if "the page is at" in line).split()[-1]
+        with RobotClient.connect(run.pid) as rig:
+            url = str(rig.status()["page"])
         if args.no_browser:
             time.sleep(args.seconds)
             found: list[Any] = [0, 0, []]

@@ -36,6 +36,7 @@ from gazerig.robot.dashboard.door.sockets import (
 from gazerig.robot.dashboard.door.viser_server import VIEW, ViewAddress, ViewProxy, view_client
 from gazerig.robot.dashboard.requests.outbox import (
     ASKED_BYTES,
+    UNCONFIRMED,
     TokenBucket,
     add_client,
     encode_request,
@@ -281,6 +282,8 @@ class AuthProxy:
             return (503, text) if text else (204, "")
         if not self._asked_rate.take(self._loop.time()):
             return 429, "too many requests; try again"
+        if asked.get("do") == "resume" and asked.get("confirmed") is not True:
+            return 409, UNCONFIRMED  # a cookie with the name of a browser proves nothing
         if takes_control(asked):
             self.browsers.give_control(who)
         return (

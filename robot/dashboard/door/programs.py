@@ -22,7 +22,7 @@ from gazerig.robot.control.command_handler import ORDERS
 from gazerig.robot.dashboard.door.admission import API
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
 from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
-from gazerig.robot.dashboard.requests.outbox import TokenBucket, takes_control
+from gazerig.robot.dashboard.requests.outbox import UNCONFIRMED, TokenBucket, takes_control
 from gazerig.robot.dashboard.requests.rig_relay import (
     BUSY,
     NEWEST,
@@ -32,7 +32,7 @@ from gazerig.robot.dashboard.requests.rig_relay import (
     StateFeed,
 )
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
-from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED
+from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED, Resume, Stop
 from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.excess import CLOSED, REST_S, STOPPED, TOO_MANY, ExcessCount
@@ -123,6 +123,7 @@ class ProgramSocket:
         ping: the newest ping of the program that is not answered yet.
         held: what the program controls: "gaze" (or joints), "talk" (the conversation).
         who: name under which it does.
+        name: name of the websocket.
     """
 
     def __init__(self, rate_hz: float, events: bool) -> None:
@@ -135,7 +136,7 @@ class ProgramSocket:
         self.news, self.alive = asyncio.Event(), asyncio.Event()
         self.ping: bytes | None = None
         self.held: set[str] = set()
-        self.who = ""
+        self.who = self.name = ""
 
     def wanted_hz(self) -> float:
         """Return the rate at which the program needs the state of the head."""
@@ -232,6 +233,7 @@ class ProgramRoutes:
         self.feed = StateFeed(relay.ask)
         self._rate = TokenBucket(_ALL_PER_S, _ALL_BURST)
         self._limits = TabLimits(MOST_PROGRAMS)
+        self._websockets = 0
 
     def add_to(self, router: web.UrlDispatcher, connections: Callable[[], Connections]) -> None:
         """Add the routes; ``connections`` returns those of the door, once it is open."""
@@ -262,6 +264,8 @@ class ProgramRoutes:
             while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
                 data += more
         message = _add_client(parse_message(data), request)
+        if message.get("do") == "resume" and message.get("confirmed") is not True:
+            raise MessageRefused(UNCONFIRMED, 409)
         if message.get("do") != "stop" and not self._is_within_rate():
             raise MessageRefused(BUSY, 429)
         ends = "seconds" if message.get("do") == "talk" else "for_s"
@@ -334,6 +338,8 @@ class ProgramRoutes:
         if (text := request.query.get("rate_hz")) is not None:
             rate_hz = parse_rate(text, "rate_hz", 1.0, MOST_RATE_HZ)
         program = ProgramSocket(rate_hz, events == "true")
+        self._websockets += 1
+        program.name = f"websocket {self._websockets}"
         socket = web.WebSocketResponse(
             max_msg_size=4 * REQUEST_BYTES, compress=False, autoping=False
         )
@@ -419,7 +425,7 @@ class ProgramRoutes:
             program.queue_message({"refused": BUSY})
         else:
             try:
-                message = _add_client(parse_message(frame.data), request)
+                message = _add_client(parse_message(frame.data), request, program.name)
                 if message.get("do") == "stop":
                     _refuse_commands(program, orders)
                     answer = await self._send_to_rig(message)
@@ -484,13 +490,19 @@ class ProgramRoutes:
         return answer | _tag(message)
 
 
-def _add_client(message: dict[str, Any], request: web.Request) -> dict[str, Any]:
-    """Return a message with the program's address and its name, which the program may choose."""
+def _add_client(
+    message: dict[str, Any], request: web.Request, websocket: str = ""
+) -> dict[str, Any]:
+    """Return a message with the program's address and its name, which the program may choose.
+
+    websocket: name of the websocket for a stop or a resume; who stopped resumes over the same one
+    """
     kind = ORDERS.get(str(message.get("do")))
     if kind is None or "who" not in kind._fields:
         return message
     name = "".join(filter(str.isprintable, str(message.get("who") or "a program")))
-    return {**message, "who": f"{name[:_WHO_CHARACTERS]} at {request.remote}"}
+    here = f", {websocket}" if websocket and kind in (Stop, Resume) else ""
+    return {**message, "who": f"{name[:_WHO_CHARACTERS]} at {request.remote}{here}"}
 
 
 def _may_stop(frame: aiohttp.WSMessage) -> bool:

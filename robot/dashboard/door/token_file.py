@@ -9,6 +9,7 @@ from pathlib import Path
 from gazerig.drivers.errors import SetupError
 
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{22,200}")
+_IN_ADDRESS = re.compile(r"/\?token=[\w-]+")
 _KINDS = 8
 """Fewest different characters; 22 random hexadecimal digits have fewer in one of 10,000 files."""
 _CURE = "remove it, and the next start writes a new one"
@@ -50,6 +51,11 @@ def read_token(path: Path) -> str:
             f"--token-file {path}: a token is 22 to 200 random letters, digits, - and _: {_CURE}"
         )
     return token
+
+
+def hide_token(line: str) -> str:
+    """Return a message without the token of an address in it, and where the token is shown."""
+    return _IN_ADDRESS.sub("/; gazerig ctl rigs shows it with its token", line)
 
 
 def _unusable(path: Path, error: OSError) -> SetupError:

@@ -16,6 +16,10 @@ DOOR = "door"
 """Name of the sender for the stop button and clicks in the image."""
 ASKED_BYTES = 2048
 """Longest request, bytes; a stop with a reason has about a hundred."""
+UNCONFIRMED = (
+    'resume needs "confirmed": true, after a person has made sure that no hand is in the mechanism; '
+    "only the websocket of a program that stopped the head needs none"
+)
 _LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
 _SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
 """Commands with the name of the client."""
