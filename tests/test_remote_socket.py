@@ -709,6 +709,30 @@ def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(
     rig.resume(confirmed=True)
 
 
+def test_a_stop_does_not_wait_for_another_thread_of_its_program(
+    rig: RobotClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Like that of a head that is speaking: the answer to say comes when it begins."""
+    answer, asked, over = RequestHandler.answer, threading.Event(), threading.Event()
+
+    def slow(self: RequestHandler, request: Any, peer: str = "") -> dict[str, object]:
+        if request["do"] == "characters":
+            asked.set()
+            over.wait(20.0)
+        return answer(self, request, peer)
+
+    monkeypatch.setattr(RequestHandler, "answer", slow)
+    other = threading.Thread(target=rig.characters)
+    other.start()
+    assert asked.wait(20.0)
+    rig.stop("meanwhile")
+    assert other.is_alive()
+    over.set()
+    other.join()
+    assert rig.status()["stopped"] == "meanwhile"
+    rig.resume()  # it is the same client
+
+
 def test_a_resume_from_before_a_stop_is_not_executed_after_it(
     rig: RobotClient, folder: Path, beat: Beat
 ) -> None:

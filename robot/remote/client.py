@@ -99,6 +99,11 @@ class ClientConnection:
         self._lock = threading.Lock()
         self._greeted = False
 
+    @property
+    def is_busy(self) -> bool:
+        """Return whether a request waits for its answer."""
+        return self._lock.locked()
+
     def close(self) -> None:
         """Close the connection."""
         self._ending()
@@ -577,12 +582,25 @@ class RobotClient:
             check_command(command)
         except ValueError as error:
             raise RequestRejected(str(error)) from None
+        if isinstance(command, Stop) and self._connection.is_busy and self._dial is not None:
+            return self._stop_at_once(command, self._dial)
         fields = as_json(command)
         said = self._connection.ask(str(fields.pop("do")), **fields)
         match said:
             case {"reply": dict(reply)}:
                 return CommandReply.from_json(reply)
         return CommandReply()
+
+    def _stop_at_once(self, command: Stop, dial: Callable[[], Wire]) -> CommandReply:
+        """Stop over another connection: a thread waits on this one, e.g. until a text is spoken."""
+        try:
+            wire = dial()
+        except OSError:
+            raise ConnectionLost(
+                f"the rig (process {self.pid}) has ended or disconnected"
+            ) from None
+        with RobotClient(wire, self.pid, self.who) as other:
+            return other.send(command)
 
     def _notes(self, said: object) -> tuple[str, ...]:
         return tuple(cast(dict[str, list[str]], said)["notes"])
