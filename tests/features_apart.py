@@ -38,7 +38,7 @@ def lay_out(folder: Path, removed: tuple[str, ...] = ()) -> Path:
     """Write the package into a folder, by links and without some features; return the folder."""
     top = folder / "gazerig"
     (top / "features").mkdir(parents=True)
-    for link in (ROOT / ".links" / "gazerig").iterdir():
+    for link in (ROOT / "gazerig").iterdir():
         if link.name != "features":
             (top / link.name).symlink_to(link.resolve())
     for path in (ROOT / "features").iterdir():
@@ -90,7 +90,7 @@ def suite(feature: str) -> int:
         return subprocess.run(
             [sys.executable, "-m", "pytest", "-n", "auto", "--dist", "loadfile"],
             cwd=clone,
-            env={**os.environ, "PYTHONPATH": str(clone / ".links")},
+            env={**os.environ, "PYTHONPATH": str(clone)},
         ).returncode
 
 

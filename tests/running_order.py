@@ -44,7 +44,7 @@ COSTS_S = {
     "sweep": 6,
     "true_motion": 6,
     "ways_out": 6,
-    "api": 5,
+    "gazerig": 5,
     "architecture": 5,
     "cli_bringup": 5,
     "closed_loop": 5,

@@ -16,7 +16,7 @@ import pytest
 from _pytest.assertion import rewrite
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ("api", "config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
+ROOMS = ("config", "doors", "drivers", "features", "gaze", "gazerig", "robot", "sim_mock")
 
 
 def compile_missing(worker: str, config: pytest.Config) -> None:

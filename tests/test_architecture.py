@@ -123,13 +123,13 @@ def package(folder: Path) -> Path:
     """Lay out the package ``gazerig`` in a folder, by links."""
     top = folder / "gazerig"
     top.mkdir()
-    for link in (ROOT / ".links" / "gazerig").iterdir():
+    for link in (ROOT / "gazerig").iterdir():
         (top / link.name).symlink_to(link.resolve())
     return top
 
 
 def test_storeys() -> None:
-    found = linted(ROOT / ".links")
+    found = linted(ROOT)
     assert found.returncode == 0, found.stdout + found.stderr
 
 
@@ -207,7 +207,7 @@ def test_gaze_stands_on_numpy_alone() -> None:
 
 
 def test_the_declaration_of_parameters_stands_on_the_standard_library_alone() -> None:
-    packages = {wanted.split(".")[0] for wanted in imports(ROOT / "api" / "params.py")}
+    packages = {wanted.split(".")[0] for wanted in imports(ROOT / "gazerig" / "params.py")}
     assert packages <= set(sys.stdlib_module_names)
 
 
@@ -221,7 +221,7 @@ def test_package_files_hold_a_docstring_and_nothing_else() -> None:
 def test_no_class_name_is_defined_twice() -> None:
     """Nor one that begins with an underscore in two modules."""
     found: dict[str, list[Path]] = {}
-    for path in [*(path for _, path in modules()), *sorted((ROOT / "api").rglob("*.py"))]:
+    for path in [*(path for _, path in modules()), *sorted((ROOT / "gazerig").rglob("*.py"))]:
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.ClassDef):
                 found.setdefault(node.name, []).append(path.relative_to(ROOT))

@@ -38,7 +38,7 @@ WORLDS = pytest.importorskip("gazerig.features.world.room").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
 
-FOLDERS = ("api", "config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
+FOLDERS = ("config", "doors", "drivers", "features", "gaze", "gazerig", "robot", "sim_mock")
 PARAMETERS = ROOT / "docs/parameters.md"
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
 

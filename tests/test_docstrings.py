@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("api", "config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
+ROOMS = ("config", "doors", "drivers", "features", "gaze", "gazerig", "robot", "sim_mock")
 Documented = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 
 

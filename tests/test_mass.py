@@ -147,7 +147,7 @@ class Neck:
         bus = rig_bus(rig, self.emulated.ports)
         self.body = Body(bus, rig.joints, park_rad(rig), sag=sag)
         self.at = self.body.names.index("neck_pitch")
-        self.goal = list(self.body.start())
+        self.goal = list(self.body.start(self.emulated.clock))
         self.t_s = 0.0
 
     def hold(self, angle_deg: float, for_s: float) -> list[float]:

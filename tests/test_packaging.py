@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -16,22 +18,27 @@ import gazerig
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-LINKS = ROOT / ".links" / "gazerig"
+PACKAGE = ROOT / "gazerig"
 PATTERNS: list[str] = PROJECT["tool"]["setuptools"]["package-data"]["*"]
-TOPS = sorted(path.parent for path in ROOT.glob("*/__init__.py") if path.parent.name != "api")
+TOPS = sorted(path.parent for path in ROOT.glob("*/__init__.py") if path.parent != PACKAGE)
 
 
 def packages() -> list[Path]:
     """Return every folder that is installed."""
-    return sorted({path.parent for top in (ROOT / "api", *TOPS) for path in top.rglob("*.py")})
+    return sorted({path.parent for top in (PACKAGE, *TOPS) for path in top.rglob("*.py")})
 
 
 def test_the_package_links_to_every_source() -> None:
-    wanted = {path for path in (ROOT / "api").iterdir() if path.name != "__pycache__"} | set(TOPS)
-    found = [path for path in LINKS.iterdir() if path.name != "__pycache__"]
-    assert {path.resolve() for path in found} == wanted, "make links"
-    assert all(path.is_symlink() and path.name == path.resolve().name for path in found)
+    links = {path.name: path.readlink() for path in PACKAGE.iterdir() if path.is_symlink()}
+    assert links == {top.name: Path("..") / top.name for top in TOPS}
     assert len(TOPS) >= 5
+
+
+def test_python_in_the_root_of_a_clone_imports_the_package() -> None:
+    code = "import gazerig, gazerig.robot.model.joint as part; print(gazerig.open, part.__file__)"
+    command = [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, '.'); {code}"]
+    printed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert printed.strip().endswith(str(PACKAGE / "robot/model/joint.py"))
 
 
 def test_every_folder_of_sources_is_a_package() -> None:
@@ -105,7 +112,7 @@ def test_a_commit_is_checked_as_the_host_checks_it() -> None:
 def test_the_container_holds_all_sources_and_starts_a_command_that_is_one() -> None:
     file = (ROOT / "docs/Containerfile").read_text(encoding="utf-8")
     copied = re.findall(r"^COPY ([\w.]+) /src/([\w.]+)$", file, re.MULTILINE)
-    assert {source for source, _ in copied} == {".links", "api", *(top.name for top in TOPS)}
+    assert {source for source, _ in copied} == {PACKAGE.name, *(top.name for top in TOPS)}
     assert all(source == target for source, target in copied)
     [beside] = re.findall(r"^COPY (.+) /src/$", file, re.MULTILINE)
     assert {

@@ -39,6 +39,7 @@ from gazerig.drivers.serial.port import BlockingPort, port_at_path
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.control.body import Body, servo_setups
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
@@ -100,7 +101,7 @@ def ours(kind: str) -> Iterator[Client]:
     }
     with PtyBus() as server:
         body = Body(made(kind, server.start_device(device(kind)), servo_setups(joints, {})), joints)
-        body.start()
+        body.start(RealClock())
 
         goals = [tuple([0.1 * sin(0.01 * k + i) for i in IDS]) for k in range(629)]
 

@@ -1,6 +1,6 @@
 """Lateness of ticks with a slow rule of attention: none, a sleeping and a computing rule.
 
-    PYTHONPATH=.links python tests/bench/bench_slow_rule.py [--seconds S]
+    PYTHONPATH=. python tests/bench/bench_slow_rule.py [--seconds S]
 
 The desk rig on emulated servos in another process, at its own rate in real time. Lateness is that
 of a tick's begin against its slot. A rule that is always slow is dropped after five overruns; one

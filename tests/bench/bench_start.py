@@ -1,4 +1,4 @@
-"""Duration of a start: python tests/bench/bench_start.py [--before /path/to/other/.links]
+"""Duration of a start: python tests/bench/bench_start.py [--before /path/to/other]
 
 Processor time of the processes, the least of rounds that take turns with those of another version:
 help, a command to a running rig, and ``gazerig run --mock`` until its first tick has written goals
@@ -46,9 +46,9 @@ def main() -> None:
     """Measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--before", help="the .links of another version")
+    parser.add_argument("--before", help="the clone of another version")
     args = parser.parse_args()
-    own = os.environ.get("PYTHONPATH", str(Path(__file__).parents[2] / ".links"))
+    own = os.environ.get("PYTHONPATH", str(Path(__file__).parents[2]))
     versions = {"before": args.before, "now": own} if args.before else {"now": own}
     print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.2f} at the start")
     for words in COMMANDS:

@@ -10,7 +10,7 @@ rustypot reads and writes nine servos.
 
     --save FILE        keeps the figures as JSON
     --against FILE     prints them next to stored ones, or those of another version:
-                       PYTHONPATH=/path/to/other/.links python tests/bench/bench_tick.py --save FILE
+                       PYTHONPATH=/path/to/other python tests/bench/bench_tick.py --save FILE
     --table            also prints them as rows of docs/measurements/performance.md
     --page             with the live page, watched by Chromium, or with --browsers N by N clients
                        that take all that is sent

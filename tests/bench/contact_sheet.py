@@ -1,6 +1,6 @@
 """Targets of the head in a film, on one sheet: contact_sheet.py FILM SHEET.png [--seconds 20]
 
-    PYTHONPATH=.links python tests/bench/contact_sheet.py film.avi sheet.png
+    PYTHONPATH=. python tests/bench/contact_sheet.py film.avi sheet.png
 
 Runs the desk rig on the film in simulated time with emulated servos, and draws frames at equal
 intervals with what was found in them (faces in green, what moves in blue), where the measured eyes

@@ -1,6 +1,6 @@
 """Duration of a sweep of 64 runs on two processes, and of the same runs one after the other.
 
-    PYTHONPATH=.links python tests/lab/bench_sweep.py [--runs N] [--seconds S] [--bus BUS]
+    PYTHONPATH=. python tests/lab/bench_sweep.py [--runs N] [--seconds S] [--bus BUS]
 
 Scene visitor, desk rig, one parameter at 8 levels and 8 seeds each, starting the processes and
 measuring the gaze of each run included. Processor time is that of the processes that run.

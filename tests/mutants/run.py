@@ -26,8 +26,6 @@ sys.path.insert(0, str(ROOT / "tests"))
 from mutants import ALL, Mutant  # noqa: E402
 
 COPIED = (
-    ".links",
-    "api",
     "config",
     "docs",
     "doors",
@@ -35,6 +33,7 @@ COPIED = (
     "examples",
     "features",
     "gaze",
+    "gazerig",
     "robot",
     "sim_mock",
     "tests",
@@ -59,7 +58,7 @@ def node(name: str) -> str:
 
 def passes(copy: Path, tests: Iterable[str]) -> bool:
     """Return whether the tests pass on the copy."""
-    environ = {**os.environ, "PYTHONPATH": str(copy / ".links"), "PYTHONDONTWRITEBYTECODE": "1"}
+    environ = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     files = [node(name) for name in tests]
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *files]
     done = subprocess.run(command, cwd=copy, env=environ, capture_output=True, text=True)

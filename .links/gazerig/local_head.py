@@ -1,1 +1,0 @@
-../../api/local_head.py

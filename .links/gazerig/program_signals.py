@@ -1,1 +1,0 @@
-../../api/program_signals.py

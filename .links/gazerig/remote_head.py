@@ -1,1 +1,0 @@
-../../api/remote_head.py
