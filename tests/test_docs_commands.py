@@ -301,7 +301,7 @@ def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> Non
 
 def test_the_tick_is_told_as_it_is() -> None:
     [block] = [b for b in blocks("python") if b.paper.name == "one-tick.md"]
-    source = "".join(ast.unparse(ast.parse(dedent(inspect.getsource(Robot.tick)))).split())
+    source = "".join(ast.unparse(ast.parse(dedent(inspect.getsource(Robot._tick)))).split())
     place = 0
     for statement in ast.parse(block.text).body:
         line = ast.unparse(statement)

@@ -55,7 +55,7 @@ def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float
     """Return the loop's rate, slots lost, and how long a stop took, in ms."""
     made = assemble(load_rig("desk"), RunOptions(True, False, 0, "visitor"))
     robot = made.robot
-    tuning = ParamStore(made.live, robot.command, "desk")
+    tuning = ParamStore(made.live_params, robot.command, "desk")
     about = {"rig": "desk", "pid": os.getpid()}
     live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, lambda _: None)
     robot.start(made.clock)

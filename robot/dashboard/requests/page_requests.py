@@ -20,7 +20,7 @@ from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
 _REPLY_S = 1.0
-_STOP_S = 0.5
+_STOP_S = 0.8
 """Timeout of a stop, s; the page waits for a second, then sends it again."""
 _SAID_EVERY_S = 3.0
 _LATER = "next start"
