@@ -14,6 +14,7 @@ from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 _KIND_OF_KEY = {
     "gaze.scanpath.transition_matrix": "scanpaths",
     "profile": "profiles",
+    "character": "characters",
     "track_files": "",
     "sound.folders": "",
     "detector.model_file": "",

@@ -159,6 +159,8 @@ class Rig:
     # fmt: off
     name: Annotated[str, "name of the rig"]
     profile: Annotated[str, "name of a shipped profile or path of a YAML file"]
+    character: Annotated[str | None,
+        "name of a shipped character or path of a YAML file, applied over rig and profile; null: none"] = field(default=None, kw_only=True)
     ranges: Annotated[Ranges, "ranges of eyes and head; null: those of the profile"]
     bus: Annotated[BusConfig, "servo bus"]
     buses: Annotated[Mapping[str, BusConfig],

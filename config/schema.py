@@ -1,6 +1,7 @@
 """Rigs, rule sets and face walks by name or path, and rules between the sections of a rig."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from math import radians
 from pathlib import Path
@@ -33,6 +34,9 @@ from gazerig.robot.model.mass_params import MassParams
 from gazerig.robot.model.track_fit import TrackFit, TrackRefused, track_motions
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME, further_joints
 
+NO_CHARACTER = "none"
+"""In place of a character's name: none, whatever the rig's file says."""
+
 
 def load_rig(
     name_or_path: str,
@@ -44,7 +48,8 @@ def load_rig(
 
     Args:
         name_or_path: name or path of the rig.
-        character: name or path of a file with differences, merged over rig and profile.
+        character: name or path of a file with differences, merged over rig and profile, instead of
+            the rig's; "none" for none.
         profile: name or path of a style of gaze, instead of the rig's.
         further: additional rules, such as those that read other files.
 
@@ -70,14 +75,24 @@ def layers_of(
     """Return the files that ``load_rig`` merges, the rig's own first.
 
     Raises:
-        gazerig.config.load.ConfigError: no shipped rig has this name, or the rig cannot be read.
+        gazerig.config.load.ConfigError: no shipped rig, profile or character has this name, or the
+            rig cannot be read.
     """
     layers = [rig_path(name_or_path)]
-    named = profile or read_yaml(layers[0], tuple(shapes_of(Rig))).data.get("profile")
-    if isinstance(named, str):
-        layers.append(_find("profiles", named))
-    if character is not None:
-        layers.append(_find("characters", character))
+    rig = read_yaml(layers[0], tuple(shapes_of(Rig)))
+    for key, given in (("profile", profile), ("character", character)):
+        named = given or rig.data.get(key)
+        if not isinstance(named, str) or (key == "character" and named == NO_CHARACTER):
+            continue
+        try:
+            layers.append(_find(f"{key}s", named))
+        except ConfigError as error:
+            if given:
+                raise
+            raise ConfigError(
+                replace(fault, file=str(layers[0]), line=rig.line(key), key=key)
+                for fault in error.faults
+            ) from None
     return layers
 
 

@@ -93,8 +93,9 @@ ABSENT = ("lid_joints.left_lower", "lid_joints.right_lower")
 
 def live_knobs() -> tuple[Parameter, ...]:
     # The desk rig has no lower lids, so nothing obeys their angles, and no joint that may be limp.
-    limp = ".limp_when_idle_s"
-    knobs = [k for k in parameters(RIG, RIG) if not k.key.endswith(limp)]
+    # A character acts by its values, which the store of parameters changes together with its name.
+    without = (".limp_when_idle_s", "character")
+    knobs = [k for k in parameters(RIG, RIG) if not k.key.endswith(without)]
     there = (k for k in knobs if not k.key.startswith(ABSENT))
     return tuple(k for k in there if not k.live.startswith(NEXT_START))
 

@@ -1,6 +1,7 @@
 """The shipped rig files, and the rules between their sections."""
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -121,6 +122,26 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
         assert "wait" in load_rules(name).rules
     for name in shipped_names("scanpaths"):
         load_walk(name)
+
+
+@pytest.mark.parametrize(
+    ("key", "slip", "near"), [("character", "shi", "shy"), ("profile", "robott", "robot")]
+)
+def test_a_rig_names_its_profile_and_character(
+    tmp_path: Path, key: str, slip: str, near: str
+) -> None:
+    file, text = tmp_path / "mine.yaml", DESK.read_text(encoding="utf-8")
+    text = text.replace("profile: robot ", "character: shy\nprofile: robot ")
+    file.write_text(text, encoding="utf-8")
+    own = load_rig(str(file))
+    assert own == replace(load_rig("desk", "shy"), character="shy")
+    assert load_rig(str(file), "bold").gaze == load_rig("desk", "bold").gaze
+    assert load_rig(str(file), "none").gaze == load_rig("desk").gaze
+    file.write_text(text.replace(f"{key}: {near}", f"{key}: {slip}"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=f"did you mean '{near}'.*available: ") as refused:
+        load_rig(str(file))
+    line = text[: text.index(f"\n{key}: ")].count("\n") + 2
+    assert str(refused.value).startswith(f"{file}:{line}: {key}: ")
 
 
 @pytest.mark.parametrize(

@@ -264,7 +264,8 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them() -> None:
     assert got.lids.close_ms == 90.0 and got.lids.open_ms == want.lids.open_ms
     assert bench.tuning.character_name == "sleepy"
     bench.tuning.revert()
-    assert bench.made.live_params.rig == load_rig("desk", "sleepy")
+    assert bench.made.live_params.rig == load_rig("desk", "shy")
+    assert bench.tuning.character_name == "shy" and bench.tuning.unsaved() == ()
     bench.tuning.apply_character("none")
     assert bench.made.live_params.rig == load_rig("desk")
     with pytest.raises(ConfigError, match="nothing named 'slepy'"):
@@ -282,18 +283,48 @@ def test_a_value_that_the_character_sets_is_not_saved_into_the_rig(mine: Path) -
 
 
 @pytest.mark.parametrize("copied", [False, True])
-def test_only_what_was_set_by_hand_is_saved_behind_another_character(
+def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_hand(
     mine: Path, tmp_path: Path, copied: bool
 ) -> None:
     bench = Bench(str(mine))
-    bench.tuning.apply_character("shy")
-    assert bench.tuning.unsaved() == () and bench.tuning.save().changes == ()
-    bench.tuning.set({"gaze.lids.close_ms": 90.0})
     bench.tuning.apply_character("bold")
+    bench.tuning.set({"gaze.lids.close_ms": 90.0, "character": "shy"})
+    assert [str(change) for change in bench.tuning.unsaved()] == [
+        "character: null -> shy",
+        "gaze.lids.close_ms: 75.0 -> 90.0",
+    ]
     saved = bench.tuning.save(tmp_path / "copy.yaml" if copied else None)
-    assert [change.key for change in saved.changes] == ["gaze.lids.close_ms"]
-    plain = values(load_rig("desk")) | {"gaze.lids.close_ms": 90.0}
-    assert values(load_rig(str(saved.path))) == plain
+    assert {change.key for change in saved.changes} == {"character", "gaze.lids.close_ms"}
+    again, by_hand = Bench(str(saved.path)), {"gaze.lids.close_ms": 90.0, "character": "shy"}
+    assert again.tuning.character_name == bench.tuning.character_name == "shy"
+    assert again.tuning.unsaved() == bench.tuning.unsaved() == ()
+    assert again.tuning.values() == bench.tuning.values()
+    assert values(load_rig("desk", "shy")) | by_hand == bench.tuning.values()
+    assert values(load_rig(str(saved.path), "none")) == values(load_rig("desk")) | by_hand
+    again.tuning.apply_character("none")
+    again.tuning.save()
+    assert values(load_rig(str(saved.path))) == values(load_rig("desk")) | {
+        "gaze.lids.close_ms": 90.0
+    }
+
+
+def test_a_character_of_the_command_line_is_saved_only_after_it_is_chosen(mine: Path) -> None:
+    bench = Bench(str(mine), "shy")
+    assert bench.tuning.unsaved() == () and bench.tuning.save().changes == ()
+    bench.tuning.apply_character("none")
+    assert bench.made.live_params.rig == load_rig("desk") and bench.tuning.save().changes == ()
+    bench.tuning.apply_character("bold")
+    (change,) = bench.tuning.save().changes
+    assert str(change) == "character: (not in the file) -> bold"
+    text = mine.read_text(encoding="utf-8").replace("character: bold", "character: sleepy")
+    mine.write_text(text, encoding="utf-8")
+    bench.tuning.apply_character("shy")
+    bench.tuning.reload()
+    assert [c.old for c in bench.tuning.unsaved()] == ["sleepy"]
+    mine.write_text(text.replace("character: sleepy", "character: bold"), encoding="utf-8")
+    bench.tuning.reload()  # the edited file replaces what is unsaved
+    assert bench.tuning.character_name == "bold" and bench.tuning.unsaved() == ()
+    assert bench.made.live_params.rig == load_rig(str(mine))
 
 
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
@@ -303,7 +334,8 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     bench.tuning.set_option("loop.rate_hz", 50.0)
     bench.tuning.reload(mine)
     assert bench.made.live_params.rig.gaze.scanpath.model == "random"
-    assert bench.made.live_params.rig.loop.rate_hz == 50.0 and bench.tuning.unsaved() == ()
+    assert bench.made.live_params.rig.loop.rate_hz == 50.0
+    assert [change.key for change in bench.tuning.unsaved()] == ["character"]
     bench.tuning.set({"gaze.aversion.min_dwell_s": 0.3})
     bench.tuning.save()
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"

@@ -39,14 +39,13 @@ from gazerig.config.rig_files import (
 )
 from gazerig.config.save import rig_file
 from gazerig.config.save_text import EditRefused, format_value
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import NO_CHARACTER, load_rig
 from gazerig.config.subprocess_call import in_subprocess
 from gazerig.robot.app.live_params import LiveParams
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandTaker
 
-NO_CHARACTER = "none"
 _DEFAULTS = "desk"
 
 
@@ -55,6 +54,7 @@ class _RigState(NamedTuple):
 
     saved: rig of the files, with the options; rig: the present one
     name: the given name or path of the rig
+    character: the command line's character; None: the rig's
     files: present files, with their contents at the last valid read
     file_values, values: values of ``saved`` and of ``rig``, by key
     """
@@ -131,7 +131,7 @@ class ParamStore:
     @property
     def character_name(self) -> str:
         """Return the present character, "none" without one."""
-        return self._state.character or NO_CHARACTER
+        return self._layers(self._state).character or self._state.rig.character or NO_CHARACTER
 
     def files(self) -> tuple[Path, ...]:
         """Return the files in use: the rig's, and those that override it."""
@@ -168,7 +168,15 @@ class ParamStore:
             gazerig.config.load.ConfigError: lists every fault; nothing changes.
         """
         with self._changing:
-            return self._apply(self._state, apply_changes(self._state.rig, changes))
+            state = before = self._state
+            rig = apply_changes(before.rig, changes)
+            if "character" in changes:
+                if rig.character == before.saved.character:  # the file's replaces the option
+                    state = before._replace(character=None)
+                state = self._read(state._replace(rig=rig))
+                changes = {**differences(before.saved, rig), **changes}
+                rig = apply_changes(state.saved, changes)
+            return self._apply(state, rig)
 
     def set_option(self, key: str, value: Value) -> tuple[str, ...]:
         """Apply a value as an option of the command line does: it is not written to a file.
@@ -193,9 +201,17 @@ class ParamStore:
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
     def revert(self) -> tuple[str, ...]:
-        """Apply the values in the files again."""
+        """Apply the values in the files again.
+
+        Raises:
+            gazerig.config.load.ConfigError: the character is another one, and the files that are
+                read without it have become invalid.
+        """
         with self._changing:
-            return self._apply(self._state, self._state.saved)
+            state = self._state
+            if state.rig.character != state.saved.character:
+                state = self._read(state._replace(rig=state.saved))
+            return self._apply(state, state.saved)
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write the present values into the rig's file, or into a copy of it at a new path.
@@ -241,6 +257,8 @@ class ParamStore:
                 done = self._elsewhere(save_over, layers, good, wanted, self._now())
             saved: SavedFile
             saved, files = done
+            if "character" in wanted:
+                state = state._replace(character=None)
             self._state = state._replace(
                 saved=state.rig, file_values=state.values, files=files, version=state.version + 1
             )
@@ -259,12 +277,7 @@ class ParamStore:
         Raises:
             gazerig.config.load.ConfigError: the character is unknown, or does not fit the rig.
         """
-        with self._changing:
-            state = self._state
-            wanted = None if name in (NO_CHARACTER, "") else name
-            state = self._read(state._replace(character=wanted))
-            rig = apply_changes(state.saved, differences(self._state.saved, self._state.rig))
-            return self._apply(state, rig)
+        return self.set({"character": None if name in (NO_CHARACTER, "") else name})
 
     def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
         """Apply the present values of the files; unsaved values stay unless the files changed them.
@@ -280,6 +293,8 @@ class ParamStore:
     def _reload(self) -> tuple[str, ...]:
         before, state = self._state, self._read(self._state)
         edited = differences(before.saved, state.saved)
+        if "character" in edited and before.rig.character != before.saved.character:
+            state = self._read(before._replace(rig=before.saved))
         kept = {
             key: value
             for key, value in differences(before.saved, before.rig).items()
@@ -291,7 +306,10 @@ class ParamStore:
         return self._apply(state, apply_changes(state.saved, kept))
 
     def _layers(self, state: _RigState) -> RigLayers:
-        return RigLayers(state.name, state.character, self._profile)
+        chosen = state.rig.character
+        unsaved = chosen != state.saved.character
+        character = (chosen or NO_CHARACTER) if unsaved else state.character
+        return RigLayers(state.name, character, self._profile)
 
     def _read(self, state: _RigState) -> _RigState:
         """Read the files and apply the options; the present rig does not change."""

@@ -121,7 +121,7 @@ def run_info(rig: Rig, options: RunOptions, placement: tuple[float, ...] = ()) -
     return RunInfo(
         rig=options.rig,
         profile=rig.profile,
-        character=options.character,
+        character=options.character or rig.character,
         config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
         tracks_yaml=tracks_text(rig.track_files),

@@ -84,7 +84,7 @@ Profile = Annotated[
 Character = Annotated[
     str | None,
     typer.Option(
-        help="A character applied over the rig: shy, bold, sleepy, strong_boxer ...",
+        help="A character applied over the rig, instead of its own: shy, bold, sleepy ...; none.",
         autocompletion=complete_shipped("characters"),
     ),
 ]

@@ -26,7 +26,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SPACED = re.compile(rf"({_NUMBER}):({_NUMBER}):(\d+)")
 _RANGE = re.compile(rf"({_NUMBER})(?::|\.\.)({_NUMBER})")
 _FORMS = "LOW:HIGH:STEPS, LOW:HIGH or A,B,C"
-_OPTIONS = {"profile": "--profile", "name": "RIG"}
+_OPTIONS = {"profile": "--profile", "character": "--character", "name": "RIG"}
 """Keys that act only while the rig's files are read, and the option to use instead."""
 
 

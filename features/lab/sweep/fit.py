@@ -13,7 +13,7 @@ import numpy as np
 
 from gazerig.config.parameters import differences, flatten_changes
 from gazerig.config.save_text import changes_text
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import NO_CHARACTER, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
 from gazerig.features.lab.sweep.run_outcome import REPORT, VERDICT, Outcome, grade
@@ -163,9 +163,6 @@ def yaml_snippet(options: RunOptions, point: Point) -> str:
 
     A run has only one character, so the changes of the runs' own character are included.
     """
-    changes = dict(point)
-    if options.character is not None:
-        plain = load_rig(options.rig, None, options.profile)
-        whole = load_rig(options.rig, options.character, options.profile)
-        changes = flatten_changes(whole, differences(plain, whole)) | changes
-    return changes_text(changes)
+    plain = load_rig(options.rig, NO_CHARACTER, options.profile)
+    whole = load_rig(options.rig, options.character, options.profile)
+    return changes_text(flatten_changes(whole, differences(plain, whole)) | dict(point))

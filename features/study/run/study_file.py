@@ -38,8 +38,8 @@ _GAZE = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
 """Sections of a rig that determine its appearance, whatever its servos and camera."""
 _MACHINE = frozenset({"bus", "buses", "webcam", "oak", "camera", "camera_recovery"})
 """Sections that may change between two participants, such as a port or a calibration."""
-_WHILE_READ = frozenset({"name", "profile"})
-"""Keys of a rig with only its name and the applied profile."""
+_WHILE_READ = frozenset({"name", "profile", "character"})
+"""Keys of a rig with only its name and the applied profile and character."""
 
 
 @dataclass(frozen=True)
