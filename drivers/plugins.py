@@ -13,9 +13,10 @@ from functools import cache
 from importlib import import_module
 from operator import attrgetter
 from pathlib import Path
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gazerig.drivers.errors import PluginError, SetupError
+from gazerig.drivers.errors import DriverError, PluginError, SetupError
 
 if TYPE_CHECKING:
     from gazerig.drivers.bus.servo_models import ServoModelInfo
@@ -276,6 +277,23 @@ def describe_error(error: BaseException) -> str:
     """Return an exception of a package as part of one line."""
     text = " ".join(str(error).split())[:200]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def plugin_error(error: BaseException) -> PluginError | None:
+    """Return an error that names the part of another package which raised it, None for others."""
+    if isinstance(error, DriverError):
+        return None
+    frames = [frame for frame, _ in walk_tb(error.__traceback__)]
+    modules = {str(frame.f_globals.get("__name__")) for frame in frames}
+    packages = {name.partition(".")[0] for name in modules}
+    parts = [
+        (part, part.value.partition(":")[0].strip())
+        for group in GROUPS
+        for part in _package_parts(group, tuple(sys.path))
+    ]
+    found = [part for part, module in parts if module in modules]
+    found += [part for part, module in parts if module.partition(".")[0] in packages]
+    return PluginError(f"{found[0].label} failed ({describe_error(error)})") if found else None
 
 
 def registrations(group: str) -> tuple[Registration, ...]:

@@ -57,7 +57,6 @@ COSTS_S = {
     "study_power": 5,
     "study_report": 5,
     "tutorial": 5,
-    "user_code": 5,
 }
 """Processor time of the files that take most of it, which ``pytest --durations=0`` shows."""
 

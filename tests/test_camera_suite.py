@@ -9,12 +9,8 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.camera_plugins import CheckedSource
-from gazerig.drivers.camera.guarded_camera import GuardedCamera
-from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.webcam import Webcam
-from gazerig.drivers.errors import CameraError
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.testing import CameraBench, CameraSuite
@@ -94,48 +90,3 @@ class TestScene(CameraSuite):
         wait()
         yield CameraBench(lambda: made.robot.camera, clock.now_s, wait)
         made.close()
-
-
-class Outside:
-    """A camera of another package that finds faces itself."""
-
-    def __init__(self, device):
-        self.device, self.number = device, 0
-
-    def open(self):
-        if not self.device.file.exists():
-            raise CameraError("no fish camera: plug it in")
-        self.number = 0
-
-    def take(self, now_s, stop):
-        self.device.held.wait(60.0)
-        if not self.device.file.exists():
-            raise CameraError("the fish camera is gone")
-        time.sleep(0.001)
-        self.number += 1
-        return Shot(now_s(), self.number, np.zeros((4, 6, 3), np.uint8))
-
-    def events(self):
-        return ()
-
-    def close(self):
-        pass
-
-
-class TestGuarded(CameraSuite):
-    """A package's camera behind the guard that keeps it from the loop."""
-
-    @pytest.fixture
-    def bench(self, tmp_path):
-        device = Video4Linux(tmp_path / "video0")
-        inner = of_source(
-            lambda: CheckedSource(Outside(device), "camera 'fish' of fish 2"),
-            device.lose,
-            device.restore,
-            device.held.clear,
-            device.held.set,
-        )
-        return CameraBench(
-            lambda: GuardedCamera(inner.make(), "camera 'fish' of fish 2"), inner.now_s, inner.wait,
-            inner.lose, inner.restore, inner.block, inner.release,
-        )  # fmt: skip

@@ -11,7 +11,6 @@ from fakes.scenes import EmptyScene
 from stand_in import StandIn
 from test_face_pose import CAMERA, image_of, turned
 
-from gazerig.drivers.camera.guarded_camera import face_fault
 from gazerig.drivers.camera.recording_format import _face, decode_faces
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
@@ -152,14 +151,11 @@ def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
         assert face.gaze_world == pytest.approx((gaze[2], -gaze[0], -gaze[1]))
 
 
-def test_a_gaze_of_the_eyes_is_kept_by_camera_recordings_and_checked() -> None:
+def test_a_gaze_of_the_eyes_is_kept_by_camera_recordings() -> None:
     for gaze in (None, (0.0, 0.6, -0.8)):
         (face,) = detection(gaze).faces
         (back,) = decode_faces(msgspec.json.encode({"faces": [_face(face)]}))
         assert back.gaze_camera == gaze
-        assert face_fault(face) == ""
-    for wrong in ((0.0, 1.0), (0.0, float("nan"), 1.0), (0.0, 0.0, 0.0)):
-        assert "gaze" in face_fault(replace(face, gaze_camera=wrong))  # type: ignore[arg-type]
 
 
 def face_at(id: int, p: Vec3, looks: bool | None) -> Face:

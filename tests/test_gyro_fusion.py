@@ -1,6 +1,5 @@
 """The camera's orientation by gyro and joints together, and what it is worth to perception."""
 
-from dataclasses import replace
 from math import degrees, exp, pi, radians, sin
 
 import cv2
@@ -14,7 +13,6 @@ from seeing.row_02_camera_motion import judged
 
 import gazerig
 from gazerig.drivers.camera import recording_format as fmt
-from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
@@ -294,12 +292,6 @@ def test_wrong_gyro_is_told_once_in_a_run_which_goes_on():
         head.step(2.0)
         texts = [event.text for event in head.events(timeout_s=0)]
     assert sum("does not turn with the joints" in text for text in texts) == 1
-
-
-def test_turn_that_is_no_rotation_ends_the_camera_of_a_program_alone():
-    wrong = Detections(0.0, 1, WIDTH, HEIGHT, turn=CameraTurn(1, rows(np.full((3, 3), np.nan))))
-    assert "not a rotation" in detections_fault(wrong)
-    assert detections_fault(replace(wrong, turn=CameraTurn(1, rows(np.eye(3))))) == ""
 
 
 def test_recording_keeps_the_turn():

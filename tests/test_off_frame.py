@@ -8,7 +8,6 @@ from test_face_pose import CAMERA, image_of, turned
 from test_gaze_at_head import AT_EYES, standing
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer, is_off_frame
-from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.robot.model.tracker_params import TrackerParams
@@ -70,26 +69,3 @@ def test_a_face_whose_middle_the_edge_cuts_off_is_not_there_and_nothing_is_said(
     analyzer = FrameAnalyzer(Detector())
     assert analyzer.analyze(Shot(0.0, 1, np.zeros((240, 640, 3), np.uint8))).faces == ()
     assert analyzer.events() == ()
-
-
-def test_it_is_said_once_of_a_camera_of_another_package() -> None:
-    class Camera:
-        number = 0
-
-        def open(self) -> None: ...
-
-        def latest(self, now_s: float) -> Detections:
-            self.number += 1
-            return Detections(now_s, self.number, 640, 480, (OFF,))
-
-        def events(self) -> tuple[str, ...]:
-            return ()
-
-        def close(self) -> None: ...
-
-    camera = GuardedCamera(Camera(), "theirs", longest_s=None)
-    camera.open()
-    for k in range(3):
-        assert camera.latest(k / 30) is not None
-    (line,) = camera.events()
-    assert line.startswith("theirs: a face with landmarks about")

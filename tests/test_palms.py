@@ -14,7 +14,6 @@ from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
 from test_perception import seen as percept_at
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
@@ -117,13 +116,7 @@ def test_frames_carry_palms_between_processes() -> None:
     found, later = (frames.analyze(Shot(0.03 * i, 1 + i, FRAME)) for i in (0, 1))
     assert pickle.loads(pickle.dumps(found.palms)) == found.palms and later.palms is None
     (palm,) = present(present(found.located).palms)
-    assert (
-        palm.kind == "hand"
-        and present(later.located).palms is None
-        and detections_fault(found) == ""
-    )
-    bad = replace(found, palms=(DetectedPalm((1.0, np.nan), 20.0, 0.9),))
-    assert "a palm at" in detections_fault(bad)
+    assert palm.kind == "hand" and present(later.located).palms is None
 
 
 # ---- what perception makes of them ---------------------------------------------------------

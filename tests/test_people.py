@@ -3,7 +3,6 @@
 import pickle
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from test_perception import seen as percept_at
 from test_scanpath import walker
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import install_command
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
@@ -151,11 +149,9 @@ def test_frames_carry_people_between_processes_and_the_page_draws_them() -> None
     assert pickle.loads(pickle.dumps(found.people)) == found.people and len(found.people) == 1
     (head,) = present(found.located).faces
     assert head.kind == "face" and head.R_camera_face is None
-    assert frames.analyze(Shot(0.03, 2, shown)).people == () and detections_fault(found) == ""
+    assert frames.analyze(Shot(0.03, 2, shown)).people == ()
     drawn = draw_detections(shown, found, None, present(found.located).intrinsics)
     assert (drawn != shown).any()
-    bad = replace(found, people=(replace(found.people[0], trunk_px=0.0),))
-    assert "a person at" in detections_fault(bad)
 
 
 def test_without_the_file_the_detector_is_the_plain_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,13 +2,15 @@
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from itertools import chain
-from math import inf
+from math import inf, isfinite
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from gazerig.drivers.errors import BusLost
+from gazerig.drivers.errors import BusLost, DriverError
+from gazerig.drivers.event_log import EventLog, RateLimitedLog
+from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.types import BusHealth, Feedback, LimpableBus, ServoBus, ServoConfig
 
 IN_A_ROW = 3
@@ -23,11 +25,15 @@ class BusShare(NamedTuple):
     """One of the buses: its name and its servos.
 
     servo_indices: index of each of its servos in the whole rig
+    label: name of another package's bus in messages, "" for ours
+    setups: servos of another package's bus, whose goals are clipped and whose readings are checked
     """
 
     name: str
     bus: ServoBus
     servo_indices: tuple[int, ...]
+    label: str = ""
+    setups: tuple[ServoConfig, ...] = ()
 
 
 class _PollTimer:
@@ -65,7 +71,9 @@ class MultiBus:
     """
 
     def __init__(self, shares: Sequence[BusShare]) -> None:
-        self._shares = tuple(shares)
+        self._shares = list(shares)
+        self._log = EventLog()
+        self._seldom = RateLimitedLog(self._log)
         self._timers = [_PollTimer() for _ in self._shares]
         places = sorted(place for share in shares for place in share.servo_indices)
         if places != list(range(len(places))):
@@ -104,7 +112,8 @@ class MultiBus:
         servos of the other buses do not wait for it.
 
         Raises:
-            BusLost: no servo of a bus has answered for longer than its ``give_up_s``.
+            BusLost: no servo of a bus has answered for longer than its ``give_up_s``, or a bus
+                returned no feedback.
         """
         feedbacks = list(self._nothing)
         lost: list[BusLost] = []
@@ -113,6 +122,8 @@ class MultiBus:
                 continue
             try:
                 feedbacks[i] = share.bus.read(now_s)
+                if share.label:
+                    feedbacks[i] = self._require_finite(feedbacks[i], share, now_s)
             except BusLost as error:  # the others are still read, so that they may reconnect
                 lost.append(error)
                 continue
@@ -138,8 +149,9 @@ class MultiBus:
         """
         goals = [0] * self._count
         try:
-            for _, bus, places in self._shares:
-                for place, goal in zip(places, bus.enable_torque(), strict=True):
+            for share in self._shares:
+                places = share.servo_indices
+                for place, goal in zip(places, share.bus.enable_torque(), strict=True):
                     goals[place] = goal
         except BaseException:
             with suppress(BusLost):
@@ -149,9 +161,10 @@ class MultiBus:
 
     def set_limp(self, servos: Collection[int]) -> None:
         """Switch torque off on these servos; all others that were limp get it again."""
-        for _, bus, places in self._shares:
-            if isinstance(bus, LimpableBus):
-                bus.set_limp([k for k, place in enumerate(places) if place in servos])
+        for share in self._shares:
+            if isinstance(share.bus, LimpableBus):
+                here = enumerate(share.servo_indices)
+                share.bus.set_limp([k for k, place in here if place in servos])
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo; goals are clipped to the limits.
@@ -166,8 +179,14 @@ class MultiBus:
                 raise ValueError(
                     "a goal is not a number: every goal must be a whole number of steps"
                 )
-        for _, bus, places in self._shares:
-            bus.write([goals_steps[place] for place in places])
+        for share in self._shares:
+            goals = [goals_steps[place] for place in share.servo_indices]
+            if share.label:
+                goals = [
+                    round(min(max(goal, setup.min_steps), setup.max_steps))
+                    for goal, setup in zip(goals, share.setups, strict=True)
+                ]
+            share.bus.write(goals)
 
     def faults(self) -> tuple[str, ...]:
         """Return the latched servo faults, one line each."""
@@ -175,7 +194,8 @@ class MultiBus:
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        return tuple([event for share in self._shares for event in share.bus.events()])
+        events = [event for share in self._shares for event in share.bus.events()]
+        return (*self._log.drain(), *events)
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Store setups for the next time torque is switched on.
@@ -185,8 +205,10 @@ class MultiBus:
         """
         if len(setups) != self._count:
             raise ValueError("ids and models must not change: create another bus for other servos")
-        for _, bus, places in self._shares:
-            bus.retune([setups[place] for place in places])
+        for i, share in enumerate(self._shares):
+            own = tuple([setups[place] for place in share.servo_indices])
+            share.bus.retune(own)
+            self._shares[i] = share._replace(setups=own)
 
     def disable_torque(self) -> None:
         """Switch torque off on every bus, even if another bus fails.
@@ -198,8 +220,11 @@ class MultiBus:
         for share in self._shares:
             try:
                 share.bus.disable_torque()
-            except BusLost as error:
+            except DriverError as error:
                 lost.append(str(error))
+            except Exception as error:
+                failed = f"torque-off failed ({describe_error(error)}): cut the servo power"
+                lost.append(f"{share.label or share.name}: {failed}")
         if lost:
             raise BusLost("; ".join(lost))
 
@@ -212,6 +237,35 @@ class MultiBus:
         return BusHealth(sum(h.tx_bytes for h in each), sum(h.rx_bytes for h in each), errors)
 
     def close(self) -> None:
-        """Close every port."""
-        for share in self._shares:
-            share.bus.close()
+        """Close every port, even if another bus fails."""
+        with ExitStack() as stack:
+            for share in reversed(self._shares):
+                stack.callback(share.bus.close)
+
+    def _require_finite(self, feedback: Feedback, share: BusShare, now_s: float) -> Feedback:
+        """Return the feedback of another package's bus; servos without finite values are missing.
+
+        Raises:
+            BusLost: it is not the feedback of the bus's servos.
+        """
+        count = len(share.servo_indices)
+        if not isinstance(feedback, Feedback) or {*map(len, feedback[:-1])} != {count}:
+            raise BusLost(f"{share.label}: read returned no feedback of {count} servos")
+        numbers = feedback[:4]
+        if all(map(isfinite, chain.from_iterable(numbers))):
+            return feedback
+        wrong = {
+            i
+            for i in range(count)
+            if i not in feedback.missing and not all([isfinite(column[i]) for column in numbers])
+        }
+        if not wrong:
+            return feedback
+        names = ", ".join(share.setups[i].label() for i in sorted(wrong))
+        text = f"{share.label}: no finite position, speed, load or time of {names}"
+        self._seldom.add(f"{text}: taken as missing", now_s, share.name)
+        columns = [
+            tuple([none[i] if i in wrong else column[i] for i in range(count)])
+            for column, none in zip(feedback[:-1], Feedback.create_missing(count)[:-1], strict=True)
+        ]
+        return Feedback._make((*columns, tuple(sorted(wrong.union(feedback.missing)))))

@@ -6,8 +6,9 @@ from math import degrees, isnan
 from time import perf_counter
 
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG, CameraRecoveryParams
-from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.source import FrameSource, Shot, to_bgr
 from gazerig.drivers.errors import CameraError
+from gazerig.drivers.plugins import plugin_error
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
 
 
@@ -251,7 +252,10 @@ class CaptureLoop:
         if shot is None:
             return None
         self._number = self._counted + shot.number
-        found = self._frames.analyze(shot._replace(number=self._number))
+        image = to_bgr(shot.image)
+        if image is None:
+            raise CameraError("the camera returned a frame that is not an image of 8 or 16 bits")
+        found = self._frames.analyze(shot._replace(number=self._number, image=image))
         for line in (*self._source.events(), *self._frames.events()):
             self._report(line)
         return found
@@ -300,6 +304,8 @@ def detection_error(failure: BaseException) -> CameraError:
     """Return the error that ended the detection, as the control loop reports it."""
     if isinstance(failure, CameraError):
         return CameraError(str(failure))
+    if (named := plugin_error(failure)) is not None:
+        return CameraError(str(named))
     return CameraError(
         f"detection in the camera frames failed ({type(failure).__name__}: "
         f"{' '.join(str(failure).split())}): start it again, and report it if it recurs"

@@ -13,7 +13,6 @@ from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.worker import Retune
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.types import Detections, FaceDetector
 
 # OpenCV stops waiting for a camera after 10 s; a film stops immediately.
@@ -58,7 +57,7 @@ class CameraThread:
         )
         self._requests: deque[Retune] = deque()
         self._stop = threading.Event()
-        self._watching: BoundedCall | None = None
+        self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
         self._failure: BaseException | None = None
         self.frames = 0
@@ -70,7 +69,7 @@ class CameraThread:
         Raises:
             CameraError: the source cannot be opened, or is open already.
         """
-        if self._watching is not None:
+        if self._thread is not None:
             raise CameraError(
                 "the camera thread is already running: close() it before opening it again"
             )
@@ -79,8 +78,8 @@ class CameraThread:
         self._stop.clear()
         self._newest, self._failure = None, None
         self.frames = self.frames_with_face = 0
-        self._watching = BoundedCall("camera", 0.0)
-        self._watching.begin(self._watch)
+        self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
+        self._thread.start()
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the detections of the newest frame, or None before the first.
@@ -118,13 +117,12 @@ class CameraThread:
         return tuple(messages)
 
     def close(self) -> None:
-        """Stop detection, by force if needed, and free the source; safe to call twice."""
+        """Stop detection and free the source; safe to call twice."""
         self._stop.set()
-        if self._watching is not None:
-            stopped = self._watching.wait_idle(_LONGEST_WAIT_S)
-            self._watching.close()
-            if stopped:
-                self._watching = None
+        if self._thread is not None:
+            self._thread.join(_LONGEST_WAIT_S)
+            if not self._thread.is_alive():
+                self._thread = None
 
     def _watch(self) -> None:
         """Analyse one frame after another until stopped."""

@@ -11,11 +11,11 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
@@ -120,7 +120,11 @@ class CameraSuite:
 
     def test_what_it_returns_is_sound(self, bench, camera):
         frame = self.next_frame(bench, camera, 0)
-        assert detections_fault(frame) == ""
+        assert isinstance(frame, Detections) and isfinite(frame.captured_s)
+        assert isinstance(frame.number, int) and frame.width_px > 0 and frame.height_px > 0
+        for face in frame.faces:
+            assert isinstance(face, DetectedFace) and np.isfinite(face.box_px).all()
+            assert face.landmarks_px.shape == (5, 2) and np.isfinite(face.landmarks_px).all()
         if frame.image is not None:
             assert frame.image.shape == (frame.height_px, frame.width_px, 3)
             assert frame.image.dtype == np.uint8 and not frame.image.flags.writeable

@@ -43,7 +43,7 @@ from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
+from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.joint_latency import JointLatency
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.robot_group import NamedRobot
@@ -213,17 +213,12 @@ def assemble(
             lambda rig: camera_placement(rig, options, kinematics, seen)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
-        robot = _build_robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
+        robot = _build_robot(parts, sight.poses, live, substitutes, rig, messages)
         if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
             robot.set_opponent(TickClockOpponent(scene.opponent, room.start_s))
     except BaseException:
         opened.close()
         raise
-
-    def close() -> None:
-        if isinstance(robot.attention, GuardedChooser):
-            robot.attention.close()
-        opened.close()
 
     # A shipped walk is reported only if verbose.
     shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
@@ -233,7 +228,7 @@ def assemble(
     if (parks := park_note(rig)) is not None:
         notes = (*notes, parks)
     return Assembly(
-        robot, clock, sight.mount, sight.poses, scene, opened.sent_bytes_digest, close, notes, live,
+        robot, clock, sight.mount, sight.poses, scene, opened.sent_bytes_digest, opened.close, notes, live,
         opened.inject_fault, room,
     )  # fmt: skip
 
@@ -347,11 +342,9 @@ def _build_robot(
     live: LiveParams,
     substitutes: Substitutes,
     rig: Rig,
-    simulated: bool,
     messages: list[str],
 ) -> Robot:
-    chooser = target_chooser(rig, parts.attention, messages.append, simulated)
-    chooser = substitutes.program.make_chooser(chooser, messages.append, simulated)
+    chooser = substitutes.program.make_chooser(target_chooser(rig, parts.attention))
     return Robot(
         substitutes.body(parts.body),
         parts.kinematics,

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 from gazerig.config.rig import Rig
-from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.errors import PluginError, SetupError
@@ -14,7 +13,6 @@ from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import servo_setups
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, pickle_params
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling_params import coupled_pairs
 
 
@@ -150,8 +148,8 @@ def has_watchdog(rig: Rig, name: str) -> bool:
 
 
 def _join_buses(shares: list[BusShare]) -> ServoBus:
-    """Return several buses as one; a single one is returned unchanged."""
-    return shares[0].bus if len(shares) == 1 else MultiBus(shares)
+    """Return several buses as one; a single one of ours is returned unchanged."""
+    return shares[0].bus if len(shares) == 1 and not shares[0].label else MultiBus(shares)
 
 
 def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
@@ -170,5 +168,4 @@ def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
         raise
     except Exception as error:
         raise PluginError(f"{label} cannot be created: {describe_error(error)}") from error
-    now_s = getattr(port, "now_s", None) or RealClock().now_s
-    return BusShare(name, CheckedBus(bus, label, own, now_s), places)
+    return BusShare(name, bus, places, label, tuple(own))

@@ -12,15 +12,12 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.camera import camera_plugins
 from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import (
-    CheckedSource,
     create_camera_part,
     create_plugin_source,
     is_source,
 )
 from gazerig.drivers.camera.capture_loop import Locate, Motion
 from gazerig.drivers.camera.double_buffer import PoseBuffer, PoseSlot
-from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, OPEN_PROCESS_S, GuardedCamera
-from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
 from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource, upright
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
@@ -275,14 +272,13 @@ def real_camera(
     if name is None or is_ours(CAMERA, name):
         parts = CameraParts(_source_factory(rig, options), detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)
-    params, label = _package_camera_params(rig, name), find(CAMERA, name).label
+    params = _package_camera_params(rig, name)
     camera = create_camera_part(name, params)
     if is_source(camera):
         source = upright(partial(create_plugin_source, name, params), frame_orientation(placed))
         parts = CameraParts(source, detector, motion, locate)
-        process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
-        return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S, open_s=OPEN_PROCESS_S)
-    return GuardedCamera(cast(Camera, camera), label)
+        return CameraProcess(parts, clock.now_s, rig.camera_recovery)
+    return cast(Camera, camera)
 
 
 def program_camera(
@@ -293,7 +289,7 @@ def program_camera(
     locate: Locate,
     fast: bool,
 ) -> Camera:
-    """Return the program's own camera, checked and supervised like another package's.
+    """Return the program's own camera.
 
     Raises:
         SetupError: it is not a camera, or it returns frames in simulated time.
@@ -302,14 +298,13 @@ def program_camera(
     label = part_label("camera", camera)
     if not is_source(camera):
         require_method(camera, "camera", "latest")
-        return GuardedCamera(cast(Camera, camera), label, None if fast else LONGEST_CAMERA_S)
+        return cast(Camera, camera)
     if fast:
         raise SetupError(
             f"{label} returns frames in real time: in simulated time return detections"
         )
-    source = CheckedSource(cast(FrameSource, camera), label)
-    turned = UprightSource(source, frame_orientation(rig.camera))
-    return GuardedCamera(supervise_source(rig, parts, turned, clock, motion, locate), label)
+    turned = UprightSource(cast(FrameSource, camera), frame_orientation(rig.camera))
+    return supervise_source(rig, parts, turned, clock, motion, locate)
 
 
 def supervise_source(
@@ -365,8 +360,6 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     motion = finder if moves else None
     try:
         match camera:
-            case GuardedCamera():
-                return retune_camera(camera.camera, before, after, placed)
             case BorrowedCamera():
                 return retune_camera(camera.own, before, after, placed)
             case DrawnCamera():

@@ -1,6 +1,5 @@
 """The models of gaze/ with a rig's parameters."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.track.breathing import Breathing
 from gazerig.gaze.track.sway import Sway
 from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
-from gazerig.robot.control.chooser import LONGEST_S, GuardedChooser, TargetChooser
+from gazerig.robot.control.chooser import RuleChooser, TargetChooser
 from gazerig.robot.model.kinematics import Kinematics
 
 
@@ -82,16 +81,12 @@ def oculomotor(
     )
 
 
-def target_chooser(
-    rig: Rig, own: TargetChooser, say: Callable[[str], None], simulated: bool
-) -> TargetChooser:
+def target_chooser(rig: Rig, own: TargetChooser) -> TargetChooser:
     """Return the chooser of the target: the rig's attention, or a package's rule before it.
 
     Args:
         rig: Its ``gaze.chooser`` selects the rule.
         own: the rig's own attention.
-        say: Receives one line when the rule is dropped.
-        simulated: time is simulated, so that no answer can be late.
 
     Raises:
         SetupError: the rule cannot be created.
@@ -104,4 +99,4 @@ def target_chooser(
     label = find(ATTENTION, name).label
     if not callable(getattr(rule, "choose", None)):
         raise PluginError(f"{label} created a {type(rule).__name__}, which has no method choose")
-    return GuardedChooser(rule, own, label, say, None if simulated else LONGEST_S)
+    return RuleChooser(rule, own, label)

@@ -1,14 +1,13 @@
 """A program's own camera, detector and attention rule, which replace those of the rig."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, FaceDetector
-from gazerig.drivers.vision.face.detector import CheckedDetector, face_detector, mtcnn
+from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.robot.control.chooser import LONGEST_S, Chooser, GuardedChooser, TargetChooser
+from gazerig.robot.control.chooser import Chooser, RuleChooser, TargetChooser
 
 
 class ProgramParts(NamedTuple):
@@ -24,24 +23,18 @@ class ProgramParts(NamedTuple):
     chooser: Chooser | None = None
 
     def make_detector(self, params: FaceDetectorParams) -> FaceDetector:
-        """Return the detector: the program's, with ours as a fallback, or the rig's."""
+        """Return the detector: the program's, or the rig's."""
         if self.detector is None:
             return face_detector(params)
         require_method(self.detector, "detector", "find")
-        label = part_label("detector", self.detector)
-        return CheckedDetector(self.detector, label, lambda: mtcnn(params))
+        return self.detector
 
-    def make_chooser(
-        self, own: TargetChooser, say: Callable[[str], None], simulated: bool
-    ) -> TargetChooser:
+    def make_chooser(self, own: TargetChooser) -> TargetChooser:
         """Return the chooser of the target: the program's rule before the rig's own."""
         if self.chooser is None:
             return own
         require_method(self.chooser, "attention", "choose")
-        longest_s = None if simulated else LONGEST_S
-        return GuardedChooser(
-            self.chooser, own, part_label("attention", self.chooser), say, longest_s
-        )
+        return RuleChooser(self.chooser, own, part_label("attention", self.chooser))
 
 
 NO_PARTS = ProgramParts()

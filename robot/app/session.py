@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.process.bounded_call import OverdueReport
 from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.summary import Summary
@@ -217,7 +216,6 @@ class Session:
             SceneScore.from_scene(scene, start_s) if summarised and scene is not None else None
         )
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
-        self._lasting = OverdueReport()
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
@@ -251,9 +249,6 @@ class Session:
             events = tuple(group_events(events))
         for event in (*events, *self._run_observers.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
-        if not self._options.fast:
-            for line in self._lasting.due_lines():
-                self._made.robot.report(line)
 
     def _stop_reason(self, seconds: float) -> str | None:
         """Return the reason for ending the run now, None while it continues."""

@@ -31,8 +31,8 @@ import typer
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError, extra_hint
-from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.process.visible_text import VisibleStream, visible
+from gazerig.drivers.process.work_queue import WorkQueue
 from gazerig.robot.control.interrupts import ENDING, Interrupts
 
 _OF_REPORTS = ("jinja2", "scipy")
@@ -55,7 +55,7 @@ class LineWriter:
     def __init__(self, fd: int, most: int = _MOST) -> None:
         self._fd = fd
         self._most = most
-        self._call = BoundedCall("line writer", 0.0)
+        self._queue = WorkQueue("line writer")
         self._status: str | None = None
         self._status_waits = False
         self._gone = False
@@ -65,12 +65,12 @@ class LineWriter:
 
     def line(self, text: str) -> None:
         """Write a line, including its line end, without waiting."""
-        if self._gone or self._call.waiting_calls() >= self._most:
+        if self._gone or len(self._queue) >= self._most:
             self.dropped += 1
             return
         # The text of the status line is older than this line.
         self._status = None
-        self._call.begin(lambda: self._write(text))
+        self._queue.add(lambda: self._write(text))
 
     def status(self, text: str) -> None:
         """Write a status line, unless a newer text replaces it first; does not wait."""
@@ -79,7 +79,7 @@ class LineWriter:
         self._status = text
         if not self._status_waits:
             self._status_waits = True
-            self._call.begin(self._write_status)
+            self._queue.add(self._write_status)
 
     def lost_reader(self) -> str | None:
         """Return a message if the reader has closed the pipe, otherwise None."""
@@ -92,7 +92,7 @@ class LineWriter:
 
     def flush(self, timeout_s: float) -> bool:
         """Wait until everything is written, at most this long; return whether it is."""
-        return self._gone or self._call.wait_idle(timeout_s)
+        return self._gone or self._queue.wait_idle(timeout_s)
 
     def _reader_gone(self) -> bool:
         """Return whether a pipe has lost its reader, which only the next write would detect."""

@@ -6,6 +6,7 @@ from math import inf, radians
 from typing import NamedTuple
 
 from gazerig.drivers.errors import DriverError
+from gazerig.drivers.plugins import plugin_error
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.attention.turn_gaze import TurnGaze
@@ -211,6 +212,14 @@ class Robot:
         """
         if isinstance(clock, RealClock):
             freeze_objects()
+        try:
+            self._open(clock, ready)
+        except Exception as error:
+            if (named := plugin_error(error)) is not None:
+                raise named from error
+            raise
+
+    def _open(self, clock: Clock, ready: Callable[[], None] | None) -> None:
         self.camera.open()
         try:
             if ready is not None:
@@ -252,13 +261,17 @@ class Robot:
                 finds the tick, or a newer one.
 
         Raises:
-            DriverError: The bus or the camera is lost.
+            DriverError: The bus or the camera is lost, or a part of another package fails.
         """
         try:
             tick = self._tick(t_s, dt_s)
             if watch is not None:
                 watch(tick)
             return tick
+        except Exception as error:
+            if (named := plugin_error(error)) is not None:
+                raise named from error
+            raise
         finally:
             self._commands.give_replies()
 

@@ -1,6 +1,5 @@
 """Bad conditions of a camera are reported once at their start and end; good ones never."""
 
-from dataclasses import replace
 from functools import cache
 from math import nan, radians
 from typing import Any
@@ -12,7 +11,6 @@ from present import present
 from seeing.material import background, carphone, noisy, paste, portrait
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.health import (
     FIELD_TEXT,
     CameraHealth,
@@ -264,13 +262,6 @@ def test_times_that_stand_still_or_run_back_are_borne():
     for t_s in (5.0, 5.0, nan, 1.0, -3.0, float("inf"), 2.0, 1e9, 3.0):
         assert health.assess(Shot(t_s, 1, np.asarray(room())), (), FAST) == ()
     assert health.events() == ()
-
-
-def test_conditions_of_a_guarded_camera_are_lines():
-    found = FrameAnalyzer(Nobody()).analyze(Shot(1.0, 1, np.asarray(room(0))))
-    assert detections_fault(replace(found, conditions=("too dark: more light",))) == ""
-    wrong: Any = (3,)
-    assert "conditions" in detections_fault(replace(found, conditions=wrong))
 
 
 class Frames:

@@ -5,27 +5,15 @@ centres at whole numbers: (0, 0) is the centre of the top left pixel, so an imag
 from -0.5 to w - 0.5.
 """
 
-from collections.abc import Callable
 from typing import cast
 
-from gazerig.drivers.camera.guarded_camera import face_fault
-from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.plugins import (
-    DETECTOR,
-    DetectorPlugin,
-    Evidence,
-    create,
-    describe_error,
-    find,
-    is_ours,
-    load,
-)
-from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
+from gazerig.drivers.plugins import DETECTOR, DetectorPlugin, Evidence, create, is_ours, load
+from gazerig.drivers.types import FaceDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 
 def mtcnn(params: FaceDetectorParams) -> FaceDetector:
-    """Create the fallback detector; this imports OpenCV."""
+    """Create MTCNN; this imports OpenCV."""
     from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 
     return MtcnnDetector(params)
@@ -63,8 +51,7 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
     if is_ours(DETECTOR, params.kind):
         detector = cast(FaceDetector, part.make(params))
     else:
-        found = create(DETECTOR, params.kind, part, getattr(params, params.kind))
-        detector = CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: mtcnn(params))
+        detector = create(DETECTOR, params.kind, part, getattr(params, params.kind))
     if params.mesh_faces > 0:
         from gazerig.drivers.vision.face.mesh import MeshedDetector
 
@@ -74,33 +61,3 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
 
         detector = add_body_detection(detector, params)
     return detector
-
-
-class CheckedDetector:
-    """A detector of another package, replaced by ours after it has failed."""
-
-    def __init__(
-        self, detector: FaceDetector, label: str, ours: Callable[[], FaceDetector]
-    ) -> None:
-        self._detector, self._label, self._ours = detector, label, ours
-        self._log = EventLog()
-        self._dropped = False
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return faces, the largest first, in pixels of the image."""
-        if self._dropped:
-            return self._detector.find(image)
-        try:
-            faces = tuple(self._detector.find(image))
-            wrong = next((f"returned {bad}" for face in faces if (bad := face_fault(face))), "")
-        except (Exception, SystemExit) as error:
-            wrong = f"failed ({describe_error(error)})"
-        if not wrong:
-            return faces
-        self._log.add(f"{self._label} {wrong}: it is no longer used, mtcnn finds the faces")
-        self._detector, self._dropped = self._ours(), True
-        return self._detector.find(image)
-
-    def events(self) -> tuple[str, ...]:
-        """Return the events since the last call, one line each."""
-        return self._log.drain()

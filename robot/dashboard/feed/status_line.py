@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from math import inf
 
-from gazerig.drivers.process.bounded_call import overdue_text
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
@@ -49,7 +48,6 @@ class StatusLine:
                 self._rate = f"{timing.rate_hz:5.1f} Hz" if timing is not None and known else ""
                 self._busy = busy_text(timing)
             parts = [
-                overdue_text(),
                 self._busy,
                 self._rate,
                 head_activity(tick).headline,
