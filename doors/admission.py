@@ -47,8 +47,8 @@ def page_refusal(bind: str, port: int, headers: Mapping[str, str]) -> str:
 def user_refusal(bind: str, transport: asyncio.WriteTransport) -> str:
     """Return why a connection is refused as that of another user, "" if it is not.
 
-    Nothing is refused on a door that listens to the network, nor where the system does not tell the
-    user. Root may connect: it can do all that the user of the door can.
+    Nothing is refused on a door that listens to the network, nor without /proc. Root may connect:
+    it can do all that the user of the door can.
 
     Args:
         bind: Where the door listens, HOST:PORT.

@@ -10,10 +10,10 @@ from concurrent.futures import thread as pool_threads
 from types import FrameType
 from typing import Protocol
 
-from gazerig.robot.control.interrupts import SAME_REQUEST_S, available_signals
+from gazerig.robot.control.interrupts import SAME_REQUEST_S
 from gazerig.robot.model.clock import RealClock
 
-_ENDING = available_signals("SIGTERM", "SIGHUP")
+_ENDING = (signal.SIGTERM, signal.SIGHUP)
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 
 
@@ -143,5 +143,4 @@ class ProgramSignals:
 SIGNALS = ProgramSignals()
 """One instance, because signal handlers belong to the whole process."""
 
-if hasattr(os, "register_at_fork"):  # not on Windows
-    os.register_at_fork(after_in_child=SIGNALS.forget)
+os.register_at_fork(after_in_child=SIGNALS.forget)

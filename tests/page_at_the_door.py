@@ -37,7 +37,8 @@ class Rig:
         with socket.socket() as trial:
             trial.bind((host, 0))
             port = trial.getsockname()[1]
-        self.server, inside = open_server(folder / "page.sock")
+        inside = folder / "page.sock"
+        self.server = open_server(inside)
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._listener = StopListener(ours, self.stop)
         self._sender = theirs

@@ -436,7 +436,6 @@ def open_as_a_stranger(port: int, monkeypatch: pytest.MonkeyPatch) -> socket.soc
 
 
 @pytest.mark.own_timeouts
-@pytest.mark.skipif(sys.platform != "linux", reason="another system does not tell the user")
 @pytest.mark.parametrize("door", [pipecat.DOOR, wyoming.DOOR], ids=lambda one: one.name)
 def test_another_user_of_this_computer_cannot_speak(
     door: Door, monkeypatch: pytest.MonkeyPatch

@@ -9,10 +9,6 @@ from pathlib import Path
 import pytest
 
 from gazerig.drivers.process import own_folder
-
-if sys.platform != "linux":
-    pytest.skip("terminals are emulated on Linux alone", allow_module_level=True)
-
 from gazerig.drivers.process.own_folder import PREFIX, OwnFolder, sweep
 
 HOLDS = (

@@ -10,7 +10,6 @@ from contextlib import suppress
 import pytest
 from shown_page import wait_for
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux groups sessions")
 ALONE = [sys.executable, "-m", "gazerig.drivers.process.own_session"]
 PROGRAM = """
 import os, signal, sys, time

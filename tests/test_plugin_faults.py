@@ -70,10 +70,13 @@ def end_of_run(
 ) -> tuple[str, list[str], bool]:
     """Run a rig; return the reason of its end, its lines, and whether torque stays on."""
     devices: list[Any] = []
-    build = run_bus.build
-    monkeypatch.setattr(
-        run_bus, "build", lambda *words: devices.append(build(*words)) or devices[-1]
-    )
+    make = run_bus.build
+
+    def build(*words: Any) -> Any:
+        devices.append(make(*words))
+        return devices[-1]
+
+    monkeypatch.setattr(run_bus, "build", build)
     chosen = RunOptions(**{"mock": True, "fast": True, "seconds": 5.0, "seed": 0, **options})
     composed = session.ComposedRun(chosen, assemble(rig, chosen, RIGS_OWN), None, None)
     lines: list[str] = []

@@ -10,7 +10,6 @@ import time_slices
 
 from gazerig.drivers.process.priority import SHORT_S, share_priority
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux groups sessions")
 LOWER = (
     "import os; from pathlib import Path; "
     "from gazerig.drivers.process.priority import lower_priority; "

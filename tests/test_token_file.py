@@ -18,7 +18,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.run import StartLine
 from gazerig.robot.dashboard.door.token_file import read_token
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="files have other rights there")
 GOOD = "Zk3-_mcd94kfuw82kd01xy"
 
 

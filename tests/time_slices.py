@@ -11,7 +11,6 @@ import ctypes
 import os
 import platform
 import struct
-import sys
 
 LONG_S = 0.1
 """The longest that Linux grants (EEVDF, since 6.12); older kernels take the wish and ignore it."""
@@ -27,7 +26,7 @@ _ATTRIBUTES = "=IIQiIQQQ"
 def ask_for(slice_s: float | None) -> bool:
     """Ask for turns of this length for the calling thread; processes it starts have usual ones."""
     call = _SCHED_SETATTR.get(platform.machine())
-    if sys.platform != "linux" or call is None:
+    if call is None:
         return False
     size = struct.calcsize(_ATTRIBUTES)
     runtime_ns = round((slice_s or 0.0) * 1e9)
@@ -43,7 +42,7 @@ def ask_for(slice_s: float | None) -> bool:
 def granted_s() -> float | None:
     """Return the length of the calling thread's turns, None if the system does not report it."""
     call = _SCHED_SETATTR.get(platform.machine())
-    if sys.platform != "linux" or call is None:
+    if call is None:
         return None
     size = struct.calcsize(_ATTRIBUTES)
     answer = ctypes.create_string_buffer(size)

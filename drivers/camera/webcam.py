@@ -1,6 +1,7 @@
 """A Video4Linux camera, read through OpenCV."""
 
 import errno
+import fcntl
 import os
 import struct
 import threading
@@ -228,10 +229,6 @@ def _report(name: str, value: object, why: str) -> Iterator[str]:
 
 def _set_control(file: int, control: int, value: int) -> str:
     """Set a control; return why it failed, "" on success."""
-    try:
-        import fcntl  # absent on Windows
-    except ImportError:
-        return "this system has no Video4Linux"
     try:
         fcntl.ioctl(file, SET_CONTROL, struct.pack("=Ii", control, value))
     except OSError as error:

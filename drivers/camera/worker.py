@@ -71,9 +71,8 @@ def run(
     import cv2  # the control loop's process imports this module too, without OpenCV
 
     # Ctrl-C reaches all processes of a terminal; only the loop may end this one.
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     lower_priority(NICE)
     # One core is left to the loop: if OpenCV uses all cores, the loop is later and no more frames
     # are analysed.

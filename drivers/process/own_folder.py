@@ -5,15 +5,11 @@ process id alone could mislead: another process, or one in another container, ma
 """
 
 import contextlib
+import fcntl
 import os
 import shutil
 import tempfile
 from pathlib import Path
-
-try:
-    import fcntl
-except ImportError:  # Windows: nothing can be said about an owner, and nothing is swept
-    fcntl = None  # type: ignore[assignment]
 
 PREFIX = "gazerig-"
 _HELD = "held"
@@ -48,20 +44,14 @@ class OwnFolder:
         """Remove it and its content; safe to call twice."""
         if self._held >= 0:
             held, self._held = self._held, -1
-            if fcntl is None:  # an open file cannot be removed there
-                os.close(held)
             shutil.rmtree(self.path, ignore_errors=True)
-            if fcntl is not None:
-                os.close(held)
+            os.close(held)
 
 
 def _hold(path: Path) -> int | None:
     """Return the locked file of a new folder; None if a sweep has removed it first."""
     # Not inherited: a server's process must not keep the lock.
-    flags = os.O_CREAT | os.O_RDWR | getattr(os, "O_CLOEXEC", 0)
-    held = os.open(path / _HELD, flags, 0o600)
-    if fcntl is None:
-        return held
+    held = os.open(path / _HELD, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
     try:
         fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if os.path.samestat(os.fstat(held), os.stat(path / _HELD)):
@@ -74,8 +64,6 @@ def _hold(path: Path) -> int | None:
 
 def sweep(parent: Path | None = None) -> None:
     """Remove this user's folders of processes that have ended."""
-    if fcntl is None:
-        return
     for path in (parent or Path(tempfile.gettempdir())).glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):  # another process may remove it, too
             _sweep_one(path)

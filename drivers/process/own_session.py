@@ -21,7 +21,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def parent_death_signal(number: signal.Signals) -> Callable[[], object]:
-    """Return what makes a fork receive a signal when the thread that forked it ends; on Linux."""
+    """Return what makes a fork receive a signal when the thread that forked it ends."""
     prctl = ctypes.CDLL(None).prctl  # loaded before the fork
     return lambda: prctl(_PR_SET_PDEATHSIG, number)
 
@@ -34,8 +34,6 @@ def run(words: list[str]) -> int:
     Raises:
         OSError: it cannot be started.
     """
-    if sys.platform != "linux":
-        os.execvp(words[0], words)
     numbers = {signal.Signals[name] for name in _PASSED_ON}
     if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:  # with nohup it outlives the terminal
         numbers.remove(signal.SIGHUP)

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.process.message_link import MessageLink
 
 _FD_BYTES = 4  # a C int
-CAN_PASS = hasattr(os, "memfd_create") and hasattr(socket, "SCM_RIGHTS")
-"""Whether this system has anonymous memory that can be passed to a process: Linux."""
-_FD_ROOM = socket.CMSG_LEN(_FD_BYTES) if CAN_PASS else 0
+_FD_ROOM = socket.CMSG_LEN(_FD_BYTES)
 
 
 class PassedImage(NamedTuple):
@@ -65,7 +63,7 @@ def send(link: MessageLink, message: bytes, fd: int = -1) -> None:
     Raises:
         OSError: raised by ``socket.send``.
     """
-    if fd < 0 or not isinstance(link, socket.socket):
+    if fd < 0:
         link.send(message)
     else:
         socket.send_fds(link, [message], [fd])
@@ -77,8 +75,6 @@ def receive(link: MessageLink, most: int, flags: int = 0) -> tuple[bytes, int]:
     Raises:
         OSError: raised by ``socket.recv``.
     """
-    if not isinstance(link, socket.socket):
-        return link.recv(most, flags), -1
     # socket.recv_fds of Python 3.11 ignores the flags.
     message, beside, _, _ = link.recvmsg(most, _FD_ROOM, flags)
     for level, kind, data in beside:

@@ -8,7 +8,6 @@ import ctypes
 import os
 import platform
 import struct
-import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -40,7 +39,7 @@ def request_slice(slice_s: float) -> bool:
         Whether the system accepts the request.
     """
     call = _SCHED_SETATTR.get(platform.machine())
-    if sys.platform != "linux" or call is None:
+    if call is None:
         return False
     policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
     if policy not in (os.SCHED_OTHER, os.SCHED_BATCH):
@@ -59,8 +58,6 @@ def lower_priority(steps: int, group: Path = Path("/proc/self/autogroup")) -> No
             it otherwise.
         group: file with the niceness of the session.
     """
-    if not hasattr(os, "nice"):  # Windows has other priorities
-        return
     os.nice(steps)
     if os.getsid(0) != os.getpid():
         try:
@@ -82,7 +79,7 @@ def raise_priority(group: Path = Path("/proc/self/autogroup")) -> None:
     Args:
         group: file with the niceness of the session.
     """
-    if sys.platform == "linux" and os.getsid(0) == os.getpid():
+    if os.getsid(0) == os.getpid():
         with suppress(OSError):
             group.write_text(str(_RAISED), encoding="ascii")
 

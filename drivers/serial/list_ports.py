@@ -6,6 +6,7 @@ others.
 
 import contextlib
 import errno
+import grp
 import os
 import re
 import stat
@@ -98,9 +99,7 @@ def access(device: str) -> Access:
         return Access(False, False, False, "", False)
     allowed = os.access(device, os.R_OK | os.W_OK)
     group, members = str(found.st_gid), []
-    with contextlib.suppress(KeyError, ImportError):  # Windows has no such groups
-        import grp
-
+    with contextlib.suppress(KeyError):
         entry = grp.getgrgid(found.st_gid)
         group, members = entry.gr_name, entry.gr_mem
     joined = found.st_gid in os.getgroups() or os.environ.get("USER", "") in members

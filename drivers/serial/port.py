@@ -5,6 +5,7 @@ It owns the host clock of the servo bus (monotonic seconds).
 
 import os
 import select
+import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,11 +16,6 @@ from serial import Serial, SerialException
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial.list_ports import is_i2c, open_failure_text, persistent_name
-
-try:
-    import termios
-except ImportError:  # without POSIX only emulated servos work
-    termios = None  # type: ignore[assignment]
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
@@ -282,8 +278,6 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             PortError: absent, busy or not permitted.
         """
         self.closePort()
-        if termios is None:
-            raise PortError(f"{self.port_name}: real servos need Linux; use --mock here")
         # A port that was open is found by its adaptor's serial number.
         lasting, name = self._lasting, str(self.port_name)
         if lasting is None:

@@ -228,7 +228,6 @@ class SoundPlayer:
             self._process = child_process.start(
                 _MODULE, *offer.arguments, str(self._fd), self._device,
                 stderr=subprocess.DEVNULL, pass_fds=(*offer.fds, self._fd),
-                variables=offer.variables,
             )  # fmt: skip
         except OSError as error:
             self._link = None

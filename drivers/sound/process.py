@@ -15,7 +15,7 @@ from typing import Any
 import miniaudio
 import msgspec
 
-from gazerig.drivers.process.message_link import DONT_WAIT, TOKEN_VARIABLE, MessageLink, open_link
+from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink, open_link
 from gazerig.drivers.sound.params import SILENT_DEVICE
 from gazerig.drivers.sound.playback import PcmQueue, Playback, SampleSource, SoundEvent
 from gazerig.drivers.sound.position import PositionMemory
@@ -219,7 +219,7 @@ def _error_text(error: Exception, device: str) -> str:
 def main(word: str, memory_fd: int, device: str) -> None:
     """Play until the program is gone."""
     parent = os.getppid()
-    link = open_link(word, os.environ.get(TOKEN_VARIABLE, ""))
+    link = open_link(word)
     player = _Player(link, PositionMemory(memory_fd), device)
     waiting = select.poll()
     waiting.register(link.fileno(), select.POLLIN)

@@ -99,9 +99,7 @@ def measure(software: bool | None) -> ComputerFigures:
     while (passed_s := clock.now_s() - began_s) < _BUSY_S:
         pass
     share = (time.thread_time() - cpu_s) / passed_s
-    allowed = getattr(os, "sched_getaffinity", None)
-    cores = len(allowed(0)) if allowed is not None else os.cpu_count() or 1
-    return ComputerFigures(cores, late / _WAITS, share, software)
+    return ComputerFigures(len(os.sched_getaffinity(0)), late / _WAITS, share, software)
 
 
 if __name__ == "__main__":

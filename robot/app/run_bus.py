@@ -42,7 +42,7 @@ from gazerig.sim_mock.devices import (
 )
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.ideal.bus import IdealBus
-from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
+from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.smart_servo.head_weight import HeadWeight, TurnedJoints
 from gazerig.sim_mock.smart_servo.physics import STEPS_PER_RAD, STEPS_PER_TURN, Physics, ServoSpec
 
@@ -271,7 +271,7 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
     if options.bus == "ideal":
         return ideal_run_bus(rig, ideal_bus(rig, clock.now_s))
     lines = emulated_lines(rig)
-    if not options.fast and has_terminals():
+    if not options.fast:
         buses = PtyBuses()
         paths = buses.start(lines)
         return RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)

@@ -8,27 +8,23 @@ import webbrowser
 from collections.abc import Mapping
 
 
-def has_desktop(environ: Mapping[str, str], platform: str, terminal: bool) -> bool:
+def has_desktop(environ: Mapping[str, str], terminal: bool) -> bool:
     """Return whether a browser can be opened on the user's desktop.
 
     Args:
         environ: Environment variables.
-        platform: Value of ``sys.platform``.
         terminal: Whether standard output is a terminal; otherwise a program has started this one.
     """
     if not terminal or environ.get("CI"):
         return False
     if environ.get("SSH_CONNECTION") or environ.get("SSH_TTY"):
         return False  # it would open on the remote computer, which has no user
-    if platform in ("darwin", "win32"):
-        return True
     return bool(environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY"))
 
 
 def is_desktop_here() -> bool:
     """Return ``has_desktop`` for this process."""
-    terminal = sys.stdout is not None and sys.stdout.isatty()
-    return has_desktop(os.environ, sys.platform, terminal)
+    return has_desktop(os.environ, sys.stdout is not None and sys.stdout.isatty())
 
 
 def open_page(url: str) -> None:

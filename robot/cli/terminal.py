@@ -97,8 +97,6 @@ class LineWriter:
     def _reader_gone(self) -> bool:
         """Return whether a pipe has lost its reader, which only the next write would detect."""
         try:
-            if not hasattr(select, "poll"):  # Windows: the next write detects it
-                return False
             if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
                 return False
             poll = select.poll()

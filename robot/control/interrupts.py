@@ -8,16 +8,10 @@ from typing import Any, Self
 
 from gazerig.robot.model.clock import RealClock
 
-
-def available_signals(*names: str) -> tuple[signal.Signals, ...]:
-    """Return the signals of these names that the operating system has."""
-    return tuple(one for name in names if (one := getattr(signal, name, None)) is not None)
-
-
-ENDING = available_signals("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
-"""Ctrl-C, a request to end, a terminal that was closed, Ctrl-backslash, and Windows' Ctrl-Break."""
-_HANG_UP = available_signals("SIGHUP")
-_BACKGROUND = available_signals("SIGTTIN", "SIGTTOU")
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+"""Ctrl-C, a request to end, a terminal that was closed, and Ctrl-backslash."""
+_HANG_UP = (signal.SIGHUP,)
+_BACKGROUND = (signal.SIGTTIN, signal.SIGTTOU)
 """Signals that would stop a background program when it accesses its terminal, with the torque on.
 """
 

@@ -8,10 +8,10 @@ are made here. Browsers connect through ``gazerig.robot.dashboard.door.auth_prox
 requests are sent to the rig over the same socket.
 """
 
-import contextlib
 import errno
 import logging
 import os
+import resource
 import select
 import shutil
 import signal
@@ -105,7 +105,8 @@ def serve(
         OSError: see ``free_port``.
     """
     open_port = free_port(host, port)
-    server, inside = open_server(folder / "page.sock")
+    inside = folder / "page.sock"
+    server = open_server(inside)
     browsers, widgets = Browsers(token), Widgets()
 
     def name(client: str) -> str:
@@ -176,20 +177,16 @@ def main(arguments: list[str]) -> int:
     """Run the page; return the exit code of the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority(_NICENESS)
-    with contextlib.suppress(ImportError):  # this system has no limit on open files either
-        import resource
-
-        least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
+    least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
     # Standard error is in memory, and a client that sends malformed data fills it with errors.
     logging.disable(logging.CRITICAL)
     fd, stop_fd, parent, host, port = arguments
     token = os.environ.pop(TOKEN_VARIABLE)
     # Do not close it explicitly: its end makes the other side read this process's last messages,
     # and those of an exception are written only after the end of a ``with`` block.
-    shown = os.environ.pop(message_link.TOKEN_VARIABLE, "")
-    feed = message_link.open_link(fd, shown)
-    stop = StopSender(message_link.open_link(stop_fd, shown))
+    feed = message_link.open_link(fd)
+    stop = StopSender(message_link.open_link(stop_fd))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     commands = os.environ.pop(COMMANDS_VARIABLE, "")
     try:

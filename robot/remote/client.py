@@ -52,7 +52,6 @@ from gazerig.robot.remote.socket_io import (
     find_sockets,
     is_private,
     socket_folder,
-    user_id,
 )
 
 if TYPE_CHECKING:
@@ -616,7 +615,7 @@ def connect_to_all(which: int | str | None = None, who: str = "") -> list[RobotC
     if isinstance(which, str) and not which.isdecimal():
         return _select_by_name(connect_to_all(who=who), which)
     pid = None if which is None else int(which)
-    uid = user_id()
+    uid = os.getuid()
     place = socket_folder(os.environ, uid)
     if not is_private(place, uid):  # any user may have put a socket there
         return []

@@ -1,19 +1,15 @@
 """Socket of a running rig: its path, and JSON lines in both directions.
 
 A Unix socket in a folder of the user: programs with access to the user's files may control the
-head; other users and other computers may not. On a system without such sockets, a port of the
-loopback replaces it: the file then contains the port and a token, which a caller must send first.
+head; other users and other computers may not.
 """
 
 import contextlib
-import hmac
 import json
 import os
-import secrets
 import socket
 import stat
 import struct
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, Self
@@ -31,16 +27,6 @@ _PATH_BYTES = 107
 """Longest path of a Unix socket on Linux (unix(7), sun_path), without its ending zero."""
 _CHUNK_BYTES = 1 << 16
 _LONGEST_S = 1e6
-HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX") and hasattr(socket, "SO_PEERCRED")
-"""Whether this system has sockets with paths and identifies their peers: Linux."""
-_LOOPBACK = "127.0.0.1"
-_TOKEN_BYTES = 32
-_TOKEN_S = 1.0
-
-
-def user_id() -> int:
-    """Return the id of the user who runs this program, 0 on systems without user ids."""
-    return os.getuid() if hasattr(os, "getuid") else 0
 
 
 def parse_json(text: str | bytes) -> Any:
@@ -89,8 +75,6 @@ def socket_folder(environ: Mapping[str, str], uid: int) -> Path:
         # unset, or left over from another user by sudo or su
         if runtime and os.path.isdir(runtime) and os.stat(runtime).st_uid == uid:
             return Path(runtime) / "gazerig"
-    if not hasattr(os, "getuid"):  # Windows: other users cannot read this folder
-        return Path(environ.get("LOCALAPPDATA") or tempfile.gettempdir()) / "gazerig"
     return Path(f"/tmp/gazerig-{uid}")
 
 
@@ -120,8 +104,6 @@ def is_private(path: Path, uid: int) -> bool:
         found = path.lstat()
     except FileNotFoundError:
         return False
-    if not hasattr(os, "getuid"):
-        return stat.S_ISDIR(found.st_mode)
     return stat.S_ISDIR(found.st_mode) and found.st_uid == uid and not found.st_mode & 0o077
 
 
@@ -147,8 +129,6 @@ def connect_to_socket(path: Path, within_s: float) -> socket.socket:
     Raises:
         OSError: there is no answer; ConnectionRefusedError if the process is dead.
     """
-    if not HAS_SOCKET_FILES:
-        return _connect_to_port(path, within_s)
     caller = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         caller.settimeout(within_s)
@@ -159,22 +139,8 @@ def connect_to_socket(path: Path, within_s: float) -> socket.socket:
     return caller
 
 
-def _connect_to_port(path: Path, within_s: float) -> socket.socket:
-    """Connect to the port in a file, and send the token."""
-    port, _, token = path.read_text(encoding="ascii").partition(" ")
-    if not port.isdecimal():
-        raise ConnectionRefusedError(f"{path} does not contain a port")
-    caller = socket.create_connection((_LOOPBACK, int(port)), within_s)
-    try:
-        caller.sendall(token.encode())
-    except BaseException:
-        caller.close()
-        raise
-    return caller
-
-
 class Peer(NamedTuple):
-    """Process and user at the other end of a socket; pid 0 if unknown."""
+    """Process and user at the other end of a socket."""
 
     pid: int
     uid: int
@@ -185,17 +151,10 @@ class Listener:
 
     Args:
         end: Listening socket.
-        token: Token that callers must send, "" if the kernel identifies them.
     """
 
-    def __init__(self, end: socket.socket, token: str = "") -> None:
+    def __init__(self, end: socket.socket) -> None:
         self._end = end
-        self._token = token
-
-    @property
-    def waits_for_token(self) -> bool:
-        """Return whether ``identify`` waits for a token from the caller."""
-        return bool(self._token)
 
     def accept(self) -> socket.socket:
         """Wait for a caller, who is not identified yet.
@@ -211,15 +170,9 @@ class Listener:
         Raises:
             OSError: the caller is gone.
         """
-        if not self._token:
-            found = identify_peer(caller)
-            # The folder is closed to others; this is a second check.
-            return found if found.uid == user_id() else None
-        caller.settimeout(_TOKEN_S)
-        shown = b""
-        while len(shown) < _TOKEN_BYTES and (more := caller.recv(_TOKEN_BYTES - len(shown))):
-            shown += more
-        return Peer(0, user_id()) if hmac.compare_digest(shown, self._token.encode()) else None
+        found = identify_peer(caller)
+        # The folder is closed to others; this is a second check.
+        return found if found.uid == os.getuid() else None
 
     def __enter__(self) -> Self:
         """Return the listener itself."""
@@ -244,8 +197,6 @@ def listen(path: Path) -> Listener:
     """
     # Renamed after it listens: a socket that refuses is taken for that of a dead rig.
     early = path.with_name(f"{path.name}.new")
-    if not HAS_SOCKET_FILES:
-        return _listen_on_port(path, early)
     if len(os.fsencode(path)) > _PATH_BYTES - len(".new"):
         raise SetupError(f"{path}: too long for a socket; set XDG_RUNTIME_DIR to a shorter path")
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -261,25 +212,6 @@ def listen(path: Path) -> Listener:
             f"{path}: no socket can be created there ({error.strerror}); no remote control"
         ) from None
     return Listener(listener)
-
-
-def _listen_on_port(path: Path, early: Path) -> Listener:
-    """Listen on a port of the loopback; write port and token to a file of this user."""
-    listener = socket.socket()
-    token = secrets.token_hex(_TOKEN_BYTES // 2)
-    try:
-        listener.bind((_LOOPBACK, 0))
-        listener.listen(128)
-        early.unlink(missing_ok=True)
-        with open(os.open(early, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            file.write(f"{listener.getsockname()[1]} {token}")
-        os.replace(early, path)
-    except OSError as error:
-        listener.close()
-        raise SetupError(
-            f"{path}: no port can be opened there ({error.strerror}); no remote control"
-        ) from None
-    return Listener(listener, token)
 
 
 def identify_peer(end: socket.socket) -> Peer:

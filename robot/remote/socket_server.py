@@ -181,7 +181,7 @@ class RemoteServer:
         Raises:
             SetupError: no socket can be opened; the message names the reason.
         """
-        uid = remote_socket.user_id()
+        uid = os.getuid()
         folder = remote_socket.socket_folder(os.environ, uid)
         remote_socket.make_private(folder, uid)
         remote_socket.remove_dead_sockets(folder)
@@ -222,10 +222,7 @@ class RemoteServer:
                 end = listener.accept()
             except OSError:  # it was closed
                 return
-            if not listener.waits_for_token:  # accept programs in the order of arrival
-                self._admit(end, listener)
-            elif not self._start(self._admit, end, listener):
-                end.close()
+            self._admit(end, listener)
 
     def _admit(self, end: socket.socket, listener: Listener) -> None:
         """Accept a program if it belongs to this user."""
@@ -247,7 +244,7 @@ class RemoteServer:
                 del self._wires[quietest]
                 quietest.close()
             self._wires[wire] = None
-        peer = f"process {caller.pid}" if caller.pid else "another program"
+        peer = f"process {caller.pid}"
         self._start(self._serve, wire, peer)
 
     def _serve(self, wire: Wire, peer: str) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,15 +14,6 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, device_data
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 STOP_S = 2.0
-
-
-def has_terminals() -> bool:
-    """Return whether this system has the pseudo-terminals for emulated servos: Linux."""
-    try:
-        import gazerig.sim_mock.pty.terminal  # noqa: F401
-    except ImportError:
-        return False
-    return sys.platform == "linux"
 
 
 class SentSurroundings(Protocol):

@@ -5,7 +5,6 @@ import pickle
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,9 +15,6 @@ import pytest
 from branch import Branch, gazerig
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.[world]'")
-if sys.platform != "linux":
-    pytest.skip("terminals are emulated on Linux alone", allow_module_level=True)
-
 from gazerig.config.load import shipped_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.run.head_group import HeadGroup, compose_group

@@ -83,7 +83,7 @@ class StudyServer:
             who: Admission(*address, token, f"gazerig_study_{address[1]}_{who}", _OTHERWISE[who])
             for who, token in self._tokens.items()
         }
-        self._loop = asyncio.SelectorEventLoop()
+        self._loop = asyncio.new_event_loop()
         self._over = asyncio.Event()
         self._opened = threading.Event()
         self._failed: OSError | None = None

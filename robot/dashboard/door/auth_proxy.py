@@ -33,7 +33,7 @@ from gazerig.robot.dashboard.door.sockets import (
     close_socket,
     until_one_ends,
 )
-from gazerig.robot.dashboard.door.viser_server import VIEW, ViewAddress, ViewProxy, view_client
+from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_client
 from gazerig.robot.dashboard.requests.outbox import (
     ASKED_BYTES,
     UNCONFIRMED,
@@ -84,7 +84,7 @@ class AuthProxy:
         self,
         host: str,
         port: int,
-        inside: ViewAddress,
+        inside: Path,
         ask: Ask,
         stop: StopSender,
         token: str,
@@ -127,8 +127,7 @@ class AuthProxy:
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
-        # The default loop of Windows cannot wait for sockets.
-        self._loop = asyncio.SelectorEventLoop()
+        self._loop = asyncio.new_event_loop()
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
         self._relay = RigRelay(rig)

@@ -34,14 +34,14 @@ def read_token(path: Path) -> str:
         return token
     try:
         # Opening a pipe without a writer would block.
-        file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         with open(file, encoding="ascii", errors="replace") as there:
             about, text = os.fstat(file), there.read(300)
     except OSError as error:
         raise _unusable(path, error) from None
     if not stat.S_ISREG(about.st_mode):
         raise SetupError(f"--token-file {path}: not a file")
-    if os.name == "posix" and (about.st_mode & 0o077 or about.st_uid not in (0, os.getuid())):
+    if about.st_mode & 0o077 or about.st_uid not in (0, os.getuid()):
         raise SetupError(
             f"--token-file {path}: other users may read it, or own it: chown $USER, chmod 600"
         )

@@ -8,19 +8,14 @@ it and bypass the door. So it listens on a Unix socket that no other user can re
 import asyncio
 import contextlib
 import functools
-import hmac
-import http
-import secrets
-import socket
 from collections.abc import Awaitable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import aiohttp
 import viser
 import websockets.asyncio.server as websocket_server
 from aiohttp import web
-from aiohttp.abc import AbstractResolver, ResolveResult
 from viser import _messages, transforms
 from yarl import URL
 
@@ -36,46 +31,24 @@ from gazerig.robot.dashboard.requests.pointer_to_look import ViewCamera
 
 BROWSER_HEADER = "X-Gazerig-Browser"
 """Header with the name of a websocket's browser."""
-KEY_HEADER = "X-Gazerig-Key"
-"""Header with the key by which a server on a TCP port recognises the door."""
-HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX")
 TO_BROWSER_BYTES = 1 << 25
 """Longest message to a browser, bytes."""
 FROM_BROWSER_BYTES = 1 << 20
 """Longest message from a browser, bytes; messages of the page's script have a few kB."""
 
 
-class ViewAddress(NamedTuple):
-    """Address of the server, for the door.
-
-    path: path of its Unix socket; None: it listens on a port of the loopback
-    key: key that each request to that port must contain, because other users can reach it
-    """
-
-    path: Path | None
-    port: int = 0
-    key: str = ""
-
-
-def open_server(socket_path: Path) -> tuple[viser.ViserServer, ViewAddress]:
+def open_server(socket_path: Path) -> viser.ViserServer:
     """Open a server on a new Unix socket, in a folder of this user only.
-
-    On a system without Unix sockets it uses a port of the loopback and requires a key.
 
     Raises:
         OSError: the socket cannot be created.
     """
-    inside = ViewAddress(socket_path)
-    if not HAS_SOCKET_FILES:
-        inside = ViewAddress(None, key=secrets.token_hex(16))
-    with _listening_inside(inside):
+    with _listening_inside(socket_path):
         server = viser.ViserServer(host="127.0.0.1", port=0, label="gazerig", verbose=False)
-    if inside.path is None:
-        inside = inside._replace(port=server.get_port())
     # A browser must not be able to publish this page on the internet.
     for publish in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(publish)
-    return server, inside
+    return server
 
 
 def browser_of(server: viser.ViserServer, client_id: int) -> str:
@@ -98,29 +71,14 @@ def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
 
 
 @contextlib.contextmanager
-def _listening_inside(inside: ViewAddress) -> Iterator[None]:
-    """Within the block, make viser's server, which supports only ports, serve only the door.
-
-    It listens on a socket file, or accepts only requests with the key on its port.
-    """
+def _listening_inside(path: Path) -> Iterator[None]:
+    """Within the block, make viser's server, which supports only ports, listen on a socket file."""
     serve = websocket_server.serve
 
     @functools.wraps(serve)
     def for_the_door(handler: object, host: str, port: int, **settings: Any) -> object:
         settings["max_size"] = FROM_BROWSER_BYTES
-        if inside.path is not None:
-            return serve(handler, unix=True, path=str(inside.path), **settings)  # type: ignore[arg-type]
-        answer = settings["process_request"]
-
-        def checked(connection: Any, request: Any) -> Any:
-            if not hmac.compare_digest(
-                request.headers.get(KEY_HEADER, "").encode(), inside.key.encode()
-            ):
-                return connection.respond(http.HTTPStatus.FORBIDDEN, "")
-            return answer(connection, request)
-
-        settings["process_request"] = checked
-        return serve(handler, host, port, **settings)  # type: ignore[arg-type]
+        return serve(handler, unix=True, path=str(path), **settings)  # type: ignore[arg-type]
 
     websocket_server.serve = for_the_door  # type: ignore[assignment, misc]
     try:
@@ -147,41 +105,10 @@ _FRAMED = {
 }
 
 
-class _ViewResolver(AbstractResolver):
-    """Resolver that returns one address for every name."""
-
-    def __init__(self, port: int) -> None:
-        self._port = port
-
-    async def resolve(
-        self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET
-    ) -> list[ResolveResult]:
-        """Return the server's address."""
-        return [
-            ResolveResult(
-                hostname=host,
-                host="127.0.0.1",
-                port=self._port,
-                family=socket.AF_INET,
-                proto=0,
-                flags=socket.AI_NUMERICHOST,
-            )
-        ]
-
-    async def close(self) -> None:
-        """Close nothing."""
-
-
-def view_client(inside: ViewAddress) -> aiohttp.ClientSession:
+def view_client(socket_path: Path) -> aiohttp.ClientSession:
     """Return a client of the server behind the door; called in the door's event loop."""
-    connector: aiohttp.BaseConnector
-    if inside.path is not None:
-        connector = aiohttp.UnixConnector(str(inside.path), limit=0)
-    else:
-        connector = aiohttp.TCPConnector(limit=0, resolver=_ViewResolver(inside.port))
-    return aiohttp.ClientSession(
-        connector=connector, auto_decompress=True, headers={KEY_HEADER: inside.key}
-    )
+    connector = aiohttp.UnixConnector(str(socket_path), limit=0)
+    return aiohttp.ClientSession(connector=connector, auto_decompress=True)
 
 
 class ViewProxy:

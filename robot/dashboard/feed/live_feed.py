@@ -14,7 +14,6 @@ from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
@@ -53,9 +52,8 @@ from gazerig.robot.model.scene_view import PinholeView, SceneView
 from gazerig.robot.model.types import Level, LoopFigures, OtherHead, Snapshot
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
-TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
-"""First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, and a frame
-with its pixels."""
+TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
+"""First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, and a frame."""
 
 _DRAWING_SHARE = 0.1
 """Largest share of a processor for drawing images of a simulated camera that delivers none."""
@@ -172,15 +170,6 @@ def frame_message(
     return DETECTED + encode(head)
 
 
-def frame_with_pixels(
-    found: Detections, array: NDArray[Any], depth: bool, wants_depth: bool
-) -> bytes:
-    """Return a message like ``frame_message`` that contains the pixels: no memory is attached."""
-    image = PassedImage(-1, array.shape, array.dtype.str)
-    head = frame_message(found, image, depth, wants_depth)[1:]
-    return PIXELS + len(head).to_bytes(4, "little") + head + np.ascontiguousarray(array).tobytes()
-
-
 class LiveFeed:
     """Receives the rig's messages; returns the data to show.
 
@@ -236,9 +225,6 @@ class LiveFeed:
                 self._world = rig.world
         elif kind == DETECTED:
             self._take_frame(FrameHeader(*decode_plain(body)), fd)
-        elif kind == PIXELS:
-            end = 4 + int.from_bytes(body[:4], "little")
-            self._take_frame(FrameHeader(*decode_plain(body[4:end])), -1, body[end:])
         else:
             return False
         return True
@@ -338,7 +324,7 @@ class LiveFeed:
             self._gaze.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 
-    def _take_frame(self, head: FrameHeader, fd: int, pixels: bytes | None = None) -> None:
+    def _take_frame(self, head: FrameHeader, fd: int) -> None:
         lens = None
         if head.lens is not None:
             fx_px, fy_px, cx_px, cy_px, k1, k2, p1, p2, k3 = head.lens
@@ -354,11 +340,8 @@ class LiveFeed:
             people=tuple([DetectedPerson(*one) for one in head.people]),
             conditions=tuple(head.conditions),
         )
-        if head.shape is not None and (fd >= 0 or pixels is not None):
-            if pixels is None:
-                array = take_image(PassedImage(fd, tuple(head.shape), head.dtype))
-            else:
-                array = np.frombuffer(pixels, np.dtype(head.dtype)).reshape(head.shape)
+        if head.shape is not None and fd >= 0:
+            array = take_image(PassedImage(fd, tuple(head.shape), head.dtype))
             found = replace(found, depth_m=array) if head.depth else replace(found, image=array)
         self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
 

@@ -11,7 +11,6 @@ import os
 import pickle
 import secrets
 import subprocess
-import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +24,7 @@ from urllib.parse import urlsplit
 from gazerig.drivers.process import child_process, message_link
 from gazerig.drivers.process.message_link import MessageLink
 from gazerig.drivers.process.own_folder import OwnFolder
-from gazerig.drivers.process.passed_image import CAN_PASS, send
+from gazerig.drivers.process.passed_image import send
 from gazerig.robot.dashboard.requests.inbox import (
     BEAT,
     MESSAGE_BYTES,
@@ -70,7 +69,6 @@ _CHECK_S = 0.25  # between two checks that the process neither hangs nor was sus
 _HANG_S = 5.0
 """Time without a message after which a page that receives snapshots counts as hung, s."""
 _LAST_LINES_BYTES = 4096
-_MOST_PIXELS = 1 << 23  # of a message that contains images
 _MOST_WORDS = 20_000  # length of one answer, in characters
 _MAX_PENDING = 100  # waiting answers to a page that accepts none
 _AGAIN_AFTER_S = 0.5
@@ -191,7 +189,6 @@ class PageProcess:
                     ONCE_VARIABLE: self._once if self.started == 0 else "",
                     FOLDER_VARIABLE: str(self._folder.path),
                     COMMANDS_VARIABLE: str(self._commands() or ""),
-                    **links.variables,
                 },
             )
         finally:
@@ -258,7 +255,7 @@ class PageProcess:
         fd: file descriptor to send with it, -1 for none; the caller still owns it
         """
         page = self._socket
-        if page is None or len(message) > (MESSAGE_BYTES if CAN_PASS else _MOST_PIXELS):
+        if page is None or len(message) > MESSAGE_BYTES:
             return False
         try:
             send(page, message, fd)
@@ -414,16 +411,12 @@ class PageProcess:
 
 
 def _errors_file() -> BinaryIO:
-    """Return a file without a name, in memory if the system supports it."""
-    if hasattr(os, "memfd_create"):
-        return os.fdopen(os.memfd_create("page_errors"), "w+b", buffering=0)
-    return tempfile.TemporaryFile(buffering=0)
+    """Return a file without a name, in memory."""
+    return os.fdopen(os.memfd_create("page_errors"), "w+b", buffering=0)
 
 
 def _read_tail(file: BinaryIO) -> bytes:
     """Return the last bytes of a file that another process may still write to."""
     start = max(0, os.fstat(file.fileno()).st_size - _LAST_LINES_BYTES)
-    if hasattr(os, "pread"):  # keeps the position at which the other process writes
-        return os.pread(file.fileno(), _LAST_LINES_BYTES, start)
-    file.seek(start)
-    return file.read(_LAST_LINES_BYTES)
+    # Keeps the position at which the other process writes.
+    return os.pread(file.fileno(), _LAST_LINES_BYTES, start)

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from math import inf
 
-from gazerig.drivers.process.passed_image import CAN_PASS, copy_image
+from gazerig.drivers.process.passed_image import copy_image
 from gazerig.drivers.types import Detections
 from gazerig.robot.control.command_handler import ParamAccess, to_plain
 from gazerig.robot.control.observers import failure_text
@@ -21,7 +21,6 @@ from gazerig.robot.dashboard.feed.live_feed import (
     LiveRig,
     RunState,
     frame_message,
-    frame_with_pixels,
     rig_message,
     state_message,
 )
@@ -243,9 +242,6 @@ class Publisher:
             self._page.show_detections(frame_message(found, None, False, self.depth))
             return
         self._images = True
-        if not CAN_PASS:
-            self._page.show_detections(frame_with_pixels(found, array, depth, self.depth))
-            return
         image = copy_image(array)
         try:
             self._page.show_detections(frame_message(found, image, depth, self.depth), image.fd)
