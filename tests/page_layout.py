@@ -15,7 +15,7 @@ MEASURE = """(() => {
   const name = e => `${e.tagName.toLowerCase()}${e.id ? '#' + e.id : ''}` +
     ` "${(e.textContent || e.getAttribute('aria-label') || '').trim().slice(0, 30)}"`;
   const seen = e => e.checkVisibility({visibilityProperty: true, opacityProperty: true});
-  const scrolls = e => e.closest('#drawer, #camera, #replay, #notices');
+  const scrolls = e => e.closest('#drawer, #camera, #notices');
   const inside = (r, o) => r.left >= o.left - 1 && r.right <= o.right + 1;
   const page = {left: 0, right: innerWidth, top: 0, bottom: innerHeight};
   const shown = [...document.querySelectorAll('button, input, select, textarea, summary, iframe,' +
@@ -42,7 +42,7 @@ MEASURE = """(() => {
   }
   if (document.documentElement.scrollWidth > innerWidth) faults.push('the page is too wide');
   if (document.documentElement.scrollHeight > innerHeight) faults.push('the page is too high');
-  for (const e of document.querySelectorAll('#drawer, #drawer > section, #notices, #replay, header')) {
+  for (const e of document.querySelectorAll('#drawer, #drawer > section, #notices, header')) {
     if (seen(e) && e.scrollWidth > e.clientWidth + 1) faults.push(`${name(e)} is too wide`);
   }
   const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);

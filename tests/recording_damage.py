@@ -22,7 +22,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import run
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
-from gazerig.robot.recording.playback import SnapshotIndex
 from gazerig.robot.recording.read import RunRecording, report_bad_contents
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
@@ -166,16 +165,6 @@ def _exported(file: Path) -> object:
         return collect_gaze_angles(RunRecording(file).ticks()).time_s.tolist()
 
 
-def _shown(file: Path) -> object:
-    with report_bad_contents(file):
-        found = RunRecording(file)
-        frames = SnapshotIndex(found.ticks(), found.frames(), found.info.rate_hz)
-    try:
-        return len(frames)
-    finally:
-        frames.close()
-
-
 def _again(file: Path) -> object:
     with report_bad_contents(file):
         done = rerun(RunRecording(file))
@@ -194,7 +183,7 @@ def _reported(file: Path) -> object:
 
 
 USES: dict[str, Callable[[Path], object]] = {
-    "export": _exported, "replay": _shown, "rerun": _again, "report": _reported,
+    "export": _exported, "rerun": _again, "report": _reported,
 }  # fmt: skip
 
 

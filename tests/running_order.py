@@ -33,7 +33,6 @@ COSTS_S = {
     "camera_health": 7,
     "compare": 7,
     "run": 7,
-    "two_heads": 7,
     "behaviours": 6,
     "bus_kinds": 6,
     "cli_calibrate_face": 6,

@@ -37,7 +37,7 @@ TO_SERVOS = [
     if re.match(r"(jog|look-at|home|monitor|reboot|doctor|scan)\b", w)
     and not re.search(r"--mock|--port|myhead", w)
 ]
-ON_A_RECORDING = [w for w in COMMANDS if re.match(r"export|replay .*--rerun", w)]
+ON_A_RECORDING = [w for w in COMMANDS if re.match(r"export|rerun ", w)]
 ENDLESS = [w for w in COMMANDS if w.startswith("emulate ")]
 LIVE = {*TO_A_HEAD, *TO_SERVOS, *ON_A_RECORDING, *ENDLESS}
 

@@ -67,7 +67,7 @@ def test_it_is_exported_and_reported(
     recorded: tuple[RunRecording, list[Tick]], tmp_path: Path
 ) -> None:
     path = str(recorded[0].path)
-    assert invoked("export", path, "--csv", "--out", str(tmp_path / "gaze")).code == 0
+    assert invoked("export", path, "--out", str(tmp_path / "gaze")).code == 0
     about = json.loads((tmp_path / "gaze_samples.json").read_text())
     assert about["joints"] == list(NAMES)
     assert invoked("report", path, "--out", str(tmp_path / "report.html")).code in (0, 1)

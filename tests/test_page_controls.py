@@ -332,7 +332,7 @@ def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
     unchecked = {"do": "tune", "changes": [["guard.max_speed", 1e9]]}
     words = heard.hear(unchecked)
     assert words is not None and words.startswith("refused") and heard.orders == []
-    for nonsense in ({}, {"pick": {"x": "1"}}, {"replay": {"play": True}}, {"tune": 3}):
+    for nonsense in ({}, {"pick": {"x": "1"}}, {"tune": 3}):
         words = heard.hear(nonsense)
         assert words is not None and words.startswith("refused")
 

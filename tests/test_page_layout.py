@@ -1,7 +1,6 @@
 """The page in every state on a desk, a laptop and a phone: all in sight, nothing cut off."""
 
 import itertools
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -15,7 +14,7 @@ from present import present
 from shown_page import SNAPSHOT, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.camera_overlay import encode
-from gazerig.robot.dashboard.feed.page_process import REPLAY, PageProcess
+from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.types import Snapshot
 
@@ -318,19 +317,3 @@ def test_what_is_measured_finds_faults_that_are_there(shown: Shown, size: str) -
         assert "button-name" in serious and "color-contrast" in serious
     finally:
         shown.browser.run("document.querySelector('#bad').remove()")
-
-
-# The last: a page that has shown a recording shows no rig any more.
-@pytest.mark.parametrize("window", SIZES)
-def test_a_recording_has_its_controls_and_no_stop(shown: Shown, window: str) -> None:
-    shown.size(window)
-    state = {"at_s": 2.5, "duration_s": 60.0, "playing": True, "speed": 1.0, "sought_s": None}
-    shown.page.send(REPLAY + json.dumps(state).encode())
-    hidden = "document.querySelector('#rig-stop').hidden"
-    wait_for(lambda: value(shown.browser, hidden) is True, "the recording")
-    slider = "document.querySelector('[data-panel=replay] input[type=range]') !== null"
-    wait_for(lambda: value(shown.browser, slider) is True, "its controls")
-    assert faults(shown.browser) == []
-    assert violations(shown.browser) == []
-    stage = present(boxes(shown.browser)["stage"])
-    assert stage[3] - stage[1] > 0.25 * SIZES[window][1]

@@ -37,9 +37,6 @@ from gazerig.robot.dashboard.feed.camera_overlay import (
 from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices
 from gazerig.robot.dashboard.feed.page_process import (
     MESSAGE_BYTES,
-    REPLAY,
-    decode_snapshot,
-    encode_snapshot,
 )
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.panels.attention_panel import reason_text, salience_bars, target_text
@@ -73,7 +70,6 @@ from gazerig.robot.dashboard.panels.servo_health import (
     health_table,
     no_data_text,
     no_feedback_note,
-    other_heads,
     servo_table,
     strain_of_heat,
     strain_of_load,
@@ -93,7 +89,6 @@ from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import (
     CommandedPose,
     LoopFigures,
-    OtherHead,
     SeenBlink,
     SeenCamera,
     SeenFace,
@@ -151,17 +146,6 @@ def test_target_reason_and_guard_are_told_and_run_no_markup() -> None:
     for word in ("guard: limited", "3 lost", "too &lt;fast&gt; (joint 0, +5)"):
         assert word in health_table(shot)
     assert "too" not in health_table(snapshot()) and alarms(snapshot()) == ""
-
-
-def test_what_the_other_heads_do_is_told_and_that_one_is_let_go_is_an_alarm() -> None:
-    well, limp = (
-        OtherHead("anna", "looks at <1>"),
-        OtherHead("bert", "the torque is off: hot", "torque_off"),
-    )
-    shot = replace(snapshot(), others=(well, limp))
-    assert "anna: looks at &lt;1&gt;" in other_heads(shot) and other_heads(snapshot()) == ""
-    assert "bert: the torque is off: hot" in alarms(shot) and "anna" not in alarms(shot)
-    assert decode_snapshot(encode_snapshot(shot)).others == shot.others
 
 
 @pytest.mark.parametrize(
@@ -935,31 +919,11 @@ def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> Non
     assert seen() == set()
 
 
-def test_a_recording_without_pictures_says_so(server: viser.ViserServer) -> None:
-    widgets = Widgets()
-    view = PageView(server, widgets, Outbox(None), Nobody().tell)  # type: ignore[arg-type]
-    state = {"at_s": 1.0, "duration_s": 9.0, "playing": False, "speed": 1.0, "sought_s": None}
-    assert view._panel.image.data == b""
-    without = {**state, "pictures": False}
-    view.show(News((healthy(),), None, ended=False, others=((REPLAY, without),)))
-    shown = cv2.imdecode(np.frombuffer(view._panel.image.data, np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert shown is not None and 0.01 < (shown > 180).mean() < 0.1  # words on a dark ground
-
-
 def test_bus_faults_are_told_in_plain_words() -> None:
     errors = {"timeout": 74, "rearmed": 1, "late computer": 0, "pulse": 2}
     said = health_text(BusHealth(0, 0, errors))
     assert said == "bus: pulse 2 times, torque switched on again 1 time, no answer 74 times"
     assert health_text(BusHealth(0, 0, {})) == "bus ok"
-
-
-def test_a_recording_that_stands_still_is_no_silent_rig(server: viser.ViserServer) -> None:
-    button = Nobody()
-    view = PageView(server, Widgets(), Outbox(None), button.tell)  # type: ignore[arg-type]
-    state = {"at_s": 1.0, "duration_s": 9.0, "playing": False, "speed": 1.0, "sought_s": None}
-    view.show(News((healthy(),), None, ended=False, others=((REPLAY, state),)))
-    view.silent()
-    assert button.reported["recording"] is True and "silent" not in button.reported
 
 
 def test_the_age_of_the_frame_is_said_once() -> None:

@@ -319,7 +319,7 @@ def values(*words: str) -> dict[str, Any]:
         (("scan",), None),
         (("scan", "my.yaml"), "my.yaml"),
         (("emulate", "maker"), "maker"),
-        (("replay", "a.mcap", "my.yaml", "--rerun"), "my.yaml"),
+        (("rerun", "a.mcap", "my.yaml"), "my.yaml"),
         (("home", "my.yaml"), "my.yaml"),
     ],
 )

@@ -113,7 +113,7 @@ def test_a_recorded_run_is_run_again_to_the_same_bytes(
     run = figures("--seconds", "2", "--record", str(file))
     assert run["ticks"] == pytest.approx(2 * 200, abs=2)
     assert run["stopped_by"] == "seconds" and file.stat().st_size > 10_000
-    again = ran("replay", str(file), "--rerun")
+    again = ran("rerun", str(file))
     assert again.returncode == 0, again.stderr
     words = re.sub(r"\s+", " ", again.stdout + again.stderr)
     assert "ticks are bit-identical; the bytes on the bus are the same" in words

@@ -1,7 +1,6 @@
 """Runs of a rig of six hobby servos without a neck: recorded, done again, reported, exported."""
 
 import csv
-import gzip
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,12 +19,8 @@ from gazerig.robot.analysis.blink_finder import UPPER, lid_openings
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.page_process import decode_snapshot
-from gazerig.robot.recording.export_bids import DatasetDescription as Subject
-from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
-from gazerig.robot.recording.playback import SnapshotIndex
 from gazerig.robot.recording.run_format import HEALTH
 from gazerig.robot.recording.tick_record import as_json, from_json
 from gazerig.robot.remote.request_handler import LoopMonitor
@@ -157,23 +152,6 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
         assert said["estimated_joints"] == said["reckoned_joints"] == expected
 
 
-def test_a_data_set_says_that_its_gaze_is_estimated(maker: Run, tmp_path: Path) -> None:
-    trace = collect_gaze_angles(maker.ticks)
-    labels = label_samples(trace)
-    about = Subject("maker", "visitor", 200.0, STARTED, "gazerig")
-    write_bids(trace, labels, find_intervals(trace, labels), about, tmp_path)
-    wanted = {1: ["lid", "lower_lid"], 2: ["lid", "lower_lid"], 3: []}
-    for eye, more in wanted.items():
-        (path,) = tmp_path.rglob(f"*eye{eye}_physio.json")
-        said = json.loads(path.read_text())
-        assert said["GazeBasis"] == "estimated"
-        assert said["EstimatedJoints"] == said["ReckonedJoints"] == list(SIX)
-        assert "not measured" in said["EyeTrackingMethod"]
-        assert said["Columns"] == ["timestamp", "x_coordinate", "y_coordinate", *more]
-        with gzip.open(path.with_name(path.name.replace(".json", ".tsv.gz")), "rt") as table:
-            assert {line.count("\t") for line in table} == {2 + len(more)}
-
-
 def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
     silent = [
         tick._replace(joints=tick.joints._replace(missing=missing))
@@ -186,10 +164,3 @@ def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
         assert np.isnan(eye[:, 0]).tolist() == [True, False, False]
     assert np.isnan(trace.lower_lids).tolist() == [[False] * 2, [False, True], [False] * 2]
     assert np.isnan(trace.head_deg).all()  # there is no neck
-
-
-def test_the_page_shows_a_recording_of_them(maker: Run) -> None:
-    frames = SnapshotIndex(iter(maker.ticks[:100]), (), 200.0)
-    shot = decode_snapshot(frames.message(len(frames) - 1))
-    assert shot.joints == shot.estimated == SIX and shot.lower_lids is not None
-    frames.close()

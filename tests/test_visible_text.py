@@ -49,7 +49,7 @@ def test_what_rich_sends_stays_and_what_a_name_holds_does_not():
     [
         ("check", f"/nowhere/{EVIL}.yaml"),
         ("import", f"/nowhere/{EVIL}.csv"),
-        ("replay", f"/nowhere/{EVIL}.mcap"),
+        ("rerun", f"/nowhere/{EVIL}.mcap"),
         ("run", "--mock", "--no-page", "--video", f"/nowhere/{EVIL}.avi"),
         (EVIL,),
         ("run", f"--{EVIL}"),

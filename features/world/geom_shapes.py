@@ -1,6 +1,6 @@
 """The geoms of a compiled MuJoCo model as coloured meshes in their initial poses."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from math import cos, pi, sin
 from typing import Any, NamedTuple
 
@@ -14,7 +14,6 @@ from gazerig.robot.description.mesh import (
     Painted,
     ellipsoid,
     lathe,
-    merge_meshes,
     smooth_normals,
 )
 from gazerig.robot.description.texture import TexturedMesh
@@ -71,31 +70,6 @@ def fixed_parts(
             seen = ((_ROOM_M - vertices[first]) * normals[first]).sum(axis=1) > 0.0
             surface = surface._replace(mesh=Mesh(vertices, faces[seen]))
         yield WorldPart(f"geom{geom}", _paint_surface(model, geom, surface), "cloth")
-
-
-def body_parts(model: Any, bodies: Iterable[int]) -> Iterator[tuple[int, WorldPart]]:
-    """Yield the parts of moving bodies in the frame of their body, with the body's number.
-
-    Args:
-        model: mujoco.MjModel
-        bodies: their numbers; all geoms of a body without a picture become one part
-    """
-    for body in bodies:
-        plain: list[Painted] = []
-        name, first = model.body(body).name, int(model.body_geomadr[body])
-        for geom in range(first, first + int(model.body_geomnum[body])):
-            if (made := _surface(model, geom)) is None:
-                continue
-            R = np.empty(9)
-            mujoco.mju_quat2Mat(R, model.geom_quat[geom])
-            surface = _move_surface(made, model.geom_pos[geom].copy(), R.reshape(3, 3))
-            shape = _paint_surface(model, geom, surface)
-            if isinstance(shape, Painted):
-                plain.append(shape)
-            else:
-                yield body, WorldPart(f"{name}/{geom}", shape, "plastic", moves=True)
-        if plain:
-            yield body, WorldPart(name, merge_meshes(plain), "plastic", moves=True)
 
 
 def _surface(model: Any, geom: int) -> _Surface | None:

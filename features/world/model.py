@@ -1,7 +1,7 @@
-"""A world compiled for MuJoCo: a room or a user's MJCF, people, and one rig or several."""
+"""A world compiled for MuJoCo: a room or a user's MJCF, people, and a rig."""
 
 from collections.abc import Sequence
-from math import cos, sin, tau
+from math import tau
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,8 +20,7 @@ STEP_S = 0.001
 """Time step of physics, which is also that of the control loop of the emulated servos."""
 
 MOUNT = "gazerig"
-"""Name of the site or frame in a user's MJCF for the neck base of the first rig; that of a further
-rig has the rig's prefix appended: ``gazerig_other``."""
+"""Name of the site or frame in a user's MJCF for the neck base of the rig."""
 
 BASE_LINK = "base_link"
 """The body of a rig that does not move; its frame is the frame of the neck base."""
@@ -29,15 +28,15 @@ BASE_LINK = "base_link"
 ROTOR_KG_M2 = 1e-5
 """Inertia of a shaft until a servo is joined to it, so that a light lid stays stable."""
 
-FIRST = "rig_"
-"""Prefix of a rig without its own prefix, because a room may have a head, too."""
+PREFIX = "rig_"
+"""Prefix of the rig's names, because a room may have a head, too."""
 
 STOP_TIME_S = 0.004
 """Time constant of a hard stop; it is damped so that nothing bounces."""
 
 
 class RigIndices(NamedTuple):
-    """The indices of one rig's parts in the arrays of MuJoCo.
+    """The indices of a rig's parts in the arrays of MuJoCo.
 
     names: prefix of its names in the model
     qpos, dof: of each joint by its name without the prefix
@@ -66,18 +65,18 @@ class WorldModel(NamedTuple):
 def world_model(
     figures: Figures | None, rigs: Sequence[RigInWorld], mjcf_file: Path | None = None
 ) -> WorldModel:
-    """Return a room with people and rigs, compiled.
+    """Return a room with people and a rig, compiled.
 
     Args:
         figures: the people of a script, and with it their room; None: an empty floor.
-        rigs: each with its own prefix.
+        rigs: the rig; () for a room without one.
         mjcf_file: a user's world instead of the room.
 
     Raises:
         SetupError: the user's file cannot be used; names the file and the remedy.
     """
     if mjcf_file is None:
-        spec = _room_spec(figures, rigs)
+        spec = _room_spec(figures)
     else:
         refuse_excessive(mjcf_file)
         try:
@@ -100,11 +99,11 @@ def world_model(
     return WorldModel(model, figures, tuple(_indices(model, *one) for one in placed))
 
 
-def _room_spec(figures: Figures | None, rigs: Sequence[RigInWorld]) -> Any:
+def _room_spec(figures: Figures | None) -> Any:
     """Return a specification of the room and the people of a script."""
     spec = mujoco.MjSpec()
     if figures is not None:
-        add_room(spec, figures.script, [rig.p_m for rig in rigs])
+        add_room(spec, figures.script)
         add_people(spec, figures)
         return spec
     spec.worldbody.add_light(pos=[1.0, 0.5, 2.0], dir=[-0.3, -0.2, -1.0])
@@ -134,48 +133,40 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
     """
     frame = None
     if mjcf_file is not None:
-        names = [rig.prefix + name for name in rig.stops_rad]
+        names = list(rig.stops_rad)
         missing = [name for name in names if spec.joint(name) is None]
         if not missing:
             for actuator in tuple(spec.actuators):  # servos turn these joints instead
                 if actuator.target in names:
                     spec.delete(actuator)
-            return rig.prefix
+            return ""
         if len(missing) < len(names):
             raise SetupError(
                 f"{mjcf_file}: it has some joints of the rig, but not {', '.join(missing)}: add "
                 "them, or rename its own and mark a place with a site for the program's head"
             )
-        frame = _mount(spec, rig, mjcf_file)
+        frame = _mount(spec, mjcf_file)
     if frame is None:
-        frame = spec.worldbody.add_frame(
-            pos=list(rig.p_m), quat=[cos(rig.yaw_rad / 2.0), 0.0, 0.0, sin(rig.yaw_rad / 2.0)]
-        )
+        frame = spec.worldbody.add_frame()
     xml, assets = rig.body()
     head = mujoco.MjSpec.from_string(xml, assets=dict(assets))
     for actuator in tuple(head.actuators):
         head.delete(actuator)
     # A site and a frame have different arguments.
     where = {"site": frame} if isinstance(frame, mujoco.MjsSite) else {"frame": frame}
-    spec.attach(head, prefix=rig.prefix or FIRST, **where)
-    return rig.prefix or FIRST
+    spec.attach(head, prefix=PREFIX, **where)
+    return PREFIX
 
 
-def _mount(spec: Any, rig: RigInWorld, path: Path) -> Any:
+def _mount(spec: Any, path: Path) -> Any:
     """Return the site or frame of a user's world for the neck base."""
-    name = mount_name(rig.prefix)
-    found = spec.site(name) or spec.frame(name)
+    found = spec.site(MOUNT) or spec.frame(MOUNT)
     if found is None:
         raise SetupError(
-            f'{path}: no place for the head: add <site name="{name}" pos="0 0 1"/> where its neck '
+            f'{path}: no place for the head: add <site name="{MOUNT}" pos="0 0 1"/> where its neck '
             "base stands (x forward, z up), or joints with the names of the rig's"
         )
     return found
-
-
-def mount_name(prefix: str) -> str:
-    """Return the name of the site of a user's world for a rig: ``gazerig``, ``gazerig_other``."""
-    return "_".join((MOUNT, prefix.strip("_"))) if prefix else MOUNT
 
 
 def _add_servos(spec: Any, rig: RigInWorld, prefix: str) -> None:
@@ -220,7 +211,7 @@ def _indices(model: Any, rig: RigInWorld, prefix: str) -> RigIndices:
     names = [servo.name for servo in rig.servos]
     for name, stops in rig.stops_rad.items():
         model.jnt_range[joints[name].id] = stops
-    R, p_m = _base(model, rig, prefix)
+    R, p_m = _base(model, prefix)
     return RigIndices(
         rig,
         prefix,
@@ -233,12 +224,12 @@ def _indices(model: Any, rig: RigInWorld, prefix: str) -> RigIndices:
     )
 
 
-def _base(model: Any, rig: RigInWorld, prefix: str) -> tuple[Mat3, Vec3]:
+def _base(model: Any, prefix: str) -> tuple[Mat3, Vec3]:
     """Return the pose of a rig's neck base: its base body, or the site of a user's own head."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, prefix + BASE_LINK)
-    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, mount_name(rig.prefix))
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, MOUNT)
     if base < 0 and site < 0:
         return IDENTITY, ORIGIN
     R, p = (

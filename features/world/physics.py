@@ -1,4 +1,4 @@
-"""Simulation of the world: MuJoCo in steps of a millisecond, moved by the servos of its rigs."""
+"""Simulation of the world: MuJoCo in steps of a millisecond, moved by the servos of its rig."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -99,7 +99,7 @@ class World:
 
     # --- devices
 
-    def device(self, line: Emulated, bus: str = "", seed: int = 0, rig: int = 0) -> Device:
+    def device(self, line: Emulated, bus: str = "", seed: int = 0) -> Device:
         """Build the servos of one bus, moved by this world.
 
         Raises:
@@ -110,7 +110,7 @@ class World:
             raise SetupError(
                 f"a bus of kind {line.kind} has no servos that a world could move: leave --world out"
             )
-        indices = self.model.rigs[rig]
+        indices = self.model.rigs[0]
         own = {one.id: one for one in indices.rig.servos if one.bus == bus}
 
         def axis(servo_id: int) -> ShaftAxis | None:
@@ -142,9 +142,9 @@ class World:
         self._devices.append(device)
         return device
 
-    def ideal_shafts(self, rig: int = 0) -> tuple[IdealShaft, ...]:
+    def ideal_shafts(self) -> tuple[IdealShaft, ...]:
         """Return shafts without servos, in the order of the rig's servos."""
-        indices = self.model.rigs[rig]
+        indices = self.model.rigs[0]
         shafts = tuple(
             IdealShaft(self._axis(indices, one), one.steps_per_turn) for one in indices.rig.servos
         )
@@ -258,38 +258,28 @@ class World:
 
     # --- from outside
 
-    def push(
-        self, body: str, force_n: tuple[float, float, float], for_s: float, rig: int = 0
-    ) -> None:
-        """Push a body of a rig for a time, at its own origin.
+    def push(self, body: str, force_n: tuple[float, float, float], for_s: float) -> None:
+        """Push a body of the rig for a time, at its own origin.
 
         Args:
-            body: its name in the rig, such as "head", with the prefix that a further rig has.
+            body: its name in the rig, such as "head".
             force_n: force in the world's axes.
             for_s: duration.
-            rig: number of the rig in the world.
 
         Raises:
             ValueError: the body does not exist.
         """
-        number = self._body(body, rig)
+        number = self._body(body)
         if number < 0:
-            names = self.model.rigs[rig].names
+            names = self.model.rigs[0].names
             bodies = [self._mj.body(i).name for i in range(1, self._mj.nbody)]
             own = [name[len(names) :] for name in bodies if name.startswith(names)]
             raise ValueError(f"no body {body!r}: there is {', '.join(own)}")
         self._pushes.append(_Push(number, np.array(force_n), self._ms + round(for_s * 1000.0)))
 
-    def has_body(self, body: str, rig: int = 0) -> bool:
-        """Return whether a rig has a body of this name, given with the rig's own prefix."""
-        return self._body(body, rig) >= 0
-
-    def _body(self, body: str, rig: int) -> int:
-        """Return the number of a rig's body, -1 if it does not exist."""
-        placed = self.model.rigs[rig]
-        name = placed.names + body.removeprefix(placed.rig.prefix)
-        if placed.rig.prefix and not body.startswith(placed.rig.prefix):
-            return -1
+    def _body(self, body: str) -> int:
+        """Return the number of a body of the rig, -1 if it does not exist."""
+        name = self.model.rigs[0].names + body
         return int(mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, name))
 
     def move(self, body: str, p_m: tuple[float, float, float]) -> None:
@@ -308,6 +298,6 @@ class World:
         """Return the current state."""
         return WorldState(self._script_s(), np.array(self._data.qpos))
 
-    def joints_rad(self, rig: int = 0) -> dict[str, float]:
-        """Return the current true joint angles of a rig."""
-        return {n: float(self._data.qpos[at]) for n, at in self.model.rigs[rig].qpos.items()}
+    def joints_rad(self) -> dict[str, float]:
+        """Return the current true joint angles of the rig."""
+        return {n: float(self._data.qpos[at]) for n, at in self.model.rigs[0].qpos.items()}

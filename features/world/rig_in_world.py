@@ -90,21 +90,16 @@ class ServoInWorld(NamedTuple):
 
 
 class RigInWorld(NamedTuple):
-    """A rig and its pose.
+    """A rig at the origin of a world, unless the world is a user's.
 
     body: returns its body as MJCF with the rig's joint names, and the files that the MJCF names.
         It can be sent, so that only processes with MuJoCo compute it
     stops_rad: hard stops of each joint
     start_rad: initial angle of each joint, 0 if not given
     servos: the servos that turn the joints
-    prefix: prefix of its names in the world, "" for the first rig
-    p_m, yaw_rad: position of its neck base in the world, and its rotation to the left
     """
 
     body: Callable[[], tuple[str, Mapping[str, bytes]]]
     stops_rad: Mapping[str, tuple[float, float]]
     start_rad: Mapping[str, float]
     servos: tuple[ServoInWorld, ...]
-    prefix: str = ""
-    p_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    yaw_rad: float = 0.0

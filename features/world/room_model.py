@@ -1,6 +1,5 @@
 """Rooms of a world as geoms of a MuJoCo model: walls, furniture, light."""
 
-from collections.abc import Sequence
 from math import cos, pi, sin
 from typing import Any
 
@@ -23,14 +22,11 @@ _TABLE_BELOW_M = 0.20
 """Height of the neck base on its plinth above the table's top."""
 
 
-def add_room(
-    spec: Any, script: SceneScript, plinths_m: Sequence[Vec3] = ((0.0, 0.0, 0.0),)
-) -> None:
-    """Add the room of a script to a specification, with its light."""
+def add_room(spec: Any, script: SceneScript) -> None:
+    """Add the room of a script to a specification, with its light and the stand of the rig."""
     room = _Room(spec, -script.neck_height_m)
     {"living-room": _living_room, "gym": _gym, "hall": _hall}[script.room](room)
-    for x, y, z in plinths_m:
-        _stand(room, script.room, x, y, z)
+    _stand(room, script.room)
     _light(spec, script)
 
 
@@ -201,19 +197,19 @@ def _chair(room: _Room, place: Place) -> None:
             room.box(at(ahead, aside, 0.5 * tall), (0.04, 0.04, tall), _WOOD, yaw)
 
 
-def _stand(room: _Room, name: str, x: float, y: float, z: float) -> None:
-    """Build the base of a rig: a table and a plinth, in the gym a post."""
-    above = z - room.floor_m
+def _stand(room: _Room, name: str) -> None:
+    """Build the base of the rig: a table and a plinth, in the gym a post."""
+    above = -room.floor_m
     if name == "gym":
-        room.cylinder((x - 0.05, y, 0.0), 0.09, above + FLOOR_M, (60, 62, 70))
-        room.box((x - 0.05, y, 0.03), (0.5, 0.5, 0.06), (46, 48, 54))
+        room.cylinder((-0.05, 0.0, 0.0), 0.09, above + FLOOR_M, (60, 62, 70))
+        room.box((-0.05, 0.0, 0.03), (0.5, 0.5, 0.06), (46, 48, 54))
         return
     top = above - _TABLE_BELOW_M
-    room.cylinder((x - 0.02, y, top), 0.07, _TABLE_BELOW_M + FLOOR_M, (72, 74, 80), 0.3)
-    room.box((x - 0.10, y, top - 0.02), (0.72, 1.30, 0.04), (150, 112, 76), 0.0, 0.15, True)
+    room.cylinder((-0.02, 0.0, top), 0.07, _TABLE_BELOW_M + FLOOR_M, (72, 74, 80), 0.3)
+    room.box((-0.10, 0.0, top - 0.02), (0.72, 1.30, 0.04), (150, 112, 76), 0.0, 0.15, True)
     for ahead in (-0.42, 0.22):
         for aside in (-0.60, 0.60):
-            room.box((x + ahead, y + aside, 0.5 * (top - 0.04)), (0.05, 0.05, top - 0.04), _WOOD)
+            room.box((ahead, aside, 0.5 * (top - 0.04)), (0.05, 0.05, top - 0.04), _WOOD)
 
 
 def _gym(room: _Room) -> None:
@@ -280,12 +276,10 @@ def _light(spec: Any, script: SceneScript) -> None:
         # name, position, direction, level of red, green and blue, specular, shadows
         ("window", [-0.6, -2.2, 1.3], [0.62, 0.62, -0.48], light.window, 0.98, 0.93, 0.15, light.shadows),
         ("lamp", [0.5, 0.8, 1.5], [0.35, -0.45, -0.82], light.lamp, 0.97, 0.90, 0.05, False),
-        ("opposite", [2.6, 1.6, 1.4], [-0.74, -0.48, -0.47], light.opposite, 0.98, 0.93, 0.10, False),
     ]  # fmt: skip
     for name, pos, direction, level, green, blue, specular, shadows in lights:
-        if name != "opposite" or level:
-            spec.worldbody.add_light(
-                name=f"room/{name}", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=pos,
-                dir=direction, ambient=[0.0] * 3, diffuse=[level, green * level, blue * level],
-                specular=[specular] * 3, castshadow=shadows,
-            )  # fmt: skip
+        spec.worldbody.add_light(
+            name=f"room/{name}", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=pos,
+            dir=direction, ambient=[0.0] * 3, diffuse=[level, green * level, blue * level],
+            specular=[specular] * 3, castshadow=shadows,
+        )  # fmt: skip

@@ -6,7 +6,6 @@ start and must not miss a part of the round.
 
 import json
 from collections.abc import Callable
-from math import cos, sin
 from pathlib import Path
 
 from gazerig.features.world.physics import World
@@ -42,13 +41,9 @@ MOST_N = 100.0
 
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:
-    """Push a body of a rig; that of a further rig is named with its prefix."""
-    rig = next((nth for nth in range(len(world.model.rigs)) if world.has_body(body, nth)), 0)
-    placed = world.model.rigs[rig].rig
+    """Push a body of the rig."""
     x, y, z = DIRECTIONS[to]
-    c, s = cos(placed.yaw_rad), sin(placed.yaw_rad)
-    force = newton * (c * x - s * y), newton * (s * x + c * y), newton * z
-    world.push(body, force, seconds, rig)
+    world.push(body, (newton * x, newton * y, newton * z), seconds)
     return f"{body} is pushed {to} with {newton:g} N for {seconds:g} s"
 
 
@@ -95,14 +90,13 @@ class ServedWorld:
         self._due_ms = 0
         self._begun = False
 
-    def joints(self) -> list[dict[str, int]]:
-        """Return the indices of the joints of each rig in a state."""
-        return [rig.qpos for rig in self.world.model.rigs]
+    def joints(self) -> dict[str, int]:
+        """Return the indices of the rig's joints in a state."""
+        return self.world.model.rigs[0].qpos
 
     def device(self, bus: BusSettings) -> Device:
-        """Return an emulated device whose servos move the joints of one of the world's rigs."""
-        name = bus.rig_bus if bus.rig_bus is not None else bus.name or ""
-        return self.world.device(bus.device, name, bus.seed, bus.rig)
+        """Return an emulated device whose servos move the joints of the world's rig."""
+        return self.world.device(bus.device, bus.name or "", bus.seed)
 
     def obey(self, text: str) -> str:
         """Execute a command of the world; return {"ok": ...} or {"error": ...} as JSON."""

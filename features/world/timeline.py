@@ -1,7 +1,6 @@
 """Acts of people in a room: durations from its paths, targets, and faults of the script."""
 
 from collections.abc import Iterable, Iterator
-from math import hypot
 
 from gazerig.features.world.object_handover import handover_faults
 from gazerig.features.world.room import (
@@ -52,7 +51,6 @@ def timed_acts(script: SceneScript, name: str, seed: int) -> tuple[TimedAct, ...
     return timeline.timed_acts(script, name, seed, lasts_s, target)
 
 
-HEADS_APART_M = 0.4
 """Smallest distance of two necks."""
 
 
@@ -61,7 +59,6 @@ def script_faults(script: SceneScript) -> Iterable[Fault]:
     if script.room == "none":
         yield "room", "a world needs one: play the script with --scene, or name a room"
         return
-    yield from _misplaced_heads(script)
     found = [*_space_faults(script), *name_faults(script, places_of(script))]
     yield from found
     if found:
@@ -72,20 +69,6 @@ def script_faults(script: SceneScript) -> Iterable[Fault]:
         yield from overlap_faults(script, f"people.{name}", timelines[name])
         yield from _walk_paths(script, name, person)
     yield from _crowding_faults(script)
-
-
-def _misplaced_heads(script: SceneScript) -> Iterator[Fault]:
-    """Find heads with an invalid name or too close to another."""
-    placed = [("", 0.0, 0.0)]
-    for name, head in script.heads.items():
-        key = f"heads.{name}"
-        if not name.isidentifier() or name == HEAD or name in script.people:
-            yield key, "a name has letters, digits and _, begins with a letter and is unique"
-        for other, x_m, y_m in placed:
-            if hypot(head.x_m - x_m, head.y_m - y_m) < HEADS_APART_M:
-                beside = f"head {other}" if other else "the first head"
-                yield key, f"it is less than {HEADS_APART_M} m from {beside}: move it away"
-        placed.append((name, head.x_m, head.y_m))
 
 
 def _space_faults(script: SceneScript) -> Iterator[Fault]:

@@ -1,9 +1,8 @@
-"""World as a scene for the score, the true gaze and detectors, in the frame of any head."""
+"""World as a scene for the score, the true gaze and detectors."""
 
-from collections.abc import Callable, Sequence
 from functools import cached_property
 from math import atan2
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +11,9 @@ from gazerig.features.world.motions import FIST_M, OUT_S
 from gazerig.features.world.opponent_motion import Opponent
 from gazerig.features.world.rotations import rotation_matrix, rotation_vector
 from gazerig.features.world.timeline import HEAD_M, place_m
-from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub, yaw_pitch
-from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing
+from gazerig.gaze.angles import yaw_pitch
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 from gazerig.sim_mock.scenes.timeline import HALF_FIELD_RAD, TimedAct, events_of
 
 GLOVE_M, HAND_M, THING_M = 0.078, 0.07, 0.05
@@ -132,69 +131,3 @@ class WorldScene:
 
 def _vec(row: Floats) -> Vec3:
     return float(row[0]), float(row[1]), float(row[2])
-
-
-class RigFrame(NamedTuple):
-    """Pose of a rig's neck base in the world; everything in the robot is in this frame."""
-
-    R: Mat3
-    p_m: Vec3
-
-    def point(self, p_world_m: Vec3) -> Vec3:
-        """Return a point of the world in the frame of the rig."""
-        return rotate_back(self.R, sub(p_world_m, self.p_m))
-
-    def direction(self, v_world: Vec3) -> Vec3:
-        """Return a direction of the world in the frame of the rig."""
-        return rotate_back(self.R, v_world)
-
-    def in_world(self, R: Mat3, p_m: Vec3) -> tuple[Mat3, Vec3]:
-        """Return a pose in the rig's frame as a pose in the world."""
-        return compose(self.R, R), add(self.p_m, rotate(self.R, p_m))
-
-
-class HeadFace(NamedTuple):
-    """Present face of a head in the world: rotation of the head, tip of the nose."""
-
-    R: Mat3
-    nose_m: Vec3
-
-
-class HeadsScene:
-    """Scene in the world's frame and the faces of other heads, in the frame of one rig.
-
-    The events of a scene state expectations of the first head only.
-    """
-
-    def __init__(
-        self, scene: Scene, frame: RigFrame, faces: Sequence[Callable[[], HeadFace]], first: bool
-    ) -> None:
-        self._scene, self._frame, self._faces, self._first = scene, frame, tuple(faces), first
-        self.name, self.round_s = scene.name, scene.round_s
-        self.behaviours = scene.behaviours
-
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return the people, followed by the present faces of the other heads."""
-        own = self._frame
-        found = []
-        for person in self._scene.people(t_s):
-            yaw, pitch = person.face_yaw_pitch_rad
-            ahead = rotate(rotation((yaw, pitch, 0.0)), (1.0, 0.0, 0.0))
-            hand = None if person.hand is None else own.point(person.hand)
-            found.append(
-                ScenePerson(own.point(person.p_world_face_m), yaw_pitch(own.direction(ahead)), hand)
-            )
-        for face in self._faces:
-            R, nose_m = face()
-            ahead = rotate(R, (1.0, 0.0, 0.0))
-            found.append(ScenePerson(own.point(nose_m), yaw_pitch(own.direction(ahead)), None))
-        return tuple(found)
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the other gaze targets."""
-        things = self._scene.things(t_s)
-        return tuple(one._replace(p_world_m=self._frame.point(one.p_world_m)) for one in things)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return the events before the first head; nothing is expected of the other heads."""
-        return self._scene.events() if self._first else ()

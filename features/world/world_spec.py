@@ -17,11 +17,11 @@ _SPEC, _STATE, _PEOPLE = "world", "state", "people.npy"
 
 
 class WorldSpec(NamedTuple):
-    """Content of a world: a room, its people and the rigs in it.
+    """Content of a world: a room, its people and the rig in it.
 
     Attributes:
         figures: the people, whose script defines the room; None for an empty floor.
-        rigs: the program controls the first one.
+        rigs: the rig; () for a room without one.
         mjcf_file: a user's own world instead of the room.
     """
 

@@ -46,7 +46,6 @@ from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.joint_latency import JointLatency
 from gazerig.robot.control.loop import Robot
-from gazerig.robot.control.robot_group import NamedRobot
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
@@ -79,7 +78,6 @@ class Assembly(NamedTuple):
     live_params: holds the present rig and applies changes to the running parts
     inject_fault: executes a fault command of the emulated servos, None for real or ideal ones
     room: the surroundings of --world, None without
-    other_heads: the other heads of the same room, which are stopped and resumed with it
     """
 
     robot: Robot
@@ -93,7 +91,6 @@ class Assembly(NamedTuple):
     live_params: LiveParams
     inject_fault: Callable[[str], str] | None = None
     room: RunRoom | None = None
-    other_heads: tuple[NamedRobot, ...] = ()
 
     def shown_rig(self) -> ShownRig:
         """Return the visible structure of the present rig."""
@@ -155,7 +152,7 @@ def assemble(
     Args:
         rig: the configuration.
         options: options of the run.
-        substitutes: wrappers or replacements of the rig's own parts, by a recording, a replay or a
+        substitutes: wrappers or replacements of the rig's own parts, by a recording, a rerun or a
             calibration.
         room: open surroundings with other robots of the caller; None: they are opened if
             ``options`` name some.

@@ -27,7 +27,6 @@ from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text, slower_rate
 from gazerig.robot.control.observers import Observers, failure_text
-from gazerig.robot.control.robot_group import RobotGroup
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.door.token_file import hide_token
@@ -110,13 +109,12 @@ class RunObservers:
         self._measured = options.computer is not None and options.rate is None
         self._relief_s = -inf
         self._choice = level_text(options.computer) if options.computer is not None else ""
-        self._tuning, self._recorder, self._world_recorded = tuning, recorder, False
-        self._commanded = RobotGroup(assembly.robot, assembly.other_heads)
+        self._tuning, self._recorder = tuning, recorder
         name = options.name or rig_name(options.rig)
         about = {"rig": options.rig, "name": name, "pid": os.getpid()}
         self._live = (
             LiveServer(
-                self._commanded,
+                assembly.robot,
                 tuning,
                 (ConfigError,),
                 assembly.clock,
@@ -163,7 +161,7 @@ class RunObservers:
         self.attach(self._observers)
 
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
-        command, steer = self._commanded.command, self._steer
+        command, steer = self._made.robot.command, self._steer
         page_requests = PageRequestHandler(
             command if steer is None else stop_only_handler(command),
             params=self._tuning,
@@ -214,23 +212,13 @@ class RunObservers:
             self._figures = self._timing.figures()
         return RunState(
             errors, *in_force, robot.perception.residual(), start_s,
-            [other.describe() for other in self._made.other_heads], self._figures,
+            self._figures,
             menus.get("expression", ("",))[0],
         )  # fmt: skip
-
-    def _record_world(self, tick: Tick) -> None:
-        """Record the surroundings, once their start is known."""
-        if self._world_recorded or self._recorder is None or self._made.room is None:
-            return
-        if (world := self._made.room.world_info()) is not None:
-            self._recorder.record_world(world)
-            self._world_recorded = True
 
     def attach(self, observers: Observers) -> None:
         """Add all of them as observers of the ticks; any that fails is dropped."""
         if self._recorder is not None:
-            if self._made.room is not None:
-                observers.add("recording the surroundings", self._record_world)
             observers.add("the recording", self._recorder.record)
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)

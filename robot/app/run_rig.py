@@ -113,7 +113,7 @@ def with_surroundings(rig: Rig, options: RunOptions) -> Rig:
     return rig if options.world is None else replace(rig, motion=replace(rig.motion, gloves=True))
 
 
-def run_info(rig: Rig, options: RunOptions, placement: tuple[float, ...] = ()) -> RunInfo:
+def run_info(rig: Rig, options: RunOptions) -> RunInfo:
     """Return the header of a run's recording."""
     eyes = options.camera_source or f"scene {options.scene}"
     if options.camera_source is None and options.world is not None:
@@ -135,5 +135,4 @@ def run_info(rig: Rig, options: RunOptions, placement: tuple[float, ...] = ()) -
         bus=options.bus or "emulated",
         pictures_hz=options.record_pictures,
         versions=versions(),
-        placement=placement,
     )

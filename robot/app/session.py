@@ -16,7 +16,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_info, run_rig
-from gazerig.robot.app.surroundings import RunRoom
 from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.event_text import group_events, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
@@ -110,15 +109,12 @@ class ComposedRun(NamedTuple):
     voice: RunVoice | None = None
 
 
-def compose(
-    options: RunOptions, substitutes: Substitutes = RIGS_OWN, room: RunRoom | None = None
-) -> ComposedRun:
+def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> ComposedRun:
     """Assemble one run; nothing moves.
 
     Args:
         options: Options of the run.
         substitutes: Parts of a program; a recorder wraps the body.
-        room: Open surroundings that contain other robots; None for a single robot.
 
     Raises:
         gazerig.config.load.ConfigError: the rig, character, profile or walk is invalid.
@@ -128,12 +124,15 @@ def compose(
     if options.record is None:
         recorder = None
     else:
+        from gazerig.robot.app.rig_description import description_of  # with meshes
+        from gazerig.robot.description.urdf import urdf
         from gazerig.robot.recording.recorder import Recorder  # imports file formats
 
-        info = run_info(rig, options, () if room is None else room.placement)
-        recorder = Recorder(options.record, info, options.force, patient=options.fast)
+        info = run_info(rig, options)
+        shown = urdf(description_of(rig, looks=False), looks=False).xml
+        recorder = Recorder(options.record, info, options.force, options.fast, shown)
         substitutes = substitutes._replace(body=recorder.wrap_body)
-    assembly = assemble(rig, options, substitutes, room)
+    assembly = assemble(rig, options, substitutes)
     names = (options.rig, options.character, options.profile)
     tuning = ParamStore(assembly.live_params, assembly.robot.command, *names)
     voice = RunVoice(
@@ -154,7 +153,6 @@ def run(
     status: Callable[[str], None] | None = None,
     watch: Callable[[Tick], object] | None = None,
     browse: Callable[[str], object] | None = None,
-    ends: Callable[[str], object] | None = None,
     summarised: bool = True,
 ) -> dict[str, object]:
     """Run until the time is over, a signal arrives or a part fails; return the figures.
@@ -166,7 +164,6 @@ def run(
         status: Rewrites the status line; None for none.
         watch: Receives every tick.
         browse: Opens the page in the user's browser; None: the user does.
-        ends: Receives the reason of the end, before the head parks.
         summarised: also summarise every tick, for figures of the gaze and of a scene's events.
 
     Raises:
@@ -174,7 +171,7 @@ def run(
     """
     try:
         session = Session(composed, stopped, say, status, watch, browse, summarised)
-        return session.run(ends)
+        return session.run()
     finally:
         composed.assembly.close()
 
@@ -255,19 +252,14 @@ class Session:
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
         return self._stopped() or self._interrupts() or (SECONDS if over else None)
 
-    def run(self, ends: Callable[[str], object] | None = None) -> dict[str, object]:
-        """Run from torque on to torque off; return the figures.
-
-        ends: receives the reason of its end, before the head parks
-        """
+    def run(self) -> dict[str, object]:
+        """Run from torque on to torque off; return the figures."""
         wall = RealClock()
         began_s = wall.now_s()
         with self.power_on() as loop:
             while (reason := loop.step()) is None:
                 pass
             self.stopped_by = reason
-            if ends is not None:
-                ends(reason)
         wall_s = wall.now_s() - began_s
         self._faults.close()
         figures = run_figures(

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from gazerig.drivers.errors import PluginError, SetupError
+from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import SURROUNDINGS, find, is_ours, registrations
 
 if TYPE_CHECKING:
@@ -19,11 +19,9 @@ if TYPE_CHECKING:
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.app.program_parts import ProgramParts
     from gazerig.robot.app.run_bus import CameraPoses, RunBus
-    from gazerig.robot.control.tick import Tick
     from gazerig.robot.description.world_shapes import WorldShapes
     from gazerig.robot.model.clock import Clock
     from gazerig.robot.model.frames import CameraParams
-    from gazerig.robot.recording.run_info import WorldInfo
     from gazerig.sim_mock.scenes.scene import Scene
 
 WORLD = "world"
@@ -46,11 +44,6 @@ class RunRoom(Protocol):
     @property
     def run_bus(self) -> "RunBus":
         """Return the bus of the rig's servos; its ``close`` ends the surroundings."""
-        ...
-
-    @property
-    def placement(self) -> tuple[float, ...]:
-        """Return the rig's placement, as in ``RunInfo.placement``; () at the origin."""
         ...
 
     def camera(
@@ -82,25 +75,6 @@ class RunRoom(Protocol):
 
     def shapes(self) -> "WorldShapes | None":
         """Return its appearance for the page, None if it is not shown."""
-        ...
-
-    def world_info(self) -> "WorldInfo | None":
-        """Return its part of a recording, None before its script has begun or without a script."""
-        ...
-
-
-class GroupRun(Protocol):
-    """A run of several heads."""
-
-    def run(
-        self,
-        stopped: Callable[[], str | None],
-        say: Callable[[str], None],
-        status: Callable[[str], None] | None = None,
-        watch: "Callable[[Tick], object] | None" = None,
-        browse: Callable[[str], object] | None = None,
-    ) -> dict[str, object]:
-        """Run; arguments and figures as in ``gazerig.robot.app.session.run``."""
         ...
 
 
@@ -146,26 +120,6 @@ class Surroundings(ABC):
     def names(self) -> tuple[str, ...]:
         """Return the names for shell completion of ``--world``."""
         return ()
-
-    def group(self, options: "RunOptions") -> GroupRun | None:
-        """Return the run of several heads, None for a single head.
-
-        Raises:
-            SetupError: they cannot be used.
-        """
-        return None
-
-    def replay_shapes(self, info: "WorldInfo", placement: tuple[float, ...]) -> "WorldShapes":
-        """Return the appearance of a recorded run's surroundings, relative to its head's neck base.
-
-        Args:
-            info: Result of ``RunRoom.world_info``.
-            placement: placement of the head, as in ``RunInfo.placement``.
-
-        Raises:
-            SetupError: they cannot be shown; the message has the reason.
-        """
-        raise SetupError(f"the surroundings {info.name} are not shown: they store no shapes")
 
 
 def surroundings(name: str) -> Surroundings:

@@ -51,13 +51,14 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
     },
     "Look back": {
-        "replay": CommandEntry(
-            "replay",
-            "Show a recorded run on the page, with a time slider; or run it again with --rerun.",
+        "rerun": CommandEntry(
+            "recordings",
+            "Run a recording's input through the present models: same input, same bytes.",
         ),
         "export": CommandEntry(
-            "replay",
-            "Export a recorded run for eye-tracking tools: degrees, + left and + up.",
+            "recordings",
+            "Export a run as CSV for eye-tracking tools: samples and events, degrees, + left and + "
+            "up.",
         ),
     },
     "Study": {},

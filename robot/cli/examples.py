@@ -16,7 +16,7 @@ EXAMPLES: dict[str, Examples] = {
         ("run --mock --video party.mp4", "an emulated rig that watches a film"),
         ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
         ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other computers too"),
-        ("run my.yaml --oak --record evening.mcap", "record every tick, for replay and reports"),
+        ("run my.yaml --oak --record evening.mcap", "record every tick, for reruns and reports"),
     ),
     "new": (
         ("new", "asks for board, mechanism, camera and eye distance, and writes myrig.yaml"),
@@ -124,14 +124,11 @@ EXAMPLES: dict[str, Examples] = {
         ("ctl fault lose 3 for 2", "an emulated servo of the running rig is silent for 2 s"),
         ("ctl fault help", "list all faults"),
     ),
-    "replay": (
-        ("replay evening.mcap", "on the page, with a time slider"),
-        ("replay evening.mcap --rerun", "the same input, with the present code and settings"),
+    "rerun": (
+        ("rerun evening.mcap", "the same input, with the present code and settings"),
+        ("rerun evening.mcap my.yaml", "with the settings of this rig"),
     ),
-    "export": (
-        ("export evening.mcap --csv --out gaze", "tables for eye-tracking tools"),
-        ("export evening.mcap --bids --out study", "a BIDS data set"),
-    ),
+    "export": (("export evening.mcap --out gaze", "tables for eye-tracking tools"),),
 }
 """Command of the core -> examples, each with its purpose."""
 

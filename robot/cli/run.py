@@ -4,7 +4,6 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,18 +93,12 @@ def run(
         browse = open_page if not no_browser and is_desktop_here() else None
         opening = StartLine("" if fast else start_text(asked))
         with exit_on_signals():
-            group = None
-            if asked.world is not None:
-                from gazerig.robot.app.surroundings import surroundings
-
-                group = surroundings(asked.world).group(asked)  # None: a single head
-            if group is not None:
-                carry_out = group.run
-            else:
-                told = summary is not None
-                carry_out = partial(session.run, session.compose(asked), summarised=told)
+            composed = session.compose(asked)
         with record_signals() as stopped:
-            figures = carry_out(stopped, opening.say, shows, opening.update, browse)
+            figures = session.run(
+                composed, stopped, opening.say, shows, opening.update, browse,
+                summarised=summary is not None,
+            )  # fmt: skip
         if summary is not None:
             text = json.dumps(figures, indent=2) + "\n"
             if summary == "-":

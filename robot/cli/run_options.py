@@ -137,7 +137,7 @@ Heatmap = Annotated[
 ]
 HeatmapFace = Annotated[Path | None, typer.Option(help="Frame of a face behind the heat map.")]
 Record = Annotated[
-    Path | None, typer.Option(help="Record every tick, for replay and reports: FILE.mcap.")
+    Path | None, typer.Option(help="Record every tick, for reruns and reports: FILE.mcap.")
 ]
 RecordPictures = Annotated[
     float, typer.Option(min=0.0, max=60.0, help="Camera frames per second in the recording.")

@@ -6,20 +6,18 @@ import viser
 
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.door.viser_server import browser_of
-from gazerig.robot.dashboard.feed.camera_overlay import encode, no_pictures_image
+from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices, ShownWorld
 from gazerig.robot.dashboard.feed.page_process import (
     ALL_USERS,
     CHOICES,
     MESSAGE,
     PARAMS,
-    REPLAY,
     TRACKS,
     VALUES,
 )
 from gazerig.robot.dashboard.panels.controls import Controls, refused_moves
 from gazerig.robot.dashboard.panels.panel import PanelView
-from gazerig.robot.dashboard.panels.replay import ReplayView
 from gazerig.robot.dashboard.panels.servo_health import no_data_text
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.glb import add_lights
@@ -67,7 +65,6 @@ class PageView:
         self._layers = OverlayPanel(server.scene)
         self._panel.depth = lambda on: outbox.ask({"show": {"depth": on}}, ALL_USERS)
         self._controls = Controls(widgets, server.scene, outbox)
-        self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._menus: Mapping[str, Sequence[str]] = {}
         self.emulated = False
@@ -104,19 +101,16 @@ class PageView:
         if news.snapshots:
             self._newest = news.snapshots[-1]
             shot = self._newest
-            if self._replay is not None:  # it can neither be stopped nor resumed
-                self._tell({"recording": True, **headline_json(ControlSource("recording"), shot)})
-            else:
-                self._tell({
-                    "stopped": shot.stopped,
-                    "silent": False,
-                    # Joints without feedback jump when the torque is switched on.
-                    "without_feedback": len(shot.estimated),
-                    "emulated": self.emulated,
-                    "opponent": self._world_now is not None and has_opponent(self._world_now.shapes),
-                    "refused": refused_moves(self._menus, shot.joints),
-                    **headline_json(shot.control_source, shot),
-                })  # fmt: skip
+            self._tell({
+                "stopped": shot.stopped,
+                "silent": False,
+                # Joints without feedback jump when the torque is switched on.
+                "without_feedback": len(shot.estimated),
+                "emulated": self.emulated,
+                "opponent": self._world_now is not None and has_opponent(self._world_now.shapes),
+                "refused": refused_moves(self._menus, shot.joints),
+                **headline_json(shot.control_source, shot),
+            })  # fmt: skip
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
         self._world_now = news.world
@@ -153,21 +147,6 @@ class PageView:
                 self._controls.offer(data)
             elif kind == VALUES:
                 self._controls.update_values(data)
-            elif kind == REPLAY:
-                if self._replay is None:
-                    duration_s = data.get("duration_s")
-                    # the first message always contains it
-                    assert isinstance(duration_s, int | float)
-                    self._controls.remove_controls()
-                    self._tell({"recording": True})
-                    self._replay = ReplayView(
-                        self._widgets.panel("replay"),
-                        lambda client, asked: self._outbox.ask(asked, client),
-                        float(duration_s),
-                    )
-                if data.get("pictures") is False:
-                    self._image = no_pictures_image()
-                self._replay.show(data)
 
     def _draw(self) -> None:
         if self._newest is not None:
@@ -181,8 +160,7 @@ class PageView:
             self._head.show(self._newest, sight=layers.sight, camera=layers.camera)
             self._people.show(self._newest, parts=layers.parts)
             self._layers.show(self._newest, layers, self._head.lid_edges)
-            if self._replay is None:
-                self._controls.show(self._newest)
+            self._controls.show(self._newest)
             self._drawn = True
         self._panel.show()
         if self._jpeg is not None:
@@ -194,7 +172,7 @@ class PageView:
     def silent(self) -> None:
         """Show that no more data arrives, together with the last data."""
         self.show(News((), None, ended=False))
-        if self._drawn and self._replay is None:  # a recording may be paused
+        if self._drawn:
             self._panel.silence.content = no_data_text()
             self._tell({"stopped": "", "silent": True})
 

@@ -6,11 +6,9 @@ The page, the status line, other programs and Python all use these texts.
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-ControlKind = Literal[
-    "gaze", "person", "pointer", "joint", "track", "stopped", "parking", "recording"
-]
+ControlKind = Literal["gaze", "person", "pointer", "joint", "track", "stopped", "parking"]
 """gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
-target is a person's mouse pointer; joint: joints are held; recording: a recorded run is shown."""
+target is a person's mouse pointer; joint: joints are held."""
 
 _WORTH_TELLING_S = 1.0
 """Shorter durations of control are not shown."""
@@ -198,8 +196,6 @@ def control_sentence(leader: ControlSource, t_s: float) -> str:
             return f"stopped: {leader.description}; the torque is off"
         case "parking":
             return "it moves to its parking pose, then the torque goes off"
-        case "recording":
-            return "a recording is shown: nothing here moves a rig"
     lasted_s = t_s - leader.since_s if leader.since_s is not None else 0.0
     if lasted_s < _WORTH_TELLING_S:
         return said

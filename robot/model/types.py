@@ -189,20 +189,6 @@ class CommandedPose(NamedTuple):
     lower_lids: tuple[float, float] | None = None
 
 
-class OtherHead(NamedTuple):
-    """Another head of the same world.
-
-    Attributes:
-        name: Name in the world's script.
-        headline: Its present activity in one sentence.
-        level: Level of its guard.
-    """
-
-    name: str
-    headline: str
-    level: Level = "ok"
-
-
 class SeenCamera(NamedTuple):
     """The camera's pose (optical axes: x right, y down, z forward) and field of view.
 
@@ -356,7 +342,6 @@ class Snapshot:
         p_world_pivot_m: Intersection of the neck's pitch and roll axes, None if unknown.
         plan: Choice of the action planner and its reason, "" without one or under a client's
             control.
-        others: The other heads of the same world.
         expressed: Names of the present track and expression, "" for none.
         tracks: Tracks that play, and the last ones that have ended.
         talk: State of the conversation, as a voice agent reports it.
@@ -409,7 +394,6 @@ class Snapshot:
     lower_lids: tuple[float, float] | None = None
     p_world_pivot_m: Vec3 | None = None
     plan: str = ""
-    others: tuple[OtherHead, ...] = ()
     expressed: tuple[str, ...] = ()
     tracks: tuple[TrackState, ...] = ()
     talk: ConversationState = NO_CONVERSATION

@@ -27,10 +27,8 @@ from gazerig.robot.recording.run_info import (
     PROFILE,
     RunEnd,
     RunInfo,
-    WorldInfo,
     read_run_end,
     read_run_info,
-    read_world_info,
 )
 from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
 
@@ -104,7 +102,6 @@ class RunRecording:
         path: The file.
         info: Settings at the start of the run.
         end: Record of the end of the run.
-        world: The run's simulated world, None without one and in older recordings.
         whole: Whether the file was closed properly; if not, its writer was killed.
         duration_s: Time from the first to the last message.
     """
@@ -118,7 +115,6 @@ class RunRecording:
         self.path = Path(path)
         self.whole = False
         self.end = RunEnd()
-        self.world: WorldInfo | None = None
         self._chunks: list[_ChunkIndex] = []
         found: RunInfo | None = None
         with open_mcap(self.path, BadRecording, _CURE) as file:
@@ -233,8 +229,6 @@ class RunRecording:
         with _damage_errors(self.path):
             if record.name == fmt.END:
                 self.end = read_run_end(record.metadata)
-            if record.name == fmt.WORLD:
-                self.world = read_world_info(record.metadata)
             return read_run_info(record.metadata) if record.name == fmt.RUN else None
 
     def _check_profile(self, profile: str) -> None:

@@ -29,7 +29,7 @@ from gazerig.robot.control.tick_stream import (
 )
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.joint_recorder import JointRecorder
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, WorldInfo, as_text, started_ns
+from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
 from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, body_record_as_plain
 from gazerig.robot.recording.writer_client import WriterClient
 
@@ -80,6 +80,7 @@ class Recorder:
         info: RunInfo,
         over: bool = False,
         patient: bool = False,
+        urdf: str = "",
     ) -> None:
         """Prepare a recording without creating the file.
 
@@ -88,9 +89,10 @@ class Recorder:
             info: Settings of the run.
             over: Overwrite an existing file.
             patient: Whether to wait for a slow writer, as in simulated time.
+            urdf: Description of the rig for viewers; "" for none.
         """
         self._path, self._target = path, Path(os.path.realpath(path))
-        self._info = info
+        self._info, self._urdf = info, urdf
         self._health: Callable[[], BusHealth] = lambda: BusHealth(0, 0, {})
         self._over = over
         self._link = WriterClient(patient)
@@ -129,7 +131,8 @@ class Recorder:
             self._link.open(file_fd)
         finally:
             os.close(file_fd)
-        self._link.post(writer.BEGIN, encode((as_text(self._info), started_ns(self._info))))
+        start = as_text(self._info), started_ns(self._info), self._urdf
+        self._link.post(writer.BEGIN, encode(start))
 
     def begin(self) -> None:
         """Replace an older recording; call it when the run has started.
@@ -156,10 +159,6 @@ class Recorder:
             return stop(seconds)
 
         return record_time
-
-    def record_world(self, world: WorldInfo) -> None:
-        """Record the simulated world of the run; call it once, after ``open``."""
-        self._link.post(writer.WORLD, encode(as_text(world)))
 
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""

@@ -16,8 +16,10 @@ from gazerig.robot.control.tick_stream import TickRow
 TICK, PERCEPT, HEALTH = "/rig/tick", "/rig/percept", "/rig/health"
 FRAME, LOG, ORDER = "/camera/picture", "/log", "/rig/order"
 JOINT_STATES, TRANSFORMS, SCENE = "/joint_states", "/tf", "/scene"
+DESCRIPTION = "/robot_description"
+"""URDF of the rig, once at the start: viewers draw it and turn its joints."""
 
-RUN, WORLD, END = "gazerig.run", "gazerig.world", "gazerig.end"
+RUN, END = "gazerig.run", "gazerig.end"
 """Names of the metadata records at the beginning and the end."""
 
 UNUSED = ("metadata", "arrows", "cubes", "cylinders", "triangles", "texts", "models")
@@ -173,5 +175,6 @@ SCHEMAS: dict[str, tuple[str, Schema]] = {
     JOINT_STATES: ("foxglove.JointStates", _STATES),
     TRANSFORMS: ("foxglove.FrameTransforms", _FRAMES),
     SCENE: ("foxglove.SceneUpdate", _ENTITIES),
+    DESCRIPTION: ("std_msgs/String", _object(data=_TEXT)),
 }
 """Topic -> name and JSON schema of its messages."""

@@ -33,8 +33,6 @@ class RunInfo:
         bus: "ideal" for emulated servos without bytes, "emulated" for those with bytes.
         pictures_hz: Rate of the recorded frames.
         versions: Name -> version of the packages that affect the arithmetic.
-        placement: Pose of the neck base of a head in a world with others: position (3, m), then
-            the rows of its rotation (9); () for a single head.
     """
 
     rig: str
@@ -53,7 +51,6 @@ class RunInfo:
     bus: str = "emulated"
     pictures_hz: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
-    placement: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,23 +68,6 @@ class RunEnd:
     lost: int = 0
     ran_s: float | None = None
     tx_sha256: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class WorldInfo:
-    """A simulated world of a run.
-
-    Attributes:
-        name: Name of its script or file, without folder and suffix.
-        script_yaml: The complete script, "" for a world in MuJoCo's own format.
-        seed: Seed of its people's behaviour.
-        start_s: Start of their script on the clock of the ticks.
-    """
-
-    name: str
-    script_yaml: str = ""
-    seed: int = 0
-    start_s: float = 0.0
 
 
 def versions() -> dict[str, str]:
@@ -110,7 +90,7 @@ def started_ns(info: RunInfo) -> int:
     return round(datetime.fromisoformat(info.started_utc).timestamp() * 1e6) * 1000
 
 
-def as_text(value: RunInfo | RunEnd | WorldInfo) -> dict[str, str]:
+def as_text(value: RunInfo | RunEnd) -> dict[str, str]:
     """Return the fields as MCAP metadata: YAML unchanged, everything else as JSON."""
     plain = asdict(value)
     return {k: v if k.endswith("_yaml") else json.dumps(v) for k, v in plain.items()}
@@ -123,8 +103,6 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
         ValueError: A field is missing, is not JSON or has an impossible value.
     """
     found = _read_fields(text, {f.name for f in fields(RunInfo)})
-    if isinstance(found.get("placement"), list):
-        found["placement"] = tuple(found["placement"])
     try:
         info = RunInfo(**found)
     except TypeError as error:
@@ -141,11 +119,6 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
         raise ValueError("mock or fast is not a boolean")
     if not isinstance(info.versions, dict):
         raise ValueError("no versions")
-    pose = info.placement
-    if not isinstance(pose, tuple) or len(pose) not in (0, 12):
-        raise ValueError("an invalid pose of the neck base")
-    if not all(_is_within(number, -1000.0, 1000.0) for number in pose):
-        raise ValueError("an invalid pose of the neck base")
     started_ns(info)
     return info
 
@@ -166,24 +139,6 @@ def read_run_end(text: Mapping[str, str]) -> RunEnd:
     if type(end.lost) is not int or not (end.ran_s is None or _is_within(end.ran_s, 0.0, 1e9)):
         raise ValueError("a field of the end is not a number")
     return end
-
-
-def read_world_info(text: Mapping[str, str]) -> WorldInfo:
-    """Read a world that ``as_text`` wrote.
-
-    Raises:
-        ValueError: A field is missing, is not JSON or has an impossible value.
-    """
-    try:
-        name, seed, start_s = (json.loads(text[key]) for key in ("name", "seed", "start_s"))
-        script_yaml = text["script_yaml"]
-    except KeyError as error:
-        raise ValueError(f"a world without {error}") from None
-    if not isinstance(name, str) or type(seed) is not int or seed < 0:
-        raise ValueError(f"the world {name!r}, seed {seed!r}")
-    if type(start_s) not in (int, float) or not -1e9 < start_s < 1e9:
-        raise ValueError(f"a world that began at {start_s!r}")
-    return WorldInfo(name, script_yaml, seed, float(start_s))
 
 
 def _read_fields(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:

@@ -86,14 +86,6 @@ class RunWriter:
             at_ns, data = self.time_ns(message.at_s), msgspec.json.encode(message.data)
             self._writer.add_message(channel, at_ns, data, at_ns, self._counts[topic])
 
-    def write_world(self, about: Mapping[str, str]) -> None:
-        """Write the run's simulated world from ``run_info.as_text``."""
-        if not self.failed:
-            with self._error_handling():
-                self._flush()
-                self._writer.add_metadata(fmt.WORLD, dict(about))
-                self._file.keep()
-
     def flush(self) -> None:
         """Write the present chunk to the operating system."""
         if not self.failed:

@@ -112,7 +112,7 @@ class RecordRouter:
 
 
 MORE, LAST = b"+", b"."
-BEGIN, WORLD, TICKS, FRAME, HEALTH, END = b"b", b"w", b"t", b"f", b"h", b"e"
+BEGIN, TICKS, FRAME, HEALTH, END = b"b", b"t", b"f", b"h", b"e"
 """Kinds of messages. Bodies are MessagePack; for TICKS see ``tick_stream.TickBatch``."""
 FAILED, DONE = "failed", "done"
 """Kinds of replies: the reason why nothing more can be written; the size of the recording."""
@@ -141,8 +141,10 @@ def main(socket_fd: int, file_fd: int) -> None:
         first = next((one for one in messages if one is not None), None)
         if first is None:
             return
-        about, started_ns = decode_plain(first.body)
+        about, started_ns, urdf = decode_plain(first.body)
         writer = RunWriter(file_fd, about, started_ns)
+        if urdf:
+            writer.add(fmt.Message(fmt.DESCRIPTION, 0.0, {"data": urdf}))
         end = _write(messages, writer, rig, RealClock())
         writer.close(end)
         _send_reply(
@@ -162,8 +164,6 @@ def _write(
         kind, body, fd = one if one is not None else (b"", b"", -1)
         if kind == END:
             end = RunEnd(**decode_plain(body))
-        elif kind == WORLD:
-            writer.write_world(decode_plain(body))
         elif kind == TICKS:
             router.write_ticks(body)
         elif kind == FRAME:

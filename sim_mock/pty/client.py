@@ -39,8 +39,8 @@ class _ServerProcess:
         self._server: subprocess.Popen[bytes] | None = None
         self._folder: OwnFolder | None = None
         self._asking = threading.Lock()
-        self.joints: list[dict[str, int]] = []
-        """Index of each rig's joints in the state of the surroundings; [] without these."""
+        self.joints: dict[str, int] = {}
+        """Index of each joint in the state of the surroundings; {} without these."""
 
     def _start(
         self, buses: Sequence[Mapping[str, object]], surroundings: SentSurroundings | None = None
@@ -184,7 +184,7 @@ class PtyBus(_ServerProcess):
 
 
 class PtyBuses(_ServerProcess):
-    """All emulated buses of a rig, or of several rigs in one world, in one process."""
+    """All emulated buses of a rig in one process."""
 
     def start(
         self, devices: Mapping[str, Emulated], surroundings: SentSurroundings | None = None
@@ -195,40 +195,7 @@ class PtyBuses(_ServerProcess):
             SetupError: the surroundings cannot be used; the message gives the reason.
             RuntimeError: the server did not start; its message is on standard error.
         """
-        return self.start_rigs([("", devices)], surroundings)[0]
-
-    def start_rigs(
-        self,
-        rigs: Sequence[tuple[str, Mapping[str, Emulated]]],
-        surroundings: SentSurroundings | None = None,
-    ) -> list[dict[str, str]]:
-        """Start a server for the buses of several rigs in one world; return the paths of each.
-
-        Args:
-            rigs: in the surroundings' order: a name, "" for the first, which precedes the names of
-                its buses in commands, and the devices of its buses.
-            surroundings: as in ``start``.
-
-        Raises:
-            SetupError: as in ``start``, or two buses have the same name.
-            RuntimeError: as in ``start``.
-        """
-        places = [(number, bus) for number, (_, devices) in enumerate(rigs) for bus in devices]
-        names = ["_".join(filter(None, (rigs[number][0], bus))) for number, bus in places]
-        if twice := next((name for name in names if names.count(name) > 1), None):
-            raise SetupError(
-                f"two buses of this world are named {twice}: rename the head or its bus"
-            )
         buses: list[dict[str, object]] = [
-            {
-                "name": name,
-                "device": device_data(rigs[number][1][bus]),
-                "rig": number,
-                "rig_bus": bus,
-            }
-            for name, (number, bus) in zip(names, places, strict=True)
+            {"name": name, "device": device_data(device)} for name, device in devices.items()
         ]
-        found: list[dict[str, str]] = [{} for _ in rigs]
-        for (number, bus), path in zip(places, self._start(buses, surroundings), strict=True):
-            found[number][bus] = path
-        return found
+        return dict(zip(devices, self._start(buses, surroundings), strict=True))

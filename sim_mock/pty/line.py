@@ -34,7 +34,6 @@ class BusSettings:
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
     seed: seed of the random numbers of faults
-    rig: index of its rig in a world; rig_bus: its name in the rig, None: the same name
     """
 
     device: Emulated
@@ -44,8 +43,6 @@ class BusSettings:
     link: str | None = None
     choices: Mapping[str, str] = field(default_factory=dict)
     seed: int = 0
-    rig: int = 0
-    rig_bus: str | None = None
 
 
 class TerminalLine:

@@ -43,8 +43,8 @@ class ServedSurroundings(Protocol):
         """Return the first words of the surroundings' commands."""
         ...
 
-    def joints(self) -> list[dict[str, int]]:
-        """Return the index of each rig's joints in a state."""
+    def joints(self) -> dict[str, int]:
+        """Return the index of each joint in a state."""
         ...
 
     def device(self, bus: BusSettings) -> Device:

@@ -351,8 +351,6 @@ def faults(script: SceneScript) -> Iterator[Fault]:
     if script.room != "none":
         yield "room", "--scene cannot have any: use --world, or write room: none"
         return
-    if script.heads:
-        yield "heads", "other heads need a room"
     found = list(name_faults(script, script.places, (HEAD, BASE)))
     for name, thing in script.things.items():
         found += _thing_faults(script, name, thing)

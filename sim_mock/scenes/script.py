@@ -185,18 +185,6 @@ class PlaceScript:
 
 
 @dataclass(frozen=True)
-class HeadScript:
-    """Another head in the same world, controlled by its own robot."""
-
-    # fmt: off
-    rig: Annotated[str, "name or file of its rig; empty: that of the first head"] = ""
-    x_m: Annotated[float, Bounds(-10, 10), "distance of its neck base ahead of the first one's"] = 0.9
-    y_m: Annotated[float, Bounds(-10, 10), "distance of its neck base to the left of the first one's"] = 0.0
-    facing_deg: Annotated[float, Bounds(-180, 180), "direction in which it faces; 180: towards the first head"] = 180.0
-    # fmt: on
-
-
-@dataclass(frozen=True)
 class AgentAct:
     """One report of a simulated voice agent, as a real one sends it to the head."""
 
@@ -217,7 +205,6 @@ class LightParams:
     ambient: Annotated[float, Bounds(0, 1), "ambient light"] = 0.5
     window: Annotated[float, Bounds(0, 2), "light from the window's side"] = 0.44
     lamp: Annotated[float, Bounds(0, 2), "light of the lamp under the ceiling"] = 0.30
-    opposite: Annotated[float, Bounds(0, 2), "light from the first head's far side, opposite the window"] = 0.0
     shadows: Annotated[bool, "whether the window's light casts shadows, which cost time"] = False
     # fmt: on
 
@@ -235,7 +222,6 @@ class SceneScript:
     places: Annotated[Mapping[str, PlaceScript], "additional places besides the room's"] = field(default_factory=dict)
     things: Annotated[Mapping[str, ThingScript], "things, for example objects that people hand to each other"] = field(default_factory=dict)
     agent: Annotated[tuple[AgentAct, ...], "reports of the robot's simulated voice agent, in the order of time"] = ()
-    heads: Annotated[Mapping[str, HeadScript], "other heads beside the first, by name"] = field(default_factory=dict)
     light: Annotated[LightParams, "brightness of the room"] = field(default_factory=LightParams)
     camera: Annotated[WorldCameraParams, "pictures of the robot's camera"] = field(default_factory=WorldCameraParams)
     expected: Annotated[tuple[ExpectedLook, ...] | None, "expected gaze over time; null: derived from the acts"] = None

@@ -189,8 +189,6 @@ MUTANTS = (
            "a look that the run's end cuts off is a whole bout", ("report",)),
     Mutant("features/lab/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(last >= len(t))",
            "a look that the run's beginning cuts off is a whole bout", ("report",)),
-    Mutant("robot/analysis/mutual_gaze.py", "if b > 0 and e < len(t_s)]", "if e < len(t_s)]",
-           "a mutual gaze that has begun before has a length", ("two_heads",)),
     # ---- worlds
     Mutant("features/world/physics.py", "            for device in self._devices:\n                device.positions_steps()\n", "",
            "a servo nobody asks knows neither heat nor watchdog", ("world_servos", "world_rigs")),

@@ -1,4 +1,4 @@
-"""Mutants of recording, playback and export: a wrong line, and who notices."""
+"""Mutants of recording and export: a wrong line, and who notices."""
 
 from mutants.mutants import Mutant
 
@@ -70,14 +70,6 @@ RECORDING = (
            "time that runs back is read", ("run_recording_faults",)),
     Mutant("robot/recording/read.py", "if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:",
            "if False:", "a chunk is read that is not as it was written", ("damaged_recordings", "run_recording_faults")),
-    Mutant("robot/recording/playback.py", "due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)", "due_s = at_s + SNAPSHOT_EVERY_S",
-           "fewer than 50 snapshots a second at other rates", ("replay",)),
-    Mutant("robot/recording/playback.py", "self.conversation = choice", "pass",
-           "a replay does not show what conversation was asked for", ("replay",)),
-    Mutant("robot/recording/playback.py", "first if self._missing is None else min(first, self._missing)", "first",
-           "a second leap forgets what the first passed over", ("replay",)),
-    Mutant("robot/recording/playback.py", "        self._introduced = False\n\n\ndef introduction", "        pass\n\n\ndef introduction",
-           "a page that is new knows nothing of the recording", ("replay",)),
     Mutant("robot/recording/run_info.py", "if type(info.seed) is not int or info.seed < 0:", "if False:",
            "a seed that is none is read", ("run_recording",)),
     Mutant("robot/recording/run_info.py",
@@ -85,10 +77,6 @@ RECORDING = (
            "an end that is no text is read", ("run_recording",)),
     Mutant("robot/recording/read.py", "(max(c.last_ns for c in chunks) - min(c.first_ns for c in chunks)) / 1e9",
            "(chunks[-1].last_ns - chunks[-1].first_ns) / 1e9", "a run is as long as its last chunk", ("run_recording",)),
-    Mutant("robot/recording/playback.py", "elif past % _THINNED == 0:", "elif past % 50 == 0:",
-           "after a leap hardly any joints are shown", ("replay",)),
-    Mutant("robot/recording/playback.py", "until - _MOST_KEPT_EVENTS)", "until - 5)",
-           "after a leap few events are shown", ("replay",)),
     # ---- exports
     Mutant("robot/recording/gaze_angles.py", "if self._led and not tick.controlled_by:", "if False:",
            "after joints were led no movement is known", ("export",)),
@@ -99,8 +87,6 @@ RECORDING = (
            "the last movement lacks its last sample", ("export",)),
     Mutant("robot/recording/gaze_angles.py", "np.hypot(dx * np.cos(np.radians(y)), dy)", "np.hypot(dx, dy)",
            "a gaze that is up is too fast", ("export",)),
-    Mutant("robot/recording/export_bids.py", 'gzip.GzipFile("", "wb", 6, raw, mtime=0)', 'gzip.GzipFile("", "wb", 6, raw)',
-           "the same run gives other bytes a second later", ("export_bids",)),
     Mutant("robot/recording/export_csv.py", '(s for s in stretches if s.event != "blink")', "iter(stretches)",
            "a blink ends what is looked at", ("export",)),
     Mutant("robot/recording/gaze_angles.py", '"cyclopean": _LEFT | _RIGHT', '"cyclopean": _LEFT',
@@ -111,14 +97,6 @@ RECORDING = (
            "_degrees(tick.gaze.gaze_point_world_m)", "what is planned is seen from the neck", ("export",)),
     Mutant("robot/recording/gaze_angles.py", "key = np.where(labels.movement == _SACCADE, -1, key)", "pass",
            "a target that changes under way makes two saccades", ("export",)),
-    Mutant("robot/recording/export_bids.py", '"EventLag": labels.lag_s', '"EventLag": 0.0',
-           "a data set does not tell the lag", ("export_bids",)),
-    Mutant("robot/recording/export_bids.py", '"RecordingStartUTC": about.started_utc or _MISSING',
-           '"RecordingStartUTC": _MISSING', "a data set does not tell when it began", ("export_bids",)),
-    Mutant("robot/recording/export_bids.py", '" ".join(text.split())', "text",
-           "a tab in a message breaks a row", ("export_bids",)),
-    Mutant("robot/recording/export_bids.py", 'if any(one.get("Name") == _GENERATOR for one in made_by):', "if True:",
-           "a run goes into the data set of another program", ("export_bids",)),
     # ---- a camera's recording
     Mutant("drivers/camera/playback.py", "                    stamp_ns, waiting = head.log_time, {}\n",
            "                    stamp_ns = head.log_time\n", "a frame has the depth of one before", ("camera_recording",)),

@@ -38,7 +38,7 @@ class Host:
         self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
         for name, line in emulated_lines(RIG).items():
             self.served.device(BusSettings(line, name))
-        joints = RigInState(rig_kinematics(RIG), self.served.joints()[0])
+        joints = RigInState(rig_kinematics(RIG), self.served.joints())
         self.poses = WorldPoses(folder / "state", joints)
 
     def serve(self, seconds: float, heard: bool) -> None:
@@ -69,7 +69,7 @@ def test_the_state_is_that_of_physics(host: Host) -> None:
     host.serve(0.02, heard=True)
     assert host.poses.newest() is not None and host.poses.state is not None
     truly = host.served.world.joints_rad()
-    for name, at in host.served.joints()[0].items():
+    for name, at in host.served.joints().items():
         assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
     assert host.poses.head(0.0)[0] == pytest.approx(np.array(host.poses.head(0.0)[0]))
 

@@ -26,24 +26,6 @@ def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name: str) -> N
     assert world.joints_rad() == rig.start_rad
 
 
-def test_two_rigs_stand_in_one_world() -> None:
-    """A second rig has a prefix, a place and a direction of its own."""
-    desk = load_rig("desk")
-    model = world_model(
-        None,
-        [
-            rig_in_world(desk, looks=False),
-            rig_in_world(desk, "other_", (1.0, 0.0, 0.0), 3.0, looks=False),
-        ],
-    )
-    first, second = model.rigs
-    assert not set(first.qpos.values()) & set(second.qpos.values())
-    data = mujoco.MjData(model.mj)
-    mujoco.mj_forward(model.mj, data)
-    necks = [data.body(one.names + "neck_pitch_link").xpos for one in model.rigs]
-    assert necks[1] - necks[0] == pytest.approx((1.0, 0.0, 0.0))
-
-
 def _world_file(folder: Path, inside: str) -> Path:
     path = folder / "own.xml"
     path.write_text(f"<mujoco><worldbody>{inside}</worldbody></mujoco>")
@@ -60,15 +42,12 @@ def test_a_users_world_carries_the_head_at_its_site(tmp_path: Path) -> None:
 
 
 def test_a_rig_knows_where_its_neck_base_stands(tmp_path: Path) -> None:
-    """A site may be turned; a further rig has a site with its own name."""
-    sites = '<site name="gazerig" pos="1 2 3" euler="0 0 90"/><site name="gazerig_other"/>'
-    desk = load_rig("desk")
-    rigs = [rig_in_world(desk, looks=False), rig_in_world(desk, "other_", looks=False)]
-    first, second = world_model(None, rigs, _world_file(tmp_path, sites)).rigs
+    """A site may be turned."""
+    sites = '<site name="gazerig" pos="1 2 3" euler="0 0 90"/>'
+    rig = rig_in_world(load_rig("desk"), looks=False)
+    (first,) = world_model(None, [rig], _world_file(tmp_path, sites)).rigs
     assert first.p_world_base_m == pytest.approx((1.0, 2.0, 3.0))
     assert [*first.R_world_base[0], *first.R_world_base[1]] == pytest.approx([0, -1, 0, 1, 0, 0])
-    assert second.p_world_base_m == pytest.approx((0.0, 0.0, 0.0))
-    assert second.R_world_base[0] == pytest.approx((1.0, 0.0, 0.0))
 
 
 def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path) -> None:

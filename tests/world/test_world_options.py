@@ -73,32 +73,6 @@ def test_a_script_at_fault_is_said_with_file_line_and_key(tmp_path: Path) -> Non
     assert "mine.yaml:4" in str(found.value) and "people.anna.start" in str(found.value)
 
 
-TWO_HEADS = "room: living-room\npeople: {}\nheads:\n  other:\n    rig: RIG\n"
-
-
-@pytest.mark.parametrize(
-    ("rig", "why"), [("desc", "did you mean 'desk'"), ("sub/my.yaml", "sub/my.yaml: there is no")]
-)
-def test_a_head_of_an_unknown_rig_is_said_with_file_line_and_key(
-    tmp_path: Path, rig: str, why: str
-) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(TWO_HEADS.replace("RIG", rig))
-    with pytest.raises(ConfigError) as found:
-        world_script(str(file))
-    assert "mine.yaml:5" in str(found.value) and "heads.other.rig" in str(found.value)
-    assert why in str(found.value)
-
-
-def test_the_rig_of_a_head_lies_beside_its_world(tmp_path: Path) -> None:
-    file, rig = tmp_path / "mine.yaml", tmp_path / "my.yaml"
-    file.write_text(TWO_HEADS.replace("RIG", "./my.yaml"))
-    rig.touch()
-    assert world_script(str(file)).heads["other"].rig == str(rig)
-    file.write_text(TWO_HEADS.replace("RIG", "minimal"))
-    assert world_script(str(file)).heads["other"].rig == "minimal"
-
-
 def test_a_script_is_read_once_until_it_is_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -132,7 +106,7 @@ def test_every_shipped_world_can_be_read() -> None:
     for name in shipped_names("worlds", HOME):
         world = world_of(rig, replace(ASKED, world=name, no_pictures=True))
         assert world is not None and world.scene.name == name
-        assert world.scene.people(0.0) or len(world.spec.rigs) > 1
+        assert world.scene.people(0.0)
 
 
 def test_the_paper_has_every_parameter_of_the_camera() -> None:

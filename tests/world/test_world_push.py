@@ -9,8 +9,6 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run, write
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.model import world_model  # noqa: E402
-from gazerig.features.world.physics import World  # noqa: E402
 from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 from gazerig.features.world.served_world import COMMANDS  # noqa: E402
 from gazerig.features.world.world_spec import WorldSpec  # noqa: E402
@@ -197,22 +195,6 @@ def test_a_push_that_cannot_be_is_refused_with_what_would_be_right(text: str, me
     """The usage follows."""
     with pytest.raises(ValueError, match=message):
         COMMANDS.obey(_held().world, text)
-
-
-def test_two_heads_are_pushed_each_by_its_own_name_and_its_own_left() -> None:
-    """The second head is opposite and turned round."""
-    desk = load_rig("desk")
-    rigs = [
-        rig_in_world(desk, looks=False),
-        rig_in_world(desk, "other_", (1.0, 0.0, 0.0), 3.14159265, looks=False),
-    ]
-    now_s = [0.0]
-    world = World(world_model(None, rigs), lambda: now_s[0])
-    before = [world.joints_rad(0)["neck_yaw"], world.joints_rad(1)["neck_yaw"]]
-    COMMANDS.obey(world, "push other_head 3 left 0.2")
-    world.advance(300)
-    assert world.joints_rad(0)["neck_yaw"] == pytest.approx(before[0], abs=1e-6)
-    assert world.joints_rad(1)["neck_yaw"] > before[1] + 0.02
 
 
 def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servos(

@@ -1,7 +1,7 @@
 """Several buses, coupled servos and several rigs in one world."""
 
 from dataclasses import replace
-from math import cos, degrees, pi, radians, sin
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from world_scripts import read as read_script
 
 mujoco_or_skip()
 
-from gazerig.config.schema import Rig, load_rig  # noqa: E402
+from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.features.world.figure import Figures  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
@@ -76,64 +76,6 @@ def test_both_servos_of_a_pair_feel_a_push_against_one_joint() -> None:
     bench.world.push("head", (0.0, 12.0, 0.0), 0.3)
     bench.pass_ms(250)
     assert a.shaft.effort > 0.1 and b.shaft.effort < -0.1
-
-
-class TwoHeads:
-    """Two desk rigs opposite each other in one world, a metre apart."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-        self.rig: Rig = load_rig("desk")
-        self.rigs = [
-            rig_in_world(self.rig, looks=False),
-            rig_in_world(self.rig, "other_", (1.0, 0.0, 0.0), pi, looks=False),
-        ]
-        self.world = World(world_model(None, self.rigs), lambda: self.now_s)
-        (line,) = emulated_lines(self.rig).values()
-        self.chains: list[Any] = [self.world.device(line, rig=nth) for nth in (0, 1)]
-        for chain in self.chains:
-            arm(chain[7])
-
-    def pass_ms(self, ms: int) -> None:
-        """Let time pass."""
-        self.now_s += ms / 1000.0
-        self.world.advance(round(self.now_s * 1000.0))
-
-
-def test_two_heads_in_one_world_move_each_by_its_own_servos() -> None:
-    """The same packet to both buses turns both; to one, only that one."""
-    both = TwoHeads()
-    write(both.chains[0][7], "goal_position", 2048)
-    write(both.chains[1][7], "goal_position", 2048 + 300)
-    both.pass_ms(700)
-    angles = [both.world.joints_rad(nth)["neck_yaw"] for nth in (0, 1)]
-    assert angles[0] == pytest.approx(0.0, abs=0.02)
-    assert angles[1] == pytest.approx(300 / 4096 * 2 * pi, abs=0.02)
-
-
-def test_a_head_moves_as_if_the_other_were_not_there() -> None:
-    """Without contact they have nothing to do with each other."""
-    both = TwoHeads()
-    now_s = [0.0]
-    alone = World(world_model(None, both.rigs[:1]), lambda: now_s[0])
-    (line,) = emulated_lines(both.rig).values()
-    chain: Any = alone.device(line)
-    arm(chain[7])
-    for one in (chain[7], both.chains[0][7]):
-        write(one, "goal_position", 2248)
-    both.pass_ms(300)
-    alone.advance(300)
-    assert both.world.joints_rad(0) == pytest.approx(alone.joints_rad(0), abs=1e-9)
-
-
-def test_a_rig_stands_where_it_was_put_and_turned() -> None:
-    """The camera of the second head is a metre away and looks back."""
-    both = TwoHeads()
-    data, mj = both.world._data, both.world.model.mj
-    frames = [mj.body(one.names + "base_link").id for one in both.world.model.rigs]
-    turned = np.array(data.xmat[frames[1]]).reshape(3, 3)
-    assert data.xpos[frames[1]] - data.xpos[frames[0]] == pytest.approx((1.0, 0.0, 0.0))
-    assert turned[:2, :2].ravel() == pytest.approx((cos(pi), -sin(pi), sin(pi), cos(pi)))
 
 
 PUSH = """description: a child pushes the head

@@ -17,7 +17,6 @@ from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals
 if TYPE_CHECKING:
     from gazerig.config.rig import Rig
     from gazerig.features.lab.report.gaze_trace import GazeTrace
-    from gazerig.features.lab.report.heads import MutualGazeReport
     from gazerig.features.lab.report.page import RunHeader
     from gazerig.gaze.scanpath.scanpath import Walk
     from gazerig.robot.app.options import RunOptions
@@ -60,10 +59,6 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="Page to write; .html is added if it is missing.")
     ] = None,
-    other: Annotated[
-        Path | None,
-        typer.Option("--with", help="Recording of the run's other head, for mutual gaze."),
-    ] = None,
     force: ForceOption = False,
 ) -> None:
     """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
@@ -75,8 +70,6 @@ def report(
             raise SetupError("report takes either a recording or --scene NAME")
         if file is not None and bus is not None:
             raise SetupError("--bus needs --scene: a recording already has its bus")
-        if file is None and other is not None:
-            raise SetupError("--with takes the recording of another head: give both recordings")
         # Drawing and models are slow to import; `--help` does not need them.
         from gazerig.features.lab.report.page import banner, refuse_foreign, report_files
         from gazerig.features.lab.report.report import FIGURE_KEYS, make_report, read_run
@@ -100,8 +93,7 @@ def report(
                     seconds=seconds,
                 ).check_and_complete()  # fmt: skip
                 about, run = _simulate_run(options, tell)
-            gaze = None if file is None or other is None else _mutual_gaze(file, other)
-            made = make_report(run, about, target, tell, force, gaze)
+            made = make_report(run, about, target, tell, force)
         if text := banner(run.joints):
             say(text)
         for finding in made.findings:
@@ -159,23 +151,6 @@ def compare(
                 say(f"{a.band.title}: {a.value:.3g} and {b.value:.3g}{unit}{shape}")
         count = sum(d.word == "more than chance" for d in made.differences)
         say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
-
-
-def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
-    """Return the mutual gaze of two heads of one run."""
-    from gazerig.features.lab.report.heads import mutual_gaze_report
-    from gazerig.robot.recording.read import RunRecording, report_bad_contents
-
-    a, b = RunRecording(first), RunRecording(second)
-    if a.info.scene != b.info.scene:
-        raise SetupError(
-            f"{first} is of the world {a.info.scene}, {second} of {b.info.scene}: --with takes the "
-            "recording of another head of the same run"
-        )
-    with report_bad_contents(Path(f"{first} or {second}")):
-        return mutual_gaze_report(
-            (a.ticks(), b.ticks()), (a.info.placement, b.info.placement), _names(first, second)
-        )
 
 
 def _simulate_run(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":

@@ -15,7 +15,6 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
 from gazerig.features.lab.report.face import ReferenceWalk
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.statistics import MeasureResult, format_number
 from gazerig.robot.analysis.human_norms import BANDS, GROUPS, NormBand
@@ -105,7 +104,6 @@ def report_page(
     run: GazeTrace,
     findings: Sequence[MeasureResult],
     figures: Sequence[PageFigure],
-    gaze: MutualGazeReport | None = None,
 ) -> str:
     """Return the page of one run as HTML that needs no other file."""
     styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
@@ -142,7 +140,6 @@ def report_page(
         outside=[f.band.title for f in findings if f.verdict == "outside"],
         uncertain=[f.band.title for f in findings if f.verdict == "uncertain"],
         basis=run.joints.whole_basis, banner=banner(run.joints),
-        gaze=gaze,
     )  # fmt: skip
 
 

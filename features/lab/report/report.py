@@ -22,7 +22,6 @@ from gazerig.features.lab.report import (
     turns,
 )
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
-from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.page import PageFigure, RunHeader, report_page, write_all
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, basis_text, drawing_png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
@@ -60,21 +59,19 @@ def make_report(
     out: Path,
     progress: Progress,
     force: bool = False,
-    gaze: MutualGazeReport | None = None,
 ) -> Report:
     """Write one HTML page, one PNG per figure, and the numbers as JSON; return the findings.
 
     out: the page to write; the PNGs are written to the folder NAME_figures of the same parent
     force: replace existing files
-    gaze: mutual gaze of this head and another one, None without another head
 
     Raises:
         SetupError: a file cannot be written.
     """
     findings = judge_run(run)
     figures = draw_figures([ShownRun(about.name, run, COLOURS[0], about.model)], progress)
-    page = report_page(about, run, findings, figures, gaze)
-    numbers = [_finding_json(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
+    page = report_page(about, run, findings, figures)
+    numbers = [_finding_json(f, run) for f in findings]
     written = write_all(out, page, figures, numbers, force)
     return Report(findings, out, *written)
 

@@ -1,17 +1,15 @@
 """Rig in a world with physics: its bus, its camera, and the shapes of the world."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.types import Camera
-from gazerig.features.world.other_heads import HeadInState, OtherHeads
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
-from gazerig.features.world.run.recorded_world import recorded_world_info
-from gazerig.features.world.run.run_world import RunWorld, ServedRig, world_ideal_bus
+from gazerig.features.world.run.run_world import RunWorld, world_ideal_bus
 from gazerig.features.world.run.sight import RenderedWorld, world_camera
 from gazerig.features.world.shapes import shapes_of
 from gazerig.features.world.world_spec import state_file
@@ -30,7 +28,6 @@ from gazerig.robot.app.run_bus import (
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -40,15 +37,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RigRoom:
-    """``RunRoom`` of gazerig.robot.app.surroundings: a world from the view of one of its rigs."""
+    """``RunRoom`` of gazerig.robot.app.surroundings: a world from the view of its rig."""
 
     world: RunWorld
     clock: Clock
     run_bus: RunBus
     head: WorldPoses | SimulatedPoses
-    heads: OtherHeads | None = None
-    info: WorldInfo | None = None
-    placement: tuple[float, ...] = ()
 
     @property
     def scene(self) -> Scene:
@@ -67,9 +61,7 @@ class RigRoom:
     ) -> Camera:
         """Return the rig's camera; arguments as of ``RunRoom.camera``."""
         world = self.world
-        rendered = RenderedWorld(
-            world.spec, world.scene, sight.mount, placed, rng, world.camera, world.number
-        )
+        rendered = RenderedWorld(world.spec, world.scene, sight.mount, placed, rng, world.camera)
         return world_camera(
             rig,
             options,
@@ -87,13 +79,8 @@ class RigRoom:
         return self.head.begin_s
 
     def shapes(self) -> WorldShapes:
-        """Return the shapes of the world, with the other heads if another process computes it."""
-        return shapes_of(self.world.spec, self.heads)
-
-    def world_info(self) -> WorldInfo | None:
-        """Return the recording's entry for the world, None before the people's script began."""
-        start_s = self.start_s()
-        return None if self.info is None or start_s is None else replace(self.info, start_s=start_s)
+        """Return the shapes of the world."""
+        return shapes_of(self.world.spec)
 
 
 def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> RigRoom:
@@ -105,54 +92,23 @@ def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> R
     if options.fast:
         return simulated_room(rig, options, clock, world, world.computed(clock.now_s))
     buses = PtyBuses()
-    served = ServedRig(buses, buses.start(emulated_lines(rig), world.spec), buses.stop)
-    return served_room(rig, options, clock, world.served(buses.folder), served)
+    paths = buses.start(emulated_lines(rig), world.spec)
+    run_bus = RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
+    joints = RigInState(rig_kinematics(rig), buses.joints)
+    head = WorldPoses(state_file(buses.folder), joints)
+    return RigRoom(world.served(buses.folder), clock, run_bus, head)
 
 
 def simulated_room(
-    rig: Rig,
-    options: RunOptions,
-    clock: Clock,
-    world: RunWorld,
-    computed: "World",
-    placement: tuple[float, ...] = (),
+    rig: Rig, options: RunOptions, clock: Clock, world: RunWorld, computed: "World"
 ) -> RigRoom:
     """Return a rig in a world of this process, on the clock of the run."""
     if options.bus == "ideal":
-        run_bus = ideal_run_bus(rig, world_ideal_bus(rig, computed, world.number))
+        run_bus = ideal_run_bus(rig, world_ideal_bus(rig, computed))
     else:
         lines = emulated_lines(rig).items()
-        devices = {name: computed.device(line, name, rig=world.number) for name, line in lines}
-        run_bus = in_process_run_bus(rig, devices)
-    joints = RigInState(rig_kinematics(rig), computed.model.rigs[world.number].qpos)
-    head = SimulatedPoses(computed, clock, joints)
-    return RigRoom(world, clock, run_bus, head, None, _info(options, world), placement)
-
-
-def served_room(
-    rig: Rig,
-    options: RunOptions,
-    clock: Clock,
-    world: RunWorld,
-    served: ServedRig,
-    placement: tuple[float, ...] = (),
-) -> RigRoom:
-    """Return a rig in a world of another process."""
-    buses, number = served.buses, world.number
-    run_bus = RunBus(
-        guarded_rig_bus(rig, served.paths), close=served.close, inject_fault=buses.command
-    )
-    state = state_file(buses.folder)
-    head = WorldPoses(state, RigInState(rig_kinematics(rig), buses.joints[number]))
-    # Only the page draws other heads, and the page belongs to the first head.
-    heads = map(HeadInState, world.others, buses.joints[1:])
-    others = OtherHeads(state, tuple(heads)) if world.others and number == 0 else None
-    return RigRoom(world, clock, run_bus, head, others, _info(options, world), placement)
-
-
-def _info(options: RunOptions, world: RunWorld) -> WorldInfo | None:
-    """Return the recording's entry for a world, None if the run is not recorded."""
-    if options.record is None:
-        return None
-    people = world.spec.figures
-    return recorded_world_info(options, options.seed if people is None else people.seed)
+        run_bus = in_process_run_bus(
+            rig, {name: computed.device(line, name) for name, line in lines}
+        )
+    joints = RigInState(rig_kinematics(rig), computed.model.rigs[0].qpos)
+    return RigRoom(world, clock, run_bus, SimulatedPoses(computed, clock, joints))

@@ -1,4 +1,4 @@
-"""World with physics of a run: its people and its rigs."""
+"""World with physics of a run: its people and its rig."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -21,15 +21,14 @@ if TYPE_CHECKING:
     from gazerig.features.world.ideal_bus import WorldIdealBus
     from gazerig.features.world.physics import World
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.config.load import ConfigError, ConfigFault, load
-from gazerig.config.schema import load_rig, rig_path
+from gazerig.config.load import load
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.room import HOME
@@ -38,23 +37,18 @@ from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.rig_description import mesh_faults
 from gazerig.robot.app.run_bus import BOARDS, CHAINS
 from gazerig.robot.app.run_rig import refuse_missing_rules
 from gazerig.robot.app.scene_files import script_file
 from gazerig.sim_mock.scenes.scene import Scene
-from gazerig.sim_mock.scenes.script import Fault, SceneScript, WorldCameraParams
+from gazerig.sim_mock.scenes.script import SceneScript, WorldCameraParams
 
 if TYPE_CHECKING:
     from gazerig.features.world.physics import World
-    from gazerig.sim_mock.pty.client import PtyBuses
 
 
 def rig_in_world(
     rig: Rig,
-    prefix: str = "",
-    p_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    yaw_rad: float = 0.0,
     looks: bool = True,
 ) -> RigInWorld:
     """Return a rig for a world."""
@@ -63,9 +57,7 @@ def rig_in_world(
         for name, one in ((name, rig.joints[name]) for name in rig.names)
     }
     servos = tuple(_servo(rig, name) for name in rig.names)
-    return RigInWorld(
-        partial(_body, rig, looks), stops, start_angles_rad(rig), servos, prefix, p_m, yaw_rad
-    )
+    return RigInWorld(partial(_body, rig, looks), stops, start_angles_rad(rig), servos)
 
 
 def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
@@ -78,13 +70,13 @@ def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
     return xml, assets
 
 
-def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus":
+def world_ideal_bus(rig: Rig, world: "World") -> "WorldIdealBus":
     """Return all servos of a rig in a world without bytes."""
     # Imports MuJoCo, which only runs in a world need.
     from gazerig.features.world.ideal_bus import WorldIdealBus
 
     measured = [rig.joints[name].model_facts.measures_position for name in rig.names]
-    return WorldIdealBus(servo_configs(rig), world.ideal_shafts(number), measured, world.now_s)
+    return WorldIdealBus(servo_configs(rig), world.ideal_shafts(), measured, world.now_s)
 
 
 def _servo(rig: Rig, name: str) -> ServoInWorld:
@@ -106,22 +98,12 @@ MJCF = (".xml", ".mjcf")
 """Suffixes of MuJoCo's own world files."""
 
 
-class ServedRig(NamedTuple):
-    """Terminals of one rig of a world that another process computes."""
-
-    buses: "PtyBuses"
-    paths: Mapping[str, str]
-    close: Callable[[], None]
-
-
 class RunWorld(NamedTuple):
     """The world of a run."""
 
     spec: WorldSpec
     scene: Scene
     camera: WorldCameraParams
-    number: int = 0
-    others: tuple[RigInWorld, ...] = ()
 
     def computed(self, now_s: Callable[[], float]) -> "World":
         """Return the world in this process."""
@@ -170,39 +152,13 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
     scene, mjcf_file = world_scene(asked, options.seed), mjcf_of(asked)
     refuse_missing_rules(rig.gaze.top_down, scene, f"--world {asked}")
     script = scene.figures.script
-    # Without pictures the looks of the rigs are not needed: the page has its own shapes.
-    looks = not options.no_pictures
-    others = other_rigs(rig, script)
-    rigs = (rig_in_world(rig, looks=looks), *placed_rigs(others, script, looks))
-    spec = WorldSpec(None if mjcf_file else scene.figures, rigs, mjcf_file)
+    # Without pictures the looks of the rig are not needed: the page has its own shapes.
+    placed = rig_in_world(rig, looks=not options.no_pictures)
+    spec = WorldSpec(None if mjcf_file else scene.figures, (placed,), mjcf_file)
     camera, level = script.camera, options.level
     if level is not None and level.pictures == "coarse":
         camera = replace(camera, rate_hz=min(COARSE_HZ, camera.rate_hz), samples=0)
-    return RunWorld(spec, scene, camera, others=placed_rigs(others, script, looks=True))
-
-
-def other_rigs(rig: Rig, script: SceneScript) -> dict[str, Rig]:
-    """Return the rigs of the other heads of a script, by the heads' names.
-
-    Raises:
-        gazerig.config.load.ConfigError: one of them has a fault.
-    """
-    return {
-        name: load_rig(head.rig, further=[mesh_faults]) if head.rig else rig
-        for name, head in script.heads.items()
-    }
-
-
-def placed_rigs(
-    rigs: Mapping[str, Rig], script: SceneScript, looks: bool
-) -> tuple[RigInWorld, ...]:
-    """Return the rigs of a script's other heads at their poses."""
-    return tuple(
-        rig_in_world(
-            rigs[name], f"{name}_", (head.x_m, head.y_m, 0.0), radians(head.facing_deg), looks
-        )
-        for name, head in script.heads.items()
-    )
+    return RunWorld(spec, scene, camera)
 
 
 def world_scene(name_or_path: str, seed: int) -> WorldScene:
@@ -219,7 +175,7 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
 
 
 def world_script(name_or_path: str) -> SceneScript:
-    """Return the script of a world; paths of its heads' rigs are relative to the working folder.
+    """Return the script of a world.
 
     Raises:
         gazerig.config.load.ConfigError: the file has a fault or does not exist.
@@ -230,33 +186,7 @@ def world_script(name_or_path: str) -> SceneScript:
 @lru_cache(maxsize=2)
 def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
     """Return a script; it is read only once, although a run requests it several times."""
-
-    def unknown_rigs(script: SceneScript) -> Iterator[Fault]:
-        for name, head in script.heads.items():
-            try:
-                _resolve_rig(path, head.rig)
-            except ConfigError as error:
-                yield f"heads.{name}.rig", error.faults[0].rule
-
-    script = load(path, SceneScript, checks=(*CHECKS, unknown_rigs))
-    heads = {
-        name: replace(head, rig=_resolve_rig(path, head.rig)) for name, head in script.heads.items()
-    }
-    return replace(script, heads=heads)
-
-
-def _resolve_rig(world: Path, rig: str) -> str:
-    """Return a rig that a world's file names; a path is relative to the working folder."""
-    if not rig:
-        return rig
-    found = rig_path(rig)
-    if found != Path(rig):
-        return rig  # by its name
-    found = world.parent / found.expanduser()
-    if not found.is_file():
-        rule = f"{found}: there is no such file; correct the path, or give the name of a rig"
-        raise ConfigError([ConfigFault(str(found), None, "", rig, rule)])
-    return str(found)
+    return load(path, SceneScript, checks=CHECKS)
 
 
 def mjcf_of(name_or_path: str) -> Path | None:

@@ -129,7 +129,6 @@ class RenderedWorld(NamedTuple):
     camera: CameraParams
     rng: np.random.Generator
     params: WorldCameraParams
-    number: int = 0
 
     def pixels(
         self,
@@ -168,7 +167,7 @@ class RenderedWorld(NamedTuple):
         field_rad = radians(self.camera.horizontal_field_deg)
         size_px = asked.width_px, asked.height_px
         lens = intrinsics_of_lens(self.camera.lens, field_rad, *size_px)
-        view = world_view(self.spec, newest, asked, self.number)
+        view = world_view(self.spec, newest, asked)
         camera = PixelCamera(
             params, self.scene, self.mount, head, detector, self.rng, find_motion, locate, view,
             lens, begins_s,
@@ -191,7 +190,6 @@ def world_view(
     spec: WorldSpec,
     newest: Callable[[], HostState | None],
     params: WorldCameraParams,
-    number: int = 0,
 ) -> "SceneView":
     """Return the renderer's view of a world."""
     model = spec.compile()
@@ -207,7 +205,7 @@ def world_view(
         if people is not None:
             people.place(data, t_s)
 
-    rig = model.rigs[number]
+    rig = model.rigs[0]
     own = rig.names + HEAD_LINK
     there = [model.mj.body(i).name for i in range(model.mj.nbody)]
     hidden = [own] if own in there else []

@@ -4,10 +4,8 @@ from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import shipped_names
 from gazerig.features.world.room import HOME
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.surroundings import GroupRun, RunRoom, Surroundings
-from gazerig.robot.description.world_shapes import WorldShapes
+from gazerig.robot.app.surroundings import RunRoom, Surroundings
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.sim_mock.scenes.scene import Scene
 
 
@@ -24,7 +22,7 @@ class WorldSurroundings(Surroundings):
         return world_scene(requested_world(options), options.seed)
 
     def open(self, rig: Rig, options: RunOptions, clock: Clock) -> RunRoom:
-        """Return the requested world with one rig in it."""
+        """Return the requested world with the rig in it."""
         from gazerig.features.world.run.rig_room import open_room
         from gazerig.features.world.run.run_world import world_of
 
@@ -33,15 +31,3 @@ class WorldSurroundings(Surroundings):
     def names(self) -> tuple[str, ...]:
         """Return the names of the shipped worlds."""
         return shipped_names("worlds", HOME)
-
-    def group(self, options: RunOptions) -> GroupRun | None:
-        """Return the run of several heads, None for a world with one."""
-        from gazerig.features.world.run.head_group import compose_group, has_other_heads
-
-        return compose_group(options) if has_other_heads(options) else None
-
-    def replay_shapes(self, info: WorldInfo, placement: tuple[float, ...]) -> WorldShapes:
-        """Return the shapes of the world of a recorded run."""
-        from gazerig.features.world.run.recorded_world import recorded_shapes
-
-        return recorded_shapes(info, placement)

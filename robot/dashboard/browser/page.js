@@ -34,7 +34,7 @@ let freshAt = performance.now();
 
 /** Show the view in grey, with its age, when nothing new has come. */
 function age() {
-  const old = performance.now() - freshAt, stale = old > STALE_MS && !state.recording;
+  const old = performance.now() - freshAt, stale = old > STALE_MS;
   const note = $("#stage .age");
   $("#stage").classList.toggle("stale", stale);
   note.hidden = !stale;
@@ -48,7 +48,7 @@ function show(now) {
   age();
   const controlled = state.control_kind && state.control_kind !== "gaze";
   const headline = state.silent ? "nothing comes from the rig"
-    : state.headline || state.control_sentence || (state.recording ? "a recording is shown" : "awake");
+    : state.headline || state.control_sentence || "awake";
   write($("#headline"), headline);
   // A change of control is read out; the target changes three times a second.
   const control = (state.control_sentence ?? "").replace(LASTING, "");
@@ -58,8 +58,6 @@ function show(now) {
   write($("#busy"), state.busy || "");
   $("#busy").hidden = !state.busy;
   document.title = `${state.stopped ? "■ stopped - " : state.silent ? "! silent - " : ""}gazerig`;
-  $("#dock").hidden = Boolean(state.recording);
-  document.body.classList.toggle("recording", Boolean(state.recording));
   followUnasked();
   $("#opponent").hidden = !state.opponent;
   for (const button of moves) {
@@ -130,7 +128,7 @@ setInterval(() => {
   if (!pointer || !(following() || boxing()) || document.hidden) return;
   if (!held && now - movedAt > RESTED_MS) return;
   const free = takesOver || FREE.has(state.control_kind ?? "");
-  if (state.stopped || state.recording || !(boxing() || free)) return;
+  if (state.stopped || !(boxing() || free)) return;
   if (!moved && now - sentAt < AGAIN_MS) return;
   moved = false;
   sentAt = now;

@@ -6,7 +6,7 @@
 //
 // Messages of the connection become an event "rig-state" of the window for the other scripts. They
 // send requests by window.rig: ask(what) waits for an answer, tell(what) does not. The button is
-// hidden for a recording and for films without a head ("headless").
+// hidden for films without a head ("headless").
 
 (() => {
   "use strict";
@@ -108,7 +108,6 @@
 
   // The message, most urgent first: [text, alarm, buttons].
   function saying() {
-    if (state.recording) return ["A recording: nothing here moves or stops a rig.", false, []];
     if (state.headless) return ["", false, []];
     const lost = performance.now() - heardAt > SILENT_AFTER_MS;
     if (failed) return [`${failed}. Use the emergency stop of the rig.`, true, []];
@@ -132,7 +131,7 @@
   let drawn = "";
   function draw() {
     if (!stop) return;
-    stop.hidden = Boolean(state.recording || state.headless);
+    stop.hidden = Boolean(state.headless);
     stop.classList.toggle("going", Boolean(stopping));
     const label = stopping ? "stopping…" : "STOP";
     if (stop.firstChild.textContent !== label) stop.firstChild.textContent = label;

@@ -80,7 +80,7 @@ if (button) {
   button.addEventListener("click", () => (stream ? end() : begin()));
   // A real rig has its own camera at its eyes.
   window.addEventListener("rig-state", (event) => {
-    button.hidden = !event.detail.emulated || Boolean(event.detail.recording);
+    button.hidden = !event.detail.emulated;
     if (button.hidden && stream) end();
   });
 }

@@ -123,7 +123,7 @@ const KINDS = {
     const timer = window.setInterval(() => {
       if (paintedAt && !node.isConnected) return window.clearInterval(timer);
       const old = performance.now() - paintedAt;
-      const stale = lives && old > STALE_MS && !node.hidden && !document.body.matches(".recording");
+      const stale = lives && old > STALE_MS && !node.hidden;
       node.classList.toggle("stale", stale);
       age.hidden = !stale;
       if (stale) age.textContent = `${Math.round(old / 1000)} s old`;

@@ -98,16 +98,6 @@ def background(detections: Detections, depth: bool) -> ImageArray | None:
     return drawn
 
 
-def no_pictures_image() -> ImageArray:
-    """Return a dark image with a message that no images were recorded."""
-    drawn = np.full((IMAGE_WIDTH_PX * 5 // 8, IMAGE_WIDTH_PX, 3), _DARK_GROUND, np.uint8)
-    words, size = "no pictures were recorded", 1.0
-    (width, height), _ = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 2)
-    at = ((drawn.shape[1] - width) // 2, (drawn.shape[0] + height) // 2)
-    cv2.putText(drawn, words, at, cv2.FONT_HERSHEY_SIMPLEX, size, _LANDMARK, 2, cv2.LINE_AA)
-    return drawn
-
-
 def depth_image(depth_m: Depth) -> ImageArray:
     """Return distances as colours, at most IMAGE_WIDTH_PX wide, with a colour scale at the bottom.
 

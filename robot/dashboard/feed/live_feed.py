@@ -36,7 +36,6 @@ from gazerig.robot.dashboard.feed.page_process import (
     FRAME,
     MESSAGE,
     PARAMS,
-    REPLAY,
     SNAPSHOT,
     TRACKS,
     VALUES,
@@ -49,7 +48,7 @@ from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.scene_view import PinholeView, SceneView
-from gazerig.robot.model.types import Level, LoopFigures, OtherHead, Snapshot
+from gazerig.robot.model.types import LoopFigures, Snapshot
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
@@ -93,7 +92,6 @@ class RunState(NamedTuple):
     errors: errors of the bus, by kind; behaviour, conversation, character: the present ones
     residual: see ``ResidualFigures``
     scene_start_s: start of a simulated scene or world, None before it and without one
-    others: the other heads of the same world, as fields of ``OtherHead``
     timing: the loop's own figures, as fields of ``LoopFigures``; None: unknown. In the page's own
         figures, ticks that a busy page did not accept would appear late.
     expression: the present one, "" without any
@@ -105,7 +103,6 @@ class RunState(NamedTuple):
     character: str
     residual: tuple[float | None, float | None, int]
     scene_start_s: float | None = None
-    others: Sequence[tuple[str, str, Level]] = ()
     timing: Sequence[Any] | None = None
     expression: str = ""
 
@@ -177,7 +174,7 @@ class LiveFeed:
     choice: see ``LiveRig``
     choices: layers selected for the camera image
     watched: whether a browser shows the images; otherwise none is drawn
-    shown_s: time of the shown data: of the newest tick, or of a recording's snapshot
+    shown_s: time of the shown data, of the newest tick
     """
 
     def __init__(self) -> None:
@@ -245,7 +242,6 @@ class LiveFeed:
                 perception,
                 state.character,
                 state.conversation,
-                tuple(OtherHead(*other) for other in state.others),
                 LoopFigures(*state.timing) if state.timing is not None else None,
                 state.expression,
             )
@@ -391,7 +387,7 @@ class OverlayChoices:
 class News(NamedTuple):
     """Messages that waited on the socket: all snapshots, the last frame, and whether it has closed.
 
-    jpeg: frame of a recording; image: frame of a running rig with its detections, BGR
+    jpeg: an encoded frame; image: a frame with its detections, BGR
     world: the simulated world around the rig, if any
     shape: geometry of the rig, if known
     others: messages that must not be lost or skipped, as (kind, content of the JSON), oldest first
@@ -428,7 +424,7 @@ def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
             live.shown_s = snapshots[-1].t_s
         elif kind == FRAME:
             jpeg = body
-        elif kind in (CHOICES, TRACKS, PARAMS, VALUES, MESSAGE, REPLAY):
+        elif kind in (CHOICES, TRACKS, PARAMS, VALUES, MESSAGE):
             others.append((kind, json.loads(body)))
         else:
             live.handle_message(message, fd)

@@ -37,10 +37,9 @@ from gazerig.robot.dashboard.requests.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
-# The first byte of a message is its kind. To the page: a snapshot and a frame of a
-# recording, menus, the parameters, their values, a reply or a message to all users, the position
-# of a replay; the messages of a running rig are in live_feed.py.
-SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
+# The first byte of a message is its kind. To the page: menus, the parameters, their values, a reply
+# or a message to all users; the messages of a running rig are in live_feed.py.
+SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE = b"s", b"p", b"c", b"k", b"v", b"w"
 TRACKS = b"l"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
@@ -56,10 +55,6 @@ CANNOT_OPEN = 3
 """Exit code of a page that cannot open its address; a restart would not help."""
 ALL_USERS = "*"
 """User name in messages to all users of the page."""
-SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""Speeds of a replay that the page offers; any speed between the ends is accepted."""
-MARK_KINDS = ("saccade", "blink", "event")
-"""Kinds of events to which a replay can jump."""
 
 OnRequest = Callable[[dict[str, object]], str | None]
 """Executes a request of a user of the page; returns the reply or None."""

@@ -24,7 +24,6 @@ from gazerig.robot.model.types import (
     JointState,
     Level,
     LoopFigures,
-    OtherHead,
     SeenBlink,
     SeenBody,
     SeenCamera,
@@ -65,7 +64,6 @@ class ShownRig(NamedTuple):
 class SnapshotTexts(NamedTuple):
     """State that a tick does not contain: bus errors, perception, present choices, as text.
 
-    others: the other heads of the same world
     timing: the loop's own figures; None: those of the ticks that arrived
     expression: the present one, "" without any
     """
@@ -75,7 +73,6 @@ class SnapshotTexts(NamedTuple):
     perception: str = ""
     character: str = ""
     conversation: str = ""
-    others: tuple[OtherHead, ...] = ()
     timing: LoopFigures | None = None
     expression: str = ""
 
@@ -157,7 +154,6 @@ class SnapshotBuilder:
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
-            others=said.others,
             expressed=(track.name if track is not None else "", said.expression),
         )
 

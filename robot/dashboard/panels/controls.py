@@ -40,14 +40,6 @@ class Controls:
         self._talk = TalkPanel(self._steer, outbox)
         self._first = FirstMenus(self._tune, outbox, self._lead.let_go)
 
-    def remove_controls(self) -> None:
-        """Remove all controls: a recording cannot be controlled."""
-        self._lead.remove_target()
-        self._tuning.remove_params()
-        for place in (self._steer, self._tune, self._widgets.panel("play")):
-            place.clear()
-            place.html(note("A recording: there is no rig to move or to tune."))
-
     def offer(self, menus: Mapping[str, Sequence[str]]) -> None:
         """Add menus with their choices."""
         for name, choices in menus.items():
@@ -167,10 +159,6 @@ class GazeTargetPanel:
             x, y, z = map(float, event.target.position)
             if event.client_id is not None and event.phase != "start":
                 self._outbox.command(LookAt((x, y, z)), str(event.client_id))
-
-    def remove_target(self) -> None:
-        """Remove the target."""
-        self._gizmo.remove()
 
     def _show_target(self, on: bool) -> None:
         self._gizmo.visible = on

@@ -19,7 +19,7 @@ from gazerig.robot.dashboard.panels.run_figures import (
     MainSequenceChart,
     RunFigures,
 )
-from gazerig.robot.dashboard.panels.servo_health import alarms, health_table, other_heads
+from gazerig.robot.dashboard.panels.servo_health import alarms, health_table
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
@@ -114,7 +114,7 @@ class PanelView:
         if self._shown % _WORDS_EVERY == 0:
             self.alarms.content = alarms(snapshot)
             if "watch" in self._open:
-                self.winner.content = target_text(snapshot) + other_heads(snapshot)
+                self.winner.content = target_text(snapshot)
                 self.saliences.content = salience_bars(snapshot)
                 self.estimation_note.content = estimation_note(snapshot)
             if "health" in self._open:

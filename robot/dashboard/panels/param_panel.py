@@ -209,20 +209,11 @@ class ParamPanels:
         self.in_force: dict[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._path = ""
-        self._over = False
         widgets.on_join(self._greet)
         widgets.on_leave(self._forget)
 
-    def remove_params(self) -> None:
-        """Remove all parameters."""
-        with self._lock:
-            self._over = True
-            self._panels.clear()
-
     def _greet(self, client: str) -> None:
         with self._lock:
-            if self._over:
-                return
             panel = ParamPanel(self._widgets, client, self._place, self._outbox, self._lock)
             panel.offer(self._params)
             panel.update_values(self.in_force, self._unsaved, self._path)

@@ -189,15 +189,7 @@ def alarms(snapshot: Snapshot) -> str:
         )
     if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
         said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
-    for other in snapshot.others:
-        if other.level in _STANDS_STILL:
-            said += banner(f"{other.name}: {other.headline}", LEVELS[other.level])
     return said
-
-
-def other_heads(snapshot: Snapshot) -> str:
-    """Return the activity of the other heads of the same world, one line each."""
-    return "".join(one_line(f"{other.name}: {other.headline}") for other in snapshot.others)
 
 
 def no_data_text() -> str:

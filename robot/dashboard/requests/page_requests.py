@@ -42,7 +42,6 @@ class PageRequestHandler:
         params: parameters that can be changed; None: there are none.
         point: returns the point in the world at a position in the image; None: there is no image.
         steer: handles a steering button; None: there are no buttons.
-        replay: controls a replay; None: there is none.
         depth: switches the depth image on or off; None: there is none.
         talk: plays a minute of conversation and returns a message; None: it cannot.
         refusals: exceptions besides ValueError that ``params`` raises for values that break a rule.
@@ -56,7 +55,6 @@ class PageRequestHandler:
         params: ParamAccess | None = None,
         point: Point | None = None,
         steer: Callable[[str], str | None] | None = None,
-        replay: Callable[[Mapping[str, object]], str | None] | None = None,
         depth: Callable[[bool], None] | None = None,
         talk: Callable[[], str] | None = None,
         refusals: tuple[type[Exception], ...] = (),
@@ -68,7 +66,6 @@ class PageRequestHandler:
         )
         self._point = point
         self._steer = steer
-        self._replay = replay
         self._depth, self._talk = depth, talk
         self._clock = RealClock()
         self._limited_s = -_SAID_EVERY_S
@@ -119,8 +116,6 @@ class PageRequestHandler:
                 return None
             case {"play_talk": True} if self._talk is not None:
                 return self._talk()
-            case {"replay": dict(asked)} if self._replay is not None:
-                return self._replay(asked)
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} is not available here")
 
     def _reply_text(self, given: PendingCommand) -> str | None:

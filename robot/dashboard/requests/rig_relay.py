@@ -28,7 +28,7 @@ _ANSWER_S, _FILES_S = 10.0, 40.0
 _AGAIN_S = 0.5
 
 Answer = dict[str, Any]
-NO_RIG = "no head takes requests here: it shows a recording, starts or has ended"
+NO_RIG = "no head takes requests here: it starts or has ended"
 BUSY = f"{TOO_MANY}; try again"
 NEWEST = 10**15
 """Number greater than that of any event."""
