@@ -59,16 +59,7 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
         ("report", "--scene", "face-to-face"),
         ("compare", "a.mcap", "b.mcap"),
         ("sweep", "--set", "gaze.head.comfort_deg=4:16:7"),
-        (
-            "calibrate",
-            "camera",
-            "--what",
-            "lens",
-            "--oak-calibration",
-            "none.json",
-            "--out",
-            "copy.yaml",
-        ),  # fmt: skip
+        ("calibrate", "camera", "--oak", "--what", "lens", "--out", "copy.yaml"),
         ("calibrate", "camera", "desk", "--mock", "--yes"),
         ("study", "design", "nakamoto_1"),
     )

@@ -13,7 +13,6 @@ from fakes.cameras import QuietCamera
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.oak.calibration import OakCalibration
 from gazerig.drivers.camera.orientation import (
     AS_DELIVERED,
     FrameOrientation,
@@ -203,14 +202,3 @@ def test_the_rig_says_how_frames_are_turned() -> None:
     source = upright(partial(Frames, iter(())), turned)
     assert isinstance(source(), UprightSource)
     assert pickle.loads(pickle.dumps(turned)) == turned  # it goes to the camera's process
-
-
-def test_the_lens_in_an_oaks_memory_is_turned_for_the_rigs_file() -> None:
-    oak = pytest.importorskip("gazerig.features.bringup.cli.calibrate.oak")
-    found = OakCalibration(
-        "OAK-D", LENS, WIDTH, HEIGHT, LENS.distortion, 0.0, None, None, None, None
-    )
-    turned = oak.upright_calibration(found, FrameOrientation(90))
-    assert (turned.width_px, turned.height_px) == (HEIGHT, WIDTH)
-    assert (turned.lens.fx_px, turned.lens.fy_px) == (LENS.fy_px, LENS.fx_px)
-    assert (turned.lens.cx_px, turned.lens.cy_px) == (HEIGHT - 1 - LENS.cy_px, LENS.cx_px)

@@ -69,8 +69,8 @@ _REMEDIES = {
 }
 FIELD_TEXT = (
     f"the field of view is not measured and taken as {ASSUMED_FIELD_DEG:g} deg (a lens of 84 deg "
-    "places people 1.3 times too far): gazerig calibrate camera --face-at 1.0 measures it with your "
-    "face in a minute"
+    "places people 1.3 times too far): gazerig calibrate camera measures it with a printed "
+    "board"
 )
 
 

@@ -24,8 +24,7 @@ class Pca9685Params(HobbyBoardParams):
         "I2C addresses of more boards on the same bus; the first channel of the second board is id 16."] = ()
     frequency_hz: Annotated[float, Bounds(40, 330), "Pulses per second; analogue servos need 50, many digital servos accept more."] = 50.0
     oscillator_hz: Annotated[float, Bounds(22_000_000, 28_000_000),
-        "Frequency of the board's oscillator. It differs from board to board by some percent, and the pulse widths with it; "
-        "gazerig setup finds it from one measured pulse."] = 25e6
+        "Frequency of the board's oscillator. It differs from board to board by some percent, and the pulse widths with it."] = 25e6
     further_oscillators_hz: Annotated[tuple[float, ...], Bounds(22_000_000, 28_000_000),
         "Oscillator frequencies of the further boards, in their order; oscillator_hz for those left out."] = ()
     min_pulse_us: Annotated[float, Bounds(100, 3000), "Shortest pulse that is ever sent."] = 500.0

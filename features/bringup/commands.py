@@ -42,18 +42,13 @@ DOCTOR = CommandEntry(
 )
 CALIBRATE = CommandEntry(
     "gazerig.features.bringup.cli.calibrate.group",
-    "Calibrate joints (the default), camera, face or mass, and write the result into the rig's YAML.",
+    "Calibrate joints (the default), camera or face, and write the result into the rig's YAML.",
     "Bring-up",
     examples={
         "calibrate": (
             ("calibrate joints my.yaml", "find zeros and ends of all joints"),
             ("calibrate board board.pdf", "print the board for the next one"),
             ("calibrate camera my.yaml", "the lens, and where the camera sits"),
-            (
-                "calibrate camera my.yaml --oak --what lens",
-                "the lens as an OAK camera has it in memory",
-            ),
-            ("calibrate mass my.yaml --weight-kg 0.9", "the head's balance, from its neck's loads"),
             ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
         )
     },

@@ -1,4 +1,4 @@
-"""Settings of a Maestro for Pololu's program, because no serial command can set them. Pure.
+"""Settings to make in a Maestro by Pololu's program, as no serial command can set them. Pure.
 
 After an error, such as one damaged byte, a board moves every channel according to its setting. Off
 stops the pulses, until the servos are held again at their positions. Ignore would continue, but
@@ -10,11 +10,10 @@ kept in multiples of 16 us) and 4.e (serial settings).
 
 from collections.abc import Iterator, Sequence
 from math import ceil, floor
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.hobby_board.params import US_STEPS
-from gazerig.drivers.maestro.commands import MICRO, accel_units, speed_units
+from gazerig.drivers.maestro.commands import accel_units, speed_units
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoConfig
 
@@ -80,53 +79,6 @@ def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool
             f"Acceleration {accel:3}    {setup.name}"
         )
     yield "  tab Script: no script, 'Run script on startup' off. Then Apply Settings, and close it."
-
-
-def settings_file(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> str:
-    """Return the settings as a file of Pololu's programs.
-
-    Channels without a joint are servos without pulses, as in the factory settings.
-    """
-    root = Element("UscSettings", version="1")
-    for name, value in (
-        ("NeverSuspend", "false"),
-        ("SerialMode", "USB_DUAL_PORT" if usb else "UART_FIXED_BAUD_RATE"),
-        ("FixedBaudRate", str(params.baud)),
-        ("SerialTimeout", str(round(TIMEOUT_S * 100.0))),
-        ("EnableCrc", str(params.crc).lower()),
-        ("SerialDeviceNumber", str(params.device)),
-        ("SerialMiniSscOffset", "0"),
-    ):
-        SubElement(root, name).text = value
-    # A Micro Maestro counts its period in other units: 156 of them and six servos are 20 ms.
-    period = (
-        {"ServosAvailable": "6", "ServoPeriod": "156"}
-        if params.channels <= MICRO
-        else {"MiniMaestroServoPeriod": "80000", "ServoMultiplier": "1"}
-    )
-    channels = SubElement(root, "Channels", period)
-    by_id = {setup.id: setup for setup in setups}
-    for channel in range(params.channels):
-        setup = by_id.get(channel)
-        low, high = FACTORY_US if setup is None else range_us(setup)
-        speed, accel = (0, 0) if setup is None else start_limits(setup)
-        kept = {
-            "name": "" if setup is None else setup.name,
-            "mode": "Servo",
-            "min": str(low * US_STEPS),
-            "max": str(high * US_STEPS),
-            "homemode": "Off",
-            "home": str(low * US_STEPS),
-            "speed": str(speed),
-            "acceleration": str(accel),
-            "neutral": str(1500 * US_STEPS),
-            "range": "1905",
-        }
-        SubElement(channels, "Channel", kept)
-    SubElement(root, "Sequences")
-    SubElement(root, "Script", ScriptDone="true")
-    indent(root)
-    return tostring(root, encoding="unicode") + "\n"
 
 
 def clipping_text(setup: ServoConfig, asked_steps: float, got_steps: float) -> str:

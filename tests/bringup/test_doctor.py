@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from xml.etree.ElementTree import fromstring
 
 import pytest
 from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one, setups_of
@@ -54,7 +53,6 @@ from gazerig.features.bringup.maestro_settings import (
     clipping_text,
     instructions,
     range_us,
-    settings_file,
     start_limits,
     wide_range,
 )
@@ -743,22 +741,6 @@ def test_what_to_set_is_said_for_every_channel():
     assert "channel  2: Min  896, Max 1808, Speed" in said and "Timeout: 0.50 s" in said
     pins = "\n".join(instructions(MaestroParams(baud=57_600), SETUPS, False))
     assert "UART, fixed baud rate 57600" in pins and "USB Dual Port" not in pins
-
-
-def test_the_same_as_a_settings_file_of_pololu_s_programs():
-    params = MaestroParams(device=5, crc=True)
-    root = fromstring(settings_file(params, SETUPS, True))
-    assert (root.findtext("EnableCrc"), root.findtext("SerialMode")) == ("true", "USB_DUAL_PORT")
-    assert root.findtext("SerialTimeout") == "50"  # hundredths of a second
-    channels = root.findall("Channels/Channel")
-    assert len(channels) == params.channels
-    assert {one.get("homemode") for one in channels} == {"Off"}
-    lid = channels[LID.id]
-    assert (lid.get("name"), lid.get("min"), lid.get("max")) == (LID.name, "3584", "7232")
-    assert (int(present(lid.get("speed"))), int(present(lid.get("acceleration")))) == start_limits(
-        LID
-    )
-    assert len(fromstring(settings_file(MaestroParams(channels=6), SETUPS, False))[7]) == 6
 
 
 @pytest.mark.parametrize(("steps_s", "units"), [(3100.0, 31), (3300.0, 32), (12_345.0, 124)])

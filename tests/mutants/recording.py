@@ -35,8 +35,6 @@ RECORDING = (
            "messages are not counted", ("run_recording",)),
     Mutant("robot/recording/run_writer.py", "enable_data_crcs=True", "enable_data_crcs=False",
            "a recording has no check sum of the whole", ("damaged_recordings",)),
-    Mutant("robot/app/run_observers.py", "            self._world_recorded = True\n", "",
-           "the world is written with every tick", ("features_apart",)),
     Mutant("robot/recording/writer_client.py",
            '                self._lose("its writer does not respond")\n                return\n', "                continue\n",
            "a writer that is stuck is waited for for ever", ("run_writer",)),

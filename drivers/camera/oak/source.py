@@ -12,9 +12,8 @@ import numpy as np
 from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
 from gazerig.drivers.camera.oak.abilities import full_line_text, supported_settings, usb2_text
 from gazerig.drivers.camera.oak.calibration import (
-    OakCalibration,
     imu_to_camera,
-    read_calibration,
+    raw_distortion,
     rotation_matrix,
 )
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
@@ -31,6 +30,7 @@ from gazerig.drivers.camera.oak.pipeline import (
     join_outputs,
     lens_of,
 )
+from gazerig.drivers.camera.pinhole import Distortion
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import DetectedFace
@@ -71,7 +71,7 @@ class OakSource:
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
-        self._calibration: OakCalibration | CameraError | None = None
+        self._distortion: Distortion | None = None
         self._gyro_queue: Any = None
         self._face_fault: Callable[[], str] = str
         self._face_fault_told = False
@@ -89,7 +89,6 @@ class OakSource:
         self.close()
         self._dai = self._load()
         self._asked, self._slow_line, self._face_fault_told = self._params, None, False
-        self._calibration = None
         try:
             if self._on_device:
                 info = find_oak(self._dai, self._params.device)
@@ -175,18 +174,6 @@ class OakSource:
                 )
         return None
 
-    def calibration(self) -> OakCalibration:
-        """Return the calibration of the colour camera from the open camera's memory.
-
-        Raises:
-            CameraError: it is not open, or its memory does not contain it.
-        """
-        if isinstance(self._calibration, CameraError):
-            raise self._calibration
-        if self._calibration is None:
-            raise CameraError("the OAK camera is not open: its calibration cannot be read")
-        return self._calibration
-
     def events(self) -> tuple[str, ...]:
         """Return new events, one line each: USB 2 instead of 3, a clock that jumped."""
         reported, self._events = tuple(self._events), []
@@ -210,11 +197,9 @@ class OakSource:
 
     def _prepare(self) -> None:
         """Check the device's features and USB speed; switch its dot projector on."""
-        stored = self._device.readCalibration()
-        try:
-            self._calibration = read_calibration(self._dai, stored, self._params)
-        except CameraError as error:
-            self._calibration = error
+        if not self._params.undistort:
+            stored = self._device.readCalibration()
+            self._distortion = raw_distortion(self._dai, stored, self._params)
         self._asked, left_out = supported_settings(self._dai, self._device, self._params)
         self._events.extend(left_out)
         speed = self._device.getUsbSpeed()
@@ -246,9 +231,9 @@ class OakSource:
                     line = full_line_text(self._asked, measured_hz)
                 self._events.append(line)
         # The lens of a frame, with distortion if the camera has not undistorted it.
-        lens, stored = lens_of(group), self._calibration
-        if lens is not None and not self._asked.undistort and isinstance(stored, OakCalibration):
-            lens = replace(lens, distortion=stored.raw_distortion)
+        lens = lens_of(group)
+        if lens is not None and self._distortion is not None:
+            lens = replace(lens, distortion=self._distortion)
         # The camera's orientation at the middle of a frame's exposure.
         turn = None
         if self._gyro is not None:

@@ -1,7 +1,6 @@
 """The command ``gazerig setup``: each servo gets its id, each channel is tested."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -49,10 +48,6 @@ def setup(
     port: PortOption = None,
     mock: MockOption = False,
     yes: YesOption = False,
-    settings: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write a Maestro's settings in Pololu's file format."),
-    ] = None,
 ) -> None:
     """Set id and baud rate of the servos, connected one at a time; test a Maestro's channels."""
     with clear_errors(rig, port, mock):
@@ -67,7 +62,7 @@ def setup(
         for bus in bus_names(model):
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if mine:
-                task = SetupTask(model, rig, bus, mine, port, mock, yes, settings)
+                task = SetupTask(model, rig, bus, mine, port, mock, yes)
                 left += BOARDS.get(model.bus_named(bus).kind, _set_up_chain)(task)
         if left:
             say(f"skipped: {', '.join(left)}")

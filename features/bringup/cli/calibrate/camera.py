@@ -2,9 +2,9 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from enum import StrEnum
-from math import degrees, radians
+from math import atan, degrees, radians
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -13,16 +13,14 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.oak.calibration import OakCalibration
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.orientation import UprightSource
-from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import SetupError, require_package
-from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
-from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.features.bringup.calibration.camera_calibration import (
     CameraCalibrationRefused,
     lens_params,
@@ -34,16 +32,7 @@ from gazerig.features.bringup.calibration.camera_procedure import (
     neck_steps,
 )
 from gazerig.features.bringup.calibration.charuco_views import RULER_MM, write_page
-from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, estimate_field
 from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
-from gazerig.features.bringup.cli.calibrate.oak import (
-    calibration_of_file,
-    lens_keys,
-    oak_changes,
-    print_calibration,
-    upright_calibration,
-    with_frame_lens,
-)
 from gazerig.features.bringup.cli.manual_session import holding_rig
 from gazerig.features.bringup.cli.ports import rig_ports
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
@@ -69,7 +58,7 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.frames import CameraParams, LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.kinematics import NECK, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
@@ -94,8 +83,6 @@ ColumnsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from le
 RowsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from top to bottom.")]
 SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a square.")]
 _BOARD = BoardParams()
-# Number of frames with a face (some seconds), and longest time without one.
-_FACE_FRAMES, _NO_FACE_S = 120, 30.0
 
 
 def calibrate_board(
@@ -120,29 +107,14 @@ def calibrate_camera(
     ] = CalibrationTarget.all,
     camera: Annotated[int | None, typer.Option(min=0, help="Webcam N (default: 0).")] = None,
     oak: Annotated[
-        bool, typer.Option("--oak", help="Use an OAK camera, whose memory has its lens.")
+        bool, typer.Option("--oak", help="Use an OAK camera, whose frames have their lens.")
     ] = False,
-    oak_calibration: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Calibration file of depthai instead of a camera's memory."
-        ),
-    ] = None,
     ruler: Annotated[
         float, typer.Option(metavar="MM", help="Measured length of the printed 100 mm ruler, mm.")
     ] = float(RULER_MM),
     columns: ColumnsOption = _BOARD.columns,
     rows: RowsOption = _BOARD.rows,
     square: SquareOption = _BOARD.square_mm,
-    face_at: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M",
-            min=0.3,
-            max=5.0,
-            help="Without a board: the field of view alone, by your face so far from the lens.",
-        ),
-    ] = None,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
@@ -152,17 +124,15 @@ def calibrate_camera(
     ] = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
-    """Measure the lens and the place of the camera, with the printed board, or a face."""
+    """Measure the lens and the place of the camera, with the printed board."""
     with clear_errors(rig, port, mock), record_signals() as stopped:
-        _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
-        if what is not CalibrationTarget.lens and face_at is None:
+        if oak and camera is not None:
+            raise SetupError("--oak and --camera name two cameras: leave one away")
+        if mock and oak:
+            raise SetupError("--mock simulates a webcam: leave --oak away")
+        if what is not CalibrationTarget.lens:
             require_package("scipy", "calibration")
         loaded = load_rig(rig)
-        if face_at is not None:
-            changes = _measure_field(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
-            person = TerminalPerson(Lines(None), stopped, yes)
-            show_and_write(rig, loaded, changes, out, dry_run, person)
-            return
         board = CharucoBoard(_board(columns, rows, square, ruler))
         if loaded.camera.mount != "head" and what is not CalibrationTarget.lens:
             raise SetupError(
@@ -174,67 +144,17 @@ def calibrate_camera(
         job = _Job(
             loaded, board, stopped, Kinematics(loaded.geometry, loaded.joints, lid_ends(loaded))
         )
-        if oak_calibration is not None:
-            changes = _read_oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
-        else:
-            source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
-            with _open_camera(job, None if mock else source, seed) as eye:
-                lens = _find_lens(job, eye, source, what)
-                changes = lens.changes
-                if what is not CalibrationTarget.lens:
-                    with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
-                        found = _measure_mount(job, eye, neck, lens.camera, lens.good)
-                        changes |= mount_changes(found, lens.camera)
+        source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
+        with _open_camera(job, None if mock else source, seed) as eye:
+            lens = _find_lens(job, eye, what)
+            changes = lens.changes
+            if what is not CalibrationTarget.lens:
+                with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
+                    found = _measure_mount(job, eye, neck, lens.camera, lens.good)
+                    changes |= mount_changes(found, lens.camera)
         show_and_write(
             rig, loaded, changes, out, dry_run, TerminalPerson(Lines(None), stopped, yes)
         )
-
-
-def _measure_field(
-    rig: Rig, source: FrameSource, face_at_m: float, stopped: Callable[[], str | None]
-) -> dict[str, Any]:
-    """Return the field of view by a face that is looked at for some seconds."""
-    if rig.camera.lens is not None:
-        raise SetupError(
-            "camera.lens is measured and contains the field of view: measure it again with the board "
-            "(--what lens), or take it out of the rig file"
-        )
-    clock = RealClock()
-    turned = UprightSource(source, frame_orientation(rig.camera))
-    thread = CameraThread(turned, face_detector(rig.detector), clock.now_s)
-    say(
-        f"sit with your face {face_at_m:g} m before the lens (lens to tip of the nose), upright and "
-        "looking at it, and hold still"
-    )
-    thread.open()
-    try:
-        seen: list[Pixels] = []
-        number, seen_s, size_px = 0, clock.now_s(), (0, 0)
-        while len(seen) < _FACE_FRAMES:
-            raise_if_stopped(stopped)
-            found = thread.latest(clock.now_s())
-            if found is None or found.number == number:
-                if clock.now_s() - seen_s > _NO_FACE_S:
-                    raise SetupError("no face is seen: more light, a face from its front, nearer")
-                clock.sleep_until(clock.now_s() + 0.01)
-                continue
-            number, size_px = found.number, (found.width_px, found.height_px)
-            if found.faces:
-                seen.append(found.faces[0].landmarks_px)
-                seen_s = clock.now_s()
-            status(f"face in {len(seen)} of {_FACE_FRAMES} frames")
-    finally:
-        thread.close()
-    field = estimate_field(seen, *size_px, face_at_m)
-    say(
-        f"horizontal field of view {field.horizontal_deg:.1f} deg, between {field.low_deg:.1f} and "
-        f"{field.high_deg:.1f} as faces differ in size by {100.0 * SIZE_SPREAD:.0f} %, and so far may "
-        "distances be off; the size varied by "
-        f"{100.0 * field.moved:.1f} %. The printed board measures it to 0.2 %"
-    )
-    field_deg = round(field.horizontal_deg, 1)
-    # Exactly 69 means a lens that has not been measured.
-    return {"camera.horizontal_field_deg": field_deg + 0.05 * (field_deg == ASSUMED_FIELD_DEG)}
 
 
 def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
@@ -314,38 +234,13 @@ def _open_camera(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_
         thread.close()
 
 
-def _refuse_contradictions(
-    what: CalibrationTarget,
-    camera: int | None,
-    oak: bool,
-    oak_calibration: Path | None,
-    mock: bool,
-    face_at: float | None,
-) -> None:
-    """Refuse contradictory options."""
-    if face_at is not None and (
-        oak or oak_calibration is not None or mock or what is not CalibrationTarget.all
-    ):
-        raise SetupError(
-            "--face-at measures a webcam's field of view alone: leave --what, --oak and --mock away "
-            "(an OAK camera knows its lens)"
-        )
-    if oak and camera is not None:
-        raise SetupError("--oak and --camera name two cameras: leave one away")
-    if mock and (oak or oak_calibration is not None):
-        raise SetupError("--mock simulates a camera without a memory: leave --oak away")
-    if oak_calibration is not None and what is not CalibrationTarget.lens:
-        raise SetupError("--oak-calibration has the lens only: add --what lens")
-
-
-def _find_lens(
-    job: _Job, eye: _CameraView, source: FrameSource, what: CalibrationTarget
-) -> _KnownLens:
-    """Return the lens of the rig or from the memory of an OAK camera, or measure it."""
+def _find_lens(job: _Job, eye: _CameraView, what: CalibrationTarget) -> _KnownLens:
+    """Return the lens of the rig, or that of the camera's own frames, or measure it."""
     if what is CalibrationTarget.mount:
         return _KnownLens(job.rig.camera, {}, HandEyeParams())
-    if isinstance(source, OakSource):
-        return _read_oak_lens(job, source.calibration(), _first_frame(job, eye))
+    first = _first_frame(job, eye)
+    if first.lens is not None:
+        return _known_lens(job, first.lens, first.image)
     steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
     say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
     while True:
@@ -384,13 +279,23 @@ def _find_lens(
     return _KnownLens(camera, lens_keys(lens.params(), lens.horizontal_field_deg), good)
 
 
-def _read_oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
-    """Return the lens of an OAK camera for upright frames, and print its memory."""
-    found = upright_calibration(delivered, frame_orientation(job.rig.camera))
-    found = with_frame_lens(found, shot.lens if shot is not None else None)
-    print_calibration(found, job.rig.oak)
-    camera = replace(job.rig.camera, lens=lens_params(found.lens, found.width_px, found.height_px))
-    return _KnownLens(camera, oak_changes(found), HandEyeParams())
+def _known_lens(job: _Job, lens: Intrinsics, image: ImageArray) -> _KnownLens:
+    """Return the lens that an OAK camera gives with its frames, from its factory calibration."""
+    height, width = image.shape[:2]
+    left, right = (lens.cx_px + 0.5) / lens.fx_px, (width - 0.5 - lens.cx_px) / lens.fx_px
+    params = lens_params(lens, width, height)
+    say(
+        f"the camera's own lens: focal length {lens.fx_px:.1f}, {lens.fy_px:.1f} px, axis at "
+        f"{lens.cx_px:.1f}, {lens.cy_px:.1f} px of {width} x {height}"
+    )
+    changes = lens_keys(params, degrees(atan(left) + atan(right)))
+    return _KnownLens(replace(job.rig.camera, lens=params), changes, HandEyeParams())
+
+
+def lens_keys(lens: LensParams, horizontal_field_deg: float) -> dict[str, Any]:
+    """Return a lens as dotted keys of a rig file and values."""
+    keys = {f"camera.lens.{key}": value for key, value in asdict(lens).items()}
+    return {"camera.horizontal_field_deg": round(horizontal_field_deg, 2), **keys}
 
 
 def _measure_mount(

@@ -1,4 +1,4 @@
-"""The commands under calibrate: joints, camera, board, face and mass; joints if none is named."""
+"""The commands under calibrate: joints, camera, board and face; joints if none is named."""
 
 from typing import Any
 
@@ -8,7 +8,6 @@ from typer.core import TyperGroup
 from gazerig.features.bringup.cli.calibrate.camera import calibrate_board, calibrate_camera
 from gazerig.features.bringup.cli.calibrate.face import calibrate_face
 from gazerig.features.bringup.cli.calibrate.joints import calibrate_joints
-from gazerig.features.bringup.cli.calibrate.mass import calibrate_mass
 
 _HELP = ("--help", "-h")
 
@@ -32,11 +31,10 @@ class DefaultCommandGroup(TyperGroup):
 app = typer.Typer(
     name="calibrate",
     cls=DefaultCommandGroup,
-    help="Calibrate joints (the default), camera, face or mass, and write the result into the rig's YAML.",
-    subcommand_metavar="[joints|camera|board|face|mass] [RIG] ...",
+    help="Calibrate joints (the default), camera or face, and write the result into the rig's YAML.",
+    subcommand_metavar="[joints|camera|board|face] [RIG] ...",
 )
 app.command("joints")(calibrate_joints)
 app.command("camera")(calibrate_camera)
 app.command("board")(calibrate_board)
 app.command("face")(calibrate_face)
-app.command("mass")(calibrate_mass)
