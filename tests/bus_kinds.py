@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import pytest
-
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
@@ -54,11 +52,7 @@ PLACES: dict[str, dict[str, tuple[int, ...]]] = {
 """Kind -> the buses that it is made of -> the places of their servos in the whole."""
 KINDS = tuple(PLACES)
 TWINS = ("in-process", "pty")
-ON_EITHER = [
-    pytest.param((kind, twin), marks=[pytest.mark.own_timeouts] if twin == "pty" else [])
-    for kind in KINDS
-    for twin in TWINS
-]
+ON_EITHER = [(kind, twin) for kind in KINDS for twin in TWINS]
 """Each kind over both; a servo that another process emulates may answer late."""
 
 

@@ -6,13 +6,14 @@ would wait for ever.
 
 import os
 import signal
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Container, Iterable, Iterator
 from contextlib import suppress
 from multiprocessing import forkserver, resource_tracker
 from pathlib import Path
 
-from gazerig.drivers.process.own_session import parent_death_signal
-
+GRACE_S = 10.0
+"""Time in which a process that a test has ended may exit, on a busy machine."""
 _PROC = Path("/proc")
 
 
@@ -27,6 +28,17 @@ def running() -> dict[int, str]:
     return found
 
 
+def end_others(kept: Container[int]) -> dict[int, str]:
+    """Kill the children that still run after a grace time, except some; return which they were."""
+    end_s = time.monotonic() + GRACE_S
+    while left := {pid: words for pid, words in running().items() if pid not in kept}:
+        if time.monotonic() > end_s:
+            end(left)
+            break
+        time.sleep(0.01)
+    return left
+
+
 def end(pids: Iterable[int]) -> None:
     """Kill processes and all that these have started."""
     for pid in pids:
@@ -36,11 +48,6 @@ def end(pids: Iterable[int]) -> None:
                 os.kill(one, signal.SIGKILL)
         with suppress(ChildProcessError):
             os.waitpid(pid, 0)
-
-
-def end_with_parent() -> None:
-    """Let this process, a fork, be killed as soon as the thread that forked it has gone."""
-    parent_death_signal(signal.SIGKILL)()
 
 
 def _children(pid: int) -> Iterator[int]:

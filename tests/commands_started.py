@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from typing import IO
 
-import child_processes
 from branch import Branch, become, gazerig
 
 
@@ -50,7 +49,6 @@ class OnTerminal:
         self.said = ""
         self.pid, self.fd = pty.fork()
         if self.pid == 0:
-            child_processes.end_with_parent()
             become(gazerig(*words))
 
     def reads(self, words: str) -> None:

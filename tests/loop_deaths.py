@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from branch import Branch, branched_children
+from branch import Branch
 from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
@@ -154,8 +154,7 @@ def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[D
     """Return a rig that a loop in another process drives."""
     with PtyBuses() as buses:
         rig = slow(kind)
-        with branched_children():
-            (path,) = buses.start(emulated_lines(rig)).values()
+        (path,) = buses.start(emulated_lines(rig)).values()
         loop = Branch(
             partial(drive, kind, guarded, watchdog, path), stdout=subprocess.PIPE, text=True
         )

@@ -13,7 +13,7 @@ from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.recording.read import RunRecording
 
-pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
+pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 def quiet(line: str) -> None:

@@ -25,8 +25,7 @@ LET_GO = "(not )?parked, torque off"
 """On a starved machine the time for parking may be over before."""
 
 pytestmark = [
-    pytest.mark.usefixtures("ideal_servos", "branched_children", "own_sockets"),
-    pytest.mark.own_timeouts,
+    pytest.mark.usefixtures("ideal_servos", "own_sockets"),
 ]
 
 

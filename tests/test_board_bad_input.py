@@ -15,8 +15,6 @@ from gazerig.robot.cli.main import app
 from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.client import PtyBus
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 PULSES = "hobby servos without pulses go to their parking place"
 
 

@@ -24,8 +24,6 @@ from gazerig.robot.app.borrowed_camera import SILENT_S, BorrowedCamera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.frames import CameraMount, fixed_mount
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 
 def jpeg(grey: int = 90, size: tuple[int, int] = (48, 64)) -> bytes:
     done, data = cv2.imencode(".jpg", np.full((*size, 3), grey, np.uint8))
@@ -249,7 +247,6 @@ navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no',
 """
 
 
-@pytest.mark.own_timeouts
 def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(near: Rig) -> None:
     taken = taker(near)
     with browsing(drawing="0") as tab:

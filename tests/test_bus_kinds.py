@@ -5,8 +5,6 @@ from bus_kinds import KINDS, ON_EITHER, in_process, twin_of
 
 from gazerig.testing import BusLossSuite, BusSuite
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 
 class TestEveryKind(BusSuite):
     @pytest.fixture(params=ON_EITHER, ids="-".join)

@@ -20,7 +20,6 @@ from gazerig.drivers.camera.process import (
     CameraProcess,
     FrameWatchdog,
     ProcessorDemand,
-    wanted_s,
 )
 from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, SlotWriter
@@ -35,7 +34,6 @@ from gazerig.robot.perception.frame_locator import FrameLocator
 
 PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))
-forked = pytest.mark.usefixtures("branched_camera")
 LOCATOR = FrameLocator(None, 1.2)
 
 
@@ -100,7 +98,6 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     camera.close()
 
 
-@forked
 def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     camera = process(partial(VideoFile, tmp_path / "nope.avi"))
     with pytest.raises(CameraError, match=r"no film or image at .*nope\.avi"):
@@ -108,7 +105,6 @@ def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     camera.close()
 
 
-@forked
 def test_detector_that_cannot_be_made_says_so_at_once(recording):
     params = FaceDetectorParams(kind="yunet", model_file="/nowhere/yunet.onnx")
     parts = CameraParts(partial(CameraReplay, recording), partial(face_detector, params))
@@ -119,7 +115,6 @@ def test_detector_that_cannot_be_made_says_so_at_once(recording):
 QUICK = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
 
 
-@forked
 def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
@@ -145,7 +140,6 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera.close()
 
 
-@forked
 def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
     camera = process(partial(CameraReplay, recording), care)
@@ -162,43 +156,12 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     camera.close()
 
 
-class Slow:
-    """A detector that a busy computer does not let run: from the 20th picture on it needs 4 s."""
-
-    def __init__(self):
-        self.pictures = 0
-
-    def find(self, picture):
-        self.pictures += 1
-        end_s = time.process_time() + 4.0
-        while self.pictures == 20 and time.process_time() < end_s:
-            pass
-        return ()
-
-
-@forked
-@pytest.mark.skipif(wanted_s(os.getpid()) is None, reason="Linux tells who waits for a processor")
-def test_pictures_that_are_not_processed_in_time_are_no_lost_camera(recording):
-    care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
-    camera = CameraProcess(
-        CameraParts(partial(CameraReplay, recording), Slow), time.monotonic, care
-    )
-    camera.open()
-    wait_for(lambda: camera.frames > 25)
-    busy, again = camera.events()
-    assert busy.startswith("this computer is too busy for the camera: no picture processed for 1.")
-    assert again.startswith("pictures are processed again after ")
-    assert camera._starts == 1, "a new process would load its networks again"
-    camera.close()
-
-
 def test_a_process_is_busy_that_wants_to_run_for_most_of_its_silence():
     wanted = [5.0, 5.6, 5.6, None]
     demand = ProcessorDemand(lambda: wanted.pop(0))
     assert [demand.is_busy(now_s) for now_s in (1.0, 2.0, 3.0, 4.0)] == [False, True, False, False]
 
 
-@forked
 def test_where_no_loss_is_borne_a_killed_process_ends_the_run(recording):
     camera = process(partial(CameraReplay, recording), CameraRecoveryParams(give_up_s=0.0))
     camera.open()
@@ -219,7 +182,6 @@ class Fussy:
         return ()
 
 
-@forked
 def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording):
     parts = CameraParts(partial(CameraReplay, recording), Fussy)
     camera = CameraProcess(parts, time.monotonic, QUICK)
@@ -231,14 +193,13 @@ def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording)
     camera.close()
 
 
-@forked
 def test_closing_does_not_wait_for_a_process_that_starts_again(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
     os.kill(present(present(camera._process).pid), signal.SIGKILL)
     wait_for(lambda: camera._starts > 1)
     camera.close()
-    assert not [t for t in threading.enumerate() if t.name == "camera"]
+    wait_for(lambda: not [t for t in threading.enumerate() if t.name == "camera"])
 
 
 def test_silence_is_judged_by_what_is_usual():
@@ -255,7 +216,6 @@ def test_silence_is_judged_by_what_is_usual():
         assert silence.verdict(now_s + hung_s + 0.01) == "hung"
 
 
-@forked
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path = tmp_path / "film.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))

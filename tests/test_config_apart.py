@@ -22,7 +22,6 @@ def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     )
 
 
-@pytest.mark.usefixtures("branched_children_here")
 def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     text = file.read_text(encoding="utf-8")
@@ -35,7 +34,6 @@ def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     assert str(there.value) == str(here.value)
 
 
-@pytest.mark.usefixtures("branched_children_here")
 def test_saving_works_there(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     now = datetime(2026, 1, 31, 23, 59, 59)
@@ -76,7 +74,6 @@ def test_it_is_another_process_that_ctrl_c_does_not_reach(importable: None) -> N
     assert pid != os.getpid() and session == pid
 
 
-@pytest.mark.usefixtures("branched_children_here")
 def test_a_process_that_fails_is_an_error_in_one_line(
     importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,8 +36,6 @@ from gazerig.robot.model.coupling import (
 from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, coupled_pairs
 from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 PITCH, ROLL = 35.0, 25.0
 RODS = PushRods((-0.035, 0.030, 0.010), (0.005, 0.030, -0.050), -0.040, 0.060)
 

@@ -281,7 +281,6 @@ def run(door: Door, scenario: Scenario, address: str = "", bind: str = "") -> Ta
     return head
 
 
-@pytest.mark.own_timeouts
 def test_a_voice_assistant_is_followed_and_found_again() -> None:
     """It is not there at first; it sends nonsense, a flood, and closes; it returns."""
     assistant = Assistant()
@@ -312,7 +311,6 @@ def test_a_voice_assistant_is_followed_and_found_again() -> None:
         assert sum(words in line for line in head.said) == 1, head.said
 
 
-@pytest.mark.own_timeouts
 def test_a_head_that_ends_is_found_again_with_its_state() -> None:
     assistant = Assistant()
 
@@ -334,7 +332,6 @@ def test_a_head_that_ends_is_found_again_with_its_state() -> None:
     run(voice_assistant.DOOR, scenario, f"ws://127.0.0.1:{assistant.port}")
 
 
-@pytest.mark.own_timeouts
 @pytest.mark.parametrize("door", [pipecat.DOOR, openai_realtime.DOOR], ids=lambda one: one.name)
 def test_web_pages_are_refused_and_programs_are_not(door: Door) -> None:
     """Also a page of this computer, a page in a frame without an address, and a rebound name."""
@@ -371,7 +368,6 @@ def test_web_pages_are_refused_and_programs_are_not(door: Door) -> None:
     run(door, scenario, "ws://127.0.0.1:9", f"127.0.0.1:{port}")
 
 
-@pytest.mark.own_timeouts
 def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -402,7 +398,6 @@ def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
     assert "the idlest is closed" in head.said[1] and "the newest is refused" in head.said[2]
 
 
-@pytest.mark.own_timeouts
 def test_a_satellite_takes_the_place_of_an_idle_one() -> None:
     pytest.importorskip("wyoming", reason="it is in the extra doors")
     port = free_port()
@@ -435,7 +430,6 @@ def open_as_a_stranger(port: int, monkeypatch: pytest.MonkeyPatch) -> socket.soc
     return one
 
 
-@pytest.mark.own_timeouts
 @pytest.mark.parametrize("door", [pipecat.DOOR, wyoming.DOOR], ids=lambda one: one.name)
 def test_another_user_of_this_computer_cannot_speak(
     door: Door, monkeypatch: pytest.MonkeyPatch
@@ -480,7 +474,6 @@ def test_the_user_of_a_connection_is_read_from_the_system_s_table() -> None:
     assert admission.socket_user(rows, ("::1", 0xC638, 0, 0), ("::1", 0x17A8, 0, 0)) == 1002
 
 
-@pytest.mark.own_timeouts
 def test_realtime_sessions_are_relayed_with_their_key() -> None:
     """The server sees the program's key and question; the program, the server's events."""
     port, bind = free_port(), f"127.0.0.1:{free_port()}"
@@ -533,7 +526,6 @@ def test_realtime_sessions_are_relayed_with_their_key() -> None:
     assert not any("hush" in line for line in head.said)
 
 
-@pytest.mark.own_timeouts
 def test_a_satellite_s_sound_is_said_and_reported_as_played() -> None:
     """The package wyoming is the judge: it writes and reads what the door reads and writes."""
     pytest.importorskip("wyoming", reason="it is in the extra doors")
@@ -583,7 +575,6 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played() -> None:
     assert len(head.sounds) == 3 and len(head.sounds[2][2]) < 960_000
 
 
-@pytest.mark.own_timeouts
 @pytest.mark.parametrize(
     "sent",
     [b"GET / HTTP/1.1\r\n\r\n", b"[]\n", b"{}\n", b"x" * 100_000,

@@ -52,7 +52,6 @@ def test_openai_s_types_accept_our_messages_and_the_door_theirs() -> None:
         openai_realtime.OpenAIRealtime().take({"type": kind}, 0.0)
 
 
-@pytest.mark.own_timeouts
 def test_openai_s_client_talks_through_the_relay() -> None:
     openai = needs("openai", "openai 'openai[realtime]'")
     port, bind = free_port(), f"127.0.0.1:{free_port()}"
@@ -124,7 +123,6 @@ def test_pipecat_s_models_accept_our_messages_and_the_door_theirs() -> None:
         pipecat.Pipecat().take({"label": "rtvi-ai", "type": kind, "data": {"text": "x"}}, 0.0)
 
 
-@pytest.mark.own_timeouts
 def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
     frames = needs("pipecat.frames.frames", "pipecat-ai")
     from pipecat.processors.filters.identity_filter import IdentityFilter
@@ -178,7 +176,6 @@ def test_livekit_s_states_are_known() -> None:
     )
 
 
-@pytest.mark.own_timeouts
 def test_livekit_s_session_steers_the_head() -> None:
     """A session without a room says a sound, and its user interrupts it."""
     agents = needs("livekit.agents", "livekit-agents")
@@ -234,7 +231,6 @@ def room() -> Iterator[Any]:
     yield rtc.Room
 
 
-@pytest.mark.own_timeouts
 def test_livekit_s_room_has_our_events(room: Any) -> None:
     head = TalkingHead()
     from livekit import rtc

@@ -23,8 +23,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.door_processes import DoorEntry
 
 pytestmark = [
-    pytest.mark.usefixtures("ideal_servos", "branched_children"),
-    pytest.mark.own_timeouts,
+    pytest.mark.usefixtures("ideal_servos"),
 ]
 
 

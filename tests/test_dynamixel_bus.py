@@ -21,9 +21,7 @@ from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.bus_bench import rows
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
-TWINS = ("in-process", pytest.param("pty", marks=pytest.mark.own_timeouts))
+TWINS = ("in-process", "pty")
 """A terminal's driver has time-outs in real time."""
 
 SPEED = 6000.0

@@ -8,7 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
 from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -95,7 +94,6 @@ def test_pulled_out_and_put_back_it_goes_on_from_where_the_joints_are():
         bus.close()
 
 
-@pytest.mark.own_timeouts
 def test_a_killed_driver_leaves_servos_that_stop_by_themselves():
     with PtyBus() as server:
         path = server.start(SPECS)

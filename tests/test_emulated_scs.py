@@ -3,8 +3,8 @@
 import math
 
 import pytest
+from fakes.waiting import eventually
 from servo_bench import ALL, PING, READ, SYNC_READ, SYNC_WRITE, WRITE, FeetechBench
-from starvation import eventually
 
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
@@ -129,7 +129,6 @@ def client():
         opened.close()
 
 
-@pytest.mark.own_timeouts
 def test_rustypot_finds_it_and_reads_every_register(client):
     assert client.scan([1, 2, 3]) == FOUND
     for register in client.registers():
@@ -137,7 +136,6 @@ def test_rustypot_finds_it_and_reads_every_register(client):
         assert (len(data), error) == (register.size, 0), register.name
 
 
-@pytest.mark.own_timeouts
 def test_rustypot_moves_it(client):
     [present] = client.read_present_position(2)
     assert present == pytest.approx(math.radians(300.0) * (300 - 511) / 1024, abs=0.01)

@@ -10,8 +10,6 @@ from attack.exits import EXITS, INTERFACES, POOLS, case, meets
 from branch import Branch
 from features_there import skip_without
 
-pytestmark = pytest.mark.own_timeouts
-
 
 def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[bytes]":
     """Start a program in a branch of this process."""

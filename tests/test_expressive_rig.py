@@ -19,7 +19,7 @@ from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Command, Express, SetLevel, Value
 from gazerig.robot.recording.read import RunRecording
 
-pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children")
+pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 NAMES = (
     "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "neck_yaw", "neck_pitch", "jaw",
@@ -97,7 +97,6 @@ def test_doctor_names_the_jaw_and_mends_its_limits() -> None:
     assert "jaw, left_brow, right_brow (servos" in done.out + done.err
 
 
-@pytest.mark.own_timeouts
 def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = tmp_path / "face.yaml"

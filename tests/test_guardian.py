@@ -41,7 +41,6 @@ PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 # --- a loop that dies, in a process of its own
 
 
-@pytest.mark.own_timeouts
 @pytest.mark.parametrize("kind", ["dynamixel", "feetech", "maestro", "pca9685"])
 def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
     with driven(kind) as it:

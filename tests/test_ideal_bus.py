@@ -19,8 +19,6 @@ from gazerig.robot.cli.main import app
 from gazerig.robot.recording.read import RunRecording
 from gazerig.sim_mock.ideal.bus import LAG_S, IdealBus
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 CONFIGS = [ServoConfig(1, "xl330-m077", 1000, 3000, 1e4), ServoConfig(2, "mg90s", 1000, 3000, 1e4)]
 
 

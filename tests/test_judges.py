@@ -7,14 +7,13 @@ import time
 from pathlib import Path
 
 import pytest
+from fakes.waiting import eventually
 from judged_servos import BAUD, IDS, PLACES, SPECS, X430
-from starvation import eventually
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 ROOT = Path(__file__).parents[1]
 OTHER_SDK = ROOT / ".venv" / "other-sdk"
 ABSENT = {"acceleration_limit", "torque_limit", "moving_speed", "current_limit", "goal_current"}

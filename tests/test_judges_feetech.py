@@ -4,13 +4,11 @@ import math
 import time
 
 import pytest
-from starvation import eventually
+from fakes.waiting import eventually
 
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 
 BAUD = 1_000_000
 IDS = [1, 2, 3]

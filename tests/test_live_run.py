@@ -20,7 +20,6 @@ from gazerig.robot.remote.socket_io import find_sockets, socket_folder
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 """A client waits for its answer, and the park for the servos, only for a bounded time."""
 
 

@@ -21,8 +21,6 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.robot.model.intrinsics import project
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 
 def test_e98_five_numbers_place_points_as_the_fourteen_of_the_factory_do():
     stored = calibrated(real())

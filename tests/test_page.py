@@ -17,7 +17,6 @@ from typing import TypeVar
 
 import cv2
 import numpy as np
-import pytest
 from browser import Browser, browsing
 from desk import GAZE_JOINTS
 from page_person import Person
@@ -162,7 +161,6 @@ def irises(browser: Browser) -> np.ndarray:
     return np.argwhere((blue > red + 70) & (blue > green + 20))
 
 
-@pytest.mark.usefixtures("branched_children")
 def test_page_shows_a_head_that_turns() -> None:
     def eyes() -> np.ndarray | None:
         seen = irises(browser)

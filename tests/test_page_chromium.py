@@ -34,8 +34,6 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.commands import Ask, LookAt, Stop
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
-
 
 @pytest.fixture(scope="module")
 def tab() -> Iterator[Browser]:

@@ -24,8 +24,6 @@ from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Stop
 from gazerig.robot.model.types import SeenFace
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 OWED_BYTES = 6_000_000
 """More than Linux keeps for one connection."""
 

@@ -18,8 +18,6 @@ from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.types import Snapshot
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
-
 SIZES = {
     "desk": (1600, 1000),
     "laptop": (1280, 720),

@@ -39,7 +39,7 @@ SNAPSHOT = replace(
 
 
 @pytest.fixture(scope="module")
-def shared(branched_children: None) -> Iterator[tuple[PageProcess, str, int]]:
+def shared() -> Iterator[tuple[PageProcess, str, int]]:
     """A page that found its port busy, its address, and that port; one test closes it."""
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -175,7 +175,6 @@ def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> 
 # Pages of their own
 
 
-@pytest.mark.usefixtures("branched_children")
 def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
     with running_page() as (page, url):
         page.offer({"lids": ("wink", "blink")})
@@ -200,7 +199,6 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         assert page.notice() is None
 
 
-@pytest.mark.usefixtures("branched_children")
 def test_a_suspended_page_holds_up_nobody_and_is_replaced() -> None:
     def show_many() -> None:
         for tick in range(3000):
@@ -303,8 +301,6 @@ def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
         theirs.close()
 
 
-@pytest.mark.usefixtures("branched_children")
-@pytest.mark.own_timeouts  # a starved machine asks no faster than the page allows
 def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     heard: list[object] = []
     slow = threading.Event()
@@ -328,7 +324,6 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
         page.close()
 
 
-@pytest.mark.usefixtures("branched_children")
 def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
     with running_page() as (page, _):
         page.show(replace(SNAPSHOT, level="mad"))  # type: ignore[arg-type]
@@ -365,7 +360,6 @@ def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
                 os.kill(sibling, signal.SIGKILL)
 
 
-@pytest.mark.usefixtures("branched_children")
 def test_address_of_another_machine_is_refused_in_words() -> None:
     page = PageProcess("192.0.2.1", 8080)
     page.open()

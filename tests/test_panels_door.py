@@ -18,8 +18,6 @@ from websockets.sync.connection import Connection
 
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
-
 PANELS = "/rig/panels"
 
 

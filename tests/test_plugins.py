@@ -40,8 +40,6 @@ from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.cli import kinds
 from gazerig.robot.model.clock import RealClock
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
 RULE = """

@@ -6,12 +6,10 @@ import threading
 import time
 
 import pytest
+from fakes.waiting import eventually
 from judged_servos import BAUD, SPECS, X430
-from starvation import eventually
 
 from gazerig.sim_mock.pty.client import PtyBus
-
-pytestmark = pytest.mark.own_timeouts
 
 
 @pytest.fixture

@@ -41,8 +41,6 @@ from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.client import RobotClient
 from gazerig.robot.remote.openapi import api_description
 
-pytestmark = pytest.mark.own_timeouts
-
 PATIENCE_S = 60.0
 ROOT = Path(__file__).parents[1]
 

@@ -33,7 +33,7 @@ def patient(monkeypatch):
 
 
 @pytest.fixture
-def path(branched_children_here):
+def path():
     with PtyBus() as bus:
         yield bus.start(SPECS)
 

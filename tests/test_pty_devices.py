@@ -12,8 +12,6 @@ from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
 
 

@@ -50,8 +50,6 @@ from gazerig.robot.recording.tick_record import (
     TorqueRefused,
 )
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 NECK_YAW = 6
 Asked = dict[int, tuple[Command, ...]]
 

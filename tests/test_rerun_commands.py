@@ -22,7 +22,7 @@ from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
 
-pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
+pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 # --- the commands

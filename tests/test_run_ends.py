@@ -46,8 +46,6 @@ def begun(*words: str) -> "subprocess.Popen[str]":
 
 
 @pytest.mark.slow
-@pytest.mark.own_timeouts
-@pytest.mark.usefixtures("branched_children_here")
 def test_signals_park_and_switch_torque_off(tmp_path: Path) -> None:
     rig = rig_at(tmp_path / "rig.yaml", 50.0)
     numbers = (signal.SIGINT, signal.SIGTERM)

@@ -57,8 +57,6 @@ from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.viewer_messages import orientation
 from gazerig.robot.recording.writer_process import PIECE_BYTES, RecordRouter
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import branch
 import pytest
 from fakes.runs import ticks
 from mcap.reader import make_reader
@@ -25,18 +24,6 @@ from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-
-pytestmark = pytest.mark.usefixtures("branched_children")
-
-
-@pytest.fixture
-def branched_children(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Start writers as branches, but not on a small disk: output of the tests may exceed it."""
-    if "small_disk" in request.fixturenames:
-        yield
-        return
-    with branch.branched_children():
-        yield
 
 
 @pytest.fixture(scope="module")

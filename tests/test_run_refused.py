@@ -18,7 +18,6 @@ from gazerig.robot.cli.run import run
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
 
-@pytest.mark.usefixtures("branched_camera", "branched_children")
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -21,7 +21,7 @@ from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
+pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from gazerig.robot.recording.run_format import HEALTH
 from gazerig.robot.recording.tick_record import as_json, from_json
 from gazerig.robot.remote.request_handler import LoopMonitor
 
-pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
+pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 STARTED = "2026-01-31T12:00:00+00:00"
 

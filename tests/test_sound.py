@@ -247,7 +247,6 @@ def wait_for(player: SoundPlayer, kind: str) -> SoundEvent:
     raise AssertionError(f"no event {kind}: {found}")
 
 
-@pytest.mark.own_timeouts
 def test_the_process_plays_files_and_streams_and_restarts_after_its_death(
     player: SoundPlayer, folder: Path
 ) -> None:
@@ -279,7 +278,6 @@ def test_the_process_plays_files_and_streams_and_restarts_after_its_death(
     wait_for(player, "started")
 
 
-@pytest.mark.own_timeouts
 def test_the_process_ends_with_its_link_and_names_a_missing_loudspeaker(folder: Path) -> None:
     player = SoundPlayer("no such loudspeaker")
     player.play(str(folder / "good.wav"), 0.0, 0.0)
@@ -304,7 +302,6 @@ os.kill(os.getpid(), 9)
 """
 
 
-@pytest.mark.own_timeouts
 def test_the_process_ends_with_a_killed_program() -> None:
     done = subprocess.run([sys.executable, "-c", _KILLED], capture_output=True, text=True)
     assert done.returncode == -signal.SIGKILL

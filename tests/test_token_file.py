@@ -76,7 +76,6 @@ def test_a_run_is_refused_in_one_line_before_anything_is_done(tmp_path: Path) ->
 
 
 @pytest.mark.pty
-@pytest.mark.usefixtures("branched_children_here")
 def test_a_program_keeps_its_token_when_the_head_is_started_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,8 +13,6 @@ from shown_page import wait_for
 
 from gazerig.robot.model.commands import LookAt
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
-
 COUNTED = f"""{SLOW_DRAWING};
 window.parts = 0; window.wholes = 0;
 const clear = WebGL2RenderingContext.prototype.clear;

@@ -216,7 +216,6 @@ def is_silent(head: Any) -> bool:
     return sound_s(head) == first
 
 
-@pytest.mark.own_timeouts
 def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder: Path) -> None:
     with speaking(folder) as head:
         track = next(one for one in head.state.tracks if one.name == "speech")
@@ -233,7 +232,6 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
         os.kill(pid, 0)
 
 
-@pytest.mark.own_timeouts
 def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_message(
     folder: Path,
 ) -> None:
@@ -264,7 +262,6 @@ def test_a_stream_moves_the_mouth_a_stall_shuts_it_and_a_dead_process_is_one_mes
         assert head.say("short.wav").wait(20.0) == "arrived"
 
 
-@pytest.mark.own_timeouts
 def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder: Path) -> None:
     text, rig = (folder / "rig.yaml").read_text("utf-8"), folder / "elsewhere.yaml"
     rig.write_text(text.replace("device: silent", "device: none such"), "utf-8")
@@ -286,7 +283,6 @@ def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder
         head.say(pieces, rate_hz=RATE, volume=0.0)
 
 
-@pytest.mark.own_timeouts
 def test_other_programs_say_files_and_streams(folder: Path) -> None:
     async def say(pid: int) -> str:
         async with gazerig.aio.connect(pid) as head:
@@ -305,7 +301,6 @@ def test_other_programs_say_files_and_streams(folder: Path) -> None:
         assert asyncio.run(say(os.getpid())) == "arrived"
 
 
-@pytest.mark.own_timeouts
 def test_the_sound_of_a_track_file_follows_its_pauses_and_seeks(folder: Path) -> None:
     show = "description: x\nsound: long.wav\nframes: [{time_s: 50, head_yaw_deg: 3}]\nfit: slow\n"
     (folder / "show.yaml").write_text(show, "utf-8")

@@ -354,8 +354,6 @@ def begun(words: list[str], breaks: str, **options: Any) -> Branch:
 
 
 # Parking takes a bounded time, in which a starved machine does not reach the end.
-@pytest.mark.own_timeouts
-@pytest.mark.usefixtures("branched_children_here")
 @pytest.mark.parametrize(
     ("rig", "command", "way"),
     [

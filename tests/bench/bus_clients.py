@@ -1,16 +1,17 @@
-"""The clients that benchmarks compare on one bus: ours, a bare one, and those that others wrote.
+"""Clients on one bus of nine emulated servos: ours, a bare one, and those that others wrote.
 
-Each opens a path at a baud rate and gives a cycle: read all servos, write one goal a servo,
-return how many values came. All servos are set up already and answer at once.
+Each opens a path and yields a cycle: read all servos, write one goal to each, return how many
+values came. The bare one does the least with the same checks: what is lost against it is ours.
 """
 
 import os
 import select
 import struct
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import NamedTuple
+from functools import partial
+from typing import Literal
 
 from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
 from fastcrc.crc16 import umts
@@ -19,59 +20,58 @@ from serial import Serial
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.dynamixel.protocol import sync_read as dynamixel_read
+from gazerig.drivers.dynamixel.protocol import sync_read
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
-from gazerig.drivers.feetech.protocol import sync_read as feetech_read
-from gazerig.drivers.serial.port import BlockingPort, BusPort
+from gazerig.drivers.feetech.protocol import sync_read as feetech_sync_read
+from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoBus, ServoConfig
+from gazerig.drivers.types import ServoConfig
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
+from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = tuple(range(1, 10))
-MODELS = {"dynamixel": "xl330-m077", "feetech": "sts3215"}
+BAUD: Literal[1_000_000] = 1_000_000
 WAIT_S = 0.2
-"""So long others wait for an answer: no client is to lose values because the host is busy."""
+"""Time for which others wait for an answer: a busy host is no reason to lose values."""
 
 Cycle = Callable[[int], int]
-"""Takes a number, from which goals are made; returns how many values came."""
-
-
-class Client(NamedTuple):
-    """One that cycles: what it reads of each servo, and how it is opened."""
-
-    name: str
-    reads: str
-    opened: Callable[[str, int], AbstractContextManager[Cycle]]
-
-
-def driver(
-    kind: str, port: BusPort, baud: int, ids: Sequence[int] = IDS, **chosen: object
-) -> SmartServoBus:
-    """Make our driver of one bus."""
-    setups = [ServoConfig(i, MODELS[kind], 1000, 3000, 3000.0, f"joint_{i}") for i in ids]
-    if kind == "dynamixel":
-        # While others have their turn it is silent for longer than servos bear.
-        params = DynamixelParams(baud=baud, watchdog_ms=0, **chosen)  # type: ignore[arg-type]
-        return SmartServoBus(DYNAMIXEL, port, setups, params)
-    return SmartServoBus(FEETECH, port, setups, FeetechParams(baud=baud))
-
-
-def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextManager[Cycle]:
-    """Return our driver, its torque on."""
-    bus = driver(kind, BlockingPort(path), baud, **chosen)  # type: ignore[arg-type]
-    return driven(bus, [2048] * len(IDS), time.monotonic)
+Open = Callable[[str], AbstractContextManager[Cycle]]
 
 
 @contextmanager
-def driven(bus: ServoBus, goals: Sequence[int], now_s: Callable[[], float]) -> Iterator[Cycle]:
-    """Cycle with a driver of ours around these goals, torque on."""
+def served(kind: str, client: Open) -> Iterator[Cycle]:
+    """Open a client on a bus of its own, whose servos our driver has set up and answer at once."""
+    line, model = (FeetechLine, "sts3215") if kind == "feetech" else (DynamixelLine, "xl330-m077")
+    with PtyBus() as server:
+        path = server.start_device(
+            line(tuple(ServoSpec(i, model, 2048) for i in IDS), None), wire_time=False
+        )
+        with ours(kind, path):
+            pass
+        with client(path) as cycle:
+            yield cycle
+
+
+@contextmanager
+def ours(kind: str, path: str) -> Iterator[Cycle]:
+    """Our driver, its torque on."""
+    port = BlockingPort(path)
+    model = "sts3215" if kind == "feetech" else "xl330-m077"
+    setups = [ServoConfig(i, model, 1000, 3000, 3000.0, f"joint_{i}") for i in IDS]
+    if kind == "feetech":
+        bus = SmartServoBus(FEETECH, port, setups, FeetechParams(baud=BAUD))
+    else:
+        # While others have their turn it is silent for longer than servos bear.
+        bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(baud=BAUD, watchdog_ms=0))
     bus.open()
     bus.enable_torque()
 
     def cycle(k: int) -> int:
-        feedback = bus.read(now_s())
-        bus.write([goal + k % 8 for goal in goals])
-        return len(goals) - len(feedback.missing)
+        feedback = bus.read(time.monotonic())
+        bus.write([2048 + k % 8] * len(IDS))
+        return len(IDS) - len(feedback.missing)
 
     try:
         yield cycle
@@ -81,94 +81,78 @@ def driven(bus: ServoBus, goals: Sequence[int], now_s: Callable[[], float]) -> I
 
 
 @contextmanager
-def bare_dynamixel(path: str, baud: int) -> Iterator[Cycle]:
-    """Select and read, goals and request in one write, every CRC checked: the least there is."""
-    serial = Serial(path, baud, timeout=0)
-    fd, count = serial.fileno(), len(IDS)
-    request = dynamixel_read(IDS, 126, 10, fast=True)
+def bare_dynamixel(path: str) -> Iterator[Cycle]:
+    """Select and read, goals and request in one write, every CRC checked."""
+    request, count = sync_read(IDS, 126, 10, fast=True), len(IDS)
     goals = struct.Struct("<4sBHBHH" + "BI" * count)
     layout = struct.Struct("<8s" + "BBhiiH" * count)
-    crc_of = struct.Struct("<H").pack
     row = [number for servo_id in IDS for number in (servo_id, 0)]
     ends = [8 + 14 * (k + 1) - 2 for k in range(count)]
     parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+    with Serial(path, BAUD, timeout=0) as serial:
 
-    def cycle(k: int) -> int:
-        row[1::2] = [2048 + k % 8] * count
-        packet = goals.pack(b"\xff\xff\xfd\x00", 254, 7 + 5 * count, 0x83, 116, 4, *row)
-        os.write(fd, packet + crc_of(umts(packet)) + request)
-        raw = _gathered(fd, layout.size)
-        if len(raw) < layout.size:
-            return 0
-        values, crc = layout.unpack(raw), 0
-        for part, sent in zip(parts, values[6::6], strict=True):
-            crc = umts(raw[part], crc)
-            if crc != sent:
+        def cycle(k: int) -> int:
+            row[1::2] = [2048 + k % 8] * count
+            packet = goals.pack(b"\xff\xff\xfd\x00", 254, 7 + 5 * count, 0x83, 116, 4, *row)
+            os.write(serial.fileno(), packet + struct.pack("<H", umts(packet)) + request)
+            raw = _gather(serial.fileno(), layout.size)
+            if len(raw) < layout.size:
                 return 0
-        return count if values[2::6] == IDS and not any(values[1::6]) else 0
+            values, crc = layout.unpack(raw), 0
+            for part, sent in zip(parts, values[6::6], strict=True):
+                crc = umts(raw[part], crc)
+                if crc != sent:
+                    return 0
+            return count if values[2::6] == IDS and not any(values[1::6]) else 0
 
-    try:
         yield cycle
-    finally:
-        serial.close()
 
 
 @contextmanager
-def bare_feetech(path: str, baud: int) -> Iterator[Cycle]:
-    """Select and read, goals and request in one write, every check sum: the least there is."""
-    serial = Serial(path, baud, timeout=0)
-    fd, count = serial.fileno(), len(IDS)
-    request = feetech_read(IDS, 56, 15)
+def bare_feetech(path: str) -> Iterator[Cycle]:
+    """Select and read, goals and request in one write, every checksum checked."""
+    request, count = feetech_sync_read(IDS, 56, 15), len(IDS)
     goals = struct.Struct("<5B" + "BHHH" * count)
-    layout = struct.Struct("<" + "4sBHHHBB5xHB" * count)
     row = [number for servo_id in IDS for number in (servo_id, 0, 0, 500)]
-    heads = tuple(bytes((255, 255, servo_id, 17)) for servo_id in IDS)
-    parts = [slice(21 * k + 2, 21 * k + 21) for k in range(count)]
+    with Serial(path, BAUD, timeout=0) as serial:
 
-    def cycle(k: int) -> int:
-        row[1::4] = [2048 + k % 8] * count
-        body = goals.pack(254, 4 + 7 * count, 0x83, 42, 6, *row)
-        os.write(fd, b"\xff\xff" + body + bytes((~sum(body) & 255,)) + request)
-        raw = _gathered(fd, layout.size)
-        if len(raw) < layout.size:
-            return 0
-        values = layout.unpack(raw)
-        for part in parts:
-            if sum(raw[part]) & 255 != 255:
-                return 0
-        return count if values[0::9] == heads and not any(values[1::9]) else 0
+        def cycle(k: int) -> int:
+            row[1::4] = [2048 + k % 8] * count
+            body = goals.pack(254, 4 + 7 * count, 0x83, 42, 6, *row)
+            packet = b"\xff\xff" + body + bytes((~sum(body) & 255,))
+            os.write(serial.fileno(), packet + request)
+            raw = _gather(serial.fileno(), 21 * count)
+            answers = [raw[at : at + 21] for at in range(0, len(raw), 21)]
+            whole = (len(one) == 21 and sum(one[2:]) & 255 == 255 and not one[4] for one in answers)
+            return sum(whole)
 
-    try:
         yield cycle
-    finally:
-        serial.close()
 
 
-def _gathered(fd: int, length: int) -> bytes:
+def _gather(fd: int, length: int) -> bytes:
     """Return this many bytes, or those that came in time."""
-    got, fds = b"", (fd,)
-    while len(got) < length and select.select(fds, (), (), WAIT_S)[0]:
+    got = b""
+    while len(got) < length and select.select((fd,), (), (), WAIT_S)[0]:
         got += os.read(fd, length - len(got))
     return got
 
 
 @contextmanager
-def robotis(port: str | BusPort, baud: int, ids: Sequence[int] = IDS) -> Iterator[Cycle]:
+def robotis(path: str) -> Iterator[Cycle]:
     """ROBOTIS' SDK: fast sync read of 10 bytes, sync write."""
-    port, packets = PortHandler(port) if isinstance(port, str) else port, PacketHandler(2.0)
-    port.setBaudRate(baud)  # opens it
+    port, packets = PortHandler(path), PacketHandler(2.0)
+    port.setBaudRate(BAUD)  # opens it
     reads, writes = GroupSyncRead(port, packets, 126, 10), GroupSyncWrite(port, packets, 116, 4)
-    for servo_id in ids:
+    for servo_id in IDS:
         reads.addParam(servo_id)
 
     def cycle(k: int) -> int:
         reads.fastSyncRead()
-        values = [reads.getData(i, 132, 4) for i in ids if reads.isAvailable(i, 132, 4)]
         writes.clearParam()
-        for servo_id in ids:
+        for servo_id in IDS:
             writes.addParam(servo_id, (2048 + k % 8).to_bytes(4, "little"))
         writes.txPacket()
-        return len(values)
+        return sum(reads.isAvailable(servo_id, 132, 4) for servo_id in IDS)
 
     try:
         yield cycle
@@ -177,61 +161,39 @@ def robotis(port: str | BusPort, baud: int, ids: Sequence[int] = IDS) -> Iterato
 
 
 @contextmanager
-def rustypot_halves(
-    kind: str, path: str, baud: int, wait_s: float = WAIT_S, servo_ids: Sequence[int] = IDS
-) -> Iterator[tuple[Cycle, Cycle]]:
-    """Open rustypot: its (fast) sync read of the position, as it reads one register; sync write."""
+def rustypot(kind: str, path: str) -> Iterator[Cycle]:
+    """Open rustypot: its (fast) sync read of the position, sync write."""
     client: Sts3215PyController | Xl330PyController
     if kind == "feetech":
-        client = Sts3215PyController(path, baud, wait_s)
+        client = Sts3215PyController(path, BAUD, WAIT_S)
     else:
-        client = fast = Xl330PyController(path, baud, wait_s)
-        fast.set_fast_sync_read(True)
-    ids = list(servo_ids)
+        client = Xl330PyController(path, BAUD, WAIT_S)
+        client.set_fast_sync_read(True)
 
-    def read(k: int) -> int:
+    def cycle(k: int) -> int:
         try:
-            return len(client.sync_read_raw_present_position(ids))
+            values = len(client.sync_read_raw_present_position(list(IDS)))
         except (OSError, RuntimeError, ValueError):
-            return 0
-
-    def write(k: int) -> int:
-        client.sync_write_raw_goal_position(ids, [2048 + k % 8] * len(ids))
-        return len(ids)
+            values = 0
+        client.sync_write_raw_goal_position(list(IDS), [2048 + k % 8] * len(IDS))
+        return values
 
     try:
-        yield read, write
+        yield cycle
     finally:
         client.close()
 
 
-@contextmanager
-def rustypot(
-    kind: str, path: str, baud: int, wait_s: float = WAIT_S, servo_ids: Sequence[int] = IDS
-) -> Iterator[Cycle]:
-    """Cycle with rustypot: read, then write."""
-    with rustypot_halves(kind, path, baud, wait_s, servo_ids) as (read, write):
-
-        def cycle(k: int) -> int:
-            values = read(k)
-            write(k)
-            return values
-
-        yield cycle
-
-
-def clients(kind: str) -> tuple[Client, ...]:
-    """List who is compared on one kind of bus, ours first."""
-    if kind == "feetech":
-        return (
-            Client("ours", "15 B, 31 every 8th", lambda p, b: ours(kind, p, b)),
-            Client("bare", "15 B", bare_feetech),
-            Client("rustypot", "2 B", lambda p, b: rustypot(kind, p, b)),
-        )
-    return (
-        Client("ours", "10 or 11 B", lambda p, b: ours(kind, p, b, indirect_block=False)),
-        Client("ours, indirect", "13 or 14 B", lambda p, b: ours(kind, p, b)),
-        Client("bare", "10 B", bare_dynamixel),
-        Client("rustypot", "4 B", lambda p, b: rustypot(kind, p, b)),
-        Client("SDK", "10 B", robotis),
-    )
+CLIENTS: dict[str, dict[str, Open]] = {
+    "dynamixel": {
+        "ours": partial(ours, "dynamixel"),
+        "bare": bare_dynamixel,
+        "rustypot": partial(rustypot, "dynamixel"),
+        "ROBOTIS' SDK": robotis,
+    },
+    "feetech": {
+        "ours": partial(ours, "feetech"),
+        "bare": bare_feetech,
+        "rustypot": partial(rustypot, "feetech"),
+    },
+}

@@ -35,7 +35,7 @@ from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
+pytestmark = pytest.mark.usefixtures("simulated_wires")
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 LINE = {"desk": DynamixelLine, "feetech": FeetechLine}
 ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "
@@ -394,7 +394,6 @@ def desk() -> Iterator[Served]:
 
 
 @pytest.mark.pty
-@pytest.mark.own_timeouts
 def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     path = desk.ports
     process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", path)

@@ -18,7 +18,7 @@ from gazerig.config.schema import load_rig
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
+pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 
 def calibrate(*words: str) -> Invoked:
@@ -233,7 +233,6 @@ def test_what_cannot_be_is_said(
 # --- on a port that another program serves, from a process of its own
 
 
-@pytest.mark.own_timeouts
 @pytest.mark.pty
 def test_by_hand_over_a_port_with_answers_through_a_pipe(
     rig: Path, bus: tuple[PtyBus, str]

@@ -33,8 +33,6 @@ from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
-pytestmark = pytest.mark.usefixtures("branched_children")
-
 
 def run(*words: str) -> Invoked:
     return invoked("calibrate", "face", *words)
@@ -190,7 +188,6 @@ def sitting_at(rig: Path, *words: str) -> OnTerminal:
     return OnTerminal("calibrate", "face", str(rig), "--mock", "--yes", *words)
 
 
-@pytest.mark.own_timeouts
 def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
     with sitting_at(rig, "--no-page") as sitting:
         sitting.reads("1/8 the tip of your nose: 0 mm")
@@ -204,7 +201,6 @@ def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
 
 
 # Parking takes a bounded time, in which a starved machine does not reach the end.
-@pytest.mark.own_timeouts
 def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
     with sitting_at(rig, "--no-page") as sitting:
@@ -221,7 +217,6 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.own_timeouts
 def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))

@@ -16,3 +16,13 @@ def wait_for(what: Callable[[], T], patience_s: float = PATIENCE_S) -> T:
         assert time.monotonic() < end_s, "it never came"
         time.sleep(0.002)
     return found
+
+
+def eventually(check: Callable[[], object], patience_s: float = 20.0) -> bool:
+    """Wait for a condition; return False if it does not become true."""
+    end_s = time.monotonic() + patience_s
+    while time.monotonic() < end_s:
+        if check():
+            return True
+        time.sleep(0.02)
+    return False

@@ -27,7 +27,9 @@ WANTED = {
     "size measured, 95th percentile, deg": (0.5, 1.8),
     "farthest from the middle, 95th percentile, deg": (0.0, 1.6),
     "hobby servos, largest re-fixation, deg": (0.0, 0.0),
+    "smallest commanded, least of all rigs, encoder steps": (5.0, 100.0),
 }
+_EYES = {"desk": "left_eye_pan", "feetech": "left_eye_pan", "expressive": "eyes_pan"}
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
@@ -56,4 +58,13 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             np.percentile(np.concatenate(off), 95)
         ),
         "hobby servos, largest re-fixation, deg": load_rig("maker").gaze.oculomotor.refixation_deg,
+        "smallest commanded, least of all rigs, encoder steps": min(map(_least_steps, _EYES)),
     }
+
+
+def _least_steps(name: str) -> float:
+    """Return the smallest re-fixation of a rig in steps of its eye's encoder."""
+    rig = load_rig(name)
+    joint = rig.joints[_EYES[name]]
+    step_deg = 360.0 / joint.model_facts.steps_per_turn / joint.ratio
+    return rig.gaze.oculomotor.refixation_least_deg / step_deg

@@ -23,7 +23,7 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 
-pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children")
+pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 SECONDS = 16.0
 DICE = np.random.default_rng(11)

@@ -22,7 +22,7 @@ from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.export_csv import columns
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 
-pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
+pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from branch import Branch, fresh_start, gazerig
+from branch import Branch, gazerig
 from child_processes import running
 from command_line import Invoked, invoked
 from hypothesis import given, settings
@@ -26,7 +26,6 @@ from gazerig.config.parameters import apply_changes
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.process import child_process
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import (
     Axis,
@@ -59,7 +58,6 @@ from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 
-pytestmark = pytest.mark.usefixtures("branched_children")
 RIG, DESK = load_rig("desk"), shipped_path("rigs", "desk")
 COMFORT = "gaze.head.comfort_deg"
 LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
@@ -234,10 +232,7 @@ def begun(out: Path, fresh: bool = False) -> Iterator[Branch]:
     """Start a sweep and wait for its first run; fresh: its workers are other Pythons."""
     words = ("sweep", "--out", str(out), *QUICK, "--set", f"{COMFORT}=1:80:80", "--seeds", "50")
     pipe = subprocess.PIPE
-    with pytest.MonkeyPatch.context() as patch:
-        if fresh:
-            patch.setattr(child_process, "start", fresh_start)
-        process = Branch(gazerig(*words), stderr=pipe, text=True)
+    process = Branch(gazerig(*words), stderr=pipe, text=True)
     file = out / RUNS
     try:
         wait_for(lambda: file.exists() and file.read_bytes().count(b"\n") > 0)

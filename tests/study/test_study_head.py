@@ -19,7 +19,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.read import RunRecording
 
-pytestmark = pytest.mark.usefixtures("branched_children")
 SHOWN_S = 0.8
 
 

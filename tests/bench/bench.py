@@ -1,0 +1,371 @@
+"""Costs beside a peer, measured in one run: python tests/bench/bench.py [CASE ...]
+
+Eight cases: tick, bus, start, camera, page, recording, world, sweep. Each prints what something
+costs and the ratio to a peer that ran in turns with it, so that other load strikes both alike.
+Compare figures of one run with each other, on a machine that has nothing else to do. Nothing here
+passes or fails.
+"""
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, suppress
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+import numpy as np
+
+TESTS = Path(__file__).parents[1]
+sys.path.insert(0, str(TESTS))
+MAIN = "from gazerig.robot.cli.entry_point import main; main()"
+RUN = ("run", "desk", "--mock", "--scene", "visitor", "--seed", "0", "--summary", "-")
+FAST = (*RUN, "--fast", "--no-page")
+ROUNDS = 5
+
+
+PLANE = """
+import os, time
+os.environ.setdefault("MUJOCO_GL", "egl")
+import mujoco
+geom = '<light pos="0 0 3"/><geom type="plane" size="5 5 .1"/>'
+model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geom}</worldbody></mujoco>")
+data, renderer = mujoco.MjData(model), mujoco.Renderer(model, 400, 640)
+mujoco.mj_forward(model, data)
+began_s = time.process_time()
+for _ in range(50):
+    renderer.update_scene(data)
+    renderer.render()
+print(1e3 * (time.process_time() - began_s) / 50)
+"""
+
+
+class Done(NamedTuple):
+    """A program that has ended: seconds, processor seconds with its children, output."""
+
+    wall_s: float
+    cpu_s: float
+    out: str
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The summary of a run."""
+        found: dict[str, Any] = json.loads(self.out[self.out.index("{") :])
+        return found
+
+
+def python(code: str, *words: str) -> Done:
+    """Run Python to its end."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    began_s = time.monotonic()
+    command = [sys.executable, "-c", code, *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    wall_s = time.monotonic() - began_s
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"{' '.join(words)} failed: {done.stderr}")
+    cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Done(wall_s, cpu_s, done.stdout)
+
+
+def gazerig(*words: str) -> Done:
+    """Run a command of gazerig to its end."""
+    return python(MAIN, *words)
+
+
+def in_turns(works: Mapping[str, Callable[[], float]], rounds: int = ROUNDS) -> dict[str, float]:
+    """Return the median of what each work measures, in rounds that take turns."""
+    found: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(rounds):
+        for name, work in works.items():
+            found[name].append(work())
+    return {name: median(values) for name, values in found.items()}
+
+
+def timed(work: Callable[[], object], count: int = 1) -> float:
+    """Return the processor time of this process for one call, in us."""
+    began_s = time.process_time()
+    for _ in range(count):
+        work()
+    return 1e6 * (time.process_time() - began_s) / count
+
+
+def show(figures: Mapping[str, float], unit: str, peer: str) -> None:
+    """Print figures, each with its ratio to the peer's."""
+    for name, value in figures.items():
+        ratio = "" if name == peer else f"   x {value / figures[peer]:.2f} of {peer}"
+        print(f"  {name:44} {value:10.1f} {unit}{ratio}")
+
+
+def bench_tick() -> None:
+    """A tick of the desk rig in simulated and in real time, beside a step of ruckig."""
+    from fakes.runs import play
+    from ruckig import InputParameter, OutputParameter, Ruckig
+
+    from gazerig.config.schema import load_rig
+    from gazerig.robot.app.assemble import assemble
+    from gazerig.robot.app.options import RunOptions
+
+    planner, given, found = Ruckig(9, 0.005), InputParameter(9), OutputParameter(9)
+    given.max_velocity, given.max_acceleration = [6.0] * 9, [60.0] * 9
+    given.max_jerk = [1000.0] * 9
+    sides = iter(range(10**9))
+
+    def step() -> None:
+        k = next(sides)
+        if k % 30 == 0:  # a new target several times a second, as a gaze has
+            given.target_position = [(-1) ** (k // 30) * (0.1 + 0.05 * axis) for axis in range(9)]
+        planner.update(given, found)
+        found.pass_to_input(given)
+
+    def tick(bus: str) -> float:
+        made = assemble(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus=bus))
+        return timed(lambda: play(made, 10.0)) / 2000
+
+    peer = "ruckig, a step of nine axes"
+    works = {name: partial(tick, bus) for name, bus in (("tick, emulated servos", "emulated"),
+             ("tick, ideal servos", "ideal"))}  # fmt: skip
+    figures = in_turns({**works, peer: lambda: timed(step, 2000)})
+    show(figures, "us of processor", peer)
+    for name in works:
+        print(f"  {name}: {5000.0 / figures[name]:.1f} simulated seconds a second of processor")
+    done = gazerig(*RUN, "--no-page", "--seconds", "20")
+    ticks, late = done.summary["ticks"], done.summary["overruns"]
+    print(f"  real time, all processes: {100 * done.cpu_s / done.wall_s:.0f} % of a core, "
+          f"{late} of {ticks} slots missed")  # fmt: skip
+
+
+def bench_bus() -> None:
+    """A cycle of nine servos, beside clients of others and the least that a client can do."""
+    from bus_clients import CLIENTS, IDS, served
+
+    for kind, clients in CLIENTS.items():
+        lost = dict.fromkeys(clients, 0)
+
+        def spent(name: str, cycle: Callable[[int], int], lost: dict[str, int] = lost) -> float:
+            return timed(lambda: lost.update({name: lost[name] + len(IDS) - cycle(3)}), 300)
+
+        with ExitStack() as stack:
+            cycles = {
+                name: stack.enter_context(served(kind, open_)) for name, open_ in clients.items()
+            }
+            figures = in_turns({name: partial(spent, name, cycles[name]) for name in cycles})
+            show(figures, f"us of processor a cycle ({kind})", "bare")
+        print(f"  lost values: {lost}")
+
+
+def bench_start() -> None:
+    """Commands until their end, and a run until it has parked, beside Python alone."""
+    commands: dict[str, tuple[str, ...]] = {
+        "gazerig --help": ("--help",),
+        "gazerig check desk": ("check", "desk"),
+        "gazerig ctl --help": ("ctl", "--help"),
+        "gazerig run --mock, .1 s": (*FAST, "--seconds", "0.1"),
+    }
+    works = {
+        name: lambda words=words: 1e3 * gazerig(*words).cpu_s for name, words in commands.items()
+    }
+    peer = "python -c 'import numpy'"
+    show(in_turns({**works, peer: lambda: 1e3 * python("import numpy").cpu_s}), "ms", peer)
+
+
+def bench_camera() -> None:
+    """Search for faces and motion in a picture, beside OpenCV's; seeing and choosing a tick."""
+    import cv2
+    from fakes.runs import play
+    from seeing.material import background, eyes_at, paste, portrait
+
+    from gazerig.config.schema import load_rig
+    from gazerig.drivers.camera.source import Shot
+    from gazerig.drivers.vision.face.detector import face_detector
+    from gazerig.drivers.vision.face.params import FaceDetectorParams
+    from gazerig.drivers.vision.motion.params import MotionParams
+    from gazerig.robot.app.assemble import assemble
+    from gazerig.robot.app.options import RunOptions
+    from gazerig.robot.perception.motion_source import MotionSource
+
+    cv2.setNumThreads(1)
+    picture = background(640, 480).copy()
+    paste(picture, portrait("astronaut"), (320.0, 240.0), eyes_at(1.0, 640, 69.0))
+    pictures = [np.roll(picture, 3 * k, axis=1) for k in range(8)]
+    grey = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) for one in pictures]
+    faces, motion = (
+        face_detector(FaceDetectorParams()),
+        MotionSource(MotionParams(), None, 1.2, None),
+    )
+    flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    numbers = iter(range(1, 10**9))
+
+    def see_motion() -> None:
+        number = next(numbers)
+        motion(Shot(number / 30.0, number, pictures[number % 8]))
+
+    def see_flow() -> None:
+        number = next(numbers)
+        flow.calc(grey[number % 8], grey[(number + 1) % 8], None)  # type: ignore[call-overload]
+
+    peer = "OpenCV's dense flow (DIS, fast)"
+    works: dict[str, Callable[[], object]] = {
+        "faces": lambda: faces.find(pictures[next(numbers) % 8]), "motion": see_motion, peer: see_flow,
+    }  # fmt: skip
+    figures = in_turns({name: partial(timed, work, 20) for name, work in works.items()})
+    show(figures, "us of processor a picture, 640x480", peer)
+    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "visitor", bus="ideal"))
+    spent: dict[str, list[float]] = {"camera": [], "see": [], "choose": []}
+
+    def follow(name: str, owner: Any, verb: str) -> None:
+        call = getattr(owner, verb)
+
+        def measured(*given: Any) -> Any:
+            began_s = time.thread_time()
+            result = call(*given)
+            spent[name].append(time.thread_time() - began_s)
+            return result
+
+        setattr(owner, verb, measured)
+
+    robot: Any = made.robot
+    for name, owner, verb in (("camera", robot.camera, "latest"), ("see", robot.perception, "see"),
+                              ("choose", robot.attention, "choose")):  # fmt: skip
+        follow(name, owner, verb)
+    whole_us = timed(lambda: play(made, 20.0)) / 4000
+    rows = {name: 1e6 * sum(times) / 4000 for name, times in spent.items()}
+    show({**rows, "whole tick": whole_us}, "us of processor a tick", "whole tick")
+
+
+def bench_page() -> None:
+    """Processor time of a running rig with the page and its clients, beside the rig alone."""
+    from page_visitor import LOOKING, Visitor
+    from websockets.exceptions import ConnectionClosed
+
+    def watch(url: str, over: threading.Event) -> None:
+        visitor = Visitor(url)
+        panels, view = visitor.open("/rig/panels"), visitor.open()
+        view.send(LOOKING)
+        with suppress(ConnectionClosed):
+            while not over.is_set():
+                for end in (panels, view):
+                    with suppress(TimeoutError):
+                        while end.recv(timeout=0.01):
+                            pass
+
+    def address(pid: int) -> tuple[str, float]:
+        """Return the page's address, and the processor time that looking for it took."""
+        cpu_s = 0.0
+        while True:
+            done = gazerig("ctl", "rigs", "--json")
+            cpu_s += done.cpu_s
+            for rig in json.loads(done.out):
+                if rig["pid"] == pid and rig["page"]:
+                    return str(rig["page"]), cpu_s
+
+    def spent(page: bool, clients: int) -> float:
+        words = ("--page", "127.0.0.1:8794") if page else ("--no-page",)
+        over, threads, other_s = threading.Event(), [], 0.0
+        began = resource.getrusage(resource.RUSAGE_CHILDREN)
+        process = subprocess.Popen([sys.executable, "-c", MAIN, *RUN, *words, "--seconds", "12"],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+        if clients:
+            url, other_s = address(process.pid)
+            threads = [threading.Thread(target=watch, args=(url, over)) for _ in range(clients)]
+            for thread in threads:
+                thread.start()
+        process.wait()
+        over.set()
+        for thread in threads:
+            thread.join()
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu_s = ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
+        return 1e3 * (cpu_s - other_s)
+
+    works = {"without a page": partial(spent, False, 0), "page": partial(spent, True, 0),
+             "page, 1 client": partial(spent, True, 1), "page, 5 clients": partial(spent, True, 5)}  # fmt: skip
+    show(in_turns(works, 1), "ms of processor in 12 s, all processes", "without a page")
+
+
+def bench_recording() -> None:
+    """A simulated minute with a recording and run again from it, beside one without."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.mcap"
+        minute = (*FAST, "--seconds", "60")
+        works = {
+            "without": lambda: gazerig(*minute).cpu_s,
+            "recorded": lambda: gazerig(*minute, "--record", str(file)).cpu_s,
+            "run again": lambda: gazerig("replay", str(file), "--rerun").cpu_s,
+        }
+
+        def fresh(work: Callable[[], float], name: str) -> float:
+            if name == "recorded":
+                file.unlink(missing_ok=True)
+            return work()
+
+        figures = in_turns({name: partial(fresh, work, name) for name, work in works.items()}, 2)
+        show(figures, "s of processor a minute", "without")
+        print(f"  {file.stat().st_size / 1e6:.2f} MB a minute")
+
+
+def bench_world() -> None:
+    """A picture of the living room, beside one that MuJoCo renders of an empty plane."""
+    from rendering import why_not
+
+    if reason := why_not():
+        print(f"  {reason}")
+        return
+    room = (*FAST[:3], *FAST[5:], "--world", "living-room", "--seconds", "10")
+
+    def picture() -> float:
+        seen, blind = gazerig(*room), gazerig(*room, "--no-pictures")
+        return 1e3 * (seen.cpu_s - blind.cpu_s) / max(1, seen.summary["pictures"])
+
+    peer = "MuJoCo's renderer, an empty plane"
+    figures = in_turns({"living room, found faces included": picture,
+                        peer: lambda: float(python(PLANE).out)}, 2)  # fmt: skip
+    show(figures, "ms of processor a picture", peer)
+
+
+def bench_sweep() -> None:
+    """Sixteen runs on one process and on all processors."""
+    key = "gaze.head.comfort_deg=4,8,12,16"
+    jobs = os.cpu_count() or 1
+
+    def swept(count: int) -> float:
+        with tempfile.TemporaryDirectory() as folder:
+            done = gazerig("sweep", "--set", key, "--seeds", "4", "--seconds", "10", "--bus", "ideal",
+                           "--jobs", str(count), "--out", str(Path(folder) / "out"))  # fmt: skip
+        return done.wall_s
+
+    figures = in_turns(
+        {"one process": partial(swept, 1), f"{jobs} processes": partial(swept, jobs)}, 1
+    )
+    show(figures, "s for 16 runs of 10 s", "one process")
+
+
+def cases() -> Iterator[tuple[str, Callable[[], None]]]:
+    """Yield all cases by name."""
+    for name, work in globals().items():
+        if name.startswith("bench_"):
+            yield name.removeprefix("bench_"), work
+
+
+def main() -> None:
+    """Measure, and print."""
+    every = dict(cases())
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("cases", nargs="*", choices=[*every, []], metavar="CASE")
+    names = parser.parse_args().cases or list(every)
+    print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.2f} at the start")
+    for name in names:
+        print(f"\n{name}: {(every[name].__doc__ or '').splitlines()[0]}")
+        every[name]()
+
+
+if __name__ == "__main__":
+    main()
