@@ -33,9 +33,6 @@ def jog(rig: str, *words: str) -> str:
         ("kind: pca9685", "kind: pca6985", "bus.kind: 'pca6985' is not one of 'dynamixel', "
          "'feetech', 'maestro', 'pca9685'; did you mean 'pca9685'?"),
         ("0x40", "0x70", "bus.pca9685: address 0x70 is reserved: boards have 0x40 to 0x77"),
-        ("frequency_hz: 50", "frequency_hz: 330, max_pulse_us: 2900", "lower frequency_hz"),
-        ("frequency_hz: 50", "min_pulse_us: 1200", "joints.eyes_pan: its range 1096.25..1926.75 us "
-         "must be within 1200..2500 us (min_pulse_us, max_pulse_us): narrow the joint's range"),
         ("kind: pca9685", "kind: maestro", "/dev/i2c-1 is an I2C bus, not a serial port: name the "
          "adaptor's port with --port or in the YAML, or set the kind of the bus to pca9685"),
         ("i2c-1", "i2c-99", "no I2C bus /dev/i2c-99: switch I2C on"),
@@ -55,11 +52,8 @@ def test_a_channel_that_no_board_has(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("device", "rig", "fault", "reported"),
     [
-        (Pca9685Line((0x41,)), "pca9685", "", "no PCA9685 answers at 0x40: does the board have its logic "
-         "supply (VCC, not only V+)? check SDA, SCL and ground; its jumpers set the address"),
         (Pca9685Line(), "pca9685", "foreign on", "the chip at 0x40 is not a PCA9685: another chip "
          "has this address; close a jumper and write the new one under bus.pca9685.address"),
-        (Pca9685Line(), "pca9685", "stuck on", "the I2C bus is stuck"),
         (Pca9685Line(), "maker", "", "no Maestro answers: on USB take the first of its two ports"),
         (MaestroLine(12), "pca9685", "", "no answer as an I2C bus (timeout): a PCA9685 is "
          "reached over an I2C bus such as /dev/i2c-1: write it under bus.port"),

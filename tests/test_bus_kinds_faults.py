@@ -81,13 +81,6 @@ def test_a_servo_that_cannot_be_set_up_again_is_named_and_keeps_no_other_waiting
     assert [k for k, heard in enumerate(machine.heard) if not heard] == [i]
 
 
-def test_a_limp_joint_may_fall_out_of_its_range_under_a_load():
-    rig, machine = copied(of_kind("dynamixel"))
-    bus, i, j = pair_of(rig, "dynamixel")
-    case = Case(("load {i} 0.05", "unplug", "brown-out {i}"), ("load {i} 0", "plug"))
-    assert machine.apply_fault(bus, i, j, case).end == "came back"
-
-
 @pytest.mark.parametrize("bit", [3, 9])
 def test_a_hit_bit_is_not_taken_for_the_pulse_of_a_channel_that_gives_none(bit):
     rig, machine = copied(of_kind("maestro"))

@@ -6,9 +6,7 @@ from hypothesis import strategies as st
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP, direct_windows, indirect_windows
+from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP, direct_windows
 from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reconnect import Reconnect
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
@@ -77,24 +75,6 @@ def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
     # Half a second later there is some of it again, and after a while all.
     assert timeout.reserve_timeout_s(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
     assert timeout.reserve_timeout_s(now_s + 5.0) == pytest.approx(0.001 + RESERVE_S)
-
-
-def test_a_reserve_never_goes_beyond_the_longest_time_out():
-    timeout = AdaptiveTimeout(0.02, 0.02)
-    assert timeout.reserve_timeout_s(1.0) == 0.02
-    timeout.consume_reserve(-0.01, 1.0)
-    assert timeout.reserve_timeout_s(1.0) == 0.02
-
-
-def test_no_two_views_that_may_follow_each_other_have_the_same_length():
-    block = indirect_blocks(MODELS["xl330-m077"], 53)[0]
-    one_by_one = DYNAMIXEL.read_plan([], DynamixelParams(), None).single_windows
-    alone = {view.length for view in one_by_one._spare}
-    assert len(alone) == len(one_by_one._spare)
-    for turns in (direct_windows(), indirect_windows(block)):
-        lengths = [view.length for view in (*turns._usual, *turns._spare)]
-        assert len(set(lengths)) == len(lengths)
-        assert not alone.intersection(lengths)
 
 
 def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():

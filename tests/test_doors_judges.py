@@ -6,7 +6,7 @@ The packages are large, and their users have them: without one, its tests are sk
 import asyncio
 import inspect
 import re
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from typing import Any, get_args
 
 import pytest
@@ -222,39 +222,3 @@ def test_livekit_s_session_steers_the_head() -> None:
 
     asyncio.run(scenario())
     assert not head.said
-
-
-@pytest.fixture
-def room() -> Iterator[Any]:
-    """Return LiveKit's room, which joins nothing."""
-    rtc = needs("livekit.rtc", "livekit")
-    yield rtc.Room
-
-
-def test_livekit_s_room_has_our_events(room: Any) -> None:
-    head = TalkingHead()
-    from livekit import rtc
-    from livekit.rtc.room import EventTypes
-
-    async def scenario() -> None:
-        one, link = room(), link_to(head)
-        options = rtc.RoomOptions(auto_subscribe=False)
-        assert rtc.TrackKind.KIND_AUDIO == 1
-        names, register = list[str](), one.on
-
-        def on(name: str, handler: Any) -> None:
-            names.append(name)
-            register(name, handler)
-
-        one.on = on
-        link.address = f"ws://127.0.0.1:{free_port()}"
-        link.start()
-        with pytest.raises(Exception, match="engine|connect|signal|refused"):
-            await livekit.follow_room(link, one, "token", options, rtc.AudioStream)
-        assert set(names) <= set(get_args(EventTypes))
-        assert {"kind", "subscribed", "set_subscribed"} <= set(dir(rtc.RemoteTrackPublication))
-        one.emit("participant_attributes_changed", {livekit.ATTRIBUTE: "thinking"}, None)
-        await until(lambda: head.last == "thinking")
-        await link.close()
-
-    asyncio.run(scenario())

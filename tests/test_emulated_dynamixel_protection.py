@@ -59,16 +59,6 @@ def test_a_load_below_the_threshold_or_broken_off_in_time_is_none():
     assert (weak.get(70), brief.get(70)) == (0, 0)
 
 
-def test_shutdown_decides_what_takes_the_torque():
-    bench = Bench()
-    bench.put(63, 1, 0)
-    bench.put(64, 1, 1)
-    bench.servo.jam()
-    bench.put(116, 4, 4000)
-    bench.at(3000)
-    assert (bench.get(70), bench.get(64), bench.servo.error_flag) == (0x20, 1, 0x80)
-
-
 def test_a_held_load_warms_the_motor_towards_its_final_temperature():
     bench = stuck(overload_s=1e4, thermal_s=100.0, stall_rise_c=60.0, supply_ohm=0.0)
     bench.put(100, 2, 708)
@@ -96,13 +86,6 @@ def test_overheating_latches_above_the_limit_register():
     bench.servo.restart()
     bench.at(1200)
     assert bench.get(70) == 0
-
-
-def test_a_hot_room_warms_the_servo():
-    bench = Bench()
-    bench.servo.ambient_c = 50.0
-    bench.at(3_000_000)
-    assert bench.get(146) == 50
 
 
 @pytest.mark.parametrize(("volts", "bits"), [(3.3, 1), (3.5, 0), (5.0, 0), (7.0, 0), (7.2, 1)])
@@ -137,18 +120,6 @@ def test_too_little_voltage_restarts_the_servo_without_a_word():
     assert bench.at(1500)
     assert (bench.get(64), bench.get(112, 4), bench.get(70)) == (0, 0, 0)
     assert bench.get(120, 2) < 500
-
-
-def test_without_supply_a_servo_stays_deaf():
-    bench = Bench()
-    bench.servo.supply_v = 0.0
-    assert not any(bench.at(ms) for ms in range(40, 5000, 40))
-
-
-def test_a_load_sags_the_voltage_register():
-    bench = stuck(supply_ohm=0.4)
-    bench.at(200)
-    assert bench.get(144, 2) == 45
 
 
 def test_a_fault_is_injected_by_name():

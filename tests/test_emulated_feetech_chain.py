@@ -1,21 +1,10 @@
 """The emulated STS bus against the written rules: instructions, memory, lock, groups, quirks."""
 
 import pytest
-from servo_bench import ALL, CALIBRATE, FACTORY_RESET, PING, READ, REBOOT, WRITE, FeetechBench
+from servo_bench import ALL, FACTORY_RESET, PING, READ, REBOOT, WRITE, FeetechBench
 
 from gazerig.drivers.feetech import memory_table as feetech_table
 from gazerig.sim_mock.feetech.memory import STS
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-FACTORY = {
-    2: (1, 0), 3: (2, 777), 5: (1, 1), 6: (1, 0), 8: (1, 1), 9: (2, 0), 11: (2, 4095), 13: (1, 70),
-    14: (1, 80), 15: (1, 40), 16: (2, 1000), 19: (1, 44), 20: (1, 47), 21: (1, 32), 22: (1, 32),
-    23: (1, 0), 28: (2, 500), 31: (2, 0), 33: (1, 0), 34: (1, 20), 35: (1, 200), 36: (1, 80),
-    40: (1, 0), 41: (1, 0), 42: (2, 0), 44: (2, 0), 46: (2, 0), 48: (2, 1000), 55: (1, 1),
-    58: (2, 0), 60: (2, 0), 62: (1, 74), 63: (1, 30), 64: (1, 0), 65: (1, 0), 66: (1, 0),
-    69: (2, 0), 84: (1, 75),
-}  # fmt: skip
-"""Size and value of registers of a servo fresh from the factory, at rest at 7.4 V and 30 degC."""
 
 
 def three(**options):
@@ -36,19 +25,9 @@ def bench():
     return FeetechBench()
 
 
-def test_every_register_of_a_new_servo(bench):
-    assert {at: (n, bench.read(1, at, n)) for at, (n, _) in FACTORY.items()} == FACTORY
-    assert bench.position() == 2048
-
-
 def test_models_differ_in_their_voltage():
     bench = FeetechBench((1, "sts3215-12v", 2048.0))
     assert (bench.read(1, 14), bench.read(1, 62), bench.read(1, 84)) == (140, 120, 61)
-
-
-def test_the_firmware_is_the_number_behind_3():
-    bench = FeetechBench(ServoSpec(1, "sts3215", 2048, firmware=10))
-    assert (bench.read(1, 0), bench.read(1, 1)) == (3, 10)
 
 
 @pytest.mark.parametrize(("length", "address"), [(0, 40), (253, 0), (20, 250), (5, 70)])
@@ -98,14 +77,6 @@ def test_ids_bauds_and_modes_that_do_not_exist_change_nothing(bench, address, va
     assert bench.read(1, address) == stays
 
 
-def test_a_locked_eeprom_counts_until_the_power_goes(bench):
-    bench.write(1, 21, 16)
-    bench.write(1, 9, 500, 2)
-    assert (bench.read(1, 21), bench.read(1, 9, 2)) == (16, 500)
-    restart(bench)
-    assert (bench.read(1, 21), bench.read(1, 9, 2)) == (32, 0)
-
-
 def test_only_what_is_written_while_it_is_open_is_kept(bench):
     bench.write(1, 22, 5)
     bench.write(1, 55, 0)
@@ -136,17 +107,6 @@ def test_a_new_id_counts_at_once_and_is_lost_with_the_lock_closed(bench):
     assert bench.ask(1, PING) == [(1, 0, b"")]
 
 
-def test_a_dip_of_the_supply_brings_back_the_id_that_was_kept():
-    bench = FeetechBench(baud=1_000_000)
-    bench.write(1, 5, 7)
-    bench.chain.faults.command("voltage 7 3")
-    bench.wait(0.5)
-    bench.chain.faults.command("voltage 1 7.4")
-    bench.wait(2.0)
-    assert bench.ask(7, PING) == []
-    assert bench.ask(1, PING) == [(1, 0, b"")]
-
-
 # --- kept writes
 
 
@@ -170,12 +130,6 @@ def test_a_reboot_may_be_met_with_silence(bench):
 
 
 # --- groups
-
-
-def test_a_calibration_of_all_is_obeyed_in_silence():
-    bench = three()
-    assert bench.ask(ALL, CALIBRATE, 42, 7) == []
-    assert {bench.position(i) for i in (1, 2, 3)} == {(7 * 256 + 42) % 4096}
 
 
 @pytest.mark.parametrize(("policy", "ids"), [("answer", [1, 2, 3]), ("silence", [])])

@@ -12,8 +12,8 @@ STEADY_STEPS = 2
 TOP_STEPS_S = 55.0 / 60.0 * 4096.0
 
 
-def one(physics=SMOOTH, start=2048.0, model="sts3215"):
-    return FeetechBench(ServoSpec(1, model, start, physics=physics))
+def one(physics=SMOOTH, start=2048.0):
+    return FeetechBench(ServoSpec(1, "sts3215", start, physics=physics))
 
 
 def command(bench, goal, speed=0, acceleration=0, time_ms=0):
@@ -44,9 +44,7 @@ def test_goal_speed_alone_is_a_straight_line(bench, seconds):
     assert led_to(bench) == pytest.approx(2048 + 1000 * seconds)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "at"), [(0.2, 40.0), (0.5, 250.0), (1.0, 750.0), (1.5, 1000.0)]
-)
+@pytest.mark.parametrize(("seconds", "at"), [(0.2, 40.0), (1.0, 750.0), (1.5, 1000.0)])
 def test_acceleration_makes_ramps_at_both_ends(bench, seconds, at):
     bench.enable_torque()
     command(bench, 3048, speed=1000, acceleration=20)
@@ -86,18 +84,9 @@ def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
     assert bench.read(1, 58, 2, 15) == pytest.approx(TOP_STEPS_S, rel=0.02)
 
 
-def test_no_goal_speed_is_faster_than_the_motor():
-    bench = one(start=0.0)
-    bench.enable_torque()
-    command(bench, 4095, speed=30_000)
-    bench.wait(0.5)
-    assert led_to(bench) == pytest.approx(TOP_STEPS_S * 0.5)
-
-
 @pytest.mark.parametrize("goal", [1000, 2049, 3500])
-@pytest.mark.parametrize("model", ["sts3215", "sts3215-12v"])
-def test_it_comes_to_its_goal_and_stays(goal, model):
-    bench = one(Physics(), model=model)
+def test_it_comes_to_its_goal_and_stays(goal):
+    bench = one(Physics())
     bench.enable_torque()
     command(bench, goal, speed=1500, acceleration=50)
     assert bench.read(1, 66) == 1
@@ -122,21 +111,6 @@ def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing(bench):
     assert led_to(bench) == pytest.approx(2048 + 100 + 200)
 
 
-def test_the_same_goals_give_the_same_bytes():
-    def run():
-        bench, said = one(Physics(gravity_nm=0.2)), []
-        bench.enable_torque()
-        for k in range(200):
-            command(bench, 2048 + 300 * (k // 40 % 2), speed=900)
-            bench.wait(0.01)
-            said.append(bench.ask(1, 2, 56, 15))
-        return said
-
-    first = run()
-    assert first == run()
-    assert len({data for [(_, _, data)] in first}) > 80
-
-
 # --- torque
 
 
@@ -156,19 +130,6 @@ def test_a_goal_may_switch_the_torque_on(bench):
     assert bench.read(1, 40) == 1
     bench.wait(1.0)
     assert bench.position() == pytest.approx(2500, abs=STEADY_STEPS)
-
-
-def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back(bench):
-    bench.chain.faults.command("turn 1 300")
-    assert bench.position() == 2348
-    bench.enable_torque()
-    bench.chain.faults.command("turn 1 -100")
-    assert bench.position() == 2248
-    assert bench.read(1, 60, 2, 10) == 0
-    bench.wait(0.02)
-    assert bench.read(1, 60, 2, 10) > 100
-    bench.wait(1.0)
-    assert bench.position() == pytest.approx(2348, abs=STEADY_STEPS)
 
 
 def test_torque_off_lets_a_load_pull_it_and_damping_slows_it():
@@ -206,13 +167,6 @@ def test_load_and_current_at_a_stop_are_those_of_the_stall():
     bench.wait(0.25)
     assert bench.read(1, 60, 2, 10) < 0
     assert bench.read(1, 58, 2, 15) < 0
-
-
-def test_a_load_sags_the_voltage():
-    bench = one(SMOOTH._replace(stop_high_steps=2100.0, supply_ohm=0.5))
-    bench.enable_torque(goal=3000)
-    bench.wait(0.5)
-    assert bench.read(1, 62) == pytest.approx(74 - 0.5 * 2.7 * 10, abs=3)
 
 
 def test_a_smaller_gain_holds_softer():
@@ -274,7 +228,7 @@ def test_the_offset_moves_the_origin(bench):
     assert bench.position() == 2148
 
 
-@pytest.mark.parametrize("start", [0.0, 5.0, 1500.0, 2048.0, 2049.0, 3000.0, 4095.0])
+@pytest.mark.parametrize("start", [0.0, 2049.0, 4095.0])
 def test_128_makes_the_present_place_the_middle_for_good(start):
     bench = one(start=start)
     bench.write(1, 40, 128)
@@ -286,18 +240,6 @@ def test_128_makes_the_present_place_the_middle_for_good(start):
     bench.wait(1.0)
     assert bench.position() == pytest.approx(2048, abs=1)
     assert bench.read(1, 31, 2, 11) == offset
-
-
-def test_making_it_the_middle_under_torque_moves_nothing():
-    bench = one(start=1500.0)
-    bench.enable_torque()
-    bench.wait(0.1)
-    true = bench.chain[1].shaft.x
-    bench.write(1, 40, 128)
-    assert (bench.read(1, 40), bench.read(1, 42, 2)) == (1, 2048)
-    bench.wait(0.5)
-    assert bench.chain[1].shaft.x == pytest.approx(true, abs=1)
-    assert bench.position() == pytest.approx(2048, abs=1)
 
 
 def test_calibrate_takes_any_place():
@@ -325,15 +267,6 @@ def test_mode_wheel_turns_at_the_goal_speed_both_ways_and_stops_at_0():
     bench.wait(3.0)
     assert abs(bench.read(1, 58, 2, 15)) <= 3
     assert bench.read(1, 66) == 0
-
-
-def test_mode_wheel_follows_the_acceleration(bench):
-    bench.write(1, 33, 1)
-    bench.write(1, 41, 10)
-    bench.write(1, 46, 1500, 2)
-    bench.write(1, 40, 1)
-    bench.wait(0.5)
-    assert bench.chain[1].shaft.profile.v * 1000 == pytest.approx(500)
 
 
 @pytest.mark.parametrize(("duty", "share"), [(500, 0.5), (0x400 | 250, -0.25), (0, 0.0)])

@@ -30,7 +30,6 @@ def speeds(positions: list[float]) -> list[float]:
 @pytest.mark.parametrize(
     ("cruise", "ramp", "kind", "ms"),
     [
-        (0.0, 0.0, STEP, 1),
         (0.0, 0.5, STEP, 1),  # no velocity: the acceleration does not count
         (2.0, 0.0, RECTANGLE, 500),
         (2.0, 0.01, TRAPEZOID, 700),
@@ -48,8 +47,8 @@ def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
         assert max(speeds(positions)) <= cruise + 1e-9
 
 
-@pytest.mark.parametrize(("total", "ramp"), [(500, 0), (500, 100), (500, 250), (500, 400)])
-@pytest.mark.parametrize("goal", [7.0, 1000.0, -3000.0])
+@pytest.mark.parametrize(("total", "ramp"), [(500, 0), (500, 100), (500, 250)])
+@pytest.mark.parametrize("goal", [7.0, -3000.0])
 def test_a_time_based_profile_takes_its_time_whatever_the_distance(total, ramp, goal):
     made = PositionProfile(0.0)
     made.plan_by_time(goal, total, ramp)

@@ -1,12 +1,11 @@
 """Injected faults of STS servos only; those of all smart servos are in test_servo_faults."""
 
-import random
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from copied import copied
-from moving_bus import IDS, LONGEST_S, NAMES
+from moving_bus import IDS, NAMES
 from present import present
 from sts_rig import Rig
 
@@ -62,33 +61,6 @@ def test_after_a_replug_all_hold_where_they_are(rig):
     assert [r.rearmed for r in rig.tick([2500] * 4)] == [False] * 4
 
 
-def test_servo_power_cut_and_back(rig):
-    rig.command("lose all for 3.0")
-    for _ in range(180):
-        assert rig.heard() == [False] * 4
-    for servo_id in IDS:
-        rig.command(f"brown-out {servo_id}")
-    assert "no servo answers: check servo power and cable" in rig.bus.events()
-    rig.until_all()
-    assert rig.bus.health().errors["rearmed"] >= 4
-    rig.run(0.6, [2200] * 4)
-    assert rig.chain.positions_steps() == pytest.approx([2200] * 4, abs=8)
-
-
-def test_power_and_port_gone_before_the_torque_was_on():
-    rig = Rig()
-    rig.bus.open()
-    rig.command("unplug for 0.3")
-    for servo_id in IDS:
-        rig.command(f"brown-out {servo_id}")
-    for _ in range(200):
-        readings = rig.tick()
-    assert not any(r.torque or r.rearmed for r in readings)
-    assert rig.bus.enable_torque() == (2000,) * 4
-    rig.run(0.6, [2200] * 4)
-    assert rig.chain.positions_steps() == pytest.approx([2200] * 4, abs=8)
-
-
 def test_a_restart_in_the_wink_of_an_eye_is_found(rig):
     """One that nobody missed, after which a goal has switched the torque on again."""
     rig.bus.disable_torque()
@@ -133,21 +105,6 @@ def test_overload_is_named_and_goes(rig):
     assert rig.bus.events() == ("jaw (servo 2): the fault is gone",)
 
 
-def test_overheating_takes_the_torque_and_cooling_brings_it_back(rig):
-    rig.run(0.5, [2000] * 4)
-    rig.command("overheat 2")
-    readings = rig.run(0.5, [2000] * 4)
-    assert (readings[1].fault, readings[1].torque) == ("overheating", False)
-    rig.command("turn 2 100")
-    readings = rig.run(0.5, [2000] * 4)
-    assert not rig.chain[2].torque
-    rig.command("temperature 2 40")
-    seen = [rig.tick([2000] * 4)[1] for _ in range(200)]
-    assert [r.rearmed for r in seen if r is not None].count(True) == 1
-    assert rig.bus.faults() == ()
-    assert rig.chain[2].torque
-
-
 def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(rig):
     rig.run(0.5, [2000] * 4)
     rig.command("overheat 2")
@@ -173,15 +130,6 @@ def test_input_voltage_is_named_and_the_torque_stays(rig):
     rig.run(1.0, [2000] * 4)
     rig.until_all()
     assert len(rig.bus.faults()) == 4
-
-
-def test_encoder(rig):
-    rig.command("encoder 2")
-    rig.tick()
-    readings = rig.tick()
-    assert readings[1] is None or readings[1].fault == "encoder"
-    assert [r is not None for r in (readings[0], readings[2], readings[3])] == [True] * 3
-    assert rig.bus.faults() == ("jaw (servo 2): encoder",)
 
 
 @pytest.mark.parametrize("goal", ["wait", "torque-on"])
@@ -271,38 +219,6 @@ def test_a_joint_that_restarts_beyond_zero_stays_limp_until_it_is_turned_back():
         rig.bus.write([500, 500])
     assert rig.bus.faults() == ()
     assert [servo.torque for servo in rig.chain.servos] == [True, True]
-
-
-MISHAPS = (
-    "drop {i} {few}", "corrupt {i} {bit}", "truncate {i} {few}", "delay {i} {ms}", "short {i} 2",
-    "long {i} 3", "lose {i}", "stall {i} {ms}", "noise before random", "noise after random",
-    "noise before FFFF01", "fragment {i}", "duplicate {i}", "reorder", "refuse {i} 33",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_mishap_upon_mishap(seed):
-    dice = random.Random(seed)
-    rig = Rig()
-    rig.command("set after-missing " + dice.choice(["silence", "skip", "timeout"]))
-    rig.start()
-    for _ in range(20):
-        words = {"i": dice.choice([*IDS, "all"]), "few": dice.randint(0, 20)}
-        words |= {"bit": dice.randint(0, 160), "ms": dice.choice([1, 5, 20, 60])}
-        rig.command(f"{dice.choice(MISHAPS).format(**words)} count {dice.randint(1, 5)}")
-        if dice.random() < 0.15:
-            rig.command(f"brown-out {dice.randint(1, 4)}")
-        if dice.random() < 0.1:
-            rig.command("unplug for 0.2")
-        for _ in range(dice.randint(1, 15)):
-            rig.tick()
-    assert rig.longest_s < LONGEST_S
-    rig.command("clear")
-    for _ in range(300):
-        rig.tick()
-    assert rig.heard() == [True] * 4
-    rig.run(0.8, [2100] * 4)
-    assert rig.chain.positions_steps() == pytest.approx([2100] * 4, abs=8)
 
 
 @pytest.mark.parametrize(("again", "well"), [(2003, True), (1000, False)])

@@ -30,7 +30,6 @@ VECTORS = [
     (read(1, 56, 2), "FF FF 01 04 02 38 02 BE"),
     (write(1, 42, bytes((0x00, 0x08, 0, 0, 0xE8, 0x03))),
      "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5"),
-    (write(1, 55, b"\x00"), "FF FF 01 04 03 37 00 C0"),
     (reg_write(1, 42, b"\x00\x08"), "FF FF 01 05 04 2A 00 08 C3"),
     (instruction(BROADCAST, ACTION), "FF FF FE 02 05 FA"),
     (instruction(0, RESET), "FF FF 00 02 06 F7"),

@@ -5,14 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.feetech.memory_table import (
-    BAUD_RATES,
-    MODELS,
     REGISTERS,
     TABLE_END,
     acceleration_units,
     from_sign_magnitude,
     name_errors,
-    registers_of,
     speed_units,
     to_sign_magnitude,
 )
@@ -24,28 +21,6 @@ def test_registers_do_not_overlap_and_end_where_the_table_does():
         assert register.address >= at
         at = register.address + register.size
     assert at == TABLE_END
-
-
-def test_addresses_as_in_the_makers_table():
-    addresses = {
-        "model_number": 3, "id": 5, "baud_rate": 6, "min_position_limit": 9, "phase": 18,
-        "position_p_gain": 21, "position_d_gain": 22, "position_i_gain": 23,
-        "position_offset": 31, "operating_mode": 33, "torque_enable": 40, "acceleration": 41,
-        "goal_position": 42, "goal_speed": 46, "torque_limit": 48, "lock": 55,
-        "present_position": 56, "present_load": 60, "status": 65, "present_current": 69,
-    }  # fmt: skip
-    assert {name: REGISTERS[name].address for name in addresses} == addresses
-    assert BAUD_RATES.index(1_000_000) == 0 and BAUD_RATES.index(115_200) == 4
-
-
-@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_factory_values_are_in_range(model):
-    registers = {r.name: r for r in registers_of(model)}
-    assert registers["model_number"].initial == 777
-    assert registers["max_voltage_limit"].initial == model.max_voltage
-    for r in registers.values():
-        if r.initial is not None and r.low is not None and r.high is not None:
-            assert r.low <= r.initial <= r.high, r.name
 
 
 def test_signs_by_hand():
@@ -65,11 +40,6 @@ def test_signed_registers_there_and_back(register, data):
     for beyond in (most + 1, -most - 1):
         with pytest.raises(ValueError, match="does not fit"):
             register.encode(beyond)
-
-
-@given(st.sampled_from([10, 11, 15]), st.integers(0, 0xFFFF))
-def test_any_bits_are_some_number(bit, raw):
-    assert abs(from_sign_magnitude(raw, bit)) < 1 << bit
 
 
 def test_what_does_not_fit_is_refused():

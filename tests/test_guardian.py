@@ -26,10 +26,8 @@ from gazerig.robot.guardian.heartbeat import (
     IDLE,
     RELEASED,
     RELEASING,
-    SIZE,
     HangDetector,
     Heartbeat,
-    shared_file,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
 from gazerig.robot.model.joint import JointParams
@@ -372,15 +370,3 @@ def test_one_that_looks_at_nothing_is_replaced(guarding, monkeypatch):
     assert guarding.pid != first
     guarding.check(200.0)  # the new one may still be starting
     assert len(guarding.events()) == 1
-
-
-def test_both_sides_see_the_same_memory():
-    fd = shared_file()
-    ours, theirs = Heartbeat(fd), Heartbeat(fd)
-    assert os.fstat(fd).st_size == SIZE
-    os.close(fd)
-    ours.beat()
-    ours.arm(3, True)
-    theirs.set_state(3, RELEASING)
-    assert theirs.beats == 1 and theirs.is_armed(3) and not theirs.is_armed(2)
-    assert ours.state(3) == RELEASING and ours.state(2) == IDLE

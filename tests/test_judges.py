@@ -16,7 +16,6 @@ from gazerig.sim_mock.pty.client import PtyBus
 
 ROOT = Path(__file__).parents[1]
 OTHER_SDK = ROOT / ".venv" / "other-sdk"
-ABSENT = {"acceleration_limit", "torque_limit", "moving_speed", "current_limit", "goal_current"}
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""
 
@@ -63,40 +62,6 @@ def test_rustypot_with_x330(path):
     assert client.ping(1) is False
     client.set_baudrate(BAUD)
     assert client.ping(1) is True
-    client.close()
-
-
-def test_rustypot_reads_every_register_it_knows(path):
-    rustypot = pytest.importorskip("rustypot")
-    for controller, servo_id in (
-        (rustypot.Xl330PyController, 1),
-        (rustypot.Xl430PyController, 11),
-    ):
-        client = controller(path, BAUD, 0.2)
-        refused = set()
-        for register in client.registers():
-            data, error = client.read_raw_data_with_error(servo_id, register.addr, register.size)
-            if error == 7:
-                refused.add(register.name)
-            else:
-                assert (len(data), error) == (register.size, 0), register
-        assert len(client.registers()) >= 40
-        # Its tables list what these models do not have.
-        assert refused <= ABSENT
-        client.close()
-
-
-def test_rustypot_resets_to_factory_settings(path):
-    client = pytest.importorskip("rustypot").Xl330PyController(path, BAUD, 0.2)
-    client.write_return_delay_time(2, 0)
-    client.factory_reset(2, conserve_id_only=False, conserve_id_and_baudrate=True)
-    time.sleep(0.45)
-    assert client.read_return_delay_time(2) in (250, [250])
-    client.factory_reset(2, conserve_id_only=True, conserve_id_and_baudrate=False)
-    time.sleep(0.45)
-    assert client.ping(2) is False
-    client.set_baudrate(57_600)
-    assert client.ping(2) is True
     client.close()
 
 
@@ -256,37 +221,3 @@ def test_an_older_sdk_of_the_vendor():
         timeout=60,
     )
     assert done.returncode == 0, done.stderr
-
-
-def test_the_vendors_easy_sdk(monkeypatch):
-    easy = pytest.importorskip("dynamixel_easy_sdk")
-    port = SimulatedPort()
-    monkeypatch.setattr("dynamixel_easy_sdk.connector.PortHandler", lambda name: port)
-    connector = easy.Connector("in this process", BAUD)
-    motors = {motor.id: motor for motor in connector.createAllMotors()}
-    assert sorted(motors) == [1, 2, 3, 11, 12]
-    group = connector.createGroupExecutor()
-    for motor in motors.values():
-        motor.disableTorque()
-        motor.setOperatingMode(easy.OperatingMode.POSITION)
-        motor.setPositionPGain(900)
-        motor.enableTorque()
-        group.addCmd(motor.stageSetGoalPosition(1800))
-        group.addCmd(motor.stageGetPresentPosition())
-    group.executeWrite()
-    assert port.eventually(lambda: near(group.executeRead(), 1800))
-    one = motors[2]
-    assert one.getOperatingMode() == easy.OperatingMode.POSITION
-    assert (one.getMinPositionLimit(), one.getMaxPositionLimit()) == (0, 4095)
-    one.disableTorque()
-    one.setDirection(easy.Direction.REVERSE)
-    one.setProfileConfiguration(easy.ProfileConfiguration.TIME_BASED)
-    assert connector.read1ByteData(2, 10) == 5
-    one.changeID(20)
-    assert connector.ping(20) == 1200
-    one.LEDOn()
-    assert one.isLEDOn() == 1
-    one.reboot()
-    port.let_pass(0.45)
-    assert one.isLEDOn() == 0
-    connector.closePort()

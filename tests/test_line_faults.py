@@ -1,6 +1,5 @@
 """Each fault of the line, injected by text, as seen in the bytes at the host."""
 
-import json
 import struct
 from typing import Any, cast
 
@@ -109,15 +108,6 @@ def test_a_late_answer_arrives_when_the_clock_gets_there(world):
     assert world.now_s == pytest.approx(0.03)
 
 
-def test_without_a_clock_to_move_nobody_waits():
-    world = World(sleeps=False)
-    world.faults.command("delay 2 30")
-    assert world.one() == b""
-    assert world.now_s == 0.0
-    world.now_s = 0.04
-    assert world.port.read_until(99, 0.0) == good(2)
-
-
 def test_a_stall_is_a_gap_in_the_middle(world):
     world.faults.command("stall 2 30 count 1")
     world.port.write(instruction(2, *READ_ONE))
@@ -149,22 +139,11 @@ def test_a_flipped_bit_is_where_it_was_asked_for(world):
     assert not sound(got)
 
 
-def test_flips_by_dice_are_the_same_each_time():
-    seen = []
-    for _ in range(2):
-        world = World(seed=5)
-        world.faults.command("corrupt all")
-        seen.append([world.one() for _ in range(20)])
-    assert seen[0] == seen[1]
-    assert len(set(seen[0])) > 10
-    assert all(bin(int.from_bytes(x) ^ int.from_bytes(good(2))).count("1") == 1 for x in seen[0])
-
-
-@pytest.mark.parametrize("byte", [0, 5, 14, -1])
-def test_a_dropped_byte(world, byte):
-    world.faults.command(f"drop 2 {byte}")
-    at = byte % 15
-    assert world.one() == good(2)[:at] + good(2)[at + 1 :]
+def test_a_dropped_byte(world):
+    world.faults.command("drop 2 5 count 1")
+    assert world.one() == good(2)[:5] + good(2)[6:]
+    world.faults.command("drop 2 -1")
+    assert world.one() == good(2)[:-1]
 
 
 def test_noise_and_loose_headers(world):
@@ -175,13 +154,6 @@ def test_noise_and_loose_headers(world):
     assert world.one() == b"\xff\xff\xfd\x00" + good(2)
     world.faults.command("noise before random count 1")
     assert world.one()[8:] == good(2)
-    assert world.one() == good(2)
-
-
-def test_echo(world):
-    world.faults.command("echo on")
-    assert world.one() == instruction(2, *READ_ONE) + good(2)
-    world.faults.command("echo off")
     assert world.one() == good(2)
 
 
@@ -206,27 +178,6 @@ def test_refused(world):
     assert block[:6] == b"\x07\x02" + bytes(4)
 
 
-def test_reordered(world):
-    world.faults.command("reorder count 2")
-    assert world.plain() == good(3) + good(2) + good(1)
-    fast = world.fast()
-    assert [fast[i] for i in (9, 17, 25)] == [3, 2, 1]
-    assert world.plain() == good(1) + good(2) + good(3)
-
-
-def test_babble_never_ends_and_the_answer_is_in_it(world):
-    world.faults.command("babble on")
-    for _ in range(5):
-        world.now_s += 0.005
-        got = world.one()
-        assert good(2) in got
-        assert len(got) >= 100
-    world.now_s += 0.005
-    assert world.port.drain() >= 100
-    world.faults.command("babble off")
-    assert world.one() == good(2)
-
-
 def test_colliding_servos_mix_where_they_differ(world):
     world.faults.command("collide 2")
     ping = world.ask(2, 1)
@@ -243,37 +194,8 @@ def test_colliding_servos_mix_where_they_differ(world):
     assert world.one(1) == good(1)
 
 
-def test_lost_group_writes_leave_no_trace(world):
-    write = struct.pack("<HH", 65, 1) + bytes((1, 1, 2, 1, 3, 1))
-    world.faults.command("lose-writes 1")
-    led = struct.pack("<HH", 65, 1)
-    for expected in (0, 1):
-        assert world.ask(0xFE, 0x83, write) == b""
-        assert world.ask(3, 2, led)[9] == expected
-
-
-def test_latched_errors_by_command(world):
-    for command, bit in (("overload 1", 0x20), ("overheat 2", 4), ("encoder 3", 8)):
-        world.faults.command(command)
-        servo_id = int(command[-1])
-        assert world.ask(servo_id, 2, struct.pack("<HH", 70, 1))[8:10] == bytes((0x80, bit))
-
-
-def byte(world, servo_id, address):
-    return world.ask(servo_id, 2, struct.pack("<HH", address, 1))[9]
-
-
 def position(world, servo_id):
     return struct.unpack("<i", world.one(servo_id)[9:13])[0]
-
-
-def test_a_brown_out_is_deafness_then_defaults_without_any_status(world):
-    world.ask(2, 3, struct.pack("<Hi", 112, 50))
-    world.ask(2, 3, struct.pack("<HB", 64, 1))
-    world.faults.command("brown-out 2")
-    assert world.one() == b""
-    world.now_s += 0.4
-    assert byte(world, 2, 64) == byte(world, 2, 70) == byte(world, 2, 112) == 0
 
 
 def test_a_reset_servo_speaks_as_from_the_factory():
@@ -290,31 +212,6 @@ def test_a_reset_servo_speaks_as_from_the_factory():
         world.faults.command("reset 2")
 
 
-def test_supply_heat_a_hand_and_a_jam(world):
-    world.faults.command("voltage all 3.2")
-    world.now_s += 0.1
-    assert [byte(world, i, 70) for i in IDS] == [1, 1, 1]
-    assert world.one(1)[8] == 0x80
-    world = World()
-    world.faults.command("temperature 1 90")
-    world.now_s += 0.1
-    assert (byte(world, 1, 70), byte(world, 2, 70)) == (4, 0)
-    world.faults.command("turn 2 -100")
-    assert abs(position(world, 2) - 1902) <= 3
-    world.faults.command("stick 3")
-    world.ask(3, 3, struct.pack("<HB", 64, 1))
-    world.ask(3, 3, struct.pack("<Hi", 116, 3000))
-    world.now_s += 0.2
-    assert abs(position(world, 3) - 2003) < 20
-    world.faults.command("free 3")
-    world.now_s += 1.0
-    held = position(world, 3)
-    assert held > 2900
-    world.faults.command("load 3 -0.1")
-    world.now_s += 0.5
-    assert position(world, 3) < held - 20
-
-
 def test_unplugged_until_plugged_and_opened_again(world):
     world.faults.command("unplug")
     for use in (lambda: world.port.write(GOLDEN_PING), world.port.drain):
@@ -325,15 +222,6 @@ def test_unplugged_until_plugged_and_opened_again(world):
     world.faults.command("plug")
     with pytest.raises(BusLost):
         world.port.read_until(1, 0.0)
-    world.port.setBaudRate(1_000_000)
-    assert world.one() == good(2)
-
-
-def test_unplugged_for_a_time(world):
-    world.faults.command("unplug for 0.5")
-    with pytest.raises(BusLost):
-        world.one()
-    world.now_s = 0.5
     world.port.setBaudRate(1_000_000)
     assert world.one() == good(2)
 
@@ -369,32 +257,18 @@ def test_faults_last_for_a_count_a_time_or_until_cleared(world):
     assert not world.faults.wire.has_any
 
 
-def test_status_tells_servos_and_faults(world):
-    world.faults.command("delay all 3")
-    reported = json.loads(world.faults.command("status"))
-    assert [servo["position"] for servo in reported["servos"]] == [2001, 2002, 2003]
-    assert reported["servos"][0]["torque"] == 0
-    assert reported["faults"] == ["delay all"]
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
         ("lsoe 3", "'lsoe' is not a command; commands: lose, delay"),
         ("lose", "ID is missing; usage: lose ID"),
-        ("lose 3 4", "'4' is one argument too many"),
         ("lose x", "'x' is not a servo id from 0 to 252"),
-        ("lose 9", "no servo 9; servos are 1, 2, 3"),
         ("lose 3 count none", "'none' is not a number of answers"),
-        ("delay 3 soon", "'soon' is not milliseconds from 0"),
         ("delay 3 nan", "'nan' is not milliseconds"),
         ("noise over", "'over' is neither before nor after"),
         ("noise before xyz", "'xyz' is neither random nor bytes in hex"),
-        ("echo perhaps", "'perhaps' is neither on nor off"),
         ("overload 1 count 3", "'count' is not expected here"),
-        ("set after-missing wait", "expected silence, skip, timeout"),
         ("set afterwards skip", "unknown; expected after-missing, wrong-baud"),
-        ("set slot-timeout-ms -1", "not a number of milliseconds"),
     ],
 )
 def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):

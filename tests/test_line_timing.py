@@ -47,7 +47,7 @@ class Wire:
         return out
 
 
-@pytest.mark.parametrize("baud", [57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000])
+@pytest.mark.parametrize("baud", [57_600, 4_000_000])
 @pytest.mark.parametrize(
     ("request_bytes", "size"), [(PLAIN, 23 + 189), (FAST, 23 + 134)], ids=["plain", "fast"]
 )
@@ -60,12 +60,6 @@ def test_a_cycle_takes_what_the_formula_says(baud, request_bytes, size, delay):
     assert answers[-1][0] == pytest.approx((59 + size) * 10 / baud + delays, abs=1e-9)
 
 
-def test_the_rates_of_nine_servos_are_the_known_ones():
-    """Sync write and read of nine servos: 369 and 463 cycles a second at 1 Mbaud."""
-    for request_bytes, rate in ((PLAIN, 369), (FAST, 463)):
-        assert round(1.0 / Wire().answers(GOALS + request_bytes)[-1][0]) == rate
-
-
 def test_the_turnaround_counts_once_a_status():
     plain = Wire(turnaround_s=30e-6).answers(PLAIN)
     fast = Wire(turnaround_s=30e-6).answers(FAST)
@@ -73,48 +67,9 @@ def test_the_turnaround_counts_once_a_status():
     assert fast[-1][0] == pytest.approx(1570e-6 + 30e-6)
 
 
-def test_a_long_reply_comes_in_parts_of_a_millisecond():
-    times = [due_s for due_s, _ in Wire().answers(PLAIN)]
-    assert times == sorted(times)
-    assert len(times) == 2
-    assert all(len(data) >= 60 for _, data in Wire().answers(PLAIN))
-
-
 def test_answers_queue_behind_one_another():
     answers = Wire().answers(PING + PING)
     assert [round(due_s * 1e6) for due_s, _ in answers] == [240, 380]
-
-
-def test_bytes_of_the_host_queue_too():
-    wire = Wire()
-    wire.line.send(PING, 1_000_000)
-    wire.line.send(PING, 1_000_000)
-    times = []
-    while (due_s := wire.line.next_due_s()) is not None:
-        wire.now_s = due_s
-        wire.line.take_arrived()
-        times.append(round(due_s * 1e6))
-    assert times == [240, 380]
-
-
-def test_an_idle_line_owes_nothing():
-    wire = Wire()
-    wire.answers(PING)
-    wire.now_s = 5.0
-    assert wire.answers(PING)[-1][0] == pytest.approx(5.00024)
-
-
-def test_a_late_answer_makes_those_behind_it_late():
-    wire = Wire()
-    wire.chain.faults.command("delay 3 2 count 1")
-    assert wire.answers(PLAIN)[-1][0] == pytest.approx(2120e-6 + 2e-3)
-
-
-def test_without_wire_time_all_is_there_at_once():
-    wire = Wire(250)
-    instant = ServoLine(wire.chain)
-    assert len(instant.send(PLAIN, 1_000_000)) == 189
-    assert instant.next_due_s() is None
 
 
 @settings(max_examples=40)
@@ -173,7 +128,7 @@ STS_READ = sts_packet(0xFE, 0x82, bytes((56, 15, *IDS)))
 STS_PARTS = [6 + 15] * len(IDS)
 
 
-@pytest.mark.parametrize("baud", [115_200, 500_000, 1_000_000])
+@pytest.mark.parametrize("baud", [115_200, 1_000_000])
 @pytest.mark.parametrize("turnaround_us", [0, 30])
 def test_a_sync_read_of_feetech_servos_takes_what_the_formula_says(baud, turnaround_us):
     wire = Device(sts, turnaround_us * 1e-6)

@@ -68,7 +68,3 @@ def test_ports_have_lasting_names(tmp_path, monkeypatch):
     assert (first.device, first.usb) == ("/dev/ttyUSB7", "0403:6014")
     assert first.by_id == str(tmp_path / "usb-FTDI-if00")
     assert (second.usb, second.by_id) == ("", None)
-
-
-def test_a_system_without_lasting_names(tmp_path):
-    assert all(port.by_id is None for port in serial_ports(Host(by_id=tmp_path / "none")))

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from gazerig.drivers.maestro.commands import (
     MaestroCodec,
-    adjacent_runs,
     crc7,
     decode_words,
     name_errors,
@@ -39,10 +38,6 @@ def test_commands_in_both_forms(call, expected):
     assert call(POLOLU) == bytes((0xAA, 0x0C, compact[0] & 0x7F)) + compact[1:]
 
 
-def test_another_device_number():
-    assert MaestroCodec("pololu", device=3).errors() == bytes.fromhex("AA 03 21")
-
-
 def test_the_check_byte():
     assert crc7(bytes.fromhex("83 01")) == 0x17
     assert crc7(bytes.fromhex("84 00 70 2E")) == 0x2B
@@ -63,11 +58,6 @@ def test_neighbours_share_a_command_where_the_board_has_it():
     )
     micro = MaestroCodec(channels=6)
     assert micro.targets({0: 4001, 1: 4000}) == micro.target(0, 4001) + micro.target(1, 4000)
-
-
-def test_runs():
-    assert adjacent_runs([]) == []
-    assert adjacent_runs([0, 1, 3, 7, 8, 9]) == [[0, 1], [3], [7, 8, 9]]
 
 
 def test_positions_are_two_full_bytes_low_byte_first():

@@ -7,10 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from maestro_world import PROTOCOL, World, acceleration, speed, target
 
-from gazerig.drivers.errors import BusLost
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.maestro.board import COMMANDS, SIZES, build_board
+from gazerig.sim_mock.maestro.board import SIZES, build_board
 from gazerig.sim_mock.maestro.commands import ERRORS
 
 
@@ -115,17 +113,6 @@ def test_servos_without_their_supply_are_limp_and_the_board_notices_nothing(worl
     assert world.after(1.0).board.positions_steps()[0] == pytest.approx(7000, abs=20)
 
 
-def test_a_stuck_servo_shows_in_nothing_that_the_board_tells(world):
-    world.do("stick 4")
-    world.ask(target(4, 7600))
-    world.after(1.0)
-    assert world.position(4) == 7600
-    report = json.loads(world.do("status"))["servos"][4]
-    assert (report["place"], report["straining"]) == (6000.0, True)
-    world.do("free all")
-    assert world.after(1.0).board.positions_steps()[4] == pytest.approx(7600, abs=20)
-
-
 def test_commands_and_bytes_are_lost_on_their_way(world):
     world.do("lose-writes 1")
     assert world.ask("A1") == bytes(2)
@@ -137,22 +124,6 @@ def test_commands_and_bytes_are_lost_on_their_way(world):
     world.ask(target(0, 6000))
     assert world.errors() == PROTOCOL
     assert not world.board.faults.wire.has_any
-
-
-def test_answers_are_lost_spoilt_and_late_as_on_any_line(world):
-    world.ask(target(3, 6000))
-    world.do("lose 3 count 1")
-    assert (world.ask("90 03"), world.ask("90 03")) == (b"", b"\x70\x17")
-    world.do("drop all 0 count 1")
-    assert world.ask("90 03") == b"\x17"
-    world.do("corrupt 3 8 count 1")
-    assert world.ask("90 02 90 03") == bytes((0, 0, 0x70, 0x16))
-    world.do("noise before AA55 count 1")
-    assert world.ask("A1") == b"\xaa\x55\x00\x00"
-    world.do("delay 3 30 count 1")
-    assert world.board.exchange(b"\x90\x03")[0].pieces[0].late_s == 0.03
-    world.do("echo on")
-    assert world.ask("A1") == b"\xa1\x00\x00"
 
 
 def test_status_tells_channels_errors_and_faults(world):
@@ -172,31 +143,18 @@ def test_status_tells_channels_errors_and_faults(world):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("lose 12", "no channel 12; channels are 0 to 11"),
         ("lose x", "'x' is not a channel from 0 to 23"),
         ("error heat", "'heat' is none of signal, overrun"),
-        ("overload 1", "'overload' is not a command; commands: lose"),
-        ("script 99", "'99' is not a channel"),
-        ("turn 1 far", "'far' is not quarter us"),
         ("set mode loud", "expected usb-dual-port, usb-chained"),
-        ("set crc maybe", "expected on or off"),
-        ("set timeout-ms -1", "not a number of milliseconds from 0"),
         ("set timeout-ms nan", "not a number of milliseconds from 0"),
         ("set home-us 20", "not a pulse width from 64 to 3280 us"),
         ("set min-us 2400", "min-us 2400 would be above max-us 2000"),
-        ("set afterwards skip", "unknown; expected mode, crc, timeout-ms"),
     ],
 )
 def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
     with pytest.raises(ValueError) as error:
         world.do(text)
     assert says in str(error.value)
-
-
-def test_help_explains_every_command_and_case(world):
-    text = world.do("help")
-    assert all(COMMANDS.usage(name) in text for name in COMMANDS.verbs)
-    assert all(f"  {case} " in text for case in COMMANDS.cases)
 
 
 @pytest.mark.parametrize(
@@ -214,37 +172,6 @@ def test_boards_that_do_not_exist(channels, options, says):
 
 
 # --- on a line
-
-
-def test_behind_a_port_answers_take_their_time_on_the_wire():
-    world = World(baud=9600)
-
-    def sleep_until(t_s):
-        world.now_s = t_s
-
-    port = InProcessPort(world.board, sleep_until=sleep_until)
-    slow = InProcessPort(world.board, sleep_until=sleep_until, wire_time=True)
-    port.setBaudRate(9600)
-    port.write(target(0, 6000) + b"\x90\x00")
-    assert (port.read_until(2, 0.0), world.now_s) == (b"\x70\x17", 0.0)
-    slow.setBaudRate(9600)
-    slow.write(b"\x90\x00")
-    assert slow.read_until(2, 1.0) == b"\x70\x17"
-    assert world.now_s == pytest.approx(4 * 10 / 9600)
-
-
-def test_an_unplugged_board_goes_on_as_it_was():
-    world = World()
-    port = InProcessPort(world.board)
-    port.setBaudRate(9600)
-    port.write(target(0, 6000))
-    world.do("unplug for 1")
-    with pytest.raises(BusLost):
-        port.write(b"\xa1")
-    world.after(1.0)
-    port.setBaudRate(9600)
-    port.write(b"\x90\x00")
-    assert port.read_until(2, world.now_s) == b"\x70\x17"
 
 
 # --- anything at all
@@ -266,22 +193,3 @@ def test_no_bytes_break_it_and_no_pulse_leaves_its_limits(channels, crc, talk):
                 assert channel.position == 0 or 3968 <= channel.position <= 8000
         assert answers[0] == answers[1]
     assert twins[0].board.positions_steps() == twins[1].board.positions_steps()
-
-
-_WORDS = st.sampled_from([*COMMANDS.verbs, "0", "1", "-1", "on", "off", "all", "crc", "mode", "5"])
-
-
-@given(st.lists(st.lists(_WORDS, min_size=1, max_size=4), max_size=6))
-def test_no_mixture_of_commands_breaks_the_board(lines):
-    world = World()
-    for line in lines:
-        try:
-            world.do(" ".join(line))
-        except ValueError as error:
-            assert str(error)
-        world.after(0.05).ask(target(0, 6000) + bytes.fromhex("90 00 A1"))
-    for text in ("clear", "set crc off", "script off", "set timeout-ms 0"):
-        world.do(text)
-    world.after(1.0).ask("A1")
-    world.ask(target(0, 6000))
-    assert world.position() == 6000

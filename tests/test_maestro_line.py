@@ -139,12 +139,6 @@ def test_an_end_of_the_board_is_believed_when_it_was_met_twice():
     assert round(channel.ramp.shaft_steps) == 7600
 
 
-def test_a_servo_is_rearmed_once():
-    channel = held()
-    channel.record_rearm()
-    assert [channel.pop_rearmed() for _ in range(2)] == [True, False]
-
-
 @pytest.mark.parametrize(("rest", "place"), [(None, 6000), (5000, 5000), (9000, 7600), (0, 4400)])
 def test_where_a_servo_without_pulses_is_taken_to_be(rest, place):
     channel = Channel(SETUP._replace(rest_steps=rest))

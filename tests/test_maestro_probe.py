@@ -3,7 +3,6 @@
 import pytest
 from present import present
 
-from gazerig.drivers.errors import PortError
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, probe
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -66,14 +65,6 @@ def test_what_the_register_held_is_told():
     assert present(probe(port, MaestroParams())).errors == ()
 
 
-def test_a_running_script_is_seen_and_goes_on():
-    board, port = make()
-    board.faults.command("script on")
-    found = probe(port, MaestroParams())
-    assert found is not None and found.is_script_running is True
-    assert board.faults.board_status()["script"]
-
-
 @pytest.mark.parametrize("wanted", [False, True])
 @pytest.mark.parametrize("real", [False, True])
 def test_the_check_byte_is_found_out(wanted, real):
@@ -92,19 +83,6 @@ def test_another_device_number_answers_the_compact_form_only():
     )
 
 
-def test_a_board_that_detects_its_baud_rate():
-    _, port = make(chosen=[("mode", "uart-detect")])
-    found = probe(port, MaestroParams())
-    assert found is not None and "compact" in found.command_forms
-
-
 def test_nobody_answers():
     _, port = make(chosen=[("mode", "mute")])
     assert probe(port, MaestroParams()) is None
-
-
-def test_no_port():
-    board, port = make()
-    board.faults.command("unplug")
-    with pytest.raises(PortError):
-        probe(port, MaestroParams())

@@ -70,13 +70,6 @@ def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
     assert seconds == pytest.approx(2.0 * sqrt(4000.0 / 5000.0), rel=0.05)
 
 
-def test_a_long_pause_ends_at_the_goal():
-    ramp = Ramp(4000.0, 100.0)
-    ramp.speed_steps_s = 100.0
-    ramp.advance(8000.0, 3600.0)
-    assert (ramp.pulse_steps, ramp.shaft_steps) == (8000.0, 8000.0)
-
-
 def test_without_pulses_the_shaft_is_taken_to_stay():
     ramp = Ramp(6000.0, 1000.0)
     ramp.advance(7000.0, 0.2)

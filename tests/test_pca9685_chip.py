@@ -10,7 +10,7 @@ from smbus2 import i2c_msg
 
 from gazerig.sim_mock.pca9685.body import Pca9685Body
 from gazerig.sim_mock.pca9685.bridge import build_bridge
-from gazerig.sim_mock.pca9685.chip import AI, MODE1, MODE2, PRESCALE, RESTART, SLEEP, START_S
+from gazerig.sim_mock.pca9685.chip import AI, MODE1, PRESCALE, RESTART, SLEEP, START_S
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
 
 ADDRESS = 0x40
@@ -80,14 +80,6 @@ def test_a_pulse_is_what_the_counts_and_the_oscillator_make_of_it(bench):
     assert bench.pulse_us() == pytest.approx(307 * 122 / 26.5, abs=0.2)
 
 
-def test_no_pulse_before_the_oscillator_is_steady(bench):
-    bench.set(MODE1, AWAKE)
-    bench.set(LED0, *MIDDLE)
-    assert bench.pulse_us() == 0
-    bench.wait(START_S)
-    assert bench.pulse_us() > 300
-
-
 def test_restart_bit_holds_pulses_back_until_it_is_written_or_a_channel_is(bench):
     for go_on in (lambda: bench.set(MODE1, AWAKE | RESTART), lambda: bench.set(LED0, *MIDDLE)):
         bench.wake()
@@ -100,25 +92,6 @@ def test_restart_bit_holds_pulses_back_until_it_is_written_or_a_channel_is(bench
         go_on()
         assert bench.get(MODE1) == [AWAKE]
         assert bench.pulse_us() > 1490
-
-
-def test_restart_does_nothing_in_the_first_half_millisecond_after_sleep(bench):
-    bench.wake()
-    bench.set(LED0, *MIDDLE)
-    bench.set(MODE1, SLEEP | AI)
-    bench.set(MODE1, RESTART | AWAKE)
-    bench.wait(START_S / 2)
-    bench.set(MODE1, RESTART | AWAKE)
-    bench.wait(START_S)
-    assert (bench.get(MODE1), bench.pulse_us()) == ([RESTART | AWAKE], 0)
-    bench.set(MODE1, RESTART | AWAKE)
-    assert bench.pulse_us() > 1490
-
-
-def test_nothing_is_held_back_where_all_was_off(bench):
-    bench.wake()
-    bench.set(MODE1, SLEEP | AI)
-    assert bench.get(MODE1) == [SLEEP | AI]
 
 
 def test_auto_increment_runs_through_the_channels_and_begins_again(bench):
@@ -140,34 +113,6 @@ def test_all_channels_at_once_and_what_cannot_be_read(bench):
     assert not any(bench.pulse_us(channel) for channel in range(16))
 
 
-def test_full_off_goes_before_full_on(bench):
-    bench.wake()
-    bench.set(LED0, 0, 0x10, 0, 0)
-    assert bench.pulse_us() == pytest.approx(4096 * 122 / 25, abs=0.2)
-    bench.set(LED0, 0, 0x10, 0, 0x10)
-    assert bench.pulse_us() == 0
-
-
-def test_outputs_change_at_the_stop_condition_not_in_the_middle(bench):
-    bench.wake()
-    bench.set(LED0, *MIDDLE)
-    chip = bench.body.chips[ADDRESS]
-    seen, store = [], chip._store
-
-    def stored(*given):
-        store(*given)
-        seen.append(chip.counts(0))
-
-    chip._store = stored
-    bench.set(LED0, 0, 0, 0x9A, 0x01)
-    assert seen == [307] * 4
-    assert chip.counts(0) == 0x19A
-    bench.set(MODE2, 0x0C)
-    seen.clear()
-    bench.set(LED0, *MIDDLE)
-    assert seen == [0x19A] * 3 + [307]
-
-
 def test_all_call_and_software_reset(bench):
     bench.bus.write_i2c_block_data(0x70, MODE1, [AI])
     assert bench.get(MODE1) == [AI]
@@ -176,15 +121,6 @@ def test_all_call_and_software_reset(bench):
     assert caught.value.errno == errno.EREMOTEIO
     bench.bus.i2c_rdwr(i2c_msg.write(0, [6]))
     assert bench.get(MODE1) == [0x11]
-
-
-def test_subaddresses_are_answered_where_that_is_switched_on_and_all_answer_at_once(bench):
-    with pytest.raises(OSError):
-        bench.bus.read_byte_data(0x71, PRESCALE)
-    bench.bus.write_i2c_block_data(0x70, MODE1, [SLEEP | AI | 0x08 | 0x01])
-    bench.bus.write_i2c_block_data(0x71, PRESCALE, [121])
-    bench.set(PRESCALE, 63)
-    assert bench.bus.read_byte_data(0x71, PRESCALE) == 121 & 63
 
 
 def test_boards_have_their_own_registers_and_strangers_are_not_there(bench):

@@ -4,19 +4,14 @@ import errno
 from dataclasses import replace
 
 import pytest
-from board_rig import SECTION, on_pca9685
-from command_line import typed
 from pca9685_world import GRAIN, QUICK, World
 
-from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.i2c import port as i2c_port
 from gazerig.drivers.i2c.port import I2cPort
 from gazerig.drivers.pca9685.board import Pca9685Bus
 from gazerig.drivers.serial.list_ports import check_owner, open_failure_text
 from gazerig.drivers.serial.port import BlockingPort, port_at_path
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
 
 
@@ -121,38 +116,3 @@ def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
 
 
 # --- the same head on either board
-
-
-def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
-    file = on_pca9685(tmp_path)
-    seen = {}
-    for name in ("maker", file):
-        rig = load_rig(name)
-        made = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="boxing"))
-        clock, head, poses = made.clock, made.robot, []
-        head.start(clock)
-        for k in range(1, 501):
-            clock.sleep_until(k * 0.01)
-            poses.append(head.tick(clock.now_s(), 0.01).joints.position_rad)
-        head.stop()
-        made.close()
-        seen[name] = rig.joints, poses
-    (joints, one), (same, other) = seen.values()
-    assert joints == same
-    span = [max(column) - min(column) for column in zip(*one, strict=True)]
-    assert max(span) > 0.3
-    apart = [
-        max(abs(a - b) for a, b in zip(*rows, strict=True)) for rows in zip(one, other, strict=True)
-    ]
-    # Two estimates of the same goals: a board's ramp is 10 ms behind, a fast eye moves then.
-    assert sorted(apart)[len(apart) // 2] < 0.02
-
-
-@pytest.mark.parametrize("words", [("run", "--no-page", "--scene", "visitor"), ("doctor",)])
-def test_a_rig_without_its_i2c_bus_is_told_to_switch_it_on(words, tmp_path, capfd):
-    file = on_pca9685(tmp_path, SECTION.replace("i2c-1", "i2c-97"))
-    verb, *rest = words
-    assert typed(verb, file, *rest) in (1, 2)
-    out, err = capfd.readouterr()
-    assert "I2C bus" in out + err and "switch I2C on" in out + err
-    assert "serial port" not in out + err and "adaptor" not in out + err

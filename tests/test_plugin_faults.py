@@ -163,7 +163,6 @@ def _hanging(file: str) -> Iterator[Driven]:
             loop.communicate()
 
 
-@pytest.mark.own_timeouts
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_rule_that_hangs_leaves_limp_servos(kind: str, tmp_path: Path) -> None:
     text = shipped_path("rigs", RIGS[kind]).read_text(encoding="utf-8")

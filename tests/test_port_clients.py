@@ -2,7 +2,6 @@
 
 import os
 import termios
-import threading
 import time
 
 import pytest
@@ -45,11 +44,6 @@ def terminal(shared):
     os.close(fd)
 
 
-def test_a_client_that_opens_a_file_and_sets_nothing(terminal):
-    os.write(terminal, PING)
-    assert answers(terminal, PONG) == PONG
-
-
 def test_bytes_one_by_one_and_packets_all_at_once(terminal):
     for byte in PING:
         os.write(terminal, bytes((byte,)))
@@ -59,15 +53,6 @@ def test_bytes_one_by_one_and_packets_all_at_once(terminal):
     os.write(terminal, PING + PING[:4])
     assert answers(terminal, PONG) == PONG
     os.write(terminal, PING[4:])
-    assert answers(terminal, PONG) == PONG
-
-
-def test_flushes_breaks_and_modem_lines_do_no_harm(terminal):
-    termios.tcflush(terminal, termios.TCIOFLUSH)
-    termios.tcdrain(terminal)
-    termios.tcsendbreak(terminal, 0)
-    os.write(terminal, PING)
-    termios.tcdrain(terminal)
     assert answers(terminal, PONG) == PONG
 
 
@@ -129,28 +114,3 @@ def locked(path):
         return bool(struct.unpack("i", fcntl.ioctl(fd, get_lock, bytes(4)))[0])
     finally:
         os.close(fd)
-
-
-def test_two_threads_of_one_client_do_not_upset_the_server(path):
-    """Nonsense from one side, questions from the other: the questions are answered again after."""
-    stop = threading.Event()
-
-    def shout():
-        fd = os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
-        while not stop.is_set():
-            try:
-                os.write(fd, b"\xff\xff\xfd\x00\x01\x10")
-            except BlockingIOError:
-                time.sleep(0.001)
-        os.close(fd)
-
-    thread = threading.Thread(target=shout)
-    thread.start()
-    time.sleep(0.05)
-    stop.set()
-    thread.join()
-    time.sleep(0.1)
-    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    os.write(fd, PING)
-    assert answers(fd, PONG) == PONG
-    os.close(fd)

@@ -5,25 +5,21 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PacketHandler
+from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from present import present
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.sim_mock.pty.client import PtyBus
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
 DEVICE = {"kind": "dynamixel", "servos": SPECS}
 ROOT = Path(__file__).parents[1]
 STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
-STEADY_STEPS = 12
-"""Friction keeps a servo with factory gains so far from its goal."""
 
 
 @pytest.fixture(autouse=True)
@@ -85,53 +81,10 @@ def test_the_server_loads_nothing_heavy():
     assert not {"numpy", "cv2", "serial", "dynamixel_sdk", "pydantic"} & set(loaded)
 
 
-def test_clients_may_come_and_go(path):
-    for _ in range(2):
-        port = BlockingPort(path)
-        port.setBaudRate(1_000_000)
-        assert PacketHandler(2.0).ping(port, 2)[:2] == (1200, COMM_SUCCESS)
-        port.closePort()
-
-
 def test_a_wrong_specification_is_an_error(capfd):
     with PtyBus() as bus, pytest.raises(RuntimeError, match="did not start"):
         bus.start([(1, "no-such-model", 2048)])
     assert "no-such-model" in capfd.readouterr().err
-
-
-def test_the_sdk_moves_servos_over_the_terminal(path):
-    port, packets = BlockingPort(path), PacketHandler(2.0)
-    port.setBaudRate(1_000_000)
-    group = GroupSyncWrite(port, packets, 64, 1)
-    goals = GroupSyncWrite(port, packets, 116, 4)
-    places = GroupSyncRead(port, packets, 132, 4)
-    for servo_id in (1, 2, 3):
-        group.addParam(servo_id, [1])
-        goals.addParam(servo_id, [0xD0, 0x07, 0, 0])
-        places.addParam(servo_id)
-    assert group.txPacket() == COMM_SUCCESS
-    assert goals.txPacket() == COMM_SUCCESS
-    time.sleep(0.6)
-    for read in (places.txRxPacket, places.fastSyncRead):
-        assert read() == COMM_SUCCESS
-        assert all(abs(places.getData(i, 132, 4) - 2000) < STEADY_STEPS for i in (1, 2, 3))
-    port.closePort()
-
-
-def test_an_independent_client_understands_the_bus(path):
-    rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
-    client = rustypot.Xl330PyController(path, 1_000_000, 0.5)
-    assert client.ping(1) is True
-    assert client.sync_read_raw_present_position([1, 2, 3]) == [2048, 1000, 3000]
-    client.sync_write_torque_enable([1, 2, 3], [True, True, True])
-    client.sync_write_raw_goal_position([1, 2, 3], [1500, 1500, 1500])
-    time.sleep(0.8)
-    for fast in (False, True):
-        client.set_fast_sync_read(fast)
-        places = client.sync_read_raw_present_position([3, 1, 2])
-        assert all(abs(place - 1500) < STEADY_STEPS for place in places)
-    assert client.read_hardware_error_status(1) in (0, [0])
-    client.close()
 
 
 def test_a_full_terminal_does_not_stop_the_server(path):
@@ -145,16 +98,6 @@ def test_a_full_terminal_does_not_stop_the_server(path):
     port.drain()
     assert PacketHandler(2.0).ping(port, 1)[1] == COMM_SUCCESS
     port.closePort()
-
-
-def test_named_specs_travel_to_the_server():
-    with PtyBus() as bus:
-        port = BlockingPort(bus.start([ServoSpec(9, "xl330-m288", 1234, firmware=45)]))
-        port.setBaudRate(1_000_000)
-        packets = PacketHandler(2.0)
-        assert packets.read1ByteTxRx(port, 9, 6)[0] == 45
-        assert packets.read4ByteTxRx(port, 9, 132)[0] == 1234
-        port.closePort()
 
 
 # --- commands while it runs
@@ -202,23 +145,6 @@ def test_faults_by_command(strict, client):
     assert "usage" not in strict.command("help")
 
 
-def test_a_late_answer_comes_late(strict, client):
-    strict.command("delay 1 300 count 1")
-    client.write(bytes.fromhex("FFFFFD0001030001194E"))
-    began = time.monotonic()
-    assert client.read_until(14, began + 0.02) == b""
-    assert len(client.read_until(14, began + 30.0)) == 14
-
-
-def test_a_client_at_a_wrong_baud_rate_hears_nothing(strict, client):
-    for rate, heard in ((57_600, False), (4_000_000, False), (1_000_000, True)):
-        client.setBaudRate(rate)
-        assert found(client) if heard else take_errors(client)
-    client.setBaudRate(115_200)
-    strict.command("set baud any")
-    assert found(client)
-
-
 def test_unplug_is_an_error_and_plug_brings_the_name_back(strict, client):
     for _ in range(2):
         strict.command("unplug")
@@ -232,49 +158,11 @@ def test_unplug_is_an_error_and_plug_brings_the_name_back(strict, client):
         assert found(client)
 
 
-def test_unplugged_for_a_time_it_comes_back_by_itself(strict, client):
-    strict.command("unplug for 0.05")
-    with pytest.raises(BusLost):
-        client.read_until(1, time.monotonic() + 30.0)
-    deadline = time.monotonic() + 30.0
-    while not Path(strict.path).exists() and time.monotonic() < deadline:
-        time.sleep(0.005)
-    client.setBaudRate(1_000_000)
-    assert found(client)
-
-
-def test_a_blocked_adapter_takes_nothing_until_it_is_free(strict, client):
-    strict.command("block on")
-    with pytest.raises(BusLost, match="accepts no more"):
-        client.write(bytes(10))
-    strict.command("block off")
-    client.setBaudRate(1_000_000)
-    assert found(client)
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may open everything")
-def test_opening_may_be_forbidden(strict, client):
-    strict.command("deny on")
-    with pytest.raises(PortError, match="no right"):
-        client.setBaudRate(1_000_000)
-    strict.command("deny off")
-    client.setBaudRate(1_000_000)
-
-
 def test_forbidding_takes_the_rights_of_the_terminal(strict):
     strict.command("deny on")
     assert os.stat(strict.path).st_mode & 0o777 == 0
     strict.command("deny off")
     assert os.stat(strict.path).st_mode & 0o777 == 0o620
-
-
-def test_babble_reaches_a_client_that_asks_nothing(strict, client):
-    strict.command("babble on")
-    heard = client.read_until(500, time.monotonic() + 30.0)
-    strict.command("babble off")
-    assert heard.count(b"\xff\xff\xfd\x00") > 50
-    client.drain()
-    assert found(client)
 
 
 def test_with_wire_time_nothing_comes_before_it_is_due():
@@ -288,28 +176,3 @@ def test_with_wire_time_nothing_comes_before_it_is_due():
             assert len(port.read_until(15, began + 30.0)) == 15
             assert port.now_s() - began >= (14 + 15) * 10 / 57_600 + 500e-6
         port.closePort()
-
-
-def test_a_command_needs_a_server():
-    with pytest.raises(RuntimeError, match="start it first"):
-        PtyBus().command("status")
-
-
-def test_a_server_ends_with_its_client_also_while_it_makes_a_world():
-    code = (
-        "import gazerig.sim_mock.pty.server as server, time\n"
-        "with server._exit_with_client(True):\n"
-        "    print('making', flush=True); time.sleep(600)"
-    )
-    server = subprocess.Popen(
-        [sys.executable, "-c", code], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    try:
-        assert present(server.stdout).readline() == b"making\n"
-        assert server.poll() is None
-        present(server.stdin).close()
-        assert server.wait(60) == 0
-    finally:
-        server.kill()
-        server.wait()
-        present(server.stdout).close()

@@ -31,17 +31,6 @@ def asked(path, data, length, baud=1_000_000):
     return answer
 
 
-def test_feetech_servos_answer_at_their_baud_rate_only():
-    with PtyBus() as bus:
-        path = bus.start_device(FeetechLine((ServoSpec(1, "sts3215"),), baud=500_000))
-        assert asked(path, STS_PING, 6, 500_000) == STS_PONG
-        port = BlockingPort(path)
-        port.setBaudRate(1_000_000)
-        port.write(STS_PING)
-        assert port.read_until(1, port.now_s() + 0.03) == b""
-        port.closePort()
-
-
 def test_a_board_tells_what_its_channels_send():
     with PtyBus() as bus:
         board = MaestroLine(12, servos=(HobbySpec(3, 5000.0),))
@@ -51,28 +40,6 @@ def test_a_board_tells_what_its_channels_send():
         assert asked(path, bytes.fromhex("AA0C21"), 2) == bytes(2)
         status = json.loads(bus.command("status"))
         assert len(status["servos"]) == 12
-
-
-def test_a_board_wants_a_crc_where_it_is_told_to():
-    with PtyBus() as bus:
-        path = bus.start_device(MaestroLine(6, crc=True))
-        assert asked(path, bytes.fromhex("84 00 70 2E 2B 90 00 65"), 2)
-        port = BlockingPort(path)
-        port.setBaudRate(9600)
-        port.write(bytes.fromhex("900000"))
-        assert port.read_until(1, port.now_s() + 0.03) == b""
-        port.closePort()
-
-
-def test_choices_and_faults_are_those_of_the_device():
-    with PtyBus() as bus:
-        path = bus.start_device(
-            FeetechLine((ServoSpec(1, "sts3215"),)), choices={"broadcast-ping": "silence"}
-        )
-        assert bus.command("lose 1 count 1") == "servo 1 does not answer 1 times"
-        assert asked(path, STS_PING + STS_PING, 6) == STS_PONG
-        assert "broadcast-ping" in bus.command("help")
-        assert json.loads(bus.command("status"))["servos"][0]["model"] == "sts3215"
 
 
 def test_the_buses_of_a_rig_live_in_one_process():

@@ -9,8 +9,6 @@ from served_rigs import hide_real_ports, served
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.drivers.bus.servo_families import FAMILY_OF
-from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.scs import FEETECH_SCS, SCS_REGISTERS
 from gazerig.drivers.servo_bus.discovery import count_corrupt, scan_ids
@@ -81,13 +79,6 @@ def test_the_guardian_lets_go_of_servos_without_sync_read():
     (again,) = decode(encode((plan,)))
     assert releaser(again)(bench.port) == ()
     assert [bench.chain[i].read(40, 1) for i in (1, 2)] == [b"\x00", b"\x00"]
-
-
-def test_models_say_where_their_steps_end():
-    facts = SERVOS["scs0009"]
-    assert (facts.bus, facts.lowest, facts.highest, facts.middle) == ("feetech", 0, 1023, 512)
-    assert facts.steps_per_turn == 1229
-    assert FAMILY_OF["scs15"] is FEETECH_SCS and FAMILY_OF["sts3215"] is FEETECH
 
 
 def test_a_place_beyond_the_potentiometer_and_a_mixture_of_series_are_refused(tmp_path):

@@ -3,7 +3,6 @@
 from typing import Any
 
 import pytest
-from present import present
 from stand_in import StandIn
 from sts_rig import Rig
 
@@ -12,7 +11,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL, protocol_1_ids
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH, set_middle
 from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, ping, scan, scan_ids
-from gazerig.drivers.servo_bus.registers import Registers, transact
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -158,15 +157,6 @@ def test_a_ping_to_all_finds_servos_with_model_and_firmware():
     assert DYNAMIXEL.model_name(350) == "model number 350"
 
 
-def test_servos_at_several_rates_are_found_where_they_are():
-    rounds = list(scan(mixed(bauds=(57_600, 1_000_000, 4_500_000)), DYNAMIXEL))
-    assert {one.baud: [f.id for f in one.found] for one in rounds if one.found} == {
-        1_000_000: [1],
-        57_600: [9],
-        4_500_000: [250],
-    }
-
-
 def test_noise_counts_as_junk():
     port = mixed()
     port.setBaudRate(57_600)
@@ -174,16 +164,6 @@ def test_noise_counts_as_junk():
         port.faults.command(command)
     found, junk = scan_ids(port, DYNAMIXEL, 57_600)
     assert [one.id for one in found] == [1, 9, 250] and junk > 0
-
-
-def test_latched_errors_and_stuffed_answers_are_heard():
-    port = mixed()
-    port.setBaudRate(57_600)
-    port.faults.command("overload 9")
-    assert present(ping(port, DYNAMIXEL, 9, 57_600)).model == XC
-    assert count_corrupt(port, DYNAMIXEL, 9) == 0
-    port.faults.command("refuse 9 7")
-    assert ping(port, DYNAMIXEL, 9, 57_600) is None
 
 
 def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
@@ -240,20 +220,6 @@ def test_listening_ends_on_a_line_that_never_falls_silent():
     found, junk = scan_ids(port, DYNAMIXEL, 57_600)
     assert found == () and 0 < junk < 10_000
     assert port.time_s < 5.0
-
-
-def test_a_thorough_scan_waits_as_long_as_the_sdk():
-    quick, thorough = ScriptedPort(), ScriptedPort()
-    list(scan(quick, DYNAMIXEL, (57_600,)))
-    list(scan(thorough, DYNAMIXEL, (57_600,), thorough=True))
-    assert quick.time_s < 0.2 and thorough.time_s > 0.77
-
-
-def test_an_answer_in_time_is_not_waited_beyond():
-    port = ScriptedPort(bytes.fromhex("FFFFFD000107005500060426655D"))
-    raw, status = transact(port, DYNAMIXEL, b"ping", 3, 0.04)
-    assert len(raw) == 14 and present(status).id == 1
-    assert port.time_s < 0.01
 
 
 # --- making a place the middle

@@ -16,7 +16,7 @@ from dynamixel_rig import WAYS
 from dynamixel_rig import Rig as DynamixelRig
 from moving_bus import IDS, LONGEST_S, NAMES
 
-from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.testing.bus_bench import rows
 
@@ -43,25 +43,18 @@ def make(request):
 
 PASSING = [
     "drop 2 0",
-    "drop 2 3",
     "drop 2 8",
     "drop 2 -1",
     "corrupt 2 20",
-    "corrupt 2 70",
     "corrupt 2 160",
-    "corrupt 2 180",
-    "truncate 2 0",
     "truncate 2 5",
-    "truncate 2 11",
     "delay 2 10",
     "delay 2 60",
     "wrong-id 2 3",
-    "wrong-id 2 77",
     "refuse 2 BITS",
     "short 2 2",
     "long 2 2",
     "lose 2",
-    "stall 2 30",
     "stall 2 60",
 ]
 
@@ -90,9 +83,8 @@ def test_a_passing_fault_costs_little_and_passes(rig, fault):
 
 @pytest.mark.parametrize(
     "fault",
-    ["noise before FFFF", "noise before FFFF0102", "noise before FFFFFD00",
-     "noise before FFFFFD00010200", "noise before", "noise after FF", "noise after", "fragment 1",
-     "fragment", "echo on", "delay 2 0.3", "stall 3 0.3"],
+    ["noise before FFFF0102", "noise before FFFFFD00010200", "noise after FF", "fragment",
+     "echo on", "delay 2 0.3", "stall 3 0.3"],
 )  # fmt: skip
 def test_what_is_harmless(rig, fault):
     rig.command(fault)
@@ -100,13 +92,7 @@ def test_what_is_harmless(rig, fault):
     assert rig.longest_s < LONGEST_S
 
 
-def test_answers_that_come_twice(rig):
-    rig.command("duplicate all")
-    for _ in range(30):
-        assert rig.heard() == [True] * 4
-
-
-@pytest.mark.parametrize("late_ms", [3, 15, 60, 80, 200])
+@pytest.mark.parametrize("late_ms", [15, 80, 200])
 def test_all_late_is_never_taken_for_fresh(rig, late_ms):
     for times in (1, 3, 12):
         rig.command(f"delay all {late_ms} count {times}")
@@ -116,14 +102,8 @@ def test_all_late_is_never_taken_for_fresh(rig, late_ms):
     assert rig.longest_s < 0.3
 
 
-def test_answers_out_of_order(rig):
-    rig.command("reorder count 1")
-    rig.tick()
-    assert rig.heard() == [True] * 4
-
-
 @pytest.mark.parametrize("policy", ["silence", "skip", "timeout"])
-@pytest.mark.parametrize("missing", [(1,), (4,), (2, 3)])
+@pytest.mark.parametrize("missing", [(1,), (2, 3)])
 def test_silent_servos_cost_only_themselves(rig, policy, missing):
     rig.command(f"set after-missing {policy}")
     for servo_id in missing:
@@ -138,40 +118,6 @@ def test_silent_servos_cost_only_themselves(rig, policy, missing):
     assert any("answers again after" in line for line in rig.bus.events())
 
 
-def test_a_port_that_fails_is_opened_again(rig):
-    rig.command("unplug for 0.4")
-    assert rig.heard() == [False] * 4
-    assert rig.bus.events()[0].startswith("port lost: ")
-    rig.bus.write([2000] * 4)
-    began_s = rig.now_s
-    rig.until_all()
-    assert rig.now_s - began_s < 1.0
-    assert any(line.startswith("port back after 0.") for line in rig.bus.events())
-
-
-def test_a_port_that_stays_away_is_given_up(make):
-    rig = make(give_up_s=2.0).start()
-    rig.command("unplug")
-    began_s = rig.now_s
-    with pytest.raises(BusLost, match="has been gone for 2.0 s"):
-        for _ in range(1000):
-            rig.tick()
-    assert 2.0 <= rig.now_s - began_s <= 2.1
-    with pytest.raises(BusLost, match="they hold their position: cut|no bus watchdog: cut"):
-        rig.bus.disable_torque()
-    rig.command("plug")
-    rig.bus.disable_torque()
-    assert not any(servo.torque for servo in rig.chain.servos)
-
-
-def test_opening_is_forbidden(make):
-    rig = make()
-    rig.command("deny on")
-    with pytest.raises(PortError, match="Permission denied"):
-        rig.bus.open()
-
-
-@pytest.mark.parametrize("what", ["silence", "garbage"])
 @pytest.mark.parametrize(
     "away",
     [
@@ -180,26 +126,11 @@ def test_opening_is_forbidden(make):
     ],
     ids=["dynamixel", "feetech"],
 )
-def test_wrong_baud_rate(away, what):
+def test_wrong_baud_rate(away):
     rig = away()
-    rig.command(f"set wrong-baud {what}")
+    rig.command("set wrong-baud garbage")
     with pytest.raises(ServoMissing, match="no servo answers: check servo power, cable and baud"):
         rig.bus.open()
-
-
-def test_a_babbling_node(rig):
-    rig.command("babble on for 0.5")
-    for _ in range(30):
-        rig.tick()
-    assert rig.longest_s < 0.5
-    rig.until_all()
-
-
-def test_lost_writes(rig):
-    rig.command("lose-writes 3")
-    for _ in range(4):
-        rig.tick([2500] * 4)
-    assert [servo.memory.get("goal_position") for servo in rig.chain.servos] == [2500] * 4
 
 
 def test_lost_writes_while_the_torque_comes_on_and_goes(make):
@@ -210,33 +141,6 @@ def test_lost_writes_while_the_torque_comes_on_and_goes(make):
     rig.command("lose-writes 2")
     rig.bus.disable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
-
-
-def test_a_blocked_write(rig):
-    rig.command("block on for 0.6")
-    assert rig.heard() == [False] * 4
-    assert "accepts no bytes" in rig.bus.events()[0]
-    rig.until_all()
-    assert rig.longest_s < 0.3
-
-
-def test_servos_that_stay_away_are_given_up(make):
-    rig = make(give_up_s=1.0).start()
-    rig.command("lose all")
-    with pytest.raises(BusLost, match="no servo has answered for 1.0 s"):
-        for _ in range(300):
-            rig.tick()
-
-
-def test_replugged_under_the_same_name(rig):
-    rig.tick([2500] * 4)
-    rig.command("unplug for 3.0")
-    for _ in range(250):
-        assert rig.heard() == [False] * 4
-    while None in (readings := rig.tick([2500] * 4)):
-        pass
-    assert [(r.rearmed, r.torque) for r in readings] == [(True, True)] * 4
-    assert [r.rearmed for r in rig.tick([2500] * 4)] == [False] * 4
 
 
 def test_two_servos_with_one_id(rig):
@@ -304,20 +208,3 @@ def test_a_stuck_joint_is_seen_by_its_load(rig):
     assert None not in readings
     assert readings[1].fault == "overload"
     assert abs(readings[1].load) < 0.3
-
-
-@pytest.mark.parametrize(
-    "made",
-    [
-        partial(DynamixelRig, check_baud=True, servo_baud=1_000_000),
-        partial(sts_rig.Rig, baud=1_000_000),
-    ],
-    ids=["dynamixel", "feetech"],
-)
-def test_factory_defaults(made):
-    rig = made().start()
-    rig.bus.disable_torque()
-    rig.command("reset 3")
-    rig.now_s += 1.0
-    with pytest.raises(ServoMissing, match=r"neck \(servo 3\) does not answer"):
-        rig.bus.open()

@@ -2,11 +2,6 @@
 
 import pytest
 from dynamixel_sdk import (
-    COMM_RX_TIMEOUT,
-    COMM_SUCCESS,
-    GroupBulkRead,
-    GroupSyncRead,
-    GroupSyncWrite,
     PacketHandler,
 )
 
@@ -15,9 +10,6 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, Maest
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-STEADY_STEPS = 12
-"""Friction keeps a servo with factory gains so far from its goal."""
 
 
 class World:
@@ -34,62 +26,6 @@ class World:
 @pytest.fixture
 def world():
     return World()
-
-
-def test_ping_and_broadcast_ping(world):
-    assert world.packets.ping(world.port, 2) == (1200, COMM_SUCCESS, 0)
-    found, result = world.packets.broadcastPing(world.port)
-    assert result == COMM_SUCCESS
-    assert found == {i: [1200, 53] for i in (1, 2, 3)}
-
-
-def test_a_missing_servo_costs_no_time(world):
-    assert world.packets.ping(world.port, 99)[1] == COMM_RX_TIMEOUT
-    assert world.now_s == 0.0
-
-
-def test_registers_read_and_write(world):
-    read, write = world.packets.read4ByteTxRx, world.packets.write4ByteTxRx
-    assert read(world.port, 3, 132) == (3000, COMM_SUCCESS, 0)
-    assert write(world.port, 3, 116, 5000) == (COMM_SUCCESS, 6)
-    assert write(world.port, 3, 112, 40) == (COMM_SUCCESS, 0)
-    assert read(world.port, 3, 112) == (40, COMM_SUCCESS, 0)
-
-
-def test_group_write_and_both_group_reads(world):
-    goals = GroupSyncWrite(world.port, world.packets, 116, 4)
-    places = GroupSyncRead(world.port, world.packets, 132, 4)
-    for servo_id in (1, 2, 3):
-        world.packets.write1ByteTxRx(world.port, servo_id, 64, 1)
-        goals.addParam(servo_id, [0xDC, 0x05, 0, 0])
-        places.addParam(servo_id)
-    assert goals.txPacket() == COMM_SUCCESS
-    world.now_s = 1.0
-    for read in (places.txRxPacket, places.fastSyncRead):
-        assert read() == COMM_SUCCESS
-        assert all(abs(places.getData(i, 132, 4) - 1500) < STEADY_STEPS for i in (1, 2, 3))
-
-
-def test_bulk_read(world):
-    bulk = GroupBulkRead(world.port, world.packets)
-    bulk.addParam(1, 132, 4)
-    bulk.addParam(3, 146, 1)
-    assert bulk.txRxPacket() == COMM_SUCCESS
-    assert (bulk.getData(1, 132, 4), bulk.getData(3, 146, 1)) == (2048, 30)
-
-
-def test_registered_write_action_reboot_and_reset(world):
-    packets, port = world.packets, world.port
-    assert packets.regWriteTxRx(port, 1, 65, 1, [1]) == (COMM_SUCCESS, 0)
-    assert packets.action(port, 1) == COMM_SUCCESS
-    port.drain()
-    assert packets.read1ByteTxRx(port, 1, 65)[0] == 1
-    assert packets.reboot(port, 1) == (COMM_SUCCESS, 0)
-    assert packets.ping(port, 1)[1] == COMM_RX_TIMEOUT
-    world.now_s = 0.5
-    assert packets.read1ByteTxRx(port, 1, 65)[0] == 0
-    assert packets.clearMultiTurn(port, 1) == (COMM_SUCCESS, 0)
-    assert packets.factoryReset(port, 2, 2) == (COMM_SUCCESS, 0)
 
 
 def test_the_tap_hears_every_byte_the_host_sends(world):

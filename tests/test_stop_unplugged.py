@@ -18,7 +18,7 @@ from gazerig.robot.model.commands import Resume, Stop
 from gazerig.sim_mock.device import Device
 from gazerig.testing.bus_bench import BusBench
 
-RIGS = ("desk", "feetech", "maker", "mixed")
+RIGS = ("feetech", "mixed")
 
 
 @pytest.fixture

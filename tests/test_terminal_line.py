@@ -6,7 +6,7 @@ import select
 
 import pytest
 
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
+from gazerig.sim_mock.devices import FeetechLine, MaestroLine
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -66,12 +66,6 @@ def bench():
         one.close()
 
 
-def test_a_question_is_answered(bench):
-    one = bench()
-    one.send(PING)
-    assert one.heard() == PONG
-
-
 def test_a_torn_packet_is_waited_for(bench):
     """A scheduler may leave the host's process alone half-way through its packet."""
     one = bench()
@@ -96,20 +90,6 @@ def test_a_late_answer_comes_when_it_is_due(bench):
     one.now_s += 0.01
     one.serve()
     assert one.heard() == PONG
-
-
-def test_with_wire_time_an_answer_takes_as_long_as_its_bytes(bench):
-    one = bench(DynamixelLine((ServoSpec(1, "xl330-m077"),), 57_600), wire_time=True)
-    one.send(bytes.fromhex("FFFFFD0001030001194E"))
-    assert one.line.line.next_due_s() - 5.0 == pytest.approx(24 * 10 / 57_600 + 500e-6, abs=1e-5)
-
-
-def test_a_board_is_quiet_while_it_is_unplugged(bench):
-    one = bench(BOARD)
-    assert json.loads(one.line.obey("unplug"))["ok"].startswith("unplugged")
-    assert one.line.watched_files() == []
-    assert json.loads(one.line.obey("plug")) == {"ok": "no longer: unplugged"}
-    assert len(one.line.watched_files()) == 2
 
 
 def test_without_a_link_the_new_path_is_told_with_the_name(bench):
@@ -143,12 +123,3 @@ def test_a_choice_that_is_none_leaves_no_link_behind(tmp_path):
         with pytest.raises(ValueError, match=says):
             TerminalLine(settings, lambda: 0.0, print)
         assert not os.path.lexists(link)
-
-
-def test_a_board_that_detects_its_rate_heeds_it_from_then_on(bench):
-    one = bench(BOARD, choices={"mode": "uart-detect"})
-    one.send(bytes.fromhex("9000"))
-    assert one.heard() == b""
-    one.send(bytes.fromhex("AA0C1000"))
-    assert len(one.heard()) == 2
-    assert one.warned == []
