@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from branch import Branch, branched_children
+from branch import Branch
 from loop_deaths import PATIENCE_S, Driven
 from outside_bus import HEAD, install_example
 from outside_package import install, on_path
@@ -150,8 +150,7 @@ def _hang(path: str, file: str) -> None:
 def _hanging(file: str) -> Iterator[Driven]:
     rig = load_rig(file)
     with PtyBuses() as buses:
-        with branched_children():
-            (path,) = buses.start(emulated_lines(rig)).values()
+        (path,) = buses.start(emulated_lines(rig)).values()
         loop = Branch(partial(_hang, path, file), stdout=subprocess.PIPE, text=True)
         late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
         late.start()

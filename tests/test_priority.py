@@ -6,9 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-import time_slices
 
-from gazerig.drivers.process.priority import SHORT_S, share_priority
+from gazerig.drivers.process.priority import share_priority
 
 LOWER = (
     "import os; from pathlib import Path; "
@@ -38,25 +37,6 @@ def test_a_process_is_lowered_within_its_session_and_with_it(tmp_path: Path, lea
 def test_a_system_without_groups_of_sessions_is_no_fault(tmp_path: Path) -> None:
     nice = str(os.getpriority(os.PRIO_PROCESS, 0) + 4)
     assert _lowered(tmp_path / "missing" / "autogroup", True) == [nice, "True"]
-
-
-@pytest.mark.skipif(time_slices.granted_s() is None, reason="this system reports no time slices")
-def test_only_the_loop_has_a_short_slice_and_only_while_it_runs() -> None:
-    code = (
-        "import sys, os; sys.path.insert(0, sys.argv[1]); import time_slices; "
-        "from gazerig.robot.control.real_time import SWITCH_INTERVAL as interval\n"
-        "print(time_slices.granted_s())\n"
-        "with interval:\n"
-        "    print(time_slices.granted_s(), flush=True)\n"
-        "    if os.fork() == 0: print(time_slices.granted_s(), flush=True); os._exit(0)\n"
-        "    os.wait()\n"
-        "print(time_slices.granted_s())"
-    )
-    words = [sys.executable, "-c", code, str(Path(__file__).parent)]
-    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
-    before, short, child, after = map(float, said)
-    assert before == child == after
-    assert short in (SHORT_S, before)  # an older kernel ignores it
 
 
 def test_real_time_priority_stays() -> None:
