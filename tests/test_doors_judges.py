@@ -98,31 +98,6 @@ def test_openai_s_client_talks_through_the_relay() -> None:
 # Pipecat
 
 
-def test_pipecat_s_models_accept_our_messages_and_the_door_theirs() -> None:
-    models = needs("pipecat.processors.frameworks.rtvi.models", "pipecat-ai")
-    classes: list[Any] = [one for one in vars(models).values() if inspect.isclass(one)]
-    kinds = {
-        one.model_fields["type"].default: one
-        for one in classes
-        if {"label", "type"} <= set(getattr(one, "model_fields", {}))
-    }
-    for message, _ in CONVERSATIONS["pipecat"][1]:
-        data = message.get("data", {}) | {
-            "version": "1",
-            "user_id": "u",
-            "timestamp": "",
-            "final": True,
-        }
-        kinds[message["type"]].model_validate({**message, "data": data})
-    frames = needs("pipecat.frames.frames", "pipecat-ai")
-    assert [name for name in pipecat.FRAMES if not hasattr(frames, name)] == [
-        "StartInterruptionFrame"  # of versions before 1.0
-    ]
-    assert set(pipecat.FRAMES.values()) - {"end"} <= set(kinds)
-    for kind in kinds:
-        pipecat.Pipecat().take({"label": "rtvi-ai", "type": kind, "data": {"text": "x"}}, 0.0)
-
-
 def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
     frames = needs("pipecat.frames.frames", "pipecat-ai")
     from pipecat.processors.filters.identity_filter import IdentityFilter
@@ -152,28 +127,6 @@ def test_an_observer_of_pipecat_s_pipeline_steers_the_head() -> None:
 
 
 # LiveKit
-
-
-def test_livekit_s_states_are_known() -> None:
-    events = needs("livekit.agents.voice.events", "livekit-agents")
-    from livekit.agents.types import ATTRIBUTE_AGENT_STATE, TOPIC_TRANSCRIPTION
-
-    assert (livekit.ATTRIBUTE, livekit.TRANSCRIPTION) == (
-        ATTRIBUTE_AGENT_STATE,
-        TOPIC_TRANSCRIPTION,
-    )
-    for state in get_args(events.AgentState):
-        livekit.LiveKit().take({livekit.ATTRIBUTE: state}, 0.0)
-    for state in get_args(events.UserState):
-        livekit.LiveKit().take({"user": state}, 0.0)
-    from google.protobuf.json_format import MessageToJson
-    from livekit.protocol.agent_pb import agent_session
-
-    timed = agent_session.TimedString(text="Hi ", start_time=0.1)
-    assert livekit.plain_text(MessageToJson(timed, indent=None) + "\n") == "Hi "
-    assert {"agent_state_changed", "user_state_changed", "close"} <= set(
-        get_args(events.EventTypes)
-    )
 
 
 def test_livekit_s_session_steers_the_head() -> None:

@@ -1,13 +1,11 @@
 """The servo driver under faults of bytes, servos or the whole line."""
 
-import struct
 from typing import Any
 
 import pytest
 from fakes.dynamixels import IDS, Rig
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
-from gazerig.sim_mock.dynamixel.packets import status
 
 GROUP_READS = (0x82, 0x8A)
 
@@ -71,17 +69,6 @@ def test_a_servo_that_only_garbles_leaves_the_group_until_it_is_well(rig):
     assert rig.places() == [2001, 2002, 2003]
 
 
-@pytest.mark.parametrize("kept", range(3))
-def test_a_truncated_answer_gives_what_arrived(rig, kept):
-    fast = rig.bus._plan.create_group_read is not None
-    block = (14 if fast else 21) + (0 if rig.bus._plan.indirect_block is None else 3)
-    size = (8 if fast else 0) + block * kept + 3
-    rig.port.spoil = once(lambda raw: raw[:size])
-    # Servos behind the silent one are queried again without it, in the same cycle.
-    assert rig.places() == [None if i == kept + 1 else 2000 + i for i in IDS]
-    assert rig.places() == [2001, 2002, 2003]
-
-
 @pytest.mark.parametrize("fast", [True, False])
 @pytest.mark.parametrize("more", [b"\xff\xff\xfd\x00\xfe", None])
 def test_bytes_behind_a_whole_answer_do_not_spoil_the_next_one(fast, more):
@@ -104,22 +91,6 @@ def test_bytes_behind_a_whole_answer_do_not_spoil_the_next_one(fast, more):
         assert [r.position_steps for r in readings] == truth
         rig.now_s += 0.005
     assert "timeout" not in rig.errors()
-
-
-def test_an_echo_of_the_own_bytes_does_no_harm(rig):
-    rig.port.spoil = lambda code, raw: rig.sent[-1] + raw
-    assert rig.places() == [2001, 2002, 2003]
-
-
-def test_the_everyday_stuffed_answer_is_read():
-    rig = Rig(fast=False, indirect_block=False).open()
-    everyday = struct.pack("<hii", -1, -3, 2048)
-    rig.port.spoil = lambda code, raw: b"".join(status(i, 0, everyday) for i in IDS)
-    readings = rig.tick()
-    assert [r.position_steps for r in readings] == [2048] * 3
-    assert readings[0].load == pytest.approx(-1.0 / 1470.0)
-    assert readings[0].velocity_steps_s == pytest.approx(-3 * 0.229 / 60 * 4096)
-    assert rig.errors() == {}
 
 
 def test_a_late_answer_is_never_taken_for_a_fresh_one(rig):
@@ -146,27 +117,7 @@ def test_a_late_answer_is_never_taken_for_a_fresh_one(rig):
     assert [r.position_steps for r in last] == [round(x) for x in rig.chain.positions_steps()]
 
 
-def test_a_refused_read_is_counted_and_has_no_value():
-    rig = Rig(fast=False, indirect_block=False).open()
-    rig.port.spoil = lambda code, raw: (
-        raw if len(raw) != 63 else raw[:21] + status(2, 7, b"") + raw[42:]
-    )
-    assert rig.places() == [2001, None, 2003]
-    assert rig.errors() == {"refused": 1}
-
-
 # --- servos
-
-
-def test_a_silent_servo_is_asked_seldom(rig):
-    rig.chain[2]._deaf_until_ms = 10**9
-    for _ in range(300):
-        rig.tick()
-    rig.sent.clear()
-    for _ in range(400):
-        rig.tick()
-    alone = [packet for packet in rig.sent if packet[12:-2] == b"\x02"]
-    assert len(alone) == 4
 
 
 def test_an_alert_that_was_there_before_opening_is_named():

@@ -41,34 +41,6 @@ def test_no_goal_is_followed_before_positions_are_read_again(rig):
     assert all(abs(goal - at) <= 2 for goal, at in zip(named, places, strict=True))
 
 
-@pytest.mark.parametrize(
-    ("fault", "name"),
-    [("overheat", "overheating"), ("shock", "electrical shock")],
-)
-def test_latched_errors(rig, fault, name):
-    # Here every error takes the torque away.
-    rig.bus.disable_torque()
-    rig.chain[2].memory.set("shutdown", 0x3F)
-    rig.bus.enable_torque()
-    rig.bus.events()
-    rig.command(f"{fault} 2")
-    readings = rig.tick()
-    assert None not in readings
-    assert readings[1].fault == name
-    for _ in range(40):
-        readings = rig.tick()
-    assert rig.bus.faults() == (f"jaw (servo 2): {name}",)
-    assert (readings[1].torque, readings[1].fault) == (False, name)
-    assert [r.fault for r in readings] == ["", name, "", ""]
-    assert rig.bus.events() == (f"jaw (servo 2): {name}",)
-    assert not rig.chain[2].torque
-    # Only a restart clears it; then the servo is set up again.
-    rig.chain[2].restart()
-    rig.until_all()
-    assert rig.bus.faults() == ()
-    assert rig.tick()[1].fault == ""
-
-
 def test_a_watchdog_that_tripped_unnoticed_is_found_where_servos_were_read_without_torque():
     rig = Rig()
     rig.bus.open()

@@ -1,7 +1,6 @@
 """Finding and preparing servos: checks, writes, repeated queries and refusals."""
 
 import pytest
-from dynamixel_sdk import PacketHandler
 from fakes.dynamixels import Rig
 from present import present
 
@@ -9,10 +8,8 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.bus_bench import rows
@@ -144,19 +141,6 @@ def test_a_lost_setup_answer_is_asked_for_again(rig):
     rig.port.spoil = lose_every_third
     rig.open()
     assert rig.chain[3].memory.get("profile_velocity") == 383
-
-
-def test_a_refused_setup_read_gives_none(rig):
-    rig.port.setBaudRate(1_000_000)
-    assert Registers(rig.port, DYNAMIXEL).read(1, "goal_current") == 1750
-    rig.port.spoil = lambda code, raw: status(1, 7, b"") if code == 2 else raw
-    assert Registers(rig.port, DYNAMIXEL).read(1, "goal_current") is None
-
-
-def test_negative_registers_are_read_as_negative(rig):
-    rig.port.setBaudRate(1_000_000)
-    PacketHandler(2.0).write4ByteTxRx(rig.port, 1, 20, (-100) & 0xFFFFFFFF)
-    assert Registers(rig.port, DYNAMIXEL).read(1, "homing_offset") == -100
 
 
 def test_servos_without_a_current_sensor_report_their_load_as_it_is():

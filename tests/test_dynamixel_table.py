@@ -11,7 +11,6 @@ from gazerig.drivers.dynamixel.control_table import (
     MODELS,
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,
-    indirect_blocks,
     name_errors,
     registers_of,
 )
@@ -20,9 +19,6 @@ RENAMED = {"secondary_shadow_id": "secondary_id", "present_load": "present_curre
 
 NOT_THE_VENDORS = {"startup_configuration", "backup_ready"}
 """Registers of the manual, from firmware 45 (X430) or 46 (X330) on, that no vendor file lists."""
-
-OLD_FIRMWARE = {m.name for m in MODELS.values() if m.family == "x330"}
-"""Models with a second vendor file for firmware below 53."""
 
 UNITS_IN_TORQUE = {"xc330-t181", "xc330-t288"}
 """Models whose vendor files give the current as torque; the others as the register has it."""
@@ -86,32 +82,6 @@ def test_units_and_turns_are_the_vendors(model):
         assert units["Present Current"] == (pytest.approx(nm, rel=0.35), "N/m")
     else:
         assert units["Present Current"] == (1.0, "raw")
-
-
-@pytest.mark.parametrize("name", sorted(OLD_FIRMWARE))
-def test_the_vendors_files_for_old_firmware_differ_in_the_indirect_data_alone(name):
-    stem = ControlTable.getModelName(MODELS[name].number).removesuffix(".model")
-    new, old = (
-        Path(CONTROL_TABLE_PATH / f"{stem}{tail}.model").read_text().splitlines()
-        for tail in ("", "_fw52")
-    )
-    differing = [(a, b) for a, b in zip(new, old, strict=True) if a != b]
-    assert {(a.split("\t")[0], b.split("\t")[0]) for a, b in differing} == {
-        ("224", "208"), ("230", "214"),
-    }  # fmt: skip
-    assert [block[:3] for block in indirect_blocks(MODELS[name], 52)] == [(168, 208, 20)]
-
-
-@pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
-def test_registers_do_not_overlap_and_start_within_their_range(model):
-    end = 0
-    for register in registers_of(model):
-        assert register.address >= end, register.name
-        end = register.address + register.size
-        if register.access == "rw" and register.initial is not None:
-            low = register.initial if register.low is None else register.low
-            high = register.initial if register.high is None else register.high
-            assert low <= register.initial <= high, register.name
 
 
 def test_error_bits_are_named_even_where_unknown():

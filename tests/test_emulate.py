@@ -126,29 +126,6 @@ def test_it_ends_with_standard_input_when_told_to():
     present(emulator.process.stdout).close()
 
 
-def test_without_a_link_a_new_path_is_told_after_the_plug_is_back():
-    emulator = Emulator("--servos", "1:xl330-m077", "--baud", "4000000")
-    port = connect(emulator.path, 4_000_000)
-    assert "ok" in emulator.type("unplug")
-    answer = emulator.type("plug")
-    path = answer.get("path", emulator.path)
-    again = connect(path, 4_000_000)
-    assert ping(again, 1) == (1190, COMM_SUCCESS)
-    for one in (port, again):
-        one.closePort()
-    assert emulator.end() == 0
-
-
-def test_a_maestro_with_hobby_servos():
-    emulator = Emulator("--maestro", "12", "--device", "5")
-    assert emulator.ready["baud"] is None
-    assert asked(emulator.path, bytes.fromhex("840B702E900B"), 2, 9600) == b"\x70\x17"
-    assert asked(emulator.path, bytes.fromhex("AA0521"), 2, 57_600) == b"\0\0"
-    assert len(emulator.type("status")["servos"]) == 12
-    assert "script" in emulator.type("help")["ok"]
-    assert emulator.end() == 0
-
-
 def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
     emulator = Emulator("--servos", "1:sts3215", "--baud", "500000", stderr=subprocess.PIPE)
     for _ in range(2):

@@ -138,19 +138,6 @@ def test_a_brown_out_is_deafness_then_a_servo_without_torque(make):
     assert not bench.chain[1].torque
 
 
-def test_a_supply_that_breaks_down_restarts_it_again_and_again(make):
-    bench = bench_of(make)
-    bench.put("torque_enable", 1)
-    rated = bench.chain[1].supply_v
-    bench.chain.faults.command("voltage 1 1.5")
-    for bench.now_s in (0.1 * k for k in range(1, 50)):
-        assert not pings(bench, 1)
-    bench.chain.faults.command(f"voltage 1 {rated}")
-    bench.now_s = 6.0
-    assert pings(bench, 1)
-    assert not bench.chain[1].torque
-
-
 def test_status_tells_everything_as_json(make):
     bench = bench_of(make)
     bench.put("torque_enable", 1)
@@ -172,15 +159,6 @@ def test_status_tells_everything_as_json(make):
 # --- the line and its adapter
 
 
-def test_answers_can_be_late_and_out_of_order(make):
-    bench = bench_of(make, (1, 2, 3))
-    bench.chain.faults.command("delay 2 7 count 1")
-    bench.chain.faults.command("reorder count 1")
-    pieces = answered(bench, 1, 2, 3)
-    assert [piece.servo_id for piece in pieces] == [3, 2, 1]
-    assert [piece.late_s for piece in pieces] == [0.0, 0.007, 0.0]
-
-
 def test_echo_and_babble(make):
     bench, ping = bench_of(make), make.instruction(1, PING)
     bench.chain.faults.command("echo")
@@ -191,30 +169,7 @@ def test_echo_and_babble(make):
     assert bench.chain.receive(b"").startswith(ping[:2])
 
 
-@pytest.mark.parametrize("fault", ["unplug", "deny", "block"])
-def test_faults_of_the_adapter_are_told_to_the_port(make, fault):
-    bench = bench_of(make)
-    bench.chain.faults.command(f"{fault} for 0.5")
-    assert bench.chain.faults.is_on(fault)
-    bench.now_s = 0.6
-    assert not bench.chain.faults.is_on(fault)
-
-
 # --- as text
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("explode 1", "'explode' is not a command; commands: lose"),
-        ("overload 9", "overload: no servo 9; servos are 1; usage: overload ID"),
-        ("turn 254 1", "'254' is not a servo id from 0 to HIGHEST"),
-        ("set after-missing wait", "after-missing 'wait': expected silence, skip, timeout"),
-    ],
-)
-def test_what_cannot_be_asked(make, text, message):
-    with pytest.raises(ValueError, match=message.replace("HIGHEST", str(make.highest_id))):
-        bench_of(make).chain.faults.command(text)
 
 
 # --- two clocks, one result

@@ -4,9 +4,6 @@ import struct
 from typing import Any
 
 import pytest
-from fastcrc.crc16 import umts
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from servo_bench import READ, DynamixelBench
 
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
@@ -91,15 +88,6 @@ def test_examples_of_the_manual_to_the_byte(name):
     assert bench.chain.receive(vector(sent)).hex(" ") == vector(answered).hex(" ")
     for servo_id, address, size, value in WRITTEN.get(name, ()):
         assert bench.read(servo_id, address, size) == value
-
-
-def test_fast_bulk_read():
-    bench = DynamixelBench((3, "xm430-w210", 166), (7, "xl430-w250"), (4, "xl430-w250"))
-    rows = struct.pack("<BHHBHHBHH", 3, 132, 4, 7, 124, 2, 4, 146, 1)
-    answer = bench.chain.receive(instruction(0xFE, 0x9A, rows))
-    assert answer[:16] == vector("FF FF FD 00 FE 14 00 55 00 03 A6 00 00 00 67 A4")
-    assert (answer[17], answer[23], len(answer)) == (7, 4, 27)
-    assert umts(answer[:-2]) == int.from_bytes(answer[-2:], "little")
 
 
 def test_clear_brings_many_turns_back_into_one():
@@ -271,50 +259,4 @@ def test_a_secondary_id_obeys_and_never_answers():
     assert (bench.read(1, 31, 1), bench.read(2, 31, 1)) == (60, 70)
 
 
-def test_a_broadcast_reset_of_everything_is_ignored_by_newer_firmware():
-    bench = DynamixelBench((5, "xm430-w210", 2048, 41), (6, "xm430-w210", 2048, 42))
-    bench.chain.receive(instruction(0xFE, 6, b"\xff"))
-    assert bench.chain.ids() == (1, 6)
-
-
 # --- where documents and devices differ
-
-
-def test_a_wrong_crc_may_be_answered():
-    bench = DynamixelBench((1, "xm430-w210"))
-    bad = PING[:-1] + bytes([PING[-1] ^ 1])
-    assert bench.chain.receive(bad) == b""
-    bench.chain.choose_behaviour("bad-crc", "reply")
-    assert bench.chain.receive(bad) == status(1, 3, b"")
-    assert len(bench.chain.receive(PING)) == 14
-
-
-def test_a_packet_that_should_have_been_stuffed_may_be_dropped():
-    raw = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\x00")
-    stuffed = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
-    bench = DynamixelBench((1, "xm430-w210"))
-    assert bench.chain.receive(raw)[8] == 0
-    bench.chain.choose_behaviour("stuffing", "strict")
-    assert bench.chain.receive(raw) == b""
-    assert bench.chain.receive(stuffed)[8] == 0
-
-
-@given(
-    st.lists(st.sampled_from([1, 2, 3, 4, 9]), max_size=6),
-    st.sampled_from([(132, 4), (126, 10), (64, 1), (40, 4), (64, 4)]),
-    st.sampled_from([0, 1, 2]),
-)
-@settings(max_examples=40)
-def test_both_ways_to_a_fast_reply_give_the_same_bytes(ids, span, level):
-    specs = [(i, "xl330-m288", 100 * i) for i in (1, 2, 3)] + [(4, "xl330-m288", 400, 45)]
-    answers = []
-    for spoilt in (False, True):
-        bench = DynamixelBench(*specs)
-        bench.write(2, 68, level, 1)
-        bench.chain[3].fail("overheating")
-        if spoilt:
-            bench.chain.faults.command("lose 3 for 0")
-            bench.chain.faults.command("delay 1 5")
-        wanted = struct.pack("<HH", *span) + bytes(ids)
-        answers.append(bench.chain.receive(instruction(0xFE, 0x8A, wanted)))
-    assert answers[0] == answers[1]

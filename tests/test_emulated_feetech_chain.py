@@ -1,7 +1,7 @@
 """The emulated STS bus against the written rules: instructions, memory, lock, groups, quirks."""
 
 import pytest
-from servo_bench import ALL, FACTORY_RESET, PING, READ, REBOOT, WRITE, FeetechBench
+from servo_bench import ALL, FACTORY_RESET, PING, REBOOT, FeetechBench
 
 from gazerig.drivers.feetech import memory_table as feetech_table
 from gazerig.sim_mock.feetech.memory import STS
@@ -23,19 +23,6 @@ def restart(bench, servo_id=1):
 @pytest.fixture
 def bench():
     return FeetechBench()
-
-
-def test_models_differ_in_their_voltage():
-    bench = FeetechBench((1, "sts3215-12v", 2048.0))
-    assert (bench.read(1, 14), bench.read(1, 62), bench.read(1, 84)) == (140, 120, 61)
-
-
-@pytest.mark.parametrize(("length", "address"), [(0, 40), (253, 0), (20, 250), (5, 70)])
-def test_what_is_no_register_reads_0(bench, length, address):
-    [(_, _, data)] = bench.ask(1, READ, address, length)
-    assert len(data) == length
-    if address >= 70:
-        assert sum(data[1:]) in (0, 1 + 75 + 254 + 1)
 
 
 def test_registers_lie_where_the_drivers_table_has_them():
@@ -85,26 +72,6 @@ def test_only_what_is_written_while_it_is_open_is_kept(bench):
     bench.write(1, 23, 7)
     restart(bench)
     assert [bench.read(1, at) for at in (21, 22, 23, 55)] == [16, 32, 0, 1]
-
-
-def test_ram_starts_anew(bench):
-    bench.write(1, 55, 0)
-    bench.write(1, 16, 700, 2)
-    for address, value in ((41, 9), (42, 99), (46, 8), (48, 5)):
-        bench.write(1, address, value, 1 if address == 41 else 2)
-    restart(bench)
-    values = [bench.read(1, at, n) for at, n in ((40, 1), (41, 1), (42, 2), (46, 2), (48, 2))]
-    assert values == [0, 0, 0, 0, 700]
-
-
-def test_a_new_id_counts_at_once_and_is_lost_with_the_lock_closed(bench):
-    assert FeetechBench.packets(bench.chain.receive(FeetechBench.instruction(1, WRITE, 5, 7))) == [
-        (1, 0, b"")
-    ]
-    assert bench.ask(1, PING) == []
-    assert bench.ask(7, PING) == [(7, 0, b"")]
-    restart(bench, 7)
-    assert bench.ask(1, PING) == [(1, 0, b"")]
 
 
 # --- kept writes

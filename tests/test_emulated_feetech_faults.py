@@ -76,18 +76,6 @@ def test_an_overload_lowers_the_torque_after_its_time():
     assert bench.error() == OVERLOAD
 
 
-def test_time_torque_and_what_is_left_are_registers():
-    bench = jammed()
-    bench.write(1, 34, 50)
-    bench.write(1, 35, 100)
-    bench.write(1, 36, 60)
-    bench.write(1, 48, 700, 2)
-    bench.wait(0.9)
-    assert bench.error() == 0
-    bench.wait(0.2)
-    assert (bench.error(), bench.read(1, 60, 2, 10)) == (OVERLOAD, 500)
-
-
 def test_a_torque_limit_below_it_never_overloads():
     bench = jammed()
     bench.write(1, 48, 790, 2)

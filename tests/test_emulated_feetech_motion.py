@@ -62,18 +62,6 @@ def test_goal_time_decides_how_long_it_takes_or_nothing():
         assert led_to(bench) == pytest.approx(at + (policy == "ignore") * 8)
 
 
-def test_no_goal_time_is_faster_than_the_motor_and_the_next_goal_brings_it_back(bench):
-    bench.enable_torque()
-    command(bench, 3048, speed=2000, time_ms=7)
-    bench.wait(0.005)
-    command(bench, 2048, speed=2000, acceleration=170)
-    bench.wait(0.3)
-    # From the motor's top speed on it brakes within 415 steps.
-    assert led_to(bench) < 2048 + 450
-    bench.wait(1.0)
-    assert led_to(bench) == pytest.approx(2048)
-
-
 def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
     bench = one(start=0.0)
     bench.enable_torque()
@@ -132,16 +120,6 @@ def test_a_goal_may_switch_the_torque_on(bench):
     assert bench.position() == pytest.approx(2500, abs=STEADY_STEPS)
 
 
-def test_torque_off_lets_a_load_pull_it_and_damping_slows_it():
-    def falls(torque):
-        bench = one(Physics(load_nm=-0.5, stop_low_steps=0.0))
-        bench.write(1, 40, torque)
-        bench.wait(0.3)
-        return 2048 - bench.position()
-
-    assert falls(0) > 4 * falls(2) > 40
-
-
 # --- force
 
 
@@ -167,18 +145,6 @@ def test_load_and_current_at_a_stop_are_those_of_the_stall():
     bench.wait(0.25)
     assert bench.read(1, 60, 2, 10) < 0
     assert bench.read(1, 58, 2, 15) < 0
-
-
-def test_a_smaller_gain_holds_softer():
-    def away(gain):
-        bench = one(SMOOTH._replace(load_nm=-0.2 * 1.91))
-        bench.write(1, 21, gain)
-        bench.enable_torque()
-        bench.wait(2.0)
-        return 2048 - bench.position()
-
-    assert away(16) == pytest.approx(2 * away(32), abs=1)
-    assert away(32) == pytest.approx(10, abs=1)
 
 
 # --- limits and origin
@@ -293,34 +259,3 @@ def test_mode_step_goes_on_from_the_last_goal(bench):
     bench.write(1, 42, 0x8000 | 1000, 2)
     bench.wait(2.0)
     assert bench.position() == pytest.approx(7048, abs=STEADY_STEPS)
-
-
-def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is(bench):
-    bench.enable_torque()
-    bench.write(1, 33, 1)
-    bench.wait(0.5)
-    assert bench.position() == 2048
-    bench.write(1, 46, 800, 2)
-    bench.wait(0.5)
-    bench.write(1, 33, 0)
-    at = bench.position()
-    bench.wait(1.0)
-    assert abs(bench.position() - at) < 60
-    assert bench.read(1, 66) == 0
-
-
-def test_coarse_speeds_are_50_steps_a_second(bench):
-    bench.write(1, 18, 8)
-    bench.enable_torque()
-    command(bench, 3048, speed=20)
-    bench.wait(0.5)
-    assert led_to(bench) == pytest.approx(2548)
-    assert bench.read(1, 58, 2, 15) == pytest.approx(20, abs=1)
-
-
-def test_speed_0_may_mean_to_stop(bench):
-    bench.write(1, 18, 4)
-    bench.enable_torque()
-    command(bench, 3048, speed=0)
-    bench.wait(0.5)
-    assert bench.position() == 2048

@@ -80,20 +80,6 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
     assert max(changes) <= 2.0 * ramp + 1e-6
 
 
-@given(st.lists(st.integers(1, 40), min_size=1, max_size=40), FLOATS, FLOATS)
-@settings(max_examples=60, deadline=None)
-def test_in_one_go_or_in_steps_is_the_same(pieces, goal, later):
-    once, often = PositionProfile(5.0), PositionProfile(5.0)
-    for made in (once, often):
-        made.plan_by_velocity(goal, 2.0, 0.01)
-    whole = once.advance(sum(pieces))
-    assert whole == [r for piece in pieces for r in often.advance(piece)]
-    assert (once.r, once.v, once.running) == (often.r, often.v, often.running)
-    for made in (once, often):
-        made.plan_by_time(later, 100, 20)
-    assert once.advance(50) == often.advance(50)
-
-
 def test_a_speed_profile_ramps_and_ends():
     made = SpeedProfile(0.0, 0.0)
     made.set_goal(2.0, 0.01)

@@ -118,15 +118,6 @@ def test_a_kept_write_waits_for_action(make):
     assert bench.get("registered_instruction") == 0
 
 
-def test_a_restart_forgets_a_kept_write(bench):
-    kept_goal(bench, 1, 1024)
-    bench.chain.faults.command("brown-out 1")
-    bench.wait(1.0)
-    before = bench.get("goal_position")
-    bench.ask(1, ACTION)
-    assert bench.get("goal_position") == before != 1024
-
-
 # --- groups
 
 
@@ -182,16 +173,6 @@ def test_the_goal_waits_for_the_torque_and_is_followed_then(bench):
     bench.put("torque_enable", 1)
     bench.wait(1.0)
     assert bench.position() == pytest.approx(2300, abs=12)
-
-
-def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back(bench):
-    bench.chain.faults.command("turn 1 300")
-    assert bench.position() == 2348
-    bench.enable_torque()
-    bench.chain.faults.command("turn 1 -100")
-    assert bench.position() == 2248
-    bench.wait(1.0)
-    assert bench.position() == pytest.approx(2348, abs=12)
 
 
 def test_without_torque_a_joint_stays_or_falls_to_its_stop(make):

@@ -9,7 +9,6 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.smart_servo.motor import Shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 from gazerig.sim_mock.smart_servo.protection import ServoProtection
 
 HOUR_S = 3600.0
@@ -92,31 +91,6 @@ def test_a_pause_ends_where_a_life_through_it_does(begin):
     apart = abs(at - truly)
     assert min(apart, 4096 - apart) <= (40 if begin is wheel else 2)
     assert torque == torque_truly and warm == pytest.approx(warm_truly, abs=0.5)
-
-
-@pytest.mark.parametrize("ramp", [0.0, 1e-4, 0.01])
-@pytest.mark.parametrize("skipped", [1, 500, 4000, 90_000])
-def test_profiles_go_on_at_once_as_they_do_step_by_step(ramp, skipped):
-    for make in (_led, _spun):
-        one, other = make(ramp), make(ramp)
-        one.advance(100)
-        other.advance(100)
-        one.skip(skipped)
-        other.advance(skipped)
-        assert (one.r, one.v) == pytest.approx((other.r, other.v), rel=1e-6, abs=1.0)
-        assert one.running == other.running
-
-
-def _led(ramp):
-    made = PositionProfile(0.0)
-    made.plan_by_velocity(5000.0, 1.0, ramp)
-    return made
-
-
-def _spun(ramp):
-    made = SpeedProfile(0.0, 0.0)
-    made.set_goal(2.0, ramp)
-    return made
 
 
 @pytest.mark.parametrize("timeout_s", [0, 100])

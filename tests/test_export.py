@@ -12,7 +12,6 @@ from exported_run import RATE_HZ, Run, seen
 from present import present
 from scipy.spatial.transform import Rotation
 
-import gazerig
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
 from gazerig.robot.control.tick import Tick
@@ -22,7 +21,6 @@ from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import (
     MOVEMENTS,
-    GazeAnglesBuilder,
     GazeTarget,
     LabelledInterval,
     collect_gaze_angles,
@@ -216,25 +214,6 @@ def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(
     assert speed_deg_s(t, gaze) == pytest.approx(np.full(len(t), 80.0 * share))
 
 
-def test_a_gaze_carried_by_the_head_is_no_fixation() -> None:
-    building = GazeAnglesBuilder()
-    with gazerig.open("desk", fast=True) as head:
-        for seconds, aside_m in ((0.5, 0.0), (3.0, 1.0)):
-            if aside_m:
-                head.look_at(0.2, aside_m, 0.3)
-            for _ in range(round(seconds * RATE_HZ)):
-                head.step()
-                tick = head._feed.newest
-                assert tick is not None
-                building.update(tick)
-    run = building.trace()
-    movement = label_samples(run).movement
-    late = run.time_s > 2.5
-    carried = (run.time_s > 0.9) & (np.abs(run.planned_deg[:, 0] - run.cyclopean_deg[:, 0]) > 10.0)
-    assert np.count_nonzero(carried) > 50
-    assert not np.any(movement[carried] == 1) and np.all(movement[late] == 1)
-
-
 def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
     ticks = list(face.ticks[1000:1600])
     ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
@@ -248,15 +227,6 @@ def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
         "requested: jog angles_rad=(('neck_yaw', 0.1),)", "requested: jog angles_rad=()",
         "requested: stop why=hand",
     ]  # fmt: skip
-
-
-def test_joints_whose_lead_has_lapsed_are_moved_by_the_models_again(face: Run) -> None:
-    """No command tells of a lapse."""
-    ticks = list(face.ticks[1000:1400])
-    ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
-    ticks[100:200] = [tick._replace(controlled_by="somebody: neck_yaw") for tick in ticks[100:200]]
-    known = collect_gaze_angles(ticks).movement > 0
-    assert known[:100].all() and not known[100:200].any() and known[200:].all()
 
 
 # --- tables
@@ -289,30 +259,6 @@ def test_a_row_a_sample_with_what_was_measured(face: Run, tables: tuple[Path, ..
     assert float(row["left_lid"]) == pytest.approx(tick.pose.lid_left, abs=6e-4)
     assert {row["event"] for row in read} == {"saccade", "fixation", "pursuit", "blink"}
     assert {row["movement"] for row in read} == {"saccade", "fixation", "pursuit"}
-
-
-def test_a_lost_eye_is_an_empty_cell(face: Run, tmp_path: Path) -> None:
-    tick = face.ticks[500]
-    lost = tick._replace(joints=tick.joints._replace(missing=("left_eye_pan",)), t_s=tick.t_s + 0.1)
-    blind = Run([tick, lost])
-    row = rows(write_csv(blind.trace, blind.labels, blind.stretches, tmp_path / "b")[0])[1]
-    assert (row["left_x_deg"], row["x_deg"]) == ("", "") and row["right_x_deg"] != ""
-
-
-def test_the_fixations_are_what_fit_scanpath_reads(face: Run, tables: tuple[Path, ...]) -> None:
-    reader = pytest.importorskip("gazerig.features.lab.analysis.eye_tracker_csv")
-    table = reader.read_recording(tables[2])
-    assert isinstance(table, reader.FixationTable) and table.labelled
-    stays = [row for row in table.rows if row.part is not None]
-    assert len(stays) > 40
-    # Stays follow each other: no look is counted twice.
-    ends = [row.start_s + row.duration_s for row in table.rows]
-    assert all(end <= row.start_s + 1e-6 for end, row in zip(ends, table.rows[1:], strict=False))
-    # All of the run's time that is no saccade is a stay.
-    jumping_s = sum(s.duration_s for s in face.stretches if s.event == "saccade")
-    assert sum(row.duration_s for row in table.rows) + jumping_s == pytest.approx(
-        face.trace.time_s[-1] + 0.005, abs=0.01
-    )
 
 
 def test_a_blink_ends_no_stay_and_a_saccade_does(face: Run, tmp_path: Path) -> None:

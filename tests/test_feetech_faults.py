@@ -44,23 +44,6 @@ def test_one_that_was_silent_gets_no_goals_until_it_holds_its_place_again(rig):
     assert rig.chain.positions_steps()[1] == pytest.approx(2600, abs=8)
 
 
-def test_after_a_replug_all_hold_where_they_are(rig):
-    rig.tick([2500] * 4)
-    rig.command("unplug for 3.0")
-    for _ in range(250):
-        assert rig.heard() == [False] * 4
-    for servo_id in IDS:
-        rig.command(f"turn {servo_id} 150")
-    rig.sent.clear()
-    while None in (readings := rig.tick([2500] * 4)):
-        pass
-    assert [(r.rearmed, r.torque) for r in readings] == [(True, True)] * 4
-    first = next(p for p in rig.sent if p[4] == 0x83 and p[5] == 42)
-    goals = [int.from_bytes(first[8 + 7 * k : 10 + 7 * k], "little") for k in range(4)]
-    assert goals == pytest.approx([r.position_steps for r in readings], abs=40)
-    assert [r.rearmed for r in rig.tick([2500] * 4)] == [False] * 4
-
-
 def test_a_restart_in_the_wink_of_an_eye_is_found(rig):
     """One that nobody missed, after which a goal has switched the torque on again."""
     rig.bus.disable_torque()
@@ -118,18 +101,6 @@ def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(rig):
     rig.command("temperature 2 40")
     rig.run(2.0, [2100] * 4)
     assert all(servo.torque for servo in rig.chain.servos) and rig.bus.faults() == ()
-
-
-def test_input_voltage_is_named_and_the_torque_stays(rig):
-    """A servo for 7.4 V on 12 V says so in every answer; its answers are good all the same."""
-    rig.command("voltage all 12.0")
-    readings = rig.run(0.5, [2000] * 4)
-    assert [(r.fault, r.torque) for r in readings] == [("input voltage", True)] * 4
-    assert all(r.voltage_v == pytest.approx(12.0, abs=0.3) for r in readings)
-    rig.command("brown-out 2")
-    rig.run(1.0, [2000] * 4)
-    rig.until_all()
-    assert len(rig.bus.faults()) == 4
 
 
 @pytest.mark.parametrize("goal", ["wait", "torque-on"])
@@ -237,21 +208,3 @@ def test_a_place_to_begin_from_is_taken_only_if_two_answers_agree(again, well):
     else:
         with pytest.raises(ServoMissing):
             read_positions(line, (1,))
-
-
-def test_a_servo_whose_answers_are_never_confirmed_is_named_and_believed_later(rig):
-    """As if a second servo with its id answered one question of two."""
-    rig.run(0.1, [2000] * 4)
-    reader = rig.bus._reader
-    second = reader.reread
-    reader.reread = lambda ids: {i: one for i, one in second(ids).items() if i != 2}
-    rig.bus.events()
-    for _ in range(150):
-        rig.command("corrupt 3 count 1")  # the line is disturbed, so answers are read twice
-        rig.tick([2000] * 4)
-    assert any("(servo 2) answers, but its bytes arrive damaged" in e for e in rig.bus.events())
-    reader.reread = second
-    rig.command("clear")
-    rig.run(0.1, [2000] * 4)
-    assert any("(servo 2) answers again" in event for event in rig.bus.events())
-    rig.until_all()

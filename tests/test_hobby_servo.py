@@ -26,12 +26,6 @@ def test_it_goes_at_its_top_speed_and_settles_within_its_dead_band():
     assert servo.is_resting and not servo.is_straining
 
 
-def test_without_lag_and_dead_band_it_is_a_straight_line():
-    servo = HobbyServo(HobbySpec(0, 4000, 20_000.0, 0.0, 0.0))
-    assert run(servo, 4500, 4) == [4200, 4400, 4500, 4500]
-    assert run(servo, 4450, 1) == [4450]
-
-
 def test_a_change_within_the_dead_band_does_not_move_it():
     servo = HobbyServo(HobbySpec(0, 6000, dead_steps=20.0))
     assert run(servo, 6020, 5) == [6000.0] * 5

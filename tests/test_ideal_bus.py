@@ -46,16 +46,6 @@ def test_goals_are_followed_with_a_lag_within_the_limits():
     assert found.velocity_steps_s[0] > 0.0 and found.torque == (True, True)
 
 
-def test_where_they_are_does_not_depend_on_how_often_they_are_read():
-    often, once = Bench(), Bench()
-    for bench, reads in ((often, 50), (once, 1)):
-        bench.bus.enable_torque()
-        bench.bus.write((2448, 1700))
-        for _ in range(reads):
-            bench.after(0.05 / reads)
-    assert often.bus.positions_steps() == pytest.approx(once.bus.positions_steps(), abs=1e-9)
-
-
 def test_without_torque_they_stand_still():
     bench = Bench()
     bench.bus.write((2448, 1700))

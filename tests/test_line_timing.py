@@ -60,18 +60,6 @@ def test_a_cycle_takes_what_the_formula_says(baud, request_bytes, size, delay):
     assert answers[-1][0] == pytest.approx((59 + size) * 10 / baud + delays, abs=1e-9)
 
 
-def test_the_turnaround_counts_once_a_status():
-    plain = Wire(turnaround_s=30e-6).answers(PLAIN)
-    fast = Wire(turnaround_s=30e-6).answers(FAST)
-    assert plain[-1][0] == pytest.approx(2120e-6 + 9 * 30e-6)
-    assert fast[-1][0] == pytest.approx(1570e-6 + 30e-6)
-
-
-def test_answers_queue_behind_one_another():
-    answers = Wire().answers(PING + PING)
-    assert [round(due_s * 1e6) for due_s, _ in answers] == [240, 380]
-
-
 @settings(max_examples=40)
 @given(
     st.lists(

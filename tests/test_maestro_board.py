@@ -41,12 +41,6 @@ def test_the_three_forms_say_the_same(world):
     assert world.positions() == [0, 6000, 6000, 6000] + [0] * 8
 
 
-@pytest.mark.parametrize(("value", "us"), [(0, 1023.75), (254, 1976.25)])
-def test_mini_ssc_covers_its_range(world, value, us):
-    world.ask(bytes((0xFF, 5, value)))
-    assert world.position(5) == us * 4
-
-
 def test_set_multiple_targets_as_in_the_guide(world):
     world.ask(target(3, 6000))
     world.ask("9F 02 03 00 00 70 2E")
@@ -111,13 +105,6 @@ def test_bytes_without_sense_are_protocol_errors_and_end_all_pulses(world, wrong
     assert world.positions() == [0] * 12
 
 
-def test_after_an_error_targets_count_again(world):
-    world.ask("00")
-    world.ask(target(0, 6000))
-    assert world.position() == 6000
-    assert world.errors() == PROTOCOL
-
-
 @pytest.mark.parametrize(("choice", "steps"), [("off", 0), ("home", 5600), ("ignore", 7000)])
 def test_what_channels_do_on_an_error_and_when_sent_home(choice, steps):
     for cause in ("00", "A2"):
@@ -158,14 +145,6 @@ def test_the_speed_of_the_guide_takes_100_ms_from_1000_to_1350_us(world):
         expected = min(4000 + 140 * period, 5400)
         assert world.after(0.01).position(5) == expected
         assert world.ask("93") == bytes((expected != 5400,))
-
-
-def test_acceleration_4_is_1250_us_a_second_every_second(world):
-    world.ask(target(0, 4000) + acceleration(0, 4) + target(0, 8000))
-    places = [world.after(0.08).position() for _ in range(6)]
-    # 4 quarter us per 10 ms more every 80 ms: half of that times 8 periods, then 1, 3, 5 ...
-    growth = [b - a for a, b in zip([4000, *places], places, strict=False)]
-    assert [b - a for a, b in zip(growth, growth[1:], strict=False)] == [32] * 5
 
 
 def test_with_both_limits_it_is_a_trapezoid_that_ends_on_the_target(world):
@@ -247,15 +226,6 @@ def test_servos_follow_the_pulses(world):
     assert places[0] == pytest.approx(8000, abs=20)
     assert places[1] == pytest.approx(4000, abs=20)
     assert places[2:] == (6000.0,) * 10
-
-
-def test_a_pulse_comes_every_20_ms(world):
-    world.ask(target(0, 4000) + speed(0, 10) + target(0, 6000))
-    widths = []
-    for _ in range(6):
-        world.after(0.01).position()
-        widths.append(world.board.body.servos[0].width_steps)
-    assert widths == [0, 4020, 4020, 4040, 4040, 4060]
 
 
 @given(st.lists(st.integers(1, 180), min_size=1, max_size=30))

@@ -92,15 +92,6 @@ def held(bench):
 # --- open and read
 
 
-def test_open_finds_pulses_that_are_on(bench):
-    bench.order(5000, 6000, 7000)
-    bench.bus.open()
-    readings = bench.run(0.05)[-1]
-    assert places(readings) == [5000, 6000, 7000]
-    assert all(reading.torque for reading in readings)
-    assert bench.pulses() == [5000, 6000, 7000]
-
-
 def test_errors_from_before_are_told_and_cleared():
     bench = Bench()
     bench.raw("90 7F A1 55")
@@ -227,32 +218,10 @@ def test_no_answer_at_engage(bench):
 # --- following
 
 
-def test_a_slow_servo_lags_behind_its_pulse():
-    bench = Bench((SETUPS[0]._replace(own_speed_steps_s=2000.0),))
-    bench.bus.open()
-    bench.bus.enable_torque()
-    reading = bench.run(0.2, [7100])[-1][0]
-    assert bench.pulses((0,)) == [7100]
-    assert reading.position_steps == pytest.approx(6100 + 0.19 * 2000.0, abs=45)
-    assert reading.velocity_steps_s == pytest.approx(2000.0, rel=0.05)
-
-
 def test_neighbours_share_one_command_and_all_goals_one_write(held):
     held.packets()
     held.bus.write([5000, 6000, 7000])
     assert held.packets() == [bytes.fromhex("9F 02 00 08 27 70 2E 84 05 58 36")]
-
-
-def test_moving_and_going_home(held):
-    held.run(0.02, [7500, 6000, 7000])
-    assert held.bus.moving() is True
-    held.run(1.0)
-    assert held.bus.moving() is False
-    held.bus.go_home()
-    assert held.pulses() == [0, 0, 0]
-    held.packets()
-    held.bus.write([5000] * 3)
-    assert held.packets() == []
 
 
 def test_release_is_confirmed_and_reported_where_it_is_not(held):
@@ -311,14 +280,6 @@ def test_an_error_that_sends_all_home_is_named_and_healed(held):
     assert held.bus.faults() == ()
 
 
-def test_an_error_that_moves_nothing_is_only_named(held):
-    held.board.choose_behaviour("on-error", "ignore")
-    held.raw("55")
-    seen = held.run(0.3, [5500, 5600, 6600])
-    assert not any(r is None or r.rearmed for readings in seen for r in readings)
-    assert held.bus.faults() == ("board 12: serial protocol error",)
-
-
 def test_where_home_is_a_place_they_come_back_before_they_are_there(held):
     held.board.choose_behaviour("on-error", "home")
     held.run(1.0, [5000, 5000, 5000])
@@ -365,34 +326,11 @@ def test_goals_never_switch_a_channel_on_that_is_not_held_yet(held):
     assert [n for n in on if n][:3] == [1, 2, 3]
 
 
-def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
-    held.board.choose_behaviour("max-us", "1850")
-    for _ in range(3):
-        seen = held.run(1.0, [7600, 6000, 7000])
-        held.run(1.0, [6000, 6000, 7000])
-    assert seen[-1][0].position_steps == 7400
-    assert not any(r is None or r.rearmed for readings in seen for r in readings)
-    reported = [line for line in held.bus.events() if "sent to" in line]
-    assert len(reported) == 1 and "gets 1850 us: widen its range" in reported[0]
-
-
 def test_a_running_script_is_stopped_at_engage(bench):
     bench.board.faults.command("script on")
     bench.bus.enable_torque()
     assert "the board was running its own script: stopped" in bench.bus.events()
     assert bench.raw("AE") != b"\0"
-
-
-def test_a_late_answer_is_never_taken_for_another(held):
-    held.run(1.0, [5000, 6000, 7000])
-    held.board.faults.command("delay all 25 count 1")
-    seen = held.run(0.3, [5000, 6000, 7000])
-    for readings in seen:
-        assert all(
-            r is None or r.position_steps == at
-            for r, at in zip(readings, (5000, 6000, 7000), strict=True)
-        )
-    assert not any(r is not None and r.rearmed for readings in seen for r in readings)
 
 
 def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):

@@ -126,20 +126,6 @@ def test_commands_and_bytes_are_lost_on_their_way(world):
     assert not world.board.faults.wire.has_any
 
 
-def test_status_tells_channels_errors_and_faults(world):
-    world.ask(target(0, 6000))
-    world.do("set on-error ignore")
-    world.do("error crc")
-    world.do("lose all")
-    reported = json.loads(world.do("status"))
-    assert (reported["errors"], reported["script"], reported["faults"]) == (
-        ["crc"],
-        False,
-        ["lose all"],
-    )
-    assert [servo["position"] for servo in reported["servos"]] == [6000] + [0] * 11
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [

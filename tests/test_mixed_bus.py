@@ -188,15 +188,6 @@ def test_a_silent_bus_is_asked_seldom_and_the_others_as_ever(mixture):
     assert all(answered[answered.index(True) :])
 
 
-def test_one_answer_is_enough_to_be_asked_every_time(mixture):
-    mixture.b.silent = True
-    mixture.bus.read(0.0)
-    mixture.b.silent, mixture.b.absent = False, (0,)
-    for k in range(1, 50):
-        assert steps(rows(mixture.bus.read(0.01 * k))) == [10, 11, None, 13, 14]
-    assert len(mixture.b.reads_s) == 50
-
-
 def test_close_closes_all_and_open_begins_anew(mixture):
     mixture.b.silent = True
     for k in range(10):

@@ -90,14 +90,6 @@ def test_first_pulses_come_one_after_another():
     assert world.now[0] - began_s == pytest.approx(0.2, abs=0.02)
 
 
-def test_neighbours_change_in_one_transfer(world):
-    world.held()
-    world.sent.clear()
-    world.bus.write([6010, 6010, 6010])
-    (packet,) = world.sent
-    assert [part.data[0] for (part,) in commands(packet)] == [6, 6 + 4 * 5]
-
-
 @pytest.mark.parametrize("hz", [50.0, 300.0])
 def test_a_measured_oscillator_makes_true_pulses(hz):
     for believed_hz, room in ((26.4e6, 0.003), (25e6, 0.08)):
@@ -229,16 +221,6 @@ def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, reported
     world.held()
 
 
-def test_pulses_that_noise_has_made_are_put_right_while_the_board_is_not_heard(world):
-    world.held().run(0.2, [6000] * 3)
-    world.command("lose all")
-    world.run(0.02, [6000] * 3)
-    EmulatedSMBus(world.device.body).i2c_rdwr(i2c_msg.write(0x40, [6, *pulse_registers(4000)]))
-    assert world.widths()[0] > 70_000
-    world.run(0.01, [7600] * 3)
-    assert world.widths() == pytest.approx([6000] * 3, abs=GRAIN)
-
-
 def test_a_board_set_to_an_external_clock_on_the_way_is_reset_and_held_where_it_was(world):
     world.held().run(0.5, [5000] * 3)
     bus = EmulatedSMBus(world.device.body)
@@ -291,18 +273,6 @@ def test_a_guardian_names_a_rate_that_would_work(world, monkeypatch):
         stop_pulses(world.port, 9, Pca9685Board(world.port, QUICK), (0,))
     with pytest.raises(PortError, match=r"cannot run at 9 bit/s: choose 57600 or 1000000"):
         disable_torque(world.port, DYNAMIXEL, 9, (1,))
-
-
-def test_a_lost_write_is_seen_and_the_way_goes_on(world):
-    world.held().run(0.2, [6000] * 3)
-    world.command("lose-writes for 0.3")
-    world.run(0.3, [7600] * 3)
-    before = world.widths()[0]
-    assert before == pytest.approx(6000, abs=GRAIN)
-    world.run(0.02, [7600] * 3)
-    assert world.widths()[0] - before <= 0.03 * SPEED_STEPS_S + 2 * GRAIN
-    world.run(0.8, [7600] * 3)
-    assert world.widths() == pytest.approx([7600] * 3, abs=GRAIN)
 
 
 # --- params

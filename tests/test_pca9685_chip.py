@@ -53,14 +53,6 @@ def bench():
     return Bench()
 
 
-def test_registers_after_power_up(bench):
-    assert bench.get(MODE1) == [0x11]
-    assert [bench.get(register)[0] for register in range(1, 6)] == [4, 0xE2, 0xE4, 0xE8, 0xE0]
-    assert [bench.get(LED0 + k)[0] for k in range(64)] == [0, 0, 0, 0x10] * 16
-    assert bench.get(PRESCALE) == [0x1E]
-    assert all(bench.pulse_us(channel) == 0 for channel in range(16))
-
-
 def test_the_prescaler_is_written_asleep_only_and_not_below_3(bench):
     bench.set(PRESCALE, 121)
     assert bench.get(PRESCALE) == [121]

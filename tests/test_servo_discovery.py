@@ -101,15 +101,6 @@ def test_servos_are_found_whatever_the_adapter_does(family, fault):
     assert bench.found() == [1, 2, 3, 40]
 
 
-def test_an_echo_is_no_servo(family):
-    bench = Bench(family, 1_000_000, 9).opened()
-    bench.command("lose 9")
-    bench.command("echo on")
-    assert bench.found() == [] and bench.ping(9) is None
-    bench.command("clear 9")
-    assert bench.ping(9) == bench.names[0]
-
-
 def test_one_servo_is_asked_alone(family):
     bench = Bench(family, 1_000_000, 9).opened()
     assert bench.ping(9) == bench.names[0]
@@ -155,15 +146,6 @@ def test_a_ping_to_all_finds_servos_with_model_and_firmware():
         0,
     )
     assert DYNAMIXEL.model_name(350) == "model number 350"
-
-
-def test_noise_counts_as_junk():
-    port = mixed()
-    port.setBaudRate(57_600)
-    for command in ("noise before FFFFFD00", "noise after random", "echo on", "fragment all"):
-        port.faults.command(command)
-    found, junk = scan_ids(port, DYNAMIXEL, 57_600)
-    assert [one.id for one in found] == [1, 9, 250] and junk > 0
 
 
 def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():

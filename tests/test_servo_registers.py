@@ -97,11 +97,6 @@ def test_answers_that_are_good_all_the_same(rig, command):
     assert rig.registers.write(2, "led", 1)
 
 
-def test_another_ones_answer_before_the_right_one_does_no_harm(rig):
-    rig.port.spoil = lambda raw: status(3, 0, bytes(4)) + raw
-    assert rig.read() == 2002
-
-
 @pytest.mark.parametrize("late_ms", [40, 90])
 @pytest.mark.parametrize("times", [1, 3])
 def test_a_late_answer_is_never_that_of_another_register(rig, late_ms, times):

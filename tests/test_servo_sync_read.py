@@ -245,16 +245,6 @@ def test_a_whole_answer_at_once_reads_as_servo_by_servo(view, velocity, load):
     assert columns[0].now.missing == ()
 
 
-def test_the_same_of_servos_that_speak_with_a_crc():
-    group = dynamixel_read((2, 5), DIRECT)
-    raw = b"".join(status(i, 0, struct.pack("<hii", -147, -3, 906)) for i in (2, 5))
-    columns = [columns_of(DYNAMIXEL, "xl330-m077", 2, 5) for _ in range(2)]
-    assert both_ways(group, raw, *columns)
-    reported = columns[0].now
-    assert reported == columns[1].now
-    assert reported.load == pytest.approx((-0.1, -0.1)) and reported.velocity_steps_s[0] < 0.0
-
-
 @pytest.mark.parametrize(
     ("torque", "acceleration", "limit", "error", "status_bits", "warm", "taken"),
     [

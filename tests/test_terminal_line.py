@@ -106,13 +106,6 @@ def test_without_a_link_the_new_path_is_told_with_the_name(bench):
     assert reported[0]["path"] != before["path"]
 
 
-def test_answers_to_commands_carry_the_name(bench):
-    one = bench(BOARD, name="eyes")
-    assert json.loads(one.line.obey("status"))["bus"] == "eyes"
-    assert json.loads(one.line.obey("lose 9"))["bus"] == "eyes"
-    assert "no channel 9; channels are 0 to 5" in json.loads(one.line.obey("lose 9"))["error"]
-
-
 def test_a_choice_that_is_none_leaves_no_link_behind(tmp_path):
     link = tmp_path / "board"
     for choices, says in (
