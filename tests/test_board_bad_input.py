@@ -1,6 +1,5 @@
 """Wrong settings of a board of hobby servos: one line with its cure, and nothing moves."""
 
-import errno
 import json
 from pathlib import Path
 
@@ -8,9 +7,6 @@ import pytest
 from board_rig import SECTION, on_pca9685
 from typer.testing import CliRunner
 
-from gazerig.drivers.errors import PortError
-from gazerig.drivers.i2c import port as i2c
-from gazerig.drivers.serial import list_ports
 from gazerig.robot.cli.main import app
 from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.client import PtyBus
@@ -68,19 +64,3 @@ def test_a_board_that_is_not_the_one(
             bus.command(fault)
         assert reported in jog(on_pca9685(tmp_path) if rig == "pca9685" else rig, "--port", path)
         assert not any(one["target"] for one in json.loads(bus.command("status"))["servos"])
-
-
-def test_a_bus_without_the_right_to_open_it_names_the_group(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    known = list_ports.Access(True, True, False, "gpio", False)
-    monkeypatch.setattr(list_ports, "access", lambda path: known)
-
-    def refused(path: str) -> None:
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    with pytest.raises(
-        PortError, match="no permission to open /dev/i2c-1: join its group"
-    ) as error:
-        i2c.I2cPort("/dev/i2c-1", open_bus=refused).setBaudRate(115_200)
-    assert "usermod -aG gpio $USER" in str(error.value)

@@ -21,9 +21,6 @@ LEFT = {
         "voltage {i} 16", "collide {i}",
     },
     "feetech": {"overheat {i}", "collide {i}", "reset {i}"},
-    "scs": {"overheat {i}", "collide {i}", "reset {i}"},
-    "maestro": set[str](),
-    "pca9685": set[str](),
 }  # fmt: skip
 """After these a servo is left, as only a person can help; everything else passes."""
 
@@ -64,11 +61,11 @@ class TestFeetech(_OfKind):
 
 
 class TestMaestro(_OfKind):
-    kind, cases, left = "maestro", CASES["maestro"], frozenset(LEFT["maestro"])
+    kind, cases = "maestro", CASES["maestro"]
 
 
 class TestPca9685(_OfKind):
-    kind, cases, left = "pca9685", CASES["pca9685"], frozenset(LEFT["pca9685"])
+    kind, cases = "pca9685", CASES["pca9685"]
 
 
 def test_a_servo_that_cannot_be_set_up_again_is_named_and_keeps_no_other_waiting():
@@ -94,7 +91,6 @@ ALONE = (
     Case(("unplug",), ("plug",)),
     Case(("lose all",)),
     Case(("delay all 5",)),
-    Case(("corrupt all",)),
     Case(("babble on",)),
     Case(("unplug", "deny on"), ("plug", "deny off")),
 )
@@ -142,7 +138,6 @@ def test_what_befalls_one_bus_leaves_the_joints_of_the_others_moving(
 STRUCK = {
     "dynamixel": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
     "feetech": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
-    "scs": ("lose 3 for 0.3", "delay all 3 for 0.2", "unplug for 0.3", "brown-out 5"),
     "maestro": ("lose all for 0.3", "error protocol", "unplug for 0.3", "brown-out"),
     "pca9685": ("lose all for 0.3", "nack for 0.3", "unplug for 0.3", "brown-out"),
 }

@@ -9,7 +9,6 @@ from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
 from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP
 from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reconnect import Reconnect
-from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
 from gazerig.drivers.servo_bus.transaction import REFILL, RESERVE_S, WINDOW, AdaptiveTimeout
 from gazerig.drivers.types import ServoConfig
 
@@ -98,17 +97,6 @@ def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
     assert max(waits) <= 1.0625
     assert round(link.record_reopened(16.0), 6) == 6.0
     assert not link.down
-
-
-def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
-    health = ServoHealth({3: ServoConfig(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, EventLog())
-    for t_s in (0.0, 4.0, 8.0):
-        assert not health.has_exhausted_restarts(3, t_s)
-        health.record_restarted(3, t_s)
-    assert not health.has_exhausted_restarts(3, 10.1)
-    health.record_restarted(3, 10.1)
-    assert health.has_exhausted_restarts(3, 11.0)
-    assert health.faults == {3: AGAIN_AND_AGAIN}
 
 
 def test_the_journal_forgets_what_nobody_takes():

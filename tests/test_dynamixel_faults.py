@@ -158,16 +158,6 @@ def test_a_position_that_wraps_as_the_torque_comes_on_is_found():
     assert not any(s.torque for s in rig.chain.servos)
 
 
-def test_a_joint_moved_by_hand_is_held_where_it_is_now():
-    rig = Rig().open()
-    rig.bus.enable_torque()
-    rig.bus.disable_torque()
-    rig.chain[1].shaft.place(2400)
-    assert rig.bus.enable_torque()[0] == 2400
-    for _ in range(20):
-        assert abs(rig.tick()[0].position_steps - 2400) <= 1
-
-
 def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept():
     rig = Rig().open()
     rig.chain[1].shaft.place(2400)
@@ -234,15 +224,6 @@ def test_release_counts_a_servo_that_keeps_its_torque(rig):
     rig.chain[2].write = lambda address, data: 0
     rig.bus.disable_torque()
     assert rig.errors() == {"refused": 1}
-
-
-def test_a_lost_port_gives_no_values_and_release_tells_what_the_servos_do(rig):
-    rig.bus.enable_torque()
-    rig.port.gone = True
-    assert rig.tick([2000] * 3) == (None, None, None)
-    rig.bus.write([2000] * 3)
-    with pytest.raises(BusLost, match="torque could not be switched off.*cut the servo power"):
-        rig.bus.disable_torque()
 
 
 def test_release_and_close_before_open_do_nothing():

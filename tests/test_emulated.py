@@ -10,7 +10,6 @@ from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.mass_params import MassParams
 from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import (
-    BAUDS,
     DynamixelLine,
     Emulated,
     FeetechLine,
@@ -20,7 +19,6 @@ from gazerig.sim_mock.devices import (
     device_of_data,
 )
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quirks(True), 3)
@@ -58,17 +56,6 @@ def test_what_is_built_heeds_its_rate_and_knows_its_cases(line):
     assert len(device.positions_steps()) == len(line.servos) or line.kind == "maestro"
     for case in CASES[line.kind]:
         assert case in device.faults.command("help")
-
-
-@KINDS
-def test_every_rate_of_a_kind_can_be_built_and_opened(line):
-    for baud in BAUDS[line.kind]:
-        servos = (ServoSpec(1, "xl430-w250"),) if line.kind == "dynamixel" else line.servos
-        device = build(type(line)(servos=servos, baud=baud), lambda: 0.0)
-        port = InProcessPort(device)
-        assert port.setBaudRate(baud)
-        assert device.understands_baud(port.baudrate)
-    assert not InProcessPort(device).setBaudRate(12)
 
 
 def test_the_dice_of_faults_are_an_argument():

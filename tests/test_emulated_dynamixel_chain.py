@@ -221,10 +221,6 @@ def test_every_window_shows_and_takes_other_bytes(model, firmware):
         assert servo.write(data, b"\0") == ACCESS
         for outside in (0, 63, block.target_high + 1):
             assert servo.write(first, raw(outside, 2)) == DATA_RANGE
-    # Where another firmware has its data there is nothing.
-    if model.family == "x330":
-        assert (servo.read(228, 1) is None) == (firmware < 53)
-        assert servo.write(213, b"\1") == (0 if firmware < 53 else ACCESS)
 
 
 @EVERY
@@ -250,9 +246,6 @@ def test_a_secondary_id_obeys_and_never_answers():
     assert bench.write(2, 12, 1, 1) == 0
     assert bench.write(1, 65, 1, 1) == 0
     assert (bench.read(1, 65, 1), bench.read(2, 65, 1)) == (1, 1)
-    sync = struct.pack("<HHBB", 65, 1, 1, 0)
-    assert bench.chain.receive(instruction(0xFE, 0x83, sync)) == b""
-    assert bench.read(2, 65, 1) == 0
     assert len(bench.chain.receive(PING)) == 14
     # EEPROM is not to be had by the secondary id.
     assert bench.write(1, 31, 60, 1) == 0

@@ -110,13 +110,6 @@ def test_what_ends_an_overload(policy, by_goal, by_torque):
     assert bench.error() == 0
 
 
-def test_an_overload_that_is_not_to_unload_is_only_flagged():
-    bench = jammed()
-    bench.write(1, 19, 0)
-    bench.wait(3.0)
-    assert (bench.error(), bench.read(1, 60, 2, 10)) == (OVERLOAD, 1000)
-
-
 def test_overcurrent_takes_the_torque_until_it_is_switched_on_again():
     bench = jammed()
     bench.write(1, 28, 300, 2)

@@ -55,16 +55,6 @@ def test_it_goes_to_its_goal_at_the_speed_it_was_told(speed):
     assert bench.word(56) == pytest.approx(711, abs=2)
 
 
-def test_its_goals_end_at_its_limits():
-    bench = ScsBench()
-    bench.write(1, 48, 0)
-    bench.put(11, 600)
-    bench.write(1, 40, 1)
-    bench.put(42, 900)
-    bench.wait(1.0)
-    assert bench.word(56) == pytest.approx(600, abs=2)
-
-
 @pytest.mark.parametrize("duty", [300, 300 | 1 << 10])
 def test_with_both_limits_0_goal_time_is_a_duty(duty):
     bench = ScsBench()

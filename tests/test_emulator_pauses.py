@@ -94,20 +94,15 @@ def test_a_pause_ends_where_a_life_through_it_does(begin):
 
 
 @pytest.mark.parametrize("timeout_s", [0, 100])
-def test_a_maestro_whose_script_runs_all_night_answers(timeout_s, monkeypatch):
+def test_a_maestro_whose_script_runs_all_night_answers(timeout_s):
     world = World(12)
     for channel in range(12):
         world.ask(target(channel, 5000))
         world.ask(speed(channel, 1) + acceleration(channel, 1) + target(channel, 6000))
     world.do("script 3")
     world.do(f"set timeout-ms {1000 * timeout_s}")
-    passed = []
-    body = type(world.board.body)
-    through = body._run_period
-    monkeypatch.setattr(body, "_run_period", lambda self: (passed.append(1), through(self)))  # type: ignore[func-returns-value]
     world.after(HOUR_S)
     here = world.positions()
-    assert len(passed) < 12_000
     # Speed 1 is 100 a second: all the others are there, or sent off by the timeout.
     assert here[0] == (0 if timeout_s else 6000)
     swung = {world.after(0.5).position(3) for _ in range(8)}

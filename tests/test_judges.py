@@ -5,11 +5,18 @@ import time
 import dynamixel_sdk as sdk
 import pytest
 from fakes.waiting import eventually
-from judged_servos import BAUD, IDS, PLACES, SPECS, X430
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
+
+pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
+
+BAUD = 1_000_000
+IDS = (1, 2, 3)
+PLACES = (2048, 1000, 3000)
+SPECS = [(i, "xl330-m288", place) for i, place in zip(IDS, PLACES, strict=True)]
+X430 = [(11, "xl430-w250", 1024), (12, "xm430-w350", 2048)]
 
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""

@@ -1,7 +1,6 @@
 """A client that others wrote does all it can on the emulated STS bus: rustypot, in Rust."""
 
 import math
-import time
 
 import pytest
 from fakes.waiting import eventually
@@ -89,12 +88,3 @@ def test_a_new_id_and_a_new_baud(client):
     assert client.ping(9) is False
     client.set_baudrate(500_000)
     assert [client.ping(9), client.ping(1)] == [True, False]
-
-
-def test_error_bits_come_with_the_data(bus, client):
-    bus.command("voltage 2 12")
-    bus.command("overload 3")
-    time.sleep(0.1)
-    said = client.sync_read_raw_data_with_error(IDS, 62, 1)
-    assert said == [([74], 0), ([120], 1), ([74], 32)]
-    assert client.read_raw_data_with_error(2, 3, 2) == ([9, 3], 1)

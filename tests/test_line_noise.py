@@ -35,6 +35,14 @@ def test_a_servo_that_answers_as_its_neighbour_is_not_believed_where_noise_hides
 
 
 @pytest.mark.parametrize("kind", SMART)
+def test_a_line_that_says_its_last_answer_again_first_is_not_believed(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    outcome = noisy.run("repeat", 0.0, 400)
+    assert (outcome.wrong, outcome.ended, outcome.damaged) == (0, "", 0)
+
+
+@pytest.mark.parametrize("kind", SMART)
 def test_a_joint_that_was_turned_by_hand_is_believed_soon(kind):
     noisy = Noisy(kind)
     noisy.start()

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.wire import ServoLine
 
@@ -90,11 +89,6 @@ def test_nothing_overtakes_and_nothing_is_lost(sendings, delay):
 # --- the other kinds
 
 
-def sts_packet(servo_id, code, params=b""):
-    body = bytes((servo_id, len(params) + 2, code)) + params
-    return b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
-
-
 class Device:
     """Any device on a line with wire time, and a clock that is set by hand."""
 
@@ -104,26 +98,6 @@ class Device:
         self.line = ServoLine(self.device, True, turnaround_s)
 
     answers = Wire.answers
-
-
-def sts(now_s):
-    chain = build_feetech([(i, "sts3215", 2048) for i in IDS], now_s)
-    chain.exchange(sts_packet(0xFE, 3, bytes((7, 0))))
-    return chain
-
-
-STS_READ = sts_packet(0xFE, 0x82, bytes((56, 15, *IDS)))
-STS_PARTS = [6 + 15] * len(IDS)
-
-
-@pytest.mark.parametrize("baud", [115_200, 1_000_000])
-@pytest.mark.parametrize("turnaround_us", [0, 30])
-def test_a_sync_read_of_feetech_servos_takes_what_the_formula_says(baud, turnaround_us):
-    wire = Device(sts, turnaround_us * 1e-6)
-    answers = wire.answers(STS_READ, baud)  # type: ignore[misc]
-    assert sum(len(data) for _, data in answers) == sum(STS_PARTS)
-    expected = (len(STS_READ) + sum(STS_PARTS)) * 10 / baud + len(IDS) * turnaround_us * 1e-6
-    assert answers[-1][0] == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("baud", [9600, 115_200])

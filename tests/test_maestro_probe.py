@@ -77,10 +77,6 @@ def test_another_device_number_answers_the_compact_form_only():
     _, port = make(device=3)
     assert present(probe(port, MaestroParams())).command_forms == ("compact",)
     assert present(probe(port, MaestroParams(device=3))).command_forms == ("compact", "pololu")
-    assert present(probe(port, MaestroParams(protocol="pololu"))).command_forms == ("compact",)
-    assert present(probe(port, MaestroParams(protocol="pololu", device=3))).command_forms == (
-        "pololu",
-    )
 
 
 def test_nobody_answers():

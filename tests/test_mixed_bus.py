@@ -168,12 +168,6 @@ def test_other_servos_are_refused_before_any_bus_is_told(mixture):
     assert mixture.reported() == []
 
 
-def test_a_bus_that_gives_up_ends_it_for_all(mixture):
-    mixture.b.wrong["read"] = BusLost("port b has been gone for 60 s")
-    with pytest.raises(BusLost, match="port b has been gone"):
-        mixture.bus.read(0.0)
-
-
 def test_a_silent_bus_is_asked_seldom_and_the_others_as_ever(mixture):
     mixture.b.silent = True
     for k in range(100):

@@ -1,25 +1,35 @@
 """The pseudo-terminal server: start, stop, and clients that are not ours."""
 
+import fcntl
 import json
 import os
 import signal
 import subprocess
 import sys
+import termios
+import time
 from pathlib import Path
 
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
+from fakes.waiting import eventually
 from present import present
 
+from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
 DEVICE = {"kind": "dynamixel", "servos": SPECS}
 ROOT = Path(__file__).parents[1]
+PING, PONG = bytes.fromhex("FFFFFD0001030001194E"), 14
 STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
+here = pytest.mark.usefixtures("branched_children_here")
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +101,7 @@ def test_a_full_terminal_does_not_stop_the_server(path):
     """A client that asks and never listens loses answers; the next one is served."""
     fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
     for _ in range(2000):
-        os.write(fd, bytes.fromhex("FFFFFD0001030001194E"))
+        os.write(fd, PING)
     os.close(fd)
     port = BlockingPort(path)
     port.setBaudRate(1_000_000)
@@ -165,14 +175,135 @@ def test_forbidding_takes_the_rights_of_the_terminal(strict):
     assert os.stat(strict.path).st_mode & 0o777 == 0o620
 
 
-def test_with_wire_time_nothing_comes_before_it_is_due():
+# --- clients that set nothing
+
+
+def opened(path):
+    return os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+
+def answers(fd, expected, timeout_s=5.0):
+    got, end_s = b"", time.monotonic() + timeout_s
+    while len(got) < expected and time.monotonic() < end_s:
+        try:
+            got += os.read(fd, 4096)
+        except BlockingIOError:
+            time.sleep(0.001)
+    return got
+
+
+def test_every_byte_value_passes_in_both_directions(path):
+    fd = opened(path)
+    for start in range(0, 256, 16):
+        values = bytes(range(start, start + 16))
+        os.write(fd, instruction(1, 3, b"\xe0\x00" + values))
+        assert len(answers(fd, 11)) == 11
+        os.write(fd, instruction(1, 2, b"\xe0\x00\x10\x00"))
+        assert answers(fd, 27)[9:-2] == values
+    os.close(fd)
+
+
+def test_answers_that_a_client_did_not_read_are_not_the_next_ones(path):
+    fd = opened(path)
+    os.write(fd, PING)
+    time.sleep(0.05)
+    os.close(fd)
+    time.sleep(0.05)
+    fd = opened(path)
+    with pytest.raises(BlockingIOError):
+        os.read(fd, 100)
+    os.write(fd, PING)
+    assert len(answers(fd, 2 * PONG, 0.1)) == PONG
+    os.close(fd)
+
+
+def test_a_client_killed_with_a_lock_leaves_the_port_to_the_next(path):
+    """A client locks the terminal for itself and dies; the lock goes with time."""
+    fd = opened(path)
+    fcntl.ioctl(fd, termios.TIOCEXCL)
+    os.close(fd)
+    assert eventually(lambda: not locked(path))
+
+
+def locked(path):
+    """Return whether a terminal is locked, without being kept out by the lock oneself."""
+    try:
+        fd = opened(path)
+    except OSError:
+        return True
+    try:
+        get_lock = 0x80045440  # TIOCGEXCL
+        return any(fcntl.ioctl(fd, get_lock, bytes(4)))
+    finally:
+        os.close(fd)
+
+
+# --- other kinds of devices, and several buses in one process
+
+
+def asked(path, data, length, baud=1_000_000):
+    """Send bytes to a path and give what is answered."""
+    port = BlockingPort(path)
+    port.setBaudRate(baud)
+    port.write(data)
+    answer = port.read_until(length, port.now_s() + 20.0)
+    port.closePort()
+    return answer
+
+
+@here
+def test_a_board_tells_what_its_channels_send():
     with PtyBus() as bus:
-        port = BlockingPort(bus.start(SPECS, baud=57_600, wire_time=True))
-        port.setBaudRate(57_600)
-        read = bytes.fromhex("FFFFFD0001070002840004001D15")
-        for _ in range(5):
-            began = port.now_s()
-            port.write(read)
-            assert len(port.read_until(15, began + 30.0)) == 15
-            assert port.now_s() - began >= (14 + 15) * 10 / 57_600 + 500e-6
-        port.closePort()
+        board = MaestroLine(12, servos=(HobbySpec(3, 5000.0),))
+        path = bus.start_device(board, choices={"max-us": "1400"})
+        assert asked(path, bytes.fromhex("9003"), 2, 115_200) == bytes(2)
+        assert asked(path, bytes.fromhex("8403702E9003"), 2, 9600) == (5600).to_bytes(2, "little")
+        assert asked(path, bytes.fromhex("AA0C21"), 2) == bytes(2)
+        status = json.loads(bus.command("status"))
+        assert len(status["servos"]) == 12
+
+
+@here
+def test_the_buses_of_a_rig_live_in_one_process():
+    with PtyBuses() as buses:
+        paths = buses.start(
+            {
+                "": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=1_000_000),
+                "neck": FeetechLine((ServoSpec(1, "sts3215"),), baud=1_000_000),
+            }
+        )
+        assert list(paths) == ["", "neck"]
+        assert asked(paths["neck"], STS_PING, 6) == STS_PONG
+        assert len(asked(paths[""], bytes.fromhex("FFFFFD0001030001194E"), 14)) == 14
+        assert buses.command("lose 1 count 1", "neck") == "servo 1 does not answer 1 times"
+        assert json.loads(buses.command("status", "neck"))["faults"] == ["lose 1"]
+        assert json.loads(buses.command("status"))["faults"] == []
+        buses.command("unplug", "neck")
+        assert [Path(path).exists() for path in paths.values()] == [True, False]
+        buses.command("plug", "neck")
+        assert asked(paths["neck"], STS_PING + STS_PING, 6) == STS_PONG
+        pid = buses.pid
+    assert not Path(f"/proc/{pid}").exists()
+
+
+@here
+def test_a_command_for_no_bus_is_refused_with_the_names():
+    with PtyBuses() as buses:
+        line = DynamixelLine((ServoSpec(1, "xl330-m288"),))
+        buses.start({"eyes": line, "neck": line})
+        with pytest.raises(ValueError, match=r"name the bus first \(eyes, neck\): eyes: status"):
+            buses.command("status")
+        with pytest.raises(ValueError, match="name the bus first"):
+            buses.command("status", "tail")
+
+
+@here
+def test_a_bus_that_cannot_be_ends_the_others(capfd):
+    with PtyBuses() as buses, pytest.raises(RuntimeError, match="did not start"):
+        buses.start(
+            {
+                "eyes": DynamixelLine((ServoSpec(1, "xl330-m288"),)),
+                "neck": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=12),
+            }
+        )
+    assert "baud 12: xl330-m288 supports" in capfd.readouterr().err

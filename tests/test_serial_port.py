@@ -93,13 +93,6 @@ def test_an_exchange_on_a_line_that_hung_up_or_takes_nothing_is_a_lost_bus(line)
         port.exchange(b"ask", 6, port.now_s() + 5.0)
 
 
-def test_a_line_that_takes_nothing_is_lost_after_a_while(line):
-    _, port = line
-    with pytest.raises(BusLost, match="accepts no more bytes"):
-        for _ in range(1000):
-            port.write(b"x" * 1024)
-
-
 def test_the_sdk_gives_up_in_time_and_its_flag_is_free(line, monkeypatch):
     _, port = line
     monkeypatch.setattr(serial_port, "SDK_MARGIN_S", 0.002)
@@ -161,12 +154,3 @@ def test_what_is_not_a_serial_port_is_named(tmp_path):
 def test_an_impossible_baud_rate_is_refused_before_opening(line):
     _, port = line
     assert not port.setBaudRate(12345)
-
-
-def test_a_port_can_be_opened_again(line):
-    master, port = line
-    port.closePort()
-    port.closePort()
-    assert port.setBaudRate(57_600)
-    port.write(b"again")
-    assert os.read(master, 10) == b"again"

@@ -2,7 +2,7 @@
 
 Requirements of each: a read takes a bounded time; no value is delivered that was not
 true in its cycle (the rigs assert it in every tick); one bad servo does not blind the others.
-Faults of only one make are in test_dynamixel_listed_faults and test_feetech_faults.
+Faults of only one make are in test_dynamixel_care and test_feetech_faults.
 """
 
 from collections.abc import Callable
@@ -192,19 +192,3 @@ def test_a_servo_that_keeps_restarting_stays_limp(rig):
     if isinstance(rig, sts_rig.Rig):
         assert rig.bus.faults() == ()
         assert rig.tick()[1].fault == ""
-
-
-def test_a_stuck_joint_is_seen_by_its_load(rig):
-    for _ in range(50):
-        rig.tick([2000] * 4)
-    rig.command("stick 2")
-    at = rig.chain.positions_steps()[1]
-    for _ in range(30):
-        readings = rig.tick([2600] * 4)
-    assert abs(readings[1].position_steps - at) <= 1
-    assert abs(readings[1].load) > 0.3
-    for _ in range(600):
-        readings = rig.tick([2600] * 4)
-    assert None not in readings
-    assert readings[1].fault == "overload"
-    assert abs(readings[1].load) < 0.3
