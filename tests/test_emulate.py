@@ -223,16 +223,6 @@ def test_servos_that_cannot_be_are_refused(text, says):
     assert says in str(error.value)
 
 
-def test_servos_are_read():
-    specs = parse_servos("0-2:XL330-M077, 9:xc330-m288@17", 45)
-    assert [(s.id, s.model, s.start_steps, s.firmware) for s in specs] == [
-        (0, "xl330-m077", 2048, 45),
-        (1, "xl330-m077", 2048, 45),
-        (2, "xl330-m077", 2048, 45),
-        (9, "xc330-m288", 17, 45),
-    ]
-
-
 def test_the_models_decide_the_kind_of_line():
     specs = parse_servos("3:STS3215@7,253:sts3215-12v", 10)
     assert line_of("3:STS3215@7,253:sts3215-12v", 10, 500_000) == FeetechLine(specs, 500_000)

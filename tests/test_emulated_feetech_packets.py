@@ -39,16 +39,6 @@ def test_the_makers_sync_write_reaches_all_four():
     assert [bench.read(i, 42, 2) for i in (1, 2, 3, 4)] == [2048] * 4
 
 
-@given(st.binary(max_size=6), st.integers(0, 253), st.binary(max_size=40), st.integers(1, 60))
-def test_an_instruction_in_pieces_behind_noise_is_found(noise, servo_id, params, cut):
-    noise = noise.replace(b"\xff", b"\x00")
-    data = noise + FeetechBench.instruction(servo_id, 3, params)
-    framing = FeetechFraming(0.001, 0.0)
-    first = framing.feed(data[:cut], 0.0)
-    found = first + framing.feed(data[cut:], 0.0005)
-    assert [(f.servo_id, f.code, f.params) for f in found] == [(servo_id, 3, params)]
-
-
 @pytest.mark.parametrize("length", [0, 1])
 def test_a_length_that_cannot_be_is_passed_over(length):
     bad = bytes((255, 255, 1, length))

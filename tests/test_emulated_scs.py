@@ -55,17 +55,6 @@ def test_it_goes_to_its_goal_at_the_speed_it_was_told(speed):
     assert bench.word(56) == pytest.approx(711, abs=2)
 
 
-@pytest.mark.parametrize("duty", [300, 300 | 1 << 10])
-def test_with_both_limits_0_goal_time_is_a_duty(duty):
-    bench = ScsBench()
-    bench.ask(1, WRITE, 9, bytes(4))
-    bench.write(1, 40, 1)
-    bench.put(44, duty)
-    bench.wait(0.1)
-    moved = bench.chain.positions_steps()[0] - 511
-    assert moved < -20 if duty >> 10 else moved > 20
-
-
 def test_what_is_written_while_locked_is_gone_after_a_restart():
     bench = ScsBench()
     bench.put(11, 800)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.linalg import expm
 
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH_MODELS
@@ -91,6 +90,8 @@ def test_the_i_part_does_not_wind_up_beyond_the_limit():
 @pytest.mark.parametrize(("more_p", "more_d"), [(1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (1.0, 3.0)])
 def test_pd_control_moves_a_shaft_as_its_differential_equation_says(more_p, more_d):
     # x'' = a (P (goal - x) - D x') - x' / T, a the no-load speed over the time T to reach it.
+    from scipy.linalg import expm
+
     p, d, model = more_p * P, more_d * D, MODELS["xl330-m077"]
     path = np.array(go(shaft(model.name, Loop(p=p, d=d), **SMOOTH), 40, 300))
     T = Physics().rotor_s

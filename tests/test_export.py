@@ -10,7 +10,6 @@ import pytest
 from desk import GAZE_JOINTS, LIDS
 from exported_run import RATE_HZ, Run, seen
 from present import present
-from scipy.spatial.transform import Rotation
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
@@ -179,6 +178,8 @@ def test_a_target_that_changes_under_way_does_not_make_two_saccades(face: Run) -
 
 def test_what_is_near_is_looked_at_without_a_saccade_and_what_is_far_is_not(face: Run) -> None:
     """The gaze is on a target that is nearer to it than half a degree."""
+    from scipy.spatial.transform import Rotation
+
     tick = face.ticks[1000]
     head = np.array(tick.pose.p_world_head_m)
     way = np.array(tick.gaze.gaze_point_world_m) - head

@@ -45,12 +45,6 @@ def test_vectors(packet, expected):
     assert packet == bytes.fromhex(expected)
 
 
-def test_the_goal_packet_is_the_general_one_made_faster():
-    rows = [(g).to_bytes(2, "little") + b"\0\0" + v.to_bytes(2, "little")
-            for g, v in ((7, 9), (4095, 32767))]  # fmt: skip
-    assert GoalWrite((4, 9)).packet((7, 4095), (9, 32767)) == sync_write((4, 9), 42, 6, rows)
-
-
 def status(servo_id, params, error=0):
     body = bytes((servo_id, len(params) + 2, error)) + params
     return b"\xff\xff" + body + bytes((checksum(body),))

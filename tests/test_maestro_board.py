@@ -1,7 +1,7 @@
 """The emulated Maestro against the numbers of its user's guide, byte by byte."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from maestro_world import PROTOCOL, World, acceleration, speed, target
 
@@ -226,18 +226,3 @@ def test_servos_follow_the_pulses(world):
     assert places[0] == pytest.approx(8000, abs=20)
     assert places[1] == pytest.approx(4000, abs=20)
     assert places[2:] == (6000.0,) * 10
-
-
-@given(st.lists(st.integers(1, 180), min_size=1, max_size=30))
-@settings(max_examples=30)
-def test_how_often_it_is_looked_at_changes_nothing(naps_ms):
-    often, once = World(), World()
-    orders = target(0, 4000) + speed(0, 30) + acceleration(0, 9) + target(0, 7000)
-    for world in (often, once):
-        world.ask(orders)
-    for nap_ms in naps_ms:
-        often.now_s += nap_ms / 1000.0
-        assert often.position() >= 4000
-    once.now_s = often.now_s
-    assert once.position() == often.position()
-    assert once.board.positions_steps() == often.board.positions_steps()

@@ -46,11 +46,6 @@ def test_the_check_byte():
     assert both == bytes.fromhex("AA 0C 10 01") + bytes((crc7(bytes.fromhex("AA 0C 10 01")),))
 
 
-def test_every_command_of_a_packet_has_its_own_check_byte():
-    packet = MaestroCodec(crc=True).targets({0: 6000, 2: 6000})
-    assert packet == bytes.fromhex("84 00 70 2E 2B") + MaestroCodec(crc=True).target(2, 6000)
-
-
 def test_neighbours_share_a_command_where_the_board_has_it():
     goals = {4: 6000, 1: 4000, 0: 4001, 6: 5000}
     assert COMPACT.targets(goals) == (

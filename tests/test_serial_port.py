@@ -116,16 +116,6 @@ def test_a_hang_up_is_a_lost_bus_and_leaves_no_flag_behind(line):
         assert not port.is_using
 
 
-def test_using_a_closed_port_is_a_lost_bus(line):
-    _, port = line
-    port.closePort()
-    with pytest.raises(BusLost):
-        port.write(b"x")
-    with pytest.raises(BusLost):
-        port.read_until(1, port.now_s() + 1.0)
-    assert port.getBytesAvailable() == 0
-
-
 def test_an_absent_port_is_named_with_the_ports_there_are(monkeypatch):
     class Found:
         device, description = "/dev/ttyACM7", "U2D2"

@@ -36,15 +36,6 @@ def test_inside_the_range_nothing_changes(steps, span):
     assert not lost(inside, low, high)
 
 
-@given(RANGE, STEPS)
-def test_one_step_on_is_one_step_on_but_for_the_far_side(span, steps):
-    low, high = span
-    leap = abs(nearest_turn(steps + 1, low, high) - nearest_turn(steps, low, high))
-    assert (
-        leap == 1 or away(nearest_turn(steps, low, high), low, high) >= (4096 - high + low) // 2 - 1
-    )
-
-
 def test_by_hand():
     assert nearest_turn(4090, 100, 1500) == -6
     assert nearest_turn(-6, 100, 1500) == -6
