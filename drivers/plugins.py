@@ -82,7 +82,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
     SCHEMA: {
         "rig": "gazerig.config.schema:Rig",
         "study": "gazerig.features.study.design:StudyDesign",
-        "questionnaire": "gazerig.features.study.questionnaire:Questionnaire",
+        "questionnaire": "gazerig.features.study.design:Questionnaire",
     },
     PAGE_PANEL: {},
     SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:WorldSurroundings"},

@@ -10,8 +10,6 @@ from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
 
-pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
-
 BAUD = 1_000_000
 IDS = (1, 2, 3)
 PLACES = (2048, 1000, 3000)

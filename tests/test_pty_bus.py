@@ -29,7 +29,6 @@ DEVICE = {"kind": "dynamixel", "servos": SPECS}
 ROOT = Path(__file__).parents[1]
 PING, PONG = bytes.fromhex("FFFFFD0001030001194E"), 14
 STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
-here = pytest.mark.usefixtures("branched_children_here")
 
 
 @pytest.fixture(autouse=True)
@@ -251,7 +250,6 @@ def asked(path, data, length, baud=1_000_000):
     return answer
 
 
-@here
 def test_a_board_tells_what_its_channels_send():
     with PtyBus() as bus:
         board = MaestroLine(12, servos=(HobbySpec(3, 5000.0),))
@@ -263,7 +261,6 @@ def test_a_board_tells_what_its_channels_send():
         assert len(status["servos"]) == 12
 
 
-@here
 def test_the_buses_of_a_rig_live_in_one_process():
     with PtyBuses() as buses:
         paths = buses.start(
@@ -286,7 +283,6 @@ def test_the_buses_of_a_rig_live_in_one_process():
     assert not Path(f"/proc/{pid}").exists()
 
 
-@here
 def test_a_command_for_no_bus_is_refused_with_the_names():
     with PtyBuses() as buses:
         line = DynamixelLine((ServoSpec(1, "xl330-m288"),))
@@ -297,7 +293,6 @@ def test_a_command_for_no_bus_is_refused_with_the_names():
             buses.command("status", "tail")
 
 
-@here
 def test_a_bus_that_cannot_be_ends_the_others(capfd):
     with PtyBuses() as buses, pytest.raises(RuntimeError, match="did not start"):
         buses.start(

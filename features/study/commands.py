@@ -3,33 +3,26 @@
 from gazerig.robot.cli.command_list import CommandEntry
 
 STUDY = CommandEntry(
-    "gazerig.features.study.cli.group",
+    "gazerig.features.study.cli",
     "Design, run and analyse a blind study in which people judge two to six styles of gaze.",
     "Study",
     examples={
         "study": (
             ("study design --example study.yaml", "a study of two gazes to start from"),
-            (
-                "study design study.yaml",
-                "check it; how many participants, and what is stated before",
-            ),
+            ("study design study.yaml", "check it"),
             ("study run study.yaml --participant 1", "the first participant's session"),
         ),
         "study design": (
             ("study design --example study.yaml", "a study of two gazes to start from"),
-            ("study design study.yaml", "check it and write its pre-registration"),
             ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
         ),
-        "study film": (("study film study.yaml", "its films, to look at before anybody comes"),),
+        "study film": (("study film study.yaml", "its films, to look at before people come"),),
         "study run": (
             ("study run study.yaml --participant 7", "a session, in the browser"),
-            ("study run study.yaml --participant 7 --mock", "on an emulated head"),
+            ("study run nakamoto_2 --participant 7 --mock", "on an emulated head"),
             ("study run study.yaml --simulate 24 --data trial", "24 simulated participants"),
         ),
         "study delete": (("study delete study-data --participant 7", "all data of a participant"),),
-        "study analyse": (
-            ("study analyse study-data", "one page for reviewers, tables, a BIDS data set"),
-            ("study analyse study-data --out ../paper/report", "written elsewhere"),
-        ),
+        "study analyse": (("study analyse study-data", "one page, and the answers as CSV"),),
     },
 )

@@ -1,0 +1,225 @@
+"""The commands under study: from a design to its report."""
+
+import asyncio
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import gazerig
+from gazerig.config.shipped_files import shipped_names
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_output import write_file
+from gazerig.robot.app.options import parse_camera, parse_host_port
+from gazerig.robot.cli import run_options as options
+from gazerig.robot.cli.browser import is_desktop_here, open_page
+from gazerig.robot.cli.examples import complete_shipped
+from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
+from gazerig.robot.model.clock import RealClock
+
+EXAMPLE = """\
+# A study of two gazes: does blinking look natural? Change it, then: gazerig study design study.yaml
+title: Blinking against staring
+welcome: # what participants read first; it must not name the difference
+  - You will see short films of a robot's face and answer two questions about each.
+conditions: # two to six; each contains its differences from the rig below
+  blinks: {}
+  stares:
+    params: # any key of a rig's YAML; gazerig ctl get lists them. Or profile:, character:, scanpath:
+      gaze.lids.blinks_per_min: 0.0
+      gaze.lids.conversation_per_min: 0.0
+presentation:
+  on: film # films in the browser; head: the head in the room
+  rig: expressive
+  scene: face-to-face # what an emulated head looks at
+trials:
+  seconds: 20
+questionnaires: [nakamoto_tsuruno] # or godspeed, rosas, free_text; choice with task: pairwise
+hypotheses:
+  - measure: nakamoto_tsuruno.naturalness
+    better: blinks
+    than: stares
+plan:
+  participants: 26
+contact: "" # whom participants write to
+"""
+"""A design to start from; written by --example."""
+HOME = Path(__file__).parent
+app = typer.Typer(
+    name="study",
+    help="Design, run and analyse a blind study in which people judge two to six styles of gaze.",
+    no_args_is_help=True,
+)
+StudyArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="STUDY",
+        help=f"A study's YAML file, or a shipped one: {', '.join(shipped_names('studies', HOME))}.",
+        autocompletion=complete_shipped("studies", HOME),
+    ),
+]
+DataOption = Annotated[
+    Path | None,
+    typer.Option("--data", help="Folder of the study's data; default: NAME-data, after the file."),
+]
+
+
+@app.command()
+def design(
+    study: StudyArgument = "study.yaml",
+    example: Annotated[
+        bool, typer.Option("--example", help="Write an example with two gazes to STUDY.")
+    ] = False,
+    force: ForceOption = False,
+) -> None:
+    """Check a study's YAML."""
+    with clear_errors():
+        if example:
+            write_file(Path(study), EXAMPLE, force)
+            print(f"{study}: written; change it, then: gazerig study design {study}")
+            return
+        from gazerig.features.study.study_file import load_study
+
+        found = load_study(study).design
+        print(f"{study}: good: {found.title!r}, conditions {', '.join(found.conditions)}")
+        for one in found.hypotheses:
+            print(f"hypothesis: {one.measure}: {one.better} > {one.than}, by {one.test}")
+        print(f"next: gazerig study run {study} --simulate {found.plan.participants} --data trial")
+
+
+@app.command()
+def film(study: StudyArgument = "study.yaml", data: DataOption = None) -> None:
+    """Make the films of a study's conditions; those that are there already are kept."""
+    with clear_errors():
+        from gazerig.features.study.film import films
+        from gazerig.features.study.study_file import load_study
+
+        found = load_study(study)
+        with progress_bar(remaining=True) as steps:
+            made = films(found, _data_folder(found.path, data) / "films", steps)
+        for key, path in made.items():
+            print(f"{key}: {path}")
+
+
+@app.command()
+def run(
+    study: StudyArgument = "study.yaml",
+    participant: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Number of the participant; no names.")
+    ] = 0,
+    data: DataOption = None,
+    mock: options.Mock = False,
+    port: options.Port = None,
+    camera: options.Camera = None,
+    oak: options.Oak = False,
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Address of the page; for a phone or another computer 0.0.0.0:8090.",
+        ),
+    ] = "127.0.0.1:8090",
+    no_browser: options.NoBrowser = False,
+    simulate: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Simulate N participants instead; 0: none.")
+    ] = 0,
+    effect: Annotated[
+        float, typer.Option(help="With --simulate: d_z of neighbouring conditions.")
+    ] = 0.6,
+    seed: Annotated[int, typer.Option(min=0, help="With --simulate: seed of the answers.")] = 0,
+) -> None:
+    """Run a participant's session in the browser; the same command resumes it."""
+    with clear_errors(None, port, mock):
+        from gazerig.features.study.film import films
+        from gazerig.features.study.head import HeadPresenter
+        from gazerig.features.study.journal import Journal, StudyFolder
+        from gazerig.features.study.server import StudyServer
+        from gazerig.features.study.session import HeadLost, Session
+        from gazerig.features.study.simulate import simulate_study
+        from gazerig.features.study.study_file import load_study
+
+        if (participant == 0) == (simulate == 0):
+            raise SetupError("write --participant N, or --simulate N for simulated participants")
+        found = load_study(study)
+        folder = StudyFolder(_data_folder(found.path, data))
+        shown, now_s = found.design.presentation, RealClock().now_s
+        with ExitStack() as stack:
+            if simulate:
+                steps = stack.enter_context(progress_bar())
+                simulate_study(
+                    found,
+                    folder,
+                    simulate,
+                    effect,
+                    seed,
+                    lambda share: steps("participants", share),
+                )
+                print(f"next: gazerig study analyse {folder.path}")
+                return
+            folder.claim(found)
+            presenter, made = None, dict[str, Path]()
+            stopped = stack.enter_context(record_signals())
+            journal = Journal(folder.participant(participant))
+            stack.callback(journal.close)
+            if shown.on == "film":
+                with progress_bar(remaining=True) as steps:
+                    made = films(found, folder.path / "films", steps)
+            else:
+                seen = parse_camera(camera)
+                drawn = seen is None and not oak
+                if drawn and not mock:
+                    raise SetupError("the head needs a camera: --camera N, --oak, or --mock")
+                head = gazerig.open(
+                    found.locate(shown.rig), mock=mock, port=port, camera=seen, oak=oak, say=say,
+                    scene=shown.scene if drawn else None, seed=shown.seed,
+                )  # fmt: skip
+                presenter = HeadPresenter(found, stack.enter_context(head), now_s)
+            session = Session(found, participant, journal, now_s, _utc, presenter)
+            if session.closed:
+                raise SetupError(f"{session.code} has ended the session already: take another")
+            server = StudyServer(
+                session, parse_host_port(page), folder.participant(participant), made, say
+            )
+            say(f"participant: {server.url}")
+            if not no_browser and is_desktop_here():
+                open_page(server.url)
+            try:
+                asyncio.run(server.serve(stopped))
+            except HeadLost as lost:
+                raise SetupError(f"{lost}; the same command resumes the session") from lost
+            print(
+                "the session is over" if session.closed else "not over: the same command resumes it"
+            )
+
+
+@app.command()
+def analyse(
+    data: Annotated[
+        Path, typer.Argument(metavar="DATA", help="Folder of the study's data, such as study-data.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write to; default: DATA/report.")
+    ] = None,
+) -> None:
+    """Analyse a study: one page with tests, tables and figures, and the answers as CSV."""
+    with clear_errors():
+        from gazerig.features.study.analyse import analyse_study
+        from gazerig.features.study.report import write_report
+
+        study = analyse_study(data)
+        page = write_report(study, out or data / "report")
+        for one in study.decisions:
+            what = f"{one.hypothesis.measure}: {one.hypothesis.better} > {one.hypothesis.than}"
+            print(f"{what}: {one.verdict} (corrected p = {one.corrected_p:.3g}, n = {one.n})")
+        print(f"{page}: the report; answers.csv next to it")
+
+
+def _data_folder(study: Path, data: Path | None) -> Path:
+    return data or Path(f"{study.stem}-data")
+
+
+def _utc() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -1,1 +1,0 @@
-"""The pages of a study: the participant's, and the experimenter's."""

@@ -1,1 +1,0 @@
-"""The report of a study: page, figures, sentences, tidy table and BIDS layout."""

@@ -1,1 +1,0 @@
-"""Execution of a study: the process of the head, films, and measures of trials."""

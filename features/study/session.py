@@ -1,0 +1,282 @@
+"""One participant's session: its place in the study, the present page, and the events on it.
+
+The place follows from the design and the records alone, so that an interrupted session resumes at
+the same place; only a presentation that was in progress starts again.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, NamedTuple, Protocol
+
+import msgspec
+import numpy as np
+
+import gazerig
+from gazerig.features.study.design import PAIR, Item, Texts, participant_order, practice_trials
+from gazerig.features.study.journal import (
+    AnswerValue,
+    ConsentGiven,
+    ItemAnswered,
+    Journal,
+    ParticipationClosed,
+    ParticipationOpened,
+    Record,
+    TrialBegan,
+    TrialEnded,
+)
+from gazerig.features.study.study_file import WHOLE_SHARE, Study
+
+LONGEST_TEXT = 5000
+"""Longest free text, characters."""
+_ITEMS = 2
+"""Random stream of the trials' seed; orders use others."""
+
+
+class WrongEvent(ValueError):
+    """A browser sent data that do not fit the present page."""
+
+
+class HeadLost(Exception):
+    """The head cannot show conditions any more; the message gives the reason."""
+
+
+class Presenter(Protocol):
+    """The head in the room; both methods raise HeadLost if it cannot show conditions."""
+
+    def show(self, condition: str) -> None:
+        """Show a condition from now on."""
+
+    def check(self) -> None:
+        """Check that the head moves."""
+
+
+class Event(msgspec.Struct):
+    """A participant's action on a page.
+
+    page: name of the page; values, ms: answers and response times in the order of the questions
+    """
+
+    page: str
+    do: str
+    values: list[AnswerValue] = []
+    ms: list[float] = []
+
+
+class Place(NamedTuple):
+    """A participant's place in a study.
+
+    trial: practice trials below 0, None outside trials; side: 1 in the second half of a pair
+    """
+
+    step: Literal["consent", "ready", "presentation", "questions", "end"]
+    trial: int | None = None
+    side: int = 0
+    questionnaire: str = ""
+
+
+class Session:
+    """A participant's session; each event is on disk before the next page is shown.
+
+    Attributes:
+        code: Code of the participant, such as P007.
+        place: The participant's place.
+
+    Args:
+        study: the study.
+        number: number of the participant, which selects the order.
+        journal: the participant's journal.
+        now_s: returns the time of a steady clock.
+        utc: returns date and time.
+        head: the head in the room; None: the browser shows films.
+        simulated: whether the participant is simulated.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        number: int,
+        journal: Journal,
+        now_s: Callable[[], float],
+        utc: Callable[[], str],
+        head: Presenter | None = None,
+        simulated: bool = False,
+    ) -> None:
+        self.code = f"P{number:03d}"
+        self._study, self._design, self._number = study, study.design, number
+        self._journal, self._now_s, self._utc, self._head = journal, now_s, utc, head
+        practice = practice_trials(self._design, number)
+        trials = (*practice, *participant_order(self._design, number))
+        self._trials = dict(enumerate(trials, start=-len(practice)))
+        self._began_s = float("inf")
+        self.place = self._find_place()
+        if not self.closed:
+            self._store(ParticipationOpened(gazerig.__version__, utc(), simulated))
+
+    @property
+    def trial(self) -> str:
+        """Return the condition, or the pair "a|b", of the present trial, "" outside trials."""
+        return "" if self.place.trial is None else self._trials[self.place.trial]
+
+    @property
+    def condition(self) -> str:
+        """Return the condition of the next or present presentation."""
+        return self.trial.split(PAIR)[self.place.side]
+
+    @property
+    def closed(self) -> bool:
+        """Return whether the session has ended permanently."""
+        return self.place.step == "end"
+
+    @property
+    def page(self) -> str:
+        """Return the name of the present page, which is the same after a crash."""
+        return "-".join(str(part) for part in (self.code, *self.place))
+
+    def page_json(self) -> dict[str, Any]:
+        """Return the present page, which contains nothing that distinguishes conditions."""
+        design, place, records = self._design, self.place, self._journal.records
+        asked = self._study.questionnaires.get(place.questionnaire)
+        finished = ParticipationClosed in map(type, records) and records[-1].finished
+        return {
+            **place._asdict(), "page": self.page, "code": self.code, "film": self._head is None,
+            "pairs": design.task == "pairwise", "practice": design.trials.practice,
+            "count": len(self._trials), "seconds": design.trials.seconds,
+            "contact": design.contact, "welcome": design.welcome, "may_skip": design.may_skip,
+            "finished": finished, "debriefing": design.debriefing if finished else (),
+            "instruction": self._text(asked.instruction) if asked else "",
+            "items": [
+                {
+                    "kind": item.kind, "points": item.points, "text": self._text(item.text),
+                    "low": self._text(item.low), "high": self._text(item.high),
+                }
+                for _, item in self.items()
+            ],
+        }  # fmt: skip
+
+    def items(self) -> list[tuple[str, Item]]:
+        """Return the items of the present questions by key, in this participant's order."""
+        key, trial, design = self.place.questionnaire, self.place.trial, self._design
+        if not key:
+            return []
+        items = list(self._study.questionnaires[key].items.items())
+        if self._study.questionnaires[key].shuffled:
+            at = (*design.questionnaires, *design.after).index(key)
+            row = 0 if trial is None else trial + design.trials.practice + 1
+            rng = np.random.default_rng((design.trials.seed, self._number, _ITEMS, at, row))
+            items = [items[i] for i in rng.permutation(len(items))]
+        return items
+
+    def handle(self, event: Event) -> bool:
+        """Apply an event; on return it is on disk. Return False if its page is over.
+
+        Raises:
+            WrongEvent: it does not fit the page; nothing has changed.
+            SetupError: it could not be written; nothing has changed.
+            HeadLost: the head cannot show the next condition.
+        """
+        if event.page != self.page:
+            return False
+        match self.place.step, event.do:
+            case "consent", "consent":
+                self._store(ConsentGiven(self._utc()))
+            case ("consent", "decline") | ("ready" | "presentation" | "questions", "leave"):
+                self._store(ParticipationClosed(False, self._utc()))
+            case "ready", "begin":
+                self._begin()
+            case "presentation", "seen" if self._head is None:
+                shown_s = max(0.0, self._now_s() - self._began_s)
+                whole = shown_s >= WHOLE_SHARE * self._design.trials.seconds
+                self._end("" if whole else f"the film was shown for {shown_s:.1f} s")
+            case "questions", "answer":
+                self._store(*self._answers(event))
+            case step, do:
+                raise WrongEvent(f"{do} does not fit the page {step}")
+        return True
+
+    def poll(self) -> None:
+        """End the head's presentation when its time is over; call it often.
+
+        Raises:
+            HeadLost: the head does not move any more; its presentation has ended.
+        """
+        if self._head is None or self.closed:
+            return
+        presenting = self.place.step == "presentation"
+        try:
+            self._head.check()
+        except HeadLost as lost:
+            if presenting:
+                self._end(f"head lost: {lost}")
+            raise
+        if presenting and self._now_s() - self._began_s >= self._design.trials.seconds:
+            self._end("")
+
+    def film_fetched(self) -> None:
+        """Note that the browser has the present film; its time begins now."""
+        self._began_s = min(self._began_s, self._now_s())
+
+    def _begin(self) -> None:
+        place = self.place
+        if self._head is not None:
+            self._head.show(self.condition)
+        self._store(TrialBegan(place.trial or 0, place.side, self.condition, self._utc()))
+        self._began_s = float("inf") if self._head is None else self._now_s()
+        self.place = place._replace(step="presentation")
+
+    def _end(self, interrupted: str) -> None:
+        self._store(TrialEnded(self.place.trial or 0, self.place.side, self._utc(), interrupted))
+
+    def _answers(self, event: Event) -> Iterator[ItemAnswered]:
+        """Yield the records of a page of answers."""
+        items, place, utc = self.items(), self.place, self._utc()
+        if not len(items) == len(event.values) == len(event.ms):
+            raise WrongEvent(f"{len(items)} questions need as many answers and times")
+        for (key, item), value, ms in zip(items, event.values, event.ms, strict=True):
+            if not self._is_valid(item, value):
+                raise WrongEvent(f"{value!r:.40} is no answer to the question {item.text}")
+            yield ItemAnswered(place.trial, self.trial, place.questionnaire, key, value, ms, utc)
+
+    def _is_valid(self, item: Item, value: AnswerValue) -> bool:
+        if item.kind == "text":
+            return isinstance(value, str) and len(value) <= LONGEST_TEXT
+        if value is None:
+            return self._design.may_skip
+        if item.kind == "choice":
+            return value in ("first", "second")
+        return isinstance(value, int) and 1 <= value <= item.points
+
+    def _text(self, texts: Texts) -> str:
+        return texts.get(self._design.language) or texts.get("en", "")
+
+    def _store(self, *records: Record) -> None:
+        """Write records to disk, then go to the next place; the last record closes the session."""
+        self._journal.write(*records)
+        self.place = self._find_place()
+        if self.closed and not isinstance(records[-1], ParticipationClosed):
+            self._journal.write(ParticipationClosed(True, self._utc()))
+
+    def _find_place(self) -> Place:
+        """Return the place that follows from the records."""
+        done: set[object] = set()
+        for one in self._journal.records:
+            match one:
+                case ParticipationClosed():
+                    return Place("end")
+                case TrialEnded(interrupted=""):
+                    done.add((one.trial, one.side))
+                case ItemAnswered():
+                    done.add((one.trial, one.questionnaire))
+                case ConsentGiven():
+                    done.add(ConsentGiven)
+        if ConsentGiven not in done:
+            return Place("consent")
+        for trial, shown in self._trials.items():
+            for side, _ in enumerate(shown.split(PAIR)):
+                if (trial, side) not in done:
+                    return Place("ready", trial, side)
+            for key in self._design.questionnaires:
+                if (trial, key) not in done:
+                    return Place("questions", trial, questionnaire=key)
+        for key in self._design.after:
+            if (None, key) not in done:
+                return Place("questions", questionnaire=key)
+        return Place("end")
