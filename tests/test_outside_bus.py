@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from math import degrees
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
+from gazerig.robot.app import run_bus as run_buses
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.app.options import RunOptions
@@ -64,6 +66,23 @@ def test_a_rig_on_it_looks_at_people(example):
     assert "face" in kinds
     assert all(b - a > 0.05 for a, b in zip(low, high, strict=True)), (low, high)
     assert made.sent_bytes_digest()
+
+
+def test_a_joint_far_outside_moves_inside_slowly_on_request(example, monkeypatch):
+    monkeypatch.setattr(run_buses, "_CROOKED_DEG", {"eyes_pan": 100.0})
+    monkeypatch.setattr(run_buses, "STOP_BEYOND_DEG", 80.0)
+    options = RunOptions(mock=True, fast=True, seed=0, scene="visitor", recover=True)
+    made = assemble(load_rig(str(HEAD)), options)
+    made.robot.start(made.clock)
+    pan = made.robot.body.names.index("eyes_pan")
+    outside_s = 0.0
+    for k in range(1, 200):
+        made.clock.sleep_until(k * 0.025)
+        tick = made.robot.tick(made.clock.now_s(), 0.025)
+        outside_s += 0.025 * (degrees(tick.joints.position_rad[pan]) > 32.5)
+    made.robot.stop()
+    made.close()
+    assert 2.0 < outside_s < 4.0  # 68 deg at 30 deg/s
 
 
 def test_its_section_is_checked(example, tmp_path):

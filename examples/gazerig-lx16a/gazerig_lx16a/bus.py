@@ -194,8 +194,7 @@ class Lx16aBus(PortBus):
         """Make a servo hold where it is, or move into its limits slowly; confirmed."""
         goal = min(max(steps, setup.min_steps), setup.max_steps)
         for _ in range(TRIES):
-            speed = setup.entry_speed_steps_s or ENTRY_STEPS_S
-            self._line.send(_move(setup.id, goal, abs(goal - steps) / speed))
+            self._line.send(_move(setup.id, goal, abs(goal - steps) / _speed(setup, steps)))
             self._line.send(p.frame(setup.id, p.LOAD, b"\x01"))
             if self._line.ask(setup.id, p.LOADED):
                 return True
@@ -229,7 +228,7 @@ class Lx16aBus(PortBus):
             # One that is silent may have restarted, and would go there at its own speed.
             fresh = last is not None and last[1] == self._heard_s[i] > self._now_s - SILENT_S
             if last is not None and fresh and not self._check[i]:
-                out += _move(setup.id, inside, abs(inside - last[0]) / setup.max_speed_steps_s)
+                out += _move(setup.id, inside, abs(inside - last[0]) / _speed(setup, last[0]))
         try:
             self._line.send(out)
         except BusLost as lost:
@@ -255,6 +254,13 @@ class Lx16aBus(PortBus):
 
     def _cannot_release(self) -> str:
         return f"{self._port.port_name} is gone: torque could not be switched off: {CUT}"
+
+
+def _speed(setup: ServoConfig, steps: float) -> float:
+    """Return the speed of a servo: slow until it is within its limits."""
+    if setup.min_steps <= steps <= setup.max_steps:
+        return setup.max_speed_steps_s
+    return min(setup.entry_speed_steps_s or ENTRY_STEPS_S, setup.max_speed_steps_s)
 
 
 def _move(servo_id: int, steps: int, seconds: float) -> bytes:
