@@ -805,3 +805,11 @@ def test_a_client_of_another_version_is_told_so_once_and_may_stop(
         newer.stop("all the same")
     assert rig.status()["stopped"] == "all the same"
     rig.resume(confirmed=True)
+
+
+def test_answers_that_nobody_reads_count_as_waiting() -> None:
+    ahead = server_module.RequestsAhead()
+    for _ in range(server_module.MOST_AHEAD):
+        assert not ahead.is_full
+        ahead.add_answer({"refused": "not a line of JSON"})
+    assert ahead.is_full

@@ -102,17 +102,16 @@ class RequestsAhead:
     def __init__(self) -> None:
         self._changed = threading.Condition()
         self._waiting: deque[WaitingRequest] = deque()
-        self._requests, self._over = 0, False
+        self._over = False
 
     @property
     def is_full(self) -> bool:
-        """Return whether no further request can be added."""
-        return self._requests >= MOST_AHEAD
+        """Return whether too much waits; answers wait if the program does not read them."""
+        return len(self._waiting) >= MOST_AHEAD
 
     def add_request(self, request: object) -> None:
         """Add a request."""
         with self._changed:
-            self._requests += 1
             self._waiting.append(WaitingRequest(request))
             self._changed.notify()
 
@@ -131,7 +130,6 @@ class RequestsAhead:
                 match one.request:
                     case {"do": str(name), **rest} if name in names:
                         tag = {"tag": rest["tag"]} if "tag" in rest else {}
-                        self._requests -= 1
                         self._waiting.append(WaitingRequest(None, {"refused": reason, **tag}))
                     case _:
                         self._waiting.append(one)
@@ -148,9 +146,7 @@ class RequestsAhead:
             self._changed.wait_for(lambda: self._waiting or self._over)
             if not self._waiting:
                 return None
-            taken = self._waiting.popleft()
-            self._requests -= taken.answer is None
-            return taken
+            return self._waiting.popleft()
 
 
 _NAMING = threading.Lock()
@@ -292,7 +288,8 @@ class RemoteServer:
                     self._wires[wire] = self._wires.pop(wire)
             request = parse_line(line) if not late or b'"stop"' in line else None
         except MalformedMessage as error:
-            ahead.add_answer({"refused": str(error)})
+            if not excess.is_over:
+                ahead.add_answer({"refused": str(error)})
             return not error.over
         except (EOFError, OSError) as error:
             return isinstance(error, TimeoutError)
