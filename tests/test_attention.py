@@ -44,15 +44,6 @@ def test_motion_saturates_unless_it_comes_nearer_fast() -> None:
     assert saturate(0.0, 9.0, 0.0, 0.35, 1.0) == pytest.approx(2.0 + bounded)
 
 
-def test_far_motion_pulls_less_than_near_motion() -> None:
-    model = BottomUp(UNBOUNDED)
-    seen = percept(
-        0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)), body(2, "hand", (4, 0, 0), (0, 1, 0))
-    )
-    total = salience(model, seen.bodies, (0, 0, 0), 0.0).total
-    assert total[0] == pytest.approx(4.0 * total[1]) and total[0] == pytest.approx(2.0)
-
-
 def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_is_not() -> None:
     """Eq 1's third term, in what the eye sees: about the line of view, however far."""
     things = percept(0.0, *(body(n, "thing", (far, 0, 0)) for n, far in ((1, 1), (2, 4), (3, 1))))
@@ -238,22 +229,6 @@ def test_ones_own_hand_hides_and_the_body_around_the_eye_does_not() -> None:
     assert visible(view, around, looking()) == [False, True]
 
 
-def test_hiding_many_at_once_is_hiding_one_by_one() -> None:
-    rng = np.random.default_rng(3)
-    p, r = rng.uniform((0.3, -1, -1), (4, 1, 1), (300, 3)), rng.uniform(0.01, 0.15, 300)
-    crowd = replace(bodies(*(body(i, "x", tuple(row)) for i, row in enumerate(p))), radius_m=r)
-    seen = visible(FieldOfView(FieldOfViewParams(occlusion=True)), crowd, looking())
-
-    def covered(i: int, j: int) -> bool:
-        """March along the line of view and look whether it meets and leaves sphere j."""
-        way = p[i] * np.linspace(0.0, 1.0, 4000)[:, None]
-        inside = (((way - p[j]) ** 2).sum(axis=1)) < r[j] ** 2
-        return bool(inside.any() and not inside[-1] and not inside[0])
-
-    expected = [not any(covered(i, j) for j in range(300) if j != i) for i in range(0, 300, 15)]
-    assert seen[::15] == expected and 0 < sum(expected) < 20
-
-
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     model = BottomUp(
         BottomUpParams(form="literal", smoothing_s=0.0, translation_reference_rad_s=9.0)
@@ -354,46 +329,3 @@ def test_a_pause_of_the_camera_keeps_smoothed_motion() -> None:
         before = salience(model, bodies(moving), (0, 0, 0), k / 10).translation[0]
     still = salience(model, bodies(body(1, "x", (1, 0, 0))), (0, 0, 0), 10.4)
     assert still.translation[0] == pytest.approx(before * exp(-0.5 / 2.0))
-
-
-def test_states_of_former_bodies_are_dropped() -> None:
-    model = BottomUp(UNBOUNDED)
-    for k in range(500):
-        salience(model, bodies(body(k, "x", (1, 0, 0))), (0, 0, 0), k / 10)
-    assert len(model._states) < 25
-
-
-def test_states_are_kept_by_body() -> None:
-    """Bodies come, go, and change places in the list; each keeps its own low-pass."""
-    rng = np.random.default_rng(5)
-    model, tau = BottomUp(replace(UNBOUNDED, smoothing_s=0.2)), 0.2
-    known: dict[int, tuple[float, float, float]] = {}  # id -> smoothed translation, entered, seen
-    for k in range(200):
-        t = k * 0.03
-        ids = rng.permutation(40)[: rng.integers(0, 40)].tolist()
-        speeds = rng.uniform(0, 2, len(ids)).tolist()
-        rows = [body(i, "x", (1, 0, 0), (0, v, 0)) for i, v in zip(ids, speeds, strict=True)]
-        saliences = salience(model, bodies(*rows), (0, 0, 0), t)
-        for row, (i, v) in enumerate(zip(ids, speeds, strict=True)):
-            past, entered, seen = known.get(i, (0.0, 0.0, -9.0))
-            if t - seen > 0.3:
-                past, entered = 0.0, t if t > 0.3 else float("-inf")
-            keep = exp(-0.03 / tau) if k else 1.0
-            known[i] = (keep * past + (1 - keep) * v / 0.5, entered, t)
-            assert saliences.translation[row] == pytest.approx(known[i][0], abs=1e-12)
-            assert saliences.onset[row] == pytest.approx(exp((entered - t) / 0.5))
-
-
-def test_many_bodies_at_once_are_as_one_by_one() -> None:
-    rng = np.random.default_rng(6)
-    n = 2_000
-    p, v, w = rng.normal(size=(3, n, 3))
-    ids = tuple(range(n))
-    crowd = Bodies(ids, ("x",) * n, p, v, w, np.full(n, 0.1))
-    state = looking(20.0)
-    view, model = FieldOfView(FieldOfViewParams()), BottomUp(UNBOUNDED)
-    seen, total = visible(view, crowd, state), salience(model, crowd, (0, 0, 0), 0.0).total
-    for i in range(0, n, 97):
-        alone = Bodies((1,), ("x",), p[i : i + 1], v[i : i + 1], w[i : i + 1], np.full(1, 0.1))
-        one = salience(BottomUp(UNBOUNDED), alone, (0, 0, 0), 0.0).total[0]
-        assert visible(view, alone, state)[0] == seen[i] and one == pytest.approx(total[i])

@@ -45,7 +45,6 @@ def scored(
 
 
 WAVE = Event("wave", "look", "hand", 2.0, 3.0, HAND, 0.3)
-RETURN = Event("return", "return", "face", 5.0, 6.3, FACE, 0.6)
 
 
 def test_latency_is_from_the_start_of_the_event_to_the_first_look() -> None:
@@ -53,52 +52,6 @@ def test_latency_is_from_the_start_of_the_event_to_the_first_look() -> None:
     assert found["wave"]["seen"] == found["wave"]["of"] == 1
     assert found["wave"]["latency_s"] == pytest.approx(0.3, abs=0.006)
     assert found["wave"]["share"] == pytest.approx(0.5, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("kind", "place", "look_s"),
-    [("hand", HAND, 3.01), ("face", HAND, 2.3), ("hand", FACE, 2.3)],
-    ids=["too late", "another kind", "another hand elsewhere"],
-)
-def test_what_is_no_answer_is_not_counted_as_seen(kind: str, place: Vec3, look_s: float) -> None:
-    found = scored((WAVE,), lambda t: (kind, place) if t >= look_s else ("idle", FACE))
-    assert found["wave"] == {"seen": 0, "of": 1, "latency_s": None, "share": 0.0}
-
-
-def test_an_event_counts_when_it_is_over() -> None:
-    def looks(_: float) -> tuple[str, Vec3]:
-        return "hand", HAND
-
-    assert scored((WAVE,), looks, seconds=2.9)["wave"]["of"] == 0
-    assert scored((WAVE,), looks, seconds=3.1)["wave"]["of"] == 1
-
-
-def test_rounds_follow_each_other() -> None:
-    everything = Event("face", "look", "face", 0.0, 10.0, FACE, 0.6)
-    found = scored((WAVE, everything), lambda t: ("hand", HAND) if t > 11 else ("face", FACE), 35.0)
-    assert (found["wave"]["seen"], found["wave"]["of"]) == (3, 4)
-    assert (found["face"]["seen"], found["face"]["of"]) == (2, 3)
-
-
-def test_the_median_is_that_of_the_events_seen() -> None:
-    def looks(t: float) -> tuple[str, Vec3]:
-        number, phase_s = divmod(t, 10.0)
-        delay_s = (0.1, 0.5, 0.2, 9.0)[int(number)]
-        return ("hand", HAND) if phase_s > 2.0 + delay_s else ("face", FACE)
-
-    found = scored((WAVE,), looks, 39.9)["wave"]
-    assert (found["seen"], found["of"]) == (3, 4)
-    assert found["latency_s"] == pytest.approx(0.2, abs=0.006)
-
-
-def test_return_measures_the_time_away() -> None:
-    found = scored((RETURN,), lambda t: ("hand", HAND) if 5.2 <= t < 5.9 else ("face", FACE))
-    assert found["return"]["seen"] == 1
-    assert found["return"]["latency_s"] == pytest.approx(0.7, abs=0.011)
-    lost = scored((RETURN,), lambda t: ("hand", HAND) if t >= 5.2 else ("face", FACE))
-    assert lost["return"]["seen"] == 0
-    undisturbed = scored((RETURN,), lambda _: ("face", FACE))["return"]
-    assert undisturbed == {"seen": 1, "of": 1, "latency_s": None, "share": 1.0}
 
 
 class Lived:

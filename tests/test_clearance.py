@@ -15,7 +15,6 @@ from gazerig.robot.app.rig_description import collision_hints, shape_of
 from gazerig.robot.description.build import describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.model.guard_params import CollisionParams
 
 Ranges = Mapping[str, tuple[float, float]]
 _LITTLE: Ranges = {"neck_pitch": (-10.0, 10.0), "neck_roll": (-5.0, 5.0)}
@@ -64,30 +63,6 @@ def test_a_part_that_runs_into_the_shoulders_is_found_where_mujoco_finds_it(
     within = (float(int(angle)), high) if angle < 0.0 else (low, float(int(angle)))
     left = collisions(shape_of(_rig({joint: within})))
     assert all(len(one.angles_deg) == 2 for one in left)
-
-
-def test_two_joints_that_only_meet_together_are_found_unless_the_guard_forbids_them() -> None:
-    rig = _rig({"neck_pitch": (-13.0, 20.0), "lower_neck_pitch": (-13.0, 10.0)})
-    (hint,) = collision_hints(rig)
-    assert "neck_pitch" in hint and "lower_neck_pitch" in hint and "guard.collisions" in hint
-    pair = CollisionParams("neck_pitch", -20.0, -1.0, "lower_neck_pitch", -20.0, -1.0)
-    guarded = replace(rig, guard=replace(rig.guard, collisions=(pair,)))
-    assert collision_hints(guarded) == []
-
-
-@pytest.mark.parametrize("upper", [(-24.0, 40.0), (-40.0, 40.0)])
-def test_lids_that_pass_through_each_other_are_found(upper: tuple[float, float]) -> None:
-    rig = shipped("maker")
-    joints = dict(rig.joints)
-    lid = shipped("desk").joints["left_upper_lid"]
-    joints["left_upper_lid"] = replace(lid, min_deg=upper[0], max_deg=upper[1])
-    found = collisions(shape_of(replace(rig, joints=joints)))
-    if upper[0] > -26.0:
-        assert found == ()
-        return
-    (one,) = found
-    assert one.parts == ("left_upper_lid", "left_lower_lid")
-    assert "joints.left_upper_lid.min_deg nearer to -20" in one.text()
 
 
 def test_check_and_describe_say_it_and_go_on(tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.model.frames import NewestPose, PoseHistory
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
@@ -93,12 +92,6 @@ def step() -> Seen:
 
 
 @pytest.fixture(scope="module")
-def step_by_newest() -> Seen:
-    """Return the same, pictures placed by the newest pose."""
-    return watched("steps-aside", ARRIVED_S + 1.0, "newest")
-
-
-@pytest.fixture(scope="module")
 def walk() -> Seen:
     """Return a person who walks past."""
     return watched("walks-past", 3.2)
@@ -148,15 +141,6 @@ def test_the_gaze_rests_on_the_true_face_part_after_a_second(step: Seen) -> None
 
 
 @pytest.mark.slow
-def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: Seen) -> None:
-    # By how much depends on the parts of the face that the gaze is on while the head turns.
-    assert overshoot_deg(step_by_newest) > max(0.0, overshoot_deg(step) + 0.8)
-    settled = ARRIVED_S + 0.25 + CORRECTED_S
-    off = [np.median(seen.off_deg[seen.t_s > settled][:100]) for seen in (step, step_by_newest)]
-    assert off[1] > 1.5 * off[0]
-
-
-@pytest.mark.slow
 def test_somebody_who_walks_past_is_followed(walk: Seen) -> None:
     walks = walk.t_s > 1.0 + 0.25
     assert walk.on_face[walks].all()
@@ -164,15 +148,3 @@ def test_somebody_who_walks_past_is_followed(walk: Seen) -> None:
     assert np.percentile(walk.off_deg[caught_up], 95) < 2.0
     travel = walk.gaze_deg[-1] - walk.gaze_deg[walks][0]
     assert travel > 50.0
-
-
-def test_the_newest_pose_is_given_whatever_the_time() -> None:
-    kinematics, _ = kinematics_and_oculomotor(RIG, 0)
-    now, then = NewestPose(kinematics), PoseHistory(kinematics)
-    for poses in (now, then):
-        poses.remember(0.0, (0.0, 0.0, 0.0))
-        poses.remember(0.1, (0.4, 0.0, 0.0))
-    assert now.head_pose(0.0) == now.head_pose(0.05) == then.head_pose(0.1)
-    assert then.head_pose(0.0) != then.head_pose(0.1)
-    with pytest.raises(LookupError):
-        NewestPose(kinematics).head_pose(0.0)

@@ -69,11 +69,6 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(work, "__module__", "test_config_apart")
 
 
-def test_it_is_another_process_that_ctrl_c_does_not_reach(importable: None) -> None:
-    pid, session = in_subprocess(here)
-    assert pid != os.getpid() and session == pid
-
-
 def test_a_process_that_fails_is_an_error_in_one_line(
     importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,9 +79,3 @@ def test_a_process_that_fails_is_an_error_in_one_line(
     monkeypatch.setattr("gazerig.config.subprocess_call._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):
         in_subprocess(sleeps)
-
-
-def test_a_process_that_cannot_be_started_is_an_error_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "executable", "/nonexistent/python")
-    with pytest.raises(ConfigError, match="cannot be started: No such file"):
-        in_subprocess(here)

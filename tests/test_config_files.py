@@ -1,7 +1,6 @@
 """YAML files as they come: unreadable, shipped by name, or any text at all."""
 
 import os
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -90,19 +89,6 @@ def test_a_file_that_cannot_be_used(tmp_path: Path, text: str | bytes, fault: st
         read_yaml(tmp_path / "rig.yaml")
 
 
-def test_a_file_that_asks_for_yaml_1_1_gets_its_words(tmp_path: Path) -> None:
-    file = write(tmp_path, f"%YAML 1.1\n---\n{GOOD}  face: off\nspare: {{face: yes}}\n")
-    rig = load(file, Rig)
-    assert (rig.camera.face, rig.spare) == (False, Camera(face=True))
-
-
-def test_an_anchor_may_be_set_again(tmp_path: Path) -> None:
-    file = write(tmp_path, "a: &x 1\nb: &x 2\nc: *x\n")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert read_yaml(file).data == {"a": 1, "b": 2, "c": 2}
-
-
 def test_two_documents_in_one_file_are_refused(tmp_path: Path) -> None:
     (fault,) = faults_of(tmp_path, GOOD + "---\nname: b\n")
     assert fault.startswith("rig.yaml:10:1: not valid YAML: expected a single document")
@@ -115,16 +101,6 @@ def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path) -> None:
     assert str(caught.value) == (
         f"{tmp_path / 'nodd.yaml'}: no such file; did you mean 'nod.yaml'? check the name"
     )
-
-
-def test_a_directory_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="is a directory; name a file in it"):
-        read_yaml(tmp_path)
-
-
-def test_a_file_below_a_file_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="cannot be read"):
-        read_yaml(write(tmp_path, GOOD) / "rig.yaml")
 
 
 def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,28 +225,6 @@ def test_right_values_come_through_unchanged(tmp_path: Path, data: dict[str, Any
     for key in ("gains", "matrix", "dwell", "baud"):
         if key in data:
             assert as_lists(getattr(rig, key)) == data[key]
-
-
-_junk = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | _words,
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.dictionaries(st.sampled_from(list(Rig.__slots__)) | _words, inner, max_size=4)
-    ),
-    max_leaves=12,
-)
-
-
-@settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(data=_junk)
-def test_other_values_are_refused_or_taken_but_never_crash(tmp_path: Path, data: Any) -> None:
-    file = write(tmp_path, as_yaml(data))
-    try:
-        assert isinstance(load(file, Rig, checks=[one_id_each]), Rig)
-    except ConfigError as error:
-        assert len(str(error).splitlines()) == len(error.faults) > 0
 
 
 _pieces = st.sampled_from(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from fakes.small_config import Camera, Joint, Rig, one_id_each, write
 
-from gazerig.config.load import ConfigError, ConfigFault, load
+from gazerig.config.load import ConfigError, load
 
 
 def has_neck(rig: Rig) -> Iterator[tuple[str, str]]:
@@ -199,30 +199,9 @@ def test_all_faults_together_in_one_message(tmp_path: Path) -> None:
     assert sorted(faults_of(tmp_path, ALL_WRONG)) == sorted(ALL_FAULTS.splitlines())
 
 
-def test_a_second_reading_of_the_same_file_tells_the_same_faults(tmp_path: Path) -> None:
-    first = faults_of(tmp_path, ALL_WRONG)
-    assert any("duplicate key" in fault for fault in first)
-    assert faults_of(tmp_path, ALL_WRONG) == first
-
-
 def test_faults_come_in_the_order_of_their_lines(tmp_path: Path) -> None:
     lines = [int(fault.split(":")[1]) for fault in faults_of(tmp_path, ALL_WRONG)]
     assert lines == sorted(lines)
-
-
-def test_a_fault_is_also_there_in_parts(tmp_path: Path) -> None:
-    file = write(tmp_path, GOOD.replace("500", "9000.0"))
-    with pytest.raises(ConfigError) as caught:
-        load(file, Rig)
-    assert caught.value.faults == (
-        ConfigFault(
-            str(file),
-            7,
-            "joints.pan.max_speed_deg_s",
-            "9000.0",
-            "9000.0 is above 2000 (unit deg/s)",
-        ),
-    )
 
 
 def is_nod(rig: Rig) -> Iterator[tuple[str, str]]:
@@ -309,19 +288,3 @@ def test_what_is_missing_is_missed_in_the_lowest_mapping(tmp_path: Path) -> None
     (fault,) = caught.value.faults
     # A layer of differences need not be whole; the file it is laid over must be.
     assert (Path(fault.file).name, fault.line, fault.key) == ("base.yaml", 3, "joints.pan.id")
-
-
-def test_unreadable_layers_are_all_named(tmp_path: Path) -> None:
-    broken = write(tmp_path, "a: [1\n", "broken.yaml")
-    with pytest.raises(ConfigError) as caught:
-        load(tmp_path / "absent.yaml", Rig, defaults=[broken, tmp_path])
-    assert [Path(f.file) for f in caught.value.faults] == [
-        broken,
-        tmp_path,
-        tmp_path / "absent.yaml",
-    ]
-
-
-def test_an_alias_stands_where_it_is_used(tmp_path: Path) -> None:
-    text = "name: x\njoints:\n  neck: &j {id: 1}\n  pan: *j\n"
-    assert faults_of(tmp_path, text) == ["rig.yaml:3: joints.pan.id: id 1 is also that of neck"]

@@ -1,11 +1,10 @@
 """Conversation: the state that a voice agent reports, its end, and what the gaze makes of it."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import inf, nan, radians
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +12,9 @@ from commanded_robot import Running, running_desk
 
 import gazerig
 from gazerig.config.schema import load_rig
-from gazerig.errors import Refused
 from gazerig.gaze.angles import angle_between
 from gazerig.gaze.attention.aversion import Aversion, AversionParams
-from gazerig.gaze.attention.turn_gaze import NOD, TurnGaze, TurnParams
-from gazerig.gaze.attention.turn_state import TurnState
+from gazerig.gaze.attention.turn_gaze import NOD
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
@@ -28,9 +25,8 @@ from gazerig.robot.control.head_state import as_json as state_as_json
 from gazerig.robot.control.head_state import from_json as state_from_json
 from gazerig.robot.control.head_state import head_state
 from gazerig.robot.dashboard.door.programs import ProgramSocket
-from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.command_json import from_json
 from gazerig.robot.model.commands import LookAt, Renew, Talk
-from gazerig.robot.model.conversation import NO_CONVERSATION
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
@@ -42,19 +38,6 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 def rig() -> Iterator[Running]:
     with running_desk() as running:
         yield running
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        Talk("listening", 3),
-        Talk("speaking", 1, 2.5, "Good morning.", (("Good", 0.0), ("morning", 0.4)), "/a.wav", "b"),
-        Talk("interrupt", stay=True),
-    ],
-    ids=str,
-)
-def test_reports_cross_processes_as_json(command: Talk) -> None:
-    assert from_json(json.loads(json.dumps(as_json(command)))) == command
 
 
 @pytest.mark.parametrize(
@@ -110,19 +93,6 @@ def test_states_follow_each_other_and_are_in_tick_and_state(rig: Running) -> Non
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (Talk("interrupt"), "nothing to interrupt: the state is idle"),
-        (Talk("listening", 99), "person 99 is not visible; visible: "),
-    ],
-)
-def test_a_refused_report_changes_nothing(rig: Running, given: Talk, words: str) -> None:
-    reply, ticks = rig.do(given, 0.5)
-    assert words in reply.refused and ticks[-1].conversation == NO_CONVERSATION
-    assert ticks[-1].target.kind == "face"
-
-
-@pytest.mark.parametrize(
     ("given", "lasts_s", "reason"),
     [
         (Talk("speaking", seconds=9.0, who="a"), 1.0, "not renewed"),  # the program has died
@@ -163,31 +133,6 @@ def test_the_newer_of_two_agents_has_the_conversation(rig: Running) -> None:
     rig.go(0.9)
     rig.do(Renew("b"))
     assert rig.go(0.5)[-1].conversation.who == "b"
-
-
-def test_two_commands_of_a_terminal_are_one_agent(rig: Running) -> None:
-    rig.do(Talk("speaking", text="x" * 90, who="ctl (process 1)", stay=True))
-    first = rig.ticks[-1].conversation
-    ticks = rig.do(Talk("speaking", seconds=3.0, who="ctl (process 2)", stay=True))[1]
-    assert ticks[-1].conversation.number == first.number and not ticks[0].events
-    assert rig.do(Talk("idle", who="b", stay=True))[1][0].events
-
-
-def test_the_python_orders_report_states() -> None:
-    with gazerig.open("desk", fast=True, scene="face-to-face") as head:
-        head.step(0.5)
-        orders: list[tuple[Callable[[], Any], str]] = [
-            (lambda: head.listening(1), "listening"),
-            (head.thinking, "thinking"),
-            (lambda: head.speaking(text="Good morning.", words=[("Good", 0.1)]), "speaking"),
-            (head.interrupt, "interrupted"),
-            (head.idle, "idle"),
-        ]
-        for order, state in orders:
-            assert order().wait() == "arrived"
-            assert head.state.conversation.state == state
-        with pytest.raises(Refused, match="above 0 and at most 600"):
-            head.speaking(seconds=nan)
 
 
 def test_reports_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
@@ -312,40 +257,11 @@ def test_looks_are_shared_by_who_speaks_and_who_is_addressed() -> None:
     made.close()
 
 
-def test_nods_are_off_and_each_head_has_its_own_rate() -> None:
-    def times(nods: float, seed: int) -> list[float]:
-        rng = np.random.default_rng(seed)
-        params, unused = TurnParams(nods_per_min=nods), Aversion(AversionParams(), rng)
-        ignored: Any = SimpleNamespace(converse=lambda *of: None)
-        turns = TurnGaze(params, unused, ignored, rng)
-        turns.enter("listening", 1, None, 0.0, 0.0)
-        return [0.1 * n for n in range(6000) if turns.step(0.1 * n) == NOD]
-
-    assert times(0.0, 1) == []
-    counts = [len(times(8.0, seed)) for seed in range(6)]
-    assert times(8.0, 1) == times(8.0, 1) and len(set(counts)) > 3
-    assert 20 < sum(counts) / 6 < 200  # in ten minutes
-
-
 def test_a_listener_nods_on_the_robot() -> None:
     with gazerig.open("desk", fast=True, scene="face-to-face") as head:
         head.set({"gaze.conversation.nods_per_min": 30.0})
         head.listening()
         assert head.run_until(lambda state: any(one.name == NOD for one in state.tracks), 20.0)
-
-
-def test_published_laws_stay_a_choice() -> None:
-    rng = np.random.default_rng(1)
-    aversion = Aversion(AversionParams(), rng)
-    ignored: Any = SimpleNamespace(converse=lambda *of: None)
-    turns = TurnGaze(TurnParams(role_law="eyes_alive"), aversion, ignored, rng)
-    for state, mode in (("listening", "listen"), ("thinking", "think"), ("speaking", "talk")):
-        turns.enter(cast(TurnState, state), None, None, 0.0, 0.0)
-        assert aversion.mode == mode
-    turns.choose_mode("think", 0.0)
-    assert aversion.mode == "talk" and turns.chosen_mode == "think"
-    turns.enter("idle", None, None, 0.0, 0.0)
-    assert aversion.mode == "think"
 
 
 def test_a_websocket_renews_what_its_program_controls() -> None:

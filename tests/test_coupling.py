@@ -13,22 +13,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.load import shipped_path
-from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import servo_configs
-from gazerig.robot.app.camera_factory import true_head_pose
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.control.coupled_servos import CoupledServos
-from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import (
     Coupling,
     Differential,
-    MeasuredGrid,
     PushRods,
     Unreachable,
     joint_rates,
@@ -92,33 +87,8 @@ def test_rates_are_the_slopes_of_the_angles(kind: str) -> None:
         assert joint_rates(rates, (rates[0][0], rates[1][0])) == pytest.approx((1.0, 0.0))
 
 
-def test_a_measured_point_is_found_in_the_triangle_that_holds_it_or_is_nearest() -> None:
-    table = KINDS["measured"].make_coupling()
-    assert isinstance(table, MeasuredGrid)
-    beyond = 0
-    for servos in np.random.default_rng(0).uniform(-1.2, 1.2, (300, 2)).tolist():
-        at = servos[0], servos[1]
-        weights = [triangle.least_weight(at) for triangle in table._triangles]
-        best = table._triangles[weights.index(max(weights))]
-        assert table.joint_rad(at) == best.joints(at)
-        beyond += max(weights) < 0.0
-    assert 50 < beyond < 250
-
-
-def test_push_rods_keep_their_length() -> None:
-    for at in ((0.0, 0.0), (0.5, 0.3), (-0.4, -0.4)):
-        for side, servo in zip((1.0, -1.0), RODS.servo_rad(at), strict=True):
-            error, _, _ = RODS._rod_error(at, side, RODS._tip(servo, side))
-            assert abs(error) < 1e-15 and abs(servo) < radians(60)
-
-
 def test_a_differential_is_the_mean_and_half_the_difference() -> None:
     assert Differential().joint_rad((0.5, 0.1)) == pytest.approx((0.3, 0.2))
-
-
-def test_impossible_servo_angles_give_finite_joint_angles() -> None:
-    for servos in ((3.0, -3.0), (-1.5, -1.5), (50.0, 0.0)):
-        assert all(abs(angle) <= 1.6 for angle in RODS.joint_rad(servos))
 
 
 @EACH
@@ -240,22 +210,6 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
     made.close()
 
 
-def test_the_emulated_camera_sits_where_coupled_servos_hold_the_head() -> None:
-    rig = rig_with(PARALLEL)
-    clock = SimulatedClock()
-    wires = run_bus(rig, RunOptions(mock=True, fast=True), clock)
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    R, _ = true_head_pose(wires.true_steps, rig, made.poses)(0.0)
-    # As the emulated neck starts: 12 deg to the right, 8 deg down.
-    assert degrees(np.arcsin(R[2][0])) == pytest.approx(-8.0, abs=0.2)
-    assert degrees(np.arctan2(R[1][0], R[0][0])) == pytest.approx(-12.0, abs=0.2)
-    plain = replace(rig, couplings={})
-    other, _ = true_head_pose(wires.true_steps, plain, made.poses)(0.0)
-    assert abs(degrees(np.arcsin(other[2][0])) + 8.0) > 1.0
-    wires.close()
-    made.close()
-
-
 def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
     rig = rig_with(KINDS["differential"])
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
@@ -279,12 +233,6 @@ def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
     assert {"neck_pitch", "neck_roll"} <= held
     assert inf > min(tick.joints.measured_s) > -inf
     made.close()
-
-
-def test_a_measured_table_may_be_of_any_two_joints() -> None:
-    table = MeasuredGrid([(f, s, 2 * f + s, f - s) for f in (-1.0, 0.0, 2.0) for s in (-1.0, 1.0)])
-    assert table.joint_rad(table.servo_rad((1.7, -0.3))) == pytest.approx((1.7, -0.3))
-    assert table.joint_rad(table.servo_rad((2.5, 1.4))) == pytest.approx((2.5, 1.4))
 
 
 def coupled_file(tmp_path: Path) -> str:
@@ -311,23 +259,6 @@ def test_bring_up_of_a_coupled_neck(tmp_path: Path) -> None:
     once = invoked("monitor", rig, "--mock", "--once")
     row = next(line.split() for line in once.out.splitlines() if line.startswith("neck_pitch"))
     assert float(row[3]) == pytest.approx(-8.0, abs=0.2)
-
-
-def test_coupled_joints_keep_their_gears_until_the_next_start() -> None:
-    """Limits of coupled joints change at once, what turns steps into angles does not."""
-    rig = rig_with(PARALLEL)
-    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    made.robot.start(made.clock)
-    changes = {"joints.neck_pitch.zero_step": 2100, "joints.neck_roll.max_deg": 20.0}
-    made.robot.command(made.live_params.prepare(rig, apply_changes(rig, changes)))
-    made.clock.sleep_until(made.clock.now_s() + 0.005)
-    before = made.robot.body.angles((2048,) * 9)
-    tick = made.robot.tick(made.clock.now_s(), 0.005)
-    assert any("tuned: joints.neck_roll.max_deg = 20.0" in event for event in tick.events)
-    assert made.robot.body.angles((2048,) * 9) == before
-    limits = made.live_params.parts.guard.limits
-    assert degrees(limits[rig.names.index("neck_roll")].high_rad) == pytest.approx(20.0)
-    made.close()
 
 
 def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints() -> None:

@@ -22,14 +22,11 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
 from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.description import head_mesh
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
 from gazerig.robot.description.gltf import gltf
-from gazerig.robot.description.head_shape import JAW_HALF
 from gazerig.robot.description.links import Description, Inertia
-from gazerig.robot.description.mass import SHELL_M, join_inertias, sheet, skull
-from gazerig.robot.description.mesh import merge_meshes
+from gazerig.robot.description.mass import join_inertias
 from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.description.urdf import urdf
 from gazerig.robot.description.weights import carried_links
@@ -63,24 +60,6 @@ def test_all_files_are_read_by_others(written: Path) -> None:
     assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 5e6
 
 
-def test_lids_are_open_at_first_and_pupils_free(written: Path) -> None:
-    """Joints keep their angles: it is where MuJoCo and glTF begin that differs from 0."""
-    model = mujoco.MjModel.from_xml_path(str(written / "expressive.xml"))
-    began = {model.joint(i).name: float(np.degrees(model.qpos0[i])) for i in range(model.njnt)}
-    lids = {name: began.pop(name) for name in ("left_upper_lid", "right_upper_lid")}
-    assert lids == pytest.approx(dict.fromkeys(lids, 16.875))  # 24 deg above the middle
-    assert set(began.values()) == {0.0}
-    description = description_of(shipped("expressive"), looks=False)
-    scene = trimesh.load_scene(written / "expressive.glb")
-    upright, _ = scene.graph.get("base_link")
-    poses = description.poses({joint.name: joint.awake_rad for joint in description.joints})
-    for link in ("left_upper_lid_link", "right_upper_lid_link", "head", "left_eye"):
-        matrix, _ = scene.graph.get(link)
-        R, p = poses[link]
-        assert np.allclose((np.linalg.inv(upright) @ matrix)[:3, :3], R, atol=1e-6)
-        assert np.allclose((np.linalg.inv(upright) @ matrix)[:3, 3], p, atol=1e-6)
-
-
 def _links(rig: str) -> tuple[Any, ...]:
     return description_of(shipped(rig)).links
 
@@ -98,13 +77,6 @@ def test_joints_of_a_urdf_have_limits_and_followers() -> None:
     assert robot.actuated_joint_names == ["eyes_pan", "eyes_tilt"]
 
 
-def test_only_what_was_asked_for_is_written(tmp_path: Path) -> None:
-    assert invoked("describe", "minimal", str(tmp_path / "a"), "--glb").code == 0
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["minimal.glb"]
-    assert invoked("describe", "minimal", str(tmp_path / "b"), "--urdf").code == 0
-    assert sorted(path.name for path in (tmp_path / "b").iterdir()) == ["meshes", "minimal.urdf"]
-
-
 def test_files_that_are_there_are_kept_unless_forced(tmp_path: Path) -> None:
     mine = tmp_path / "minimal.glb"
     mine.write_text("mine")
@@ -113,21 +85,6 @@ def test_files_that_are_there_are_kept_unless_forced(tmp_path: Path) -> None:
     assert mine.read_text() == "mine"
     assert invoked("describe", "minimal", str(tmp_path), "--glb", "--force").code == 0
     assert mine.read_bytes()[:4] == b"glTF"
-
-
-def test_a_file_is_no_folder_to_write_to(tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("mine")
-    done = invoked("describe", "minimal", str(tmp_path / "out"))
-    assert done.code == 2 and "out is a file: name a folder" in done.err
-
-
-def test_a_faulty_rig_is_told_as_check_tells_it(tmp_path: Path) -> None:
-    path = tmp_path / "my.yaml"
-    path.write_text("name: my\nprofile: robot\njoints: {}\n")
-    done = invoked("describe", str(path), str(tmp_path / "out"))
-    assert done.code == 2
-    assert done.err == invoked("check", str(path)).err
-    assert not (tmp_path / "out").exists()
 
 
 def _tree(data: bytes) -> dict[str, Any]:
@@ -327,27 +284,6 @@ def test_a_head_weighs_what_its_file_says() -> None:
     balanced = whole_head(replace(desk, mass=MassParams(head=given, counterweights=weight)))
     assert balanced.mass_kg == pytest.approx(1.2)
     assert np.allclose(balanced.com_m, (0.010, 0.0015, 0.030), atol=1e-9)
-
-
-def test_a_skull_weighs_as_its_mesh_does() -> None:
-    skin = head_mesh.skin()
-    mesh = merge_meshes([skin.head, skin.jaw]).mesh
-    # The walls next to the jaw are not part of the shell.
-    walls = np.isclose(np.abs(mesh.vertices[:, 1]), JAW_HALF)[mesh.faces].all(axis=1)
-    mesh = mesh._replace(faces=mesh.faces[~walls])
-    for unit in (0.03, 0.0619, 0.15):
-        found, expected = skull(unit), sheet(mesh.vertices * unit, mesh.faces, SHELL_M)
-        assert found.mass_kg == pytest.approx(expected.mass_kg, rel=1e-3)
-        assert np.allclose(found.com_m, expected.com_m, atol=1e-3 * unit)
-        size = np.abs(expected.tensor_kg_m2).max()
-        assert np.allclose(found.tensor_kg_m2, expected.tensor_kg_m2, atol=1e-3 * size)
-
-
-def test_a_description_without_looks_is_the_same_mechanism() -> None:
-    for name in ("desk", "expressive"):
-        assert description_of(shipped(name), looks=False) == (
-            description_of(shipped(name)).without_looks()
-        )
 
 
 def test_the_camera_sees_what_the_lens_covers() -> None:

@@ -3,13 +3,11 @@
 from collections.abc import Iterator
 
 import pytest
-from ticked_rig import Outbox, TickedRig, connected, gazerig
+from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.robot.cli import animation
-from gazerig.robot.dashboard.panels.controls import ExpressionPanel
-from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.model.commands import Express, SetLevel
+from gazerig.robot.model.commands import SetLevel
 
 
 @pytest.fixture
@@ -35,21 +33,3 @@ def test_a_level_from_the_command_line_is_kept_up_and_let_go(
     assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
     assert "'loud' is not a level: give a number 0..1" in gazerig("ctl", "level", "mouth", "loud")
     assert "no level 'ear'; available: mouth" in gazerig("ctl", "level", "ear", "1")
-
-
-def test_levels_come_from_standard_input(rig: TickedRig) -> None:
-    assert gazerig("ctl", "level", "mouth", "-", typed="0.2\n\n1\n") == ""
-    assert rig.commands == [SetLevel("mouth", v) for v in (0.2, 1.0, 0.0)]
-
-
-def test_buttons_and_strength_on_the_page() -> None:
-    outbox = Outbox()
-    panel = ExpressionPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
-    panel.offer(["sad", "neutral", "happy"])
-    panel.offer(["happy", "neutral", "sad"])
-    expressions, strength = panel.expressions, panel.strength
-    assert expressions is not None and strength is not None
-    assert expressions.options == ("neutral", "happy", "sad")
-    strength.receive_input(0.4, "5")
-    expressions.receive_input("sad", "5")
-    assert outbox.asked == [(Express("sad", 0.4), "5")]

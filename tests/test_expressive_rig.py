@@ -1,6 +1,5 @@
 """The shipped rig with a jaw and brows goes through every part of the program."""
 
-import json
 from math import degrees
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from expressive_rig import started
 from fakes.runs import record, ticks
 
 from gazerig.config.load import shipped_path
-from gazerig.config.parameters import apply_changes, parameters
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
@@ -62,41 +61,6 @@ def test_a_recorded_face_is_rerun_with_the_same_angles(
     assert len([c for t in ticks for c in t.commands]) == 30
 
 
-@pytest.mark.usefixtures("few_drawings")
-def test_it_is_exported_and_reported(
-    recorded: tuple[RunRecording, list[Tick]], tmp_path: Path
-) -> None:
-    path = str(recorded[0].path)
-    assert invoked("export", path, "--out", str(tmp_path / "gaze")).code == 0
-    about = json.loads((tmp_path / "gaze_samples.json").read_text())
-    assert about["joints"] == list(NAMES)
-    assert invoked("report", path, "--out", str(tmp_path / "report.html")).code in (0, 1)
-    assert (tmp_path / "report.html").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        (("check", "expressive"), 0, "valid: rig 'expressive', 9 joints"),
-        (("scan", "expressive", "--mock", "--kind", "feetech"), 0, "9 servos on"),
-        (("setup", "expressive", "--mock", "--joint", "jaw", "--yes"), 0, "jaw (servo 7): id 1 -> 7"),
-        (("monitor", "expressive", "--mock", "--seconds", "0.3"), 0, "right_brow"),
-        (("jog", "expressive", "jaw", "40", "--mock"), 2, "jaw"),
-    ],
-)  # fmt: skip
-def test_bring_up_knows_all_joints(words: tuple[str, ...], code: int, said: str) -> None:
-    pytest.importorskip("gazerig.features.bringup")
-    done = invoked(*words)
-    assert done.code == code, done
-    assert said in done.out + done.err
-
-
-def test_doctor_names_the_jaw_and_mends_its_limits() -> None:
-    pytest.importorskip("gazerig.features.bringup")
-    done = invoked("doctor", "expressive", "--mock")
-    assert "jaw, left_brow, right_brow (servos" in done.out + done.err
-
-
 def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = tmp_path / "face.yaml"
@@ -108,15 +72,6 @@ def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     )  # fmt: skip
     assert "did jaw just go to its POSITIVE end?" in done.out + done.err
     assert "joints.jaw.zero_step" in done.out + done.err, done
-
-
-def test_every_joint_has_a_key_a_table_and_a_chart() -> None:
-    rig = load_rig("expressive")
-    keys = {one.key for one in parameters(rig, rig)}
-    assert {"joints.jaw.max_deg", "expressions.sad.neck_pitch", "levels.mouth.high_deg"} <= keys
-    tuned = apply_changes(rig, {"expressions.happy.jaw": 5.0, "levels.mouth.smoothing_ms": 120.0})
-    assert tuned.expressions["happy"]["jaw"] == 5.0
-    assert tuned.levels["mouth"].smoothing_ms == 120.0
 
 
 def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
@@ -159,30 +114,3 @@ def test_the_jaw_moves_on_while_a_stale_frame_holds_the_neck() -> None:
     held = [reason for reason in tick.guard_result.reasons if "stale frame" in reason]
     assert {reason.partition(":")[0] for reason in held} <= {"neck_yaw", "neck_pitch"} and held
     assert degrees(tick.joints.position_rad[NAMES.index("jaw")]) == pytest.approx(12.0, abs=0.5)
-
-
-def test_an_expression_tuned_while_it_is_in_force_moves_without_a_jump() -> None:
-    rig = load_rig("expressive")
-    made = started(rig)
-    made.robot.command(Express("happy"))
-    jaw, last, largest = NAMES.index("jaw"), 0.0, 0.0
-    for k in range(600):
-        if k == 300:
-            made.robot.command(
-                made.live_params.prepare(rig, apply_changes(rig, {"expressions.happy.jaw": 10.0}))
-            )
-        now = degrees(ticks(made, 1)[0].desired_rad[jaw])
-        largest, last = max(largest, abs(now - last)), now
-    made.close()
-    assert last == pytest.approx(10.0)
-    assert largest <= 1.875 * 6.0 / 0.6 * 0.005 + 1e-9
-
-
-def test_a_wrong_expression_is_named_with_its_file_and_line(tmp_path: Path) -> None:
-    text = shipped_path("rigs", "expressive").read_text(encoding="utf-8")
-    path = tmp_path / "face.yaml"
-    path.write_text(text.replace("happy: {jaw: 4.0", "happy: {jaw: 44.0"), encoding="utf-8")
-    done = invoked("check", str(path))
-    line = 1 + text[: text.index("happy: {")].count("\n")
-    assert done.code == 2 and f"face.yaml:{line}" in done.err
-    assert "expressions.happy.jaw" in done.err and "outside the joint's range -2..25" in done.err

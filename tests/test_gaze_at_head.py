@@ -1,9 +1,7 @@
 """Whether a person looks at the head: from landmarks and eyes to page, recording and attention."""
 
-from dataclasses import replace
 from math import atan2, degrees, hypot, pi, radians
 
-import msgspec
 import numpy as np
 import pytest
 from attention_scene import attention, looking
@@ -11,20 +9,15 @@ from fakes.scenes import EmptyScene
 from stand_in import StandIn
 from test_face_pose import CAMERA, image_of, turned
 
-from gazerig.drivers.camera.recording_format import _face, decode_faces
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Percept, Vec3
-from gazerig.robot.control.tick_stream import _percept_row, decode_plain, encode
-from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.tracker_params import TrackerParams
-from gazerig.robot.model.types import SeenFace
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import looks_at_head
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.robot.recording.tick_record import percept_as_json, percept_from_json
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
@@ -151,13 +144,6 @@ def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
         assert face.gaze_world == pytest.approx((gaze[2], -gaze[0], -gaze[1]))
 
 
-def test_a_gaze_of_the_eyes_is_kept_by_camera_recordings() -> None:
-    for gaze in (None, (0.0, 0.6, -0.8)):
-        (face,) = detection(gaze).faces
-        (back,) = decode_faces(msgspec.json.encode({"faces": [_face(face)]}))
-        assert back.gaze_camera == gaze
-
-
 def face_at(id: int, p: Vec3, looks: bool | None) -> Face:
     R = rotation((pi, 0.0, 0.0))
     return Face(id, p, (0.0, 0.0, 0.0), R, (p,) * len(PARTS), 0.9, "", 0.0, 0.0, 0.2, looks)
@@ -169,24 +155,6 @@ def percept_of(t_s: float, *rows: Face) -> Percept:
     places = np.array([face.p_world_m for face in rows])
     ids = tuple(face.id for face in rows)
     return Percept(t_s, Bodies(ids, ("face",) * n, places, still, still, np.full(n, 0.1)), rows)
-
-
-def test_recordings_hold_it_and_those_of_before_are_read() -> None:
-    handed = percept_of(1.0, face_at(3, (1.0, 0.0, 0.2), True))
-    data = percept_as_json(decode_plain(encode(_percept_row(7, handed))))
-    number, back = percept_from_json(msgspec.json.decode(msgspec.json.encode(data)))
-    assert number == 7 and back.faces == handed.faces
-    for face in data["faces"]:
-        for name in ("off_head_rad", "looks_at_head", "gaze_world"):
-            del face[name]
-    (old,) = percept_from_json(msgspec.json.decode(msgspec.json.encode(data)))[1].faces
-    assert (old.off_head_rad, old.looks_at_head, old.gaze_world) == (None, None, None)
-
-
-def test_the_page_says_it_above_the_face() -> None:
-    shown = SeenFace(3, (1.0, 0.0, 0.0), LEVEL, ())
-    assert face_label(shown) == "face 3"
-    assert face_label(replace(shown, looks_at_head=True)) == "face 3, looks at the head"
 
 
 @pytest.mark.parametrize(("ratio", "looked_at"), [(0.85, [(2,), (1,)]), (1.0, [(1, 2), (1, 2)])])

@@ -56,14 +56,6 @@ def test_each_joint_has_its_own_latency_or_that_of_its_bus_or_the_default() -> N
     assert max(measured([0.5], [10.0], 3.0, ("a",))) <= 0.2
 
 
-def test_a_reading_that_is_not_a_number_does_not_count() -> None:
-    latency = JointLatency(("a",))
-    for k in range(200):
-        state = JointState((np.nan,), (0.0,), (k * PERIOD_S,), (), torque=(True,), measured=(True,))
-        latency.add(k * PERIOD_S, (0.001 * k,), state)
-    assert latency.estimates_s(DEFAULT_S) == (DEFAULT_S,)
-
-
 def test_joints_of_slower_buses_begin_earlier() -> None:
     rig = load_rig("expressive")
     sound = Track(

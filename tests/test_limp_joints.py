@@ -12,9 +12,6 @@ import gazerig
 from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.robot.control.limp_joints import LimpJoints
-from gazerig.robot.control.tick_text import guard_text
-from gazerig.robot.dashboard.panels.servo_health import servo_table
-from gazerig.robot.model.types import LIMP, GuardResult, Servos
 
 BUSES = {
     "dynamixel": ("{kind: dynamixel, port: /dev/ttyUSB0}", "xl330-m077", "gains: [1200, 0, 12000]"),
@@ -217,16 +214,6 @@ def test_a_warm_jaw_is_reported_once(tmp_path: Path) -> None:
         head.step(3.0)
     found = [line for line in lines if "warm" in line]
     assert len(found) == 1 and "jaw is warm, " in found[0] and "stops at" in found[0], lines
-
-
-def test_status_line_and_page_show_it() -> None:
-    result = GuardResult((0.0,), "ok", (), (0.0,), (LIMP,), (), ("jaw",))
-    assert result.limp == ("jaw",) and guard_text(result) == "ok (jaw: limp)"
-    row = (30.0,), (5.0,), (0.0,), (False,), ("",), (0.01,)
-    assert "<div class='quiet'>limp, as idle</div>" in servo_table(
-        Servos(*row, limp=("jaw",)), ("jaw",)
-    )
-    assert "<div class='quiet'>torque off</div>" in servo_table(Servos(*row), ("jaw",))
 
 
 def test_on_a_rig_of_several_buses_only_the_jaw_is_limp(tmp_path: Path) -> None:

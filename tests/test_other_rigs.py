@@ -47,23 +47,6 @@ def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -
     made.close()
 
 
-def test_two_eyes_need_neither_lids_nor_a_parking_pose(tmp_path: Path) -> None:
-    file, both = tmp_path / "eyes.yaml", "model: xl330-m077, min_deg: -25, max_deg: 25"
-    limits = "max_speed_deg_s: 600, max_accel_deg_s2: 45000"
-    file.write_text(
-        "name: eyes\nprofile: robot\nbus: {port: /dev/ttyUSB0}\n"
-        "geometry: {pitch_axis_height_mm: 0, eyes_ahead_mm: 0, eyes_above_mm: 60}\n"
-        f"joints:\n  eyes_pan: {{id: 1, {both}, {limits}}}\n  eyes_tilt: {{id: 2, {both}, {limits}}}\n",
-        encoding="utf-8",
-    )
-    made, ticks, _ = ran(load_rig(str(file)), 4.0)
-    assert made.park_rad == (0.0, 0.0)
-    kinds = [t.target.kind for t in ticks[400:]]
-    assert set(kinds) <= {"face", "away"} and kinds.count("face") > 0.7 * len(kinds)
-    assert ticks[-1].pose.lid_left == 1.0
-    made.close()
-
-
 @pytest.fixture(scope="module")
 def maker() -> tuple[Assembly, list[Tick], tuple[str, ...]]:
     """Return twelve seconds of the maker's eyes."""
@@ -103,17 +86,6 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     assert np.ptp(tilt) > 2.0
     assert np.corrcoef(tilt, upper)[0, 1] > 0.6  # looks up: the upper lid opens
     assert np.corrcoef(tilt, lower)[0, 1] < -0.6  # and the lower one follows it up: less open
-
-
-@pytest.mark.parametrize("name", ["maker", "feetech", "mixed"])
-def test_same_seed_same_bytes(name: str, tmp_path: Path) -> None:
-    rig = rig_of(name, tmp_path)
-    sent = []
-    for seed in (3, 3, 4):
-        made, _, _ = ran(rig, 0.75, seed)
-        sent.append(made.sent_bytes_digest())
-        made.close()
-    assert sent[0] == sent[1] != sent[2]
 
 
 def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from functools import cache
 from math import degrees, radians
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -11,13 +10,9 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.reachability import look_reply
-from gazerig.robot.model.commands import Jog, LookAt
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles, JointState
@@ -91,39 +86,3 @@ def test_behind_the_head_the_ends_are_named() -> None:
     assert "deg off: " in reply.text() and "neck_yaw stays at" in reply.text()
     assert CommandReply.from_json(reply.as_json()).text() == reply.text()
     assert reply.as_json()["text"] == reply.text()
-
-
-def test_a_rig_without_a_neck_says_so() -> None:
-    reply, _ = foretold_and_true("maker", (1.0, 2.0, 0.0), 0.1)
-    assert "neck_yaw: this rig has none" in reply.text() and reply.error_deg > 20.0
-
-
-def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:
-    made = assemble(loaded("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face"))
-    ticks: list[Any] = []
-    robot = made.robot
-
-    def go(seconds: float) -> None:
-        run(robot, made.clock, made.loop, lambda s: "s" if s >= seconds else None, ticks.append)
-
-    robot.start(made.clock)
-    try:
-        point = (0.3, 2.0, 0.2)
-        look = robot.command(LookAt(point, stay=True))
-        far = robot.command(LookAt((-1.0, -0.5, 0.3), stay=True))
-        go(8.0)
-        near, reply = look.wait(0.0), far.wait(0.0)
-        assert near is not None and near.error_deg < 1.0 and not near.joints
-        assert reply is not None
-        error = gaze_error((-1.0, -0.5, 0.3), ticks[-1].pose).whole
-        assert reply.error_deg == pytest.approx(degrees(error), abs=3.0)
-        axes = {one.axis for one in ticks[-1].gaze.limited}
-        assert {"left eye yaw", "right eye yaw", "head yaw"} <= axes
-        jog = robot.command(Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1))))
-        go(0.1)
-        held = jog.wait(0.0)
-        assert held is not None and not held.limited
-        assert [round(one.done_rad, 3) for one in held.joints] == [0.2, 0.1]
-    finally:
-        robot.stop()
-        made.close()

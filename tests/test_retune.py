@@ -5,19 +5,17 @@ import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from retuned_run import DT_S, RIG, Judge, Running, fresh, inside, put, started
+from retuned_run import DT_S, RIG, Judge, Running, inside, put, started
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import NEXT_START, apply_changes, parameters, value_of
 from gazerig.config.schema import Rig
-from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.command_json import as_json, from_json
 from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value
 from gazerig.robot.model.parameter import Parameter
@@ -131,110 +129,6 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
     assert len(turned) > 0.8 * len(todo)
 
 
-# Return the place of a section's parameters; limits of joints concern both worlds.
-OF_GAZE = (
-    "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion", "conversation",
-    "oculomotor", "saccade", "pursuit", "head", "breathing", "lids",
-    "tracks",
-)  # fmt: skip
-
-OF_BODY = ("guard", "body", "kinematics", "head", "oculomotor")
-OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor", "animation")
-
-
-def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return what some of the running parts, the loop and the parking go by."""
-    parts = made.live_params.parts
-    held = inside({name: getattr(parts, name) for name in names}, "", {})
-    return {**held, "park": made.park_rad, "loop": (made.loop.rate_hz, made.loop.park_s)}
-
-
-ELSEWHERE = ("detector.", "motion.", "sound.", "gaze.mouth.")
-"""Keys of the process of the pictures, and of the voice, which reads them when a sound begins."""
-SECTIONS = [("gaze", OF_GAZE), ("joints", OF_BODY), ("guard", OF_BODY), ("", OF_SIGHT)]
-
-
-def of_section(section: str) -> list[Parameter]:
-    """List the live knobs of a section, "" for all that is in none."""
-    named = {name for name, _ in SECTIONS}
-    return [
-        knob
-        for knob in live_knobs()
-        if not knob.key.startswith(ELSEWHERE)
-        and (knob.key.split(".")[0] == section or not section)
-        and (bool(section) or knob.key.split(".")[0] not in named)
-    ]
-
-
-@pytest.mark.parametrize(("section", "names"), SECTIONS)
-def test_every_live_knob_has_an_effect_on_the_running_parts(
-    section: str, names: tuple[str, ...], walk: str
-) -> None:
-    dice = np.random.default_rng(0)
-    made, in_force = fresh(RIG), RIG
-    first = running_parameters(made, names)
-    for knob in of_section(section):
-        base = apply_changes(RIG, in_use(knob.key))
-        other = acceptable(knob, base, dice, walk)
-        if base != in_force:  # nearly every knob has the same one, which the last one left
-            put(made, base)
-            first, in_force = running_parameters(made, names), base
-        said = put(made, other)
-        assert any(knob.key in line for line in said), said
-        assert running_parameters(made, names) != first, f"{knob.key} changes nothing"
-        put(made, base)
-        left = running_parameters(made, names)
-        assert left == first, f"{knob.key} leaves something behind"
-
-
-@pytest.mark.parametrize(("section", "names"), SECTIONS)
-def test_parts_retuned_go_by_what_new_parts_would_go_by(
-    section: str, names: tuple[str, ...], walk: str
-) -> None:
-    dice, other = np.random.default_rng(1), RIG
-    for knob in of_section(section):
-        for changes in some_changes(knob, other, dice, walk):
-            try:
-                other = apply_changes(other, changes)
-                break
-            except ConfigError:
-                continue
-    made = fresh(RIG)
-    put(made, other)
-    assert made.live_params.rig == other != RIG
-    got, wanted = running_parameters(made, names), running_parameters(fresh(other), names)
-    assert {k: got[k] for k in got if got[k] != wanted.get(k)} == {}
-    assert got.keys() == wanted.keys()
-
-
-def in_use(key: str) -> dict[str, Value]:
-    """Choose the model of a knob, if it is one of several."""
-    name = key.split(".")[-1]
-    if key.startswith("gaze.scanpath.") and name.split("_")[0] in ("simple", "random"):
-        return {"gaze.scanpath.model": name.split("_")[0]}
-    if key in ("gaze.scanpath.rest_spread", "gaze.scanpath.shift_ms"):
-        return {"gaze.scanpath.diagonal": "one_rest"}
-    if key == "gaze.saccade.human_peak_over_mean":
-        return {"gaze.saccade.profile": "main_sequence"}
-    if key == "gaze.saccade.min_duration_ms":
-        return {"gaze.saccade.profile": "min_jerk"}
-    if key.startswith("gaze.saccade.frame"):
-        return {"gaze.saccade.profile": "literal_frame"}
-    return {}
-
-
-def acceptable(knob: Parameter, base: Rig, dice: np.random.Generator, walk: str) -> Rig:
-    """Return the rig with another value of a knob."""
-    for changes in some_changes(knob, base, dice, walk):
-        try:
-            other = apply_changes(base, changes)
-        except ConfigError:
-            continue
-        if value_of(other, knob.key) != value_of(base, knob.key):
-            return other
-    raise AssertionError(f"no value will do for {knob.key}")
-
-
 # A running head with a changed range, zero, rate or detector
 
 
@@ -242,17 +136,6 @@ def test_a_running_head_keeps_its_joints() -> None:
     joints = {name: joint for name, joint in RIG.joints.items() if name != "neck_roll"}
     with pytest.raises(ConfigError, match="joints: neck_roll: a running head keeps its joints"):
         started().made.live_params.prepare(RIG, replace(RIG, joints=joints))
-
-
-def test_a_tune_of_nothing_different_touches_nothing() -> None:
-    quiet, tuned = started(), started()
-    quiet.go(200)
-    tuned.go(100)
-    same = {key: value_of(RIG, key) for key in ("gaze.lids.blinks_per_min", "guard.soft_start_ms")}
-    tuned.made.robot.command(Tune(tuple(same.items())))
-    tuned.go(100)
-    assert tuned.goals == quiet.goals
-    assert tuned.ticks[100].events == tuple(f"tuned: {key} = {same[key]}" for key in same)
 
 
 def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
@@ -367,23 +250,6 @@ def test_a_changed_zero_moves_the_joint_without_a_jump(changes: dict[str, Value]
     off = np.subtract(tick.guard_result.command_rad, tick.joints.position_rad)
     off_deg = dict(zip(GAZE_JOINTS, np.degrees(np.abs(off)), strict=True))
     assert max(deg for name, deg in off_deg.items() if "lid" not in name) < 5.0  # those may blink
-
-
-def test_another_rate_goes_on_from_the_last_slot() -> None:
-    made = fresh(RIG)
-    made.robot.start(made.clock)
-    times: list[float] = []
-
-    def watch(tick: Tick) -> None:
-        times.append(tick.t_s)
-        if len(times) == 100:
-            made.robot.command(Tune((("loop.rate_hz", 50.0),)))
-
-    run(made.robot, made.clock, lambda: made.loop, lambda s: "over" if s > 1.5 else None, watch)
-    gaps = np.diff(times)
-    assert gaps[:99] == pytest.approx(0.005)
-    # The tick that reads the order is at its old slot, all after it at new ones.
-    assert gaps[100:] == pytest.approx(0.02)
 
 
 def test_what_looks_at_pictures_is_retuned_too() -> None:

@@ -2,26 +2,18 @@
 
 import re
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
 
 import pytest
-import typer
 from desk import GAZE_JOINTS
-from features_there import skip_without
 from mixed_rig import mixed_rig, mixed_text
-from typer.core import TyperGroup
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
-from gazerig.config.save_text import comment
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 from gazerig.drivers.bus.multi_bus import MultiBus
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli.command_list import PANELS
-from gazerig.robot.cli.main import app
 
 DESK = shipped_path("rigs", "desk")
 
@@ -47,66 +39,6 @@ def test_the_desk_rig_is_the_head_described() -> None:
     assert rig.geometry.interocular_mm == 61.9
     pan, tilt = rig.joints["left_eye_pan"], rig.joints["right_eye_tilt"]
     assert (pan.min_deg, pan.max_deg, tilt.min_deg, tilt.max_deg) == (-35, 35, -30, 30)
-
-
-SHORT = ("simple_order",)
-"""Keys whose choices stand above them, not again in their comment."""
-
-
-def test_every_key_of_the_desk_rig_is_commented() -> None:
-    lines = DESK.read_text(encoding="utf-8").splitlines()
-    names = rf"\s*({'|'.join(GAZE_JOINTS)}|wait|guard|attack):"
-    keys, plain = 0, []
-    for above, line in pairwise(lines):
-        if not re.match(r"\s*\w+:", line):
-            continue
-        keys += 1
-        if "#" not in line and not re.match(names, line) and not above.strip().startswith("#"):
-            plain.append(line)
-    assert keys > 150 and plain == []
-
-
-def test_the_desk_rig_explains_its_keys_as_they_are_declared() -> None:
-    lines = DESK.read_text(encoding="utf-8").splitlines()
-    seen, other = 0, []
-    path: list[str] = []
-    for number, line in enumerate(lines):
-        found = re.match(r"( *)(\w+):", line)
-        if found is None:
-            continue
-        path = [*path[: len(found[1]) // 2], found[2]]
-        if path[0] not in (
-            "gaze",
-            "guard",
-            "tracker",
-            "loop",
-            "motion",
-            "detector",
-            "oak",
-            "sound",
-        ):
-            continue
-        said = line.partition("  # ")[2]
-        above = number - 1
-        while not said and lines[above].strip().startswith("#"):
-            above -= 1
-        said = said or " ".join(one.strip()[2:] for one in lines[above + 1 : number])
-        seen += 1
-        if said != comment(Rig, path) and path[-1] not in ("wait", "guard", "attack", *SHORT):
-            other.append((".".join(path), said, comment(Rig, path)))
-    assert seen > 200 and other == []
-
-
-def test_the_desk_rig_spells_out_every_default(tmp_path: Path) -> None:
-    """What stands in the file is what the rooms would take without it."""
-    text = DESK.read_text(encoding="utf-8")
-    short = tmp_path / "short.yaml"
-    cut = re.split(r"^gaze:", text, flags=re.M)[0]
-    short.write_text(cut, encoding="utf-8")
-    whole, cut_rig = load_rig("desk"), load_rig(str(short))
-    assert (
-        whole.gaze == cut_rig.gaze == cast(Any, Rig.__dataclass_fields__["gaze"]).default_factory()
-    )
 
 
 def test_shipped_profiles_characters_and_walks_load() -> None:
@@ -172,19 +104,6 @@ def test_a_rig_names_its_profile_and_character(
 def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path) -> None:
     faults = broken(tmp_path, (old, new))
     assert any(re.search(r"rig\.yaml:\d+", f) and place in f and rule in f for f in faults), faults
-
-
-def test_all_faults_come_in_one_message(tmp_path: Path) -> None:
-    faults = broken(
-        tmp_path,
-        (r"^    id: 9 ", "    id: 8 "),
-        (r"rate_hz: 200.0", "rate_hz: -1.0"),
-        (r"^name: desk", "naem: desk"),
-        (r"min_duration_ms: 50.0", "min_duration_ms: fast"),
-    )
-    text = "\n".join(faults)
-    for part in ("id 8 is already", "rate_hz", "naem", "missing", "min_duration_ms"):
-        assert part in text
 
 
 # Rigs with other joints and other buses than the desk's: valid files, and the result
@@ -290,54 +209,3 @@ def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:
 
 
 # RIG is a word of every command, the first one; options of earlier versions still work
-
-
-def group_of_all() -> TyperGroup:
-    group = typer.main.get_command(app)
-    assert isinstance(group, TyperGroup)
-    return group
-
-
-def values(*words: str) -> dict[str, Any]:
-    """Parse a command as the command line does, without running it."""
-    skip_without(words[0])
-    command = group_of_all().commands[words[0]]
-    return dict(command.make_context(words[0], list(words[1:])).params)
-
-
-@pytest.mark.parametrize(
-    ("words", "rig"),
-    [
-        (("jog", "neck_yaw", "-10"), "desk"),
-        (("jog", "--speed", "5", "my.yaml", "neck_yaw", "-10", "--mock"), "my.yaml"),
-        (("look-at", "1", "-0.2", "0.3"), "desk"),
-        (("look-at", "maker", "1", "-0.2", "0.3"), "maker"),
-        (("reboot", "7", "neck_yaw"), "desk"),
-        (("reboot", "feetech", "7", "neck_yaw"), "feetech"),
-        (("reboot", "./feetech", "7", "neck_yaw"), "./feetech"),
-        (("reboot", "7", "neck_yaw", "--port", "/dev/ttyACM0"), "desk"),
-        (("scan",), None),
-        (("scan", "my.yaml"), "my.yaml"),
-        (("emulate", "maker"), "maker"),
-        (("rerun", "a.mcap", "my.yaml"), "my.yaml"),
-        (("home", "my.yaml"), "my.yaml"),
-    ],
-)
-def test_the_rig_is_found_among_the_words(words: tuple[str, ...], rig: str | None) -> None:
-    read = values(*words)
-    assert read["rig"] == rig
-    if words[0] == "jog":
-        assert (read["joint"], read["deg"]) == ("neck_yaw", -10.0)
-    elif words[0] == "look-at":
-        assert (read["x"], read["y"], read["z"]) == (1.0, -0.2, 0.3)
-    elif words[0] == "reboot":
-        assert list(read["servos"]) == ["7", "neck_yaw"]
-
-
-def test_every_command_stands_in_a_panel_of_help_and_in_its_order() -> None:
-    group = group_of_all()
-    context = typer.Context(group)
-    shown = group.list_commands(context)
-    panels = [str(group.commands[name].rich_help_panel) for name in shown]  # type: ignore[attr-defined]
-    assert panels == sorted(panels, key=list(PANELS).index)
-    assert set(shown) == set(group.commands)

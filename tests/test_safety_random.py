@@ -288,21 +288,6 @@ def test_new_limits_come_into_force_and_every_joint_gets_inside(seed: int) -> No
     assert ((watched.p >= low - 1e-9) & (watched.p <= high + 1e-9)).all()
 
 
-def test_angles_counted_otherwise_send_the_joint_to_the_same_place() -> None:
-    watched = Watched(np.random.default_rng(0))
-    watched.wander(100)
-    hard = np.array(watched.guard.limits)[:, 3] * DT_S
-    while not (fast := np.abs(watched.v) > 4.0 * hard).any():
-        watched.wander(1)
-    i, factor, offset = int(fast.argmax()), -0.5, 0.2
-    before: NDArray[np.float64] = watched.p.copy()
-    watched.guard.rescale_joint(i, factor, offset)
-    watched.p[i], watched.v[i] = factor * watched.p[i] + offset, factor * watched.v[i]
-    watched.tick()
-    assert abs(watched.p[i] - (factor * before[i] + offset)) <= abs(watched.v[i]) * DT_S + 1e-9
-    watched.wander(100)
-
-
 def test_a_collision_that_leaves_no_pose_changes_nothing() -> None:
     watched = Watched(np.random.default_rng(0))
     before = watched.guard.limits
@@ -311,14 +296,3 @@ def test_a_collision_that_leaves_no_pose_changes_nothing() -> None:
         watched.guard.retune(GuardParams(collisions=(all_of_it,)), limits(watched.dice))
     watched.wander(20)
     assert watched.guard.limits == before
-
-
-def test_servos_that_keep_to_less_bound_what_is_in_force() -> None:
-    first = tuple(JointLimit(-1.0, 1.0, 5.0, 50.0) for _ in range(9))
-    guard = Guard(GENTLE, first, GAZE_JOINTS, lambda: first)
-    guard.reset(0.0, (0.0,) * 9)
-    wider = tuple(JointLimit(-1.5, 0.5, 9.0, 90.0) for _ in range(9))
-    guard.retune(GENTLE, wider)
-    joints = JointState((0.0,) * 9, (0.0,) * 9, (DT_S,) * 9, ())
-    guard.check((0.0,) * 9, joints, 0.0, DT_S)
-    assert guard.limits[0] == JointLimit(-1.0, 0.5, 5.0, 90.0)

@@ -4,23 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.view.glb import glow_disc
 from gazerig.robot.description import head_mesh, person_shape
 from gazerig.robot.description.mesh import (
-    Mesh,
     Painted,
-    cap,
-    merge_meshes,
     mirror_mesh,
-    mix,
-    move_mesh,
-    paint,
     smooth_normals,
-    uniform_colours,
 )
 from gazerig.robot.description.texture import TexturedMesh, add_texture
 
@@ -70,48 +61,3 @@ def test_every_corner_has_its_place_colour_and_normal(shape: str) -> None:
     width = 9 + one.colours.shape[1] - 3
     assert np.allclose(before.reshape(-1, width)[:, :6], after.reshape(-1, width)[:, :6], atol=1e-9)
     assert np.abs(before.reshape(-1, width)[:, 6:] - after.reshape(-1, width)[:, 6:]).max() < 0.51
-
-
-@pytest.mark.parametrize("shape", ["eye", "skin", "person"])
-def test_the_middle_of_a_triangle_is_between_its_corners(shape: str) -> None:
-    one = SHAPES[shape]()
-    mesh = add_texture(one)
-    corners = _seen(mesh, mesh.uv)[mesh.faces]
-    middle = _seen(mesh, mesh.uv[mesh.faces].mean(axis=1))
-    # A grid is interpolated between four corners, of which a triangle has three.
-    least, most = corners.min(axis=1), corners.max(axis=1)
-    off = np.maximum(least - middle, middle - most).max(axis=1)
-    assert np.mean(off > 2.0) < 0.03
-
-
-def test_a_plain_mesh_needs_no_more_than_a_few_texels() -> None:
-    mesh = add_texture(paint(cap(0.1, 1.0), (10, 20, 30)))
-    assert mesh.image.shape[0] * mesh.image.shape[1] <= 36
-    assert (mesh.image == (10, 20, 30)).all()
-
-
-def test_parts_do_not_bleed_into_each_other() -> None:
-    ball = cap(0.1, 3.0)
-    red = Painted(
-        ball, mix(uniform_colours(ball, (255, 0, 0)), (200, 0, 0), ball.vertices[:, 2] * 10)
-    )
-    blue = red._replace(colours=red.colours[:, ::-1])
-    both = merge_meshes([one._replace(normals=smooth_normals(ball)) for one in (red, blue)])
-    image = add_texture(both).image.astype(int)
-    # Half a texel outside the vertices every colour is still the part's own.
-    assert not ((image[..., 0] > 0) & (image[..., 2] > 0)).any()
-    assert (image.sum(axis=-1) > 0).mean() > 0.5
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.integers(1, 60), st.integers(0, 10**6))
-def test_any_triangles_keep_their_colours(count: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    vertices = rng.uniform(-1.0, 1.0, (count + 2, 3))
-    faces = np.stack([rng.permutation(count + 2)[:3] for _ in range(count)]).astype(np.uint32)
-    colours = np.rint(rng.uniform(0.0, 255.0, (count + 2, 3)))
-    one = Painted(Mesh(vertices, faces), colours, np.tile((0.0, 0.0, 1.0), (count + 2, 1)))
-    mesh = add_texture(move_mesh(one, (0.0, 0.0, 0.0)))
-    before = _corners(vertices, faces, colours)
-    after = _corners(mesh.vertices, mesh.faces, _seen(mesh, mesh.uv))
-    assert np.allclose(before, after, atol=0.51)

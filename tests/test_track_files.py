@@ -1,13 +1,9 @@
 """Files of tracks, and fits of keys to samples."""
 
 from math import pi
-from pathlib import Path
 
 import numpy as np
-import pytest
 
-from gazerig.config.allowed_folder import AllowedFolder
-from gazerig.config.load import ConfigError
 from gazerig.gaze.track.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.track_file import TOLERANCE_DEG
 from gazerig.robot.model.motion_keys import fit_keys, smooth
@@ -32,10 +28,3 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     assert len(many) <= 20 * (2 * len(found) + 4)
     still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
     assert len(still[0]) == 0
-
-
-def test_a_page_names_track_files_in_its_folder_alone(tmp_path: Path) -> None:
-    folder = AllowedFolder(tmp_path)
-    folder.check_changes({"track_files": [str(tmp_path / "mine.yaml")]})
-    with pytest.raises(ConfigError, match="track_files"):
-        folder.check_changes({"track_files": [str(tmp_path / "mine.yaml"), "/etc/passwd.yaml"]})

@@ -83,20 +83,6 @@ def test_joints_follow_tracks_within_limits_and_the_eyes_stay_on_the_point(name:
         made.close()
 
 
-def test_eyes_that_did_not_compensate_would_be_found() -> None:
-    """The nod moves the head by more than the eyes may be off."""
-    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, scene="visitor"))
-    try:
-        made.robot.start(made.clock)
-        made.robot.command(LookAt(POINT, "test", stay=True))
-        ticks(made, 500)
-        _, done = played(made, "nod")
-        pitch = [tick.pose.head_rad[1] for tick in done]
-        assert degrees(max(pitch) - min(pitch)) > 7.0
-    finally:
-        made.close()
-
-
 OWNED = """\
 description: own neck and jaw
 owns: [neck, jaw]

@@ -5,22 +5,12 @@ from collections.abc import Iterator
 import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
-from gazerig.config.load import ConfigError
-from gazerig.config.parameters import apply_changes
-from gazerig.config.schema import RULES, load_rig
 from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.track.track_trigger import TrackTrigger
 from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.model.command_json import (
-    as_json,
-    as_recorded_json,
-    check_command,
-    from_json,
-    from_recorded_json,
-)
-from gazerig.robot.model.commands import Ask, Jog, Play, Resume, Stop
+from gazerig.robot.model.commands import Jog, Play, Resume, Stop
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -68,31 +58,6 @@ def test_whoever_is_stopped_or_led_by_hand_does_not_track(rig: TickedRig) -> Non
         RobotClient.connect().play("nod")
 
 
-def test_menus_offer_what_this_rig_can_do_and_what_is_under_way(rig: TickedRig) -> None:
-    assert rig.made.robot.menus()["track"][:2] == ("none", "brow_shrug")
-    rig.command(Ask("track", "tilt"))
-    rig.tick(5)
-    assert rig.made.robot.menus()["track"][0] == "tilt"
-    rig.command(Ask("track", "none"))
-    rig.tick(200)
-    assert rig.made.robot.menus()["track"][0] == "none"
-
-
-def test_the_command_is_data() -> None:
-    command = Play("nod", 1.5, 3, "me")
-    assert from_json(as_json(command)) == command
-    assert from_recorded_json(as_recorded_json(command)) == command
-    assert from_json({"do": "play", "track": "nod"}) == Play("nod")
-    for wrong in (
-        *(Play("nod", speed) for speed in (0.0, -1.0, 9.0, float("nan"), float("inf"))),
-        *(Play("nod", 1.0, times) for times in (-1, 21, True, 1.5)),  # type: ignore[arg-type]
-        Play("n" * 999),
-        Play(3),  # type: ignore[arg-type]
-    ):
-        with pytest.raises(ValueError, match="track"):
-            check_command(wrong)
-
-
 def looked_at(kind: str, number: int = 1) -> Target:
     return Target((1.0, 0.0, 0.2), (0.0, 0.0, 0.0), 0.0, kind, number, 0.5, True, None, 0, "")
 
@@ -119,9 +84,3 @@ def test_a_visitor_who_waves_is_nodded_to() -> None:
     (nod,) = [line for line in said if "track" in line]
     at_s = float(nod.split(" s: ")[0])
     assert 17.5 < at_s < 18.5 and "for rule wait: nod takes 1.0 s" in nod  # the wave begins at 17.5
-
-
-def test_a_rule_that_names_no_track_is_refused_with_those_there_are() -> None:
-    with pytest.raises(ConfigError, match=r"rules\.wait\.gesture: no gesture 'nodd'.*nod"):
-        apply_changes(load_rig("desk"), {"gaze.top_down.rules.wait.gesture": "nodd"})
-    assert not [1 for rule in RULES for _ in rule(load_rig("desk"))]

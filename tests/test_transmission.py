@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.model.joint import ConstantRatio, JointParams, MeasuredLinkage
+from gazerig.robot.model.joint import JointParams, MeasuredLinkage
 
 ROD = [[-30.0, 1900.0], [-10.0, 1640.0], [0.0, 1500.0], [15.0, 1350.0], [30.0, 1100.0]]
 MAKER = load_rig("maker")
@@ -60,13 +60,6 @@ def test_measured_places_are_met_and_lines_lie_between() -> None:
     assert not curve.rising
 
 
-def test_a_straight_gear_is_what_it_was() -> None:
-    gear = ConstantRatio(2048.0, -651.9)
-    assert gear.steps(0.1) == pytest.approx(2048.0 - 65.19)
-    assert gear.angle_rad(gear.steps(0.3)) == pytest.approx(0.3)
-    assert gear.steepest == 651.9 and not gear.rising and gear.rate_rad(7.0) < 0.0
-
-
 @pytest.mark.parametrize(
     ("angles", "steps", "words"),
     [
@@ -102,11 +95,6 @@ def test_a_hobby_joint_is_set_up_in_quarter_microseconds() -> None:
     assert setup.own_speed_steps_s == pytest.approx(600.0 / 90.0 * 4000.0)
 
 
-def test_servos_that_tell_their_place_are_not_told_where_they_rest() -> None:
-    joint = load_rig("desk").joints["neck_pitch"]
-    assert joint.setup("neck_pitch", radians(-12.0)).rest_steps is None
-
-
 @pytest.mark.parametrize(
     ("other", "words"),
     [
@@ -123,11 +111,6 @@ def test_a_joint_beyond_its_servo_or_its_measuring_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=words):
         hobby(**other)
-
-
-def test_the_zero_of_a_joint_is_the_middle_of_its_servo_where_none_is_given() -> None:
-    assert JointParams(1, "hobby", -20.0, 20.0, 100.0, 1000.0).zero == 1500
-    assert JointParams(1, "sts3215", -20.0, 20.0, 100.0, 1000.0).zero == 2048
 
 
 def test_the_shipped_rods_give_every_joint_its_whole_range() -> None:

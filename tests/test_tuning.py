@@ -1,6 +1,5 @@
 """Tuning: values set, saved, reverted and read again while a rig runs."""
 
-import os
 import re
 from collections.abc import Callable
 from datetime import datetime
@@ -67,12 +66,6 @@ def test_set_puts_all_in_force_with_one_order() -> None:
     assert bench.tuning.unsaved() == bench.tuning.changed_from_defaults()
 
 
-def test_what_is_in_force_already_orders_nothing() -> None:
-    bench = Bench("desk")
-    assert bench.tuning.set({"gaze.lids.close_ms": 75.0}) == ()
-    assert not bench.orders and bench.tuning.version == 0
-
-
 def test_one_wrong_value_refuses_all_with_every_rule() -> None:
     bench = Bench("desk")
     with pytest.raises(ConfigError) as refused:
@@ -100,33 +93,6 @@ def test_save_keeps_comments_and_a_backup_and_reload_finds_nothing_new(mine: Pat
     assert bench.tuning.unsaved() == ()
     version = bench.tuning.version
     assert bench.tuning.reload(mine) == () and bench.tuning.version == version
-
-
-def test_what_is_no_new_file_is_no_copy_and_starts_no_process(tmp_path: Path) -> None:
-    bench = Bench("desk")
-    bench.tuning._elsewhere = None  # type: ignore[assignment]  # cannot be called
-    pipe, folder, full = (tmp_path / f"{name}.yaml" for name in ("pipe", "folder", "full"))
-    os.mkfifo(pipe)
-    folder.mkdir()
-    full.symlink_to("/dev/full")
-    for path, what in {
-        pipe: "is a named pipe; name a new .yaml file",
-        folder: "is a directory; name a new .yaml file in it",
-        full: "is a device; name a new .yaml file",
-        Path("/dev/full"): "is a device; name a new .yaml file",
-        tmp_path / "mine.txt": "ends in .yaml; rename it",
-    }.items():
-        with pytest.raises(ConfigError, match=f"{path}: .*{what}"):
-            bench.tuning.save(path)
-    assert bench.tuning.name == "desk"
-
-
-def test_a_file_replaced_by_a_pipe_is_not_waited_for(mine: Path) -> None:
-    bench = Bench(str(mine))
-    mine.unlink()
-    os.mkfifo(mine)
-    with pytest.raises(ConfigError, match="is a named pipe"):
-        bench.tuning.save()
 
 
 SPOILT = ["loop:\n  rate_hz: fast\n", "name: [\n", "", "\x00\xff", "root:*:19000:\n", None]
@@ -159,15 +125,6 @@ def test_a_file_spoilt_by_hand_is_kept_and_what_is_in_force_is_saved(
     assert load_rig(str(mine)).gaze.lids.close_ms == 95.0
 
 
-def test_a_spoilt_file_is_not_copied(mine: Path, tmp_path: Path) -> None:
-    bench = Bench(str(mine))
-    bench.tuning.set({"gaze.lids.close_ms": 90.0})
-    mine.write_text("name: 5\n", encoding="utf-8")
-    bench.tuning.save(tmp_path / "copy.yaml")
-    assert load_rig(str(tmp_path / "copy.yaml")) == bench.made.live_params.rig
-    assert mine.read_text(encoding="utf-8") == "name: 5\n"
-
-
 def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path) -> None:
     bench = Bench(str(mine))
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
@@ -177,22 +134,6 @@ def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path)
     rig = load_rig(str(mine))
     assert (rig.loop.rate_hz, rig.gaze.lids.close_ms) == (100.0, 90.0)
     assert rig == bench.made.live_params.rig
-
-
-def test_a_copy_that_fails_names_a_file_that_is_there(mine: Path, tmp_path: Path) -> None:
-    bench = Bench(str(mine), character="sleepy")
-    key = next(c for c in _differing(bench))
-    bench.tuning.set({key: bench.tuning.values()[key] * 1.01})  # type: ignore[operator]
-    with pytest.raises(ConfigError) as refused:
-        bench.tuning.save(tmp_path / "copy.yaml")
-    assert refused.value.faults[0].file == str(mine) and not (tmp_path / "copy.yaml").exists()
-
-
-def _differing(bench: Bench) -> list[str]:
-    """Return the numbers that the character lays over the rig."""
-    plain = values(load_rig(str(bench.tuning.path)))
-    now = bench.tuning.values()
-    return [k for k, v in now.items() if isinstance(v, float) and v and v != plain[k]]
 
 
 def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path) -> None:
@@ -341,70 +282,3 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"
     assert load_rig(str(mine)).loop.rate_hz == 200.0
     assert load_rig(str(mine)).gaze.aversion.min_dwell_s == 0.3
-
-
-def test_parameters_follow_what_entries_there_are() -> None:
-    bench = Bench("desk")
-    before = len(bench.tuning.parameters())
-    rule: dict[str, Any] = {"look_at": "hand", "salience": 1.0}
-    bench.tuning.set({"gaze.top_down.rules.fetch": rule})
-    assert len(bench.tuning.parameters()) == before + 6
-    assert "fetch" in bench.made.robot.menus()["behaviour"]
-
-
-def test_lists_of_mappings_are_left_to_the_file(mine: Path) -> None:
-    bench = Bench(str(mine))
-    box: dict[str, Any] = {
-        "first": "neck_pitch",
-        "first_min_deg": -40.0,
-        "first_max_deg": -30.0,
-        "second": "left_upper_lid",
-        "second_min_deg": 5.0,
-        "second_max_deg": 20.0,
-    }
-    bench.tuning.set({"guard.collisions": (box,)})
-    with pytest.raises(ConfigError, match="change it in the file"):
-        bench.tuning.save()
-
-
-def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
-    mine: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bench = Bench(str(mine))
-    knobs, files = bench.tuning.parameters(), bench.tuning.files()
-
-    def read(*words: object) -> None:
-        raise AssertionError(f"read: {words}")
-
-    monkeypatch.setattr("gazerig.config.rig_files.layers_of", read)
-    monkeypatch.setattr("gazerig.config.rig_files.load_rig", read)
-    for step in range(3):
-        bench.tuning.set({"gaze.lids.close_ms": 90.0 + step})
-        assert bench.tuning.files() == files and bench.tuning.parameters() is knobs
-        assert bench.tuning.values() == values(bench.made.live_params.rig)
-        assert [change.key for change in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
-
-
-def test_the_files_in_use_are_those_that_the_rig_names_now(mine: Path) -> None:
-    bench = Bench(str(mine))
-    assert [path.name for path in bench.tuning.files()] == ["mine.yaml", "robot.yaml"]
-    text = mine.read_text(encoding="utf-8")
-    mine.write_text(text.replace("profile: robot", "profile: mitake"), encoding="utf-8")
-    bench.tuning.reload(mine)
-    assert [path.name for path in bench.tuning.files()] == ["mine.yaml", "mitake.yaml"]
-    bench.tuning.apply_character("shy")
-    assert [p.name for p in bench.tuning.files()] == ["mine.yaml", "mitake.yaml", "shy.yaml"]
-    assert bench.tuning.values() == values(bench.made.live_params.rig)
-
-
-def test_values_and_what_is_unsaved_go_by_what_was_saved_last(mine: Path) -> None:
-    bench = Bench(str(mine))
-    bench.tuning.set({"gaze.lids.close_ms": 90.0})
-    bench.tuning.save()
-    bench.tuning.set({"gaze.lids.close_ms": 95.0})
-    (change,) = bench.tuning.unsaved()
-    assert (change.old, change.new) == ("90.0", "95.0")
-    bench.tuning.revert()
-    assert bench.tuning.values()["gaze.lids.close_ms"] == 90.0
-    bench.tuning.values()["gaze.lids.close_ms"] = 1.0
-    assert bench.tuning.get("gaze.lids.close_ms") == {"gaze.lids.close_ms": 90.0}
