@@ -32,8 +32,7 @@ from gazerig.sim_mock.scenes import script
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
 design = pytest.importorskip("gazerig.features.study.design")
-questionnaire = pytest.importorskip("gazerig.features.study.questionnaire")
-HOME = pytest.importorskip("gazerig.features.study.shipped").HOME
+HOME = pytest.importorskip("gazerig.features.study.study_file").HOME
 WORLDS = pytest.importorskip("gazerig.features.world.room").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
@@ -144,7 +143,7 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
             _fits(Shape("params", params=script.SceneScript), data, "world")
             continue
         if "conditions" in data or "items" in data:
-            form = design.StudyDesign if "conditions" in data else questionnaire.Questionnaire
+            form = design.StudyDesign if "conditions" in data else design.Questionnaire
             _fits(Shape("params", params=form), data, form.__name__)
             continue
         for key, value in data.items():
@@ -306,7 +305,7 @@ def test_every_span_names_something_that_is_there() -> None:
     words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD, script.BASE}
     forms = (
         *(design.StudyDesign, design.Presentation, design.Trials, design.StatisticalPlan),
-        *(design.Exclusion, design.Privacy, questionnaire.Questionnaire, questionnaire.Item),
+        *(design.Questionnaire, design.Item),
     )
     words |= {field.name for form in forms for field in fields(form)}
     words |= {*shipped_names("studies", HOME), *shipped_names("questionnaires", HOME)}

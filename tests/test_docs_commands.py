@@ -5,7 +5,6 @@ import importlib
 import inspect
 import re
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 from textwrap import dedent
 from types import ModuleType
@@ -148,22 +147,10 @@ def commands_as_written() -> list[str]:
     ]
 
 
-@pytest.fixture
-def few_studies(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Have the power of a design from few simulated studies: it is judged elsewhere."""
-    power = importlib.import_module("gazerig.features.study.power")
-    monkeypatch.setattr(power, "_STUDIES", 100)
-    power.power_of.cache_clear()
-    yield
-    power.power_of.cache_clear()
-
-
 @pytest.mark.parametrize("words", commands_as_written())
 def test_a_command_works_as_it_is_written(
-    words: str, folder: Path, request: pytest.FixtureRequest, capfd: pytest.CaptureFixture[str]
+    words: str, folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    if words.startswith("study design"):
-        request.getfixturevalue("few_studies")
     (folder / "my.yaml").write_bytes((folder / "myrig.yaml").read_bytes())
     typed("study", "design", "--example", "study.yaml")
     if "--example" not in words:

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 from attack.exits import EXITS, INTERFACES, POOLS, case, meets
 from branch import Branch
-from features_there import skip_without
 
 
 def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[bytes]":
@@ -37,12 +36,9 @@ def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[byte
         ("desk", "thread pool, left open", "SIGINT"),
         ("desk", "thread pool", "SIGTERM"),
         ("maker", "two heads", "SIGUSR1"),
-        ("pca9685", "study", "the study's program killed"),
     ],
 )
 def test_no_servo_keeps_its_torque(kind: str, interface: str, exit_: str) -> None:
-    if interface == "study":
-        skip_without("study")
     row = case(kind, interface, exit_, begin)
     assert row.void == "" and row.of > 0
     assert row.powered == 0

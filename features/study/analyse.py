@@ -198,10 +198,10 @@ def _decide(one: Hypothesis, scores: Scores) -> Decision:
     sides = scores[one.better], scores[one.than]
     codes = [code for code in sides[0] if code in sides[1]]
     better, than = (np.array([np.mean(side[code]) for code in codes]) for side in sides)
-    if not (better != than).any():
-        return Decision(one, len(codes), (nan, nan), nan, (_NO_DIFFERENCE,))
+    means = (float(better.mean()), float(than.mean())) if codes else (nan, nan)
+    if len(codes) < 2 or not (better != than).any():
+        return Decision(one, len(codes), means, nan, (_NO_DIFFERENCE,))
     tests = tuple([_run_test(key, better, than, one, scores) for key in (one.test, *one.also)])
-    means = (float(better.mean()), float(than.mean()))
     return Decision(one, len(codes), means, cohens_dz(better, than), tests)
 
 

@@ -117,22 +117,6 @@ def work():
 """
 )
 
-STUDY = """
-import sys, time
-from pathlib import Path
-from gazerig.robot.app.options import RunOptions
-from gazerig.features.study.run.head_process import HeadProcess
-from gazerig.robot.model.clock import RealClock
-head = HeadProcess(
-    RunOptions(rig=sys.argv[1], port=sys.argv[2], scene="visitor"), Path(sys.argv[3]), RealClock()
-)
-try:
-    while head.alive:
-        time.sleep(0.05)
-finally:
-    head.end()
-"""
-
 
 class Target(NamedTuple):
     """A program that holds heads.
@@ -161,11 +145,6 @@ def send(*numbers: signal.Signals, gap_s: float = 0.03) -> Strike:
                 os.kill(target.pid, number)
 
     return strike
-
-
-def kill_program(target: Target) -> None:
-    """Kill the program, which for a study is not the process of the head."""
-    target.program.kill()
 
 
 def fault(word: str) -> Strike:
@@ -215,7 +194,6 @@ EXITS: dict[str, Strike] = {
     "SIGSTOP": send(signal.SIGSTOP),
     "guardian suspended, then SIGKILL": without_guardian,
     "children suspended, then SIGTERM": without_page,
-    "the study's program killed": kill_program,
     "all descriptors closed": fault("fds"),
     "os._exit": fault("_exit"),
     "sys.exit": fault("exit"),
@@ -228,19 +206,14 @@ OWN = {"all descriptors closed", "os._exit", "sys.exit", "exception"}
 STAYS = {"SIGSTOP", "all descriptors closed"}
 """The program itself does not end."""
 
-INTERFACES = ("command", "python", "daemon thread", *POOLS, "two heads", "study")
+INTERFACES = ("command", "python", "daemon thread", *POOLS, "two heads")
 
 
 def meets(interface: str, exit_: str) -> bool:
     """Return whether an interface can end like that."""
     if exit_ in OWN:
         return interface in ("python", "two heads")
-    if exit_ == "the main thread ends":
-        return interface == "daemon thread"
-    if exit_ == "the study's program killed":
-        return interface == "study"
-    # The head of a study leaves Ctrl-C to its program.
-    return not (interface == "study" and "SIGINT" in exit_)
+    return exit_ != "the main thread ends" or interface == "daemon thread"
 
 
 Begin = Callable[..., "subprocess.Popen[bytes]"]
@@ -265,11 +238,10 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
         (at,) = benches[:1]
         code = {
             "command": START, "python": PYTHON, "daemon thread": DAEMON, "two heads": PYTHON,
-            "study": STUDY, **{name: POOL + rest for name, rest in POOLS.items()},
+            **{name: POOL + rest for name, rest in POOLS.items()},
         }[interface]  # fmt: skip
         words = {
             "command": ["run", at.file, "--port", at.port, "--scene", "visitor", "--page", "127.0.0.1:8911"],
-            "study": [at.file, at.port, str(folder / "log")],
         }.get(interface, rigs)  # fmt: skip
         environment = {**os.environ, "BLOW": str(folder / "blow"), "XDG_RUNTIME_DIR": name}
         null = subprocess.DEVNULL
@@ -284,10 +256,7 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
         )
         try:
             alive = wait_until(lambda: _holds(program, benches))
-            pid = program.pid
-            if alive and interface == "study":
-                (pid,) = children(program.pid)
-            yield Target(program, pid if alive else 0, folder)
+            yield Target(program, program.pid if alive else 0, folder)
         finally:
             for number in (signal.SIGCONT, signal.SIGKILL):
                 for one in {program.pid, *_descendants(program.pid)}:

@@ -1,0 +1,128 @@
+"""Short studies with films that are made in an instant, and a participant without a browser."""
+
+import itertools
+import json
+import re
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from http.cookiejar import CookieJar
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shown_page import free_port
+
+from gazerig.drivers.files.film_writer import film_writer
+from gazerig.features.study.journal import Journal
+from gazerig.features.study.session import Event, Session
+from gazerig.features.study.study_file import load_study
+
+STUDY = """\
+title: Short
+conditions:
+  alpha: { film: ./alpha.webm }
+  beta: { film: ./beta.webm }
+trials: { seconds: 2, practice: 0 }
+questionnaires: [nakamoto_tsuruno]
+after: [free_text]
+debriefing: [It was the difference.]
+hypotheses: [{ measure: nakamoto_tsuruno.naturalness, better: alpha, than: beta }]
+plan: { participants: 2 }
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """A study of two films of two seconds."""
+    for shade, name in enumerate(("alpha", "beta")):
+        with film_writer(tmp_path / f"{name}.webm", (64, 64), 10.0) as write:
+            for _ in range(20):
+                write(np.full((64, 64, 3), 100 * shade, np.uint8))
+    path = tmp_path / "short.yaml"
+    path.write_text(STUDY)
+    return path
+
+
+def session_of(study: Path, journal: Journal) -> Session:
+    """A session whose clock advances by a minute whenever it is read."""
+    now_s = itertools.count(0.0, 60.0).__next__
+    return Session(load_study(str(study)), 1, journal, now_s, lambda: "now")
+
+
+def events(session: Session) -> list[str]:
+    """Do what each page asks for to the end; return the steps."""
+    steps = []
+    do = {"consent": "consent", "ready": "begin", "presentation": "seen", "questions": "answer"}
+    while (step := session.place.step) != "end":
+        steps.append(step)
+        session.film_fetched()
+        kinds = {"rating": 3, "choice": "first", "text": "well"}
+        values: list[Any] = [kinds[item.kind] for _, item in session.items()]
+        assert session.handle(Event(session.page, do[step], values, [900.0] * len(values)))
+    return steps
+
+
+class Program:
+    """The command ``gazerig study run``, and a browser without a window."""
+
+    def __init__(self, *words: str) -> None:
+        main = "from gazerig.robot.cli.entry_point import main; main()"
+        command = [sys.executable, "-c", main, "study", "run", *words]
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        assert self.process.stderr is not None
+        self.said = ""
+        for line in self.process.stderr:
+            self.said += line
+            if found := re.search(r"participant: (http://\S+)/\?token=(\S+)", line):
+                break
+        else:
+            raise AssertionError(self.said)
+        self.url, self.token = found.groups()
+        self._opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+        self.fetch(f"/?token={self.token}")
+
+    def fetch(self, path: str, body: dict[str, Any] | None = None) -> tuple[int, bytes]:
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(
+            self.url + path, data, {"Origin": self.url} if data else {}
+        )
+        for _ in range(300):
+            try:
+                with self._opener.open(request, timeout=30.0) as answer:
+                    return answer.status, answer.read()
+            except urllib.error.HTTPError as error:
+                return error.code, error.read()
+            except urllib.error.URLError:  # it does not listen yet
+                assert self.process.poll() is None, self.said
+        raise AssertionError("no answer")
+
+    def page(self) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self.fetch("/page")[1])
+        return found
+
+    def do(self, page: dict[str, Any], do: str, **more: Any) -> int:
+        return self.fetch("/event", {"page": page["page"], "do": do, **more})[0]
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Any:
+    """Starts ``gazerig study run`` at one address; kills it at the end."""
+    started: list[Program] = []
+    address = f"127.0.0.1:{free_port()}"
+
+    def start(*words: str) -> Program:
+        data = ("--data", str(tmp_path / "data"), "--page", address, "--no-browser")
+        started.append(Program(*words, "--participant", "1", *data))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.process.kill()
+        one.process.wait()
+
+
+Start = Callable[..., Program]

@@ -1,0 +1,317 @@
+"""Designs, sessions, data and reports."""
+
+import json
+import os
+import signal
+import time
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import browsing
+from command_line import invoked
+from study_helpers import Program, Start, events, session_of
+
+from gazerig.config.load import ConfigError
+from gazerig.config.shipped_files import shipped_names
+from gazerig.drivers.errors import SetupError
+from gazerig.features.study.analyse import analyse_study
+from gazerig.features.study.design import participant_order, williams
+from gazerig.features.study.journal import Journal, StudyFolder
+from gazerig.features.study.report import answers_csv, write_report
+from gazerig.features.study.session import Event, WrongEvent
+from gazerig.features.study.simulate import simulate_study
+from gazerig.features.study.study_file import HOME, load_study
+
+
+@pytest.mark.parametrize("n", range(2, 7))
+def test_orders_balance_positions_and_successors(n: int) -> None:
+    rows = williams(n)
+    each = len(rows) // n
+    assert all(set(Counter(column).values()) == {each} for column in zip(*rows, strict=True))
+    successors = Counter(pair for row in rows for pair in pairwise(row))
+    assert len(successors) == n * (n - 1) and set(successors.values()) == {each}
+
+
+def test_pairs_are_seen_in_both_orders(tmp_path: Path) -> None:
+    path = tmp_path / "pairs.yaml"
+    path.write_text(
+        "title: Pairs\ntask: pairwise\nquestionnaires: [choice]\nplan: {participants: 12}\n"
+        "conditions: {a: {profile: robot}, b: {profile: mitake}, c: {profile: nakamoto}}\n"
+        "hypotheses: [{measure: choice.alive, better: a, than: b, test: sign}]\n"
+    )
+    study = load_study(str(path))
+    seen = Counter(pair for n in range(1, 13) for pair in participant_order(study.design, n))
+    assert len(seen) == 6 and set(seen.values()) == {6}
+    folder = StudyFolder(tmp_path / "data")
+    simulate_study(study, folder, 12, 2.0, 0, lambda share: None)
+    found = analyse_study(folder.path)
+    assert found.decisions[0].verdict == "supported" and found.decisions[0].means[0] > 0.8
+    write_report(found, tmp_path)
+
+
+def faults(path: Path, text: str) -> list[str]:
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_study(str(path))
+    return [f"{fault.line} {fault.key}" for fault in caught.value.faults]
+
+
+def test_faults_name_line_and_key(study: Path) -> None:
+    text = study.read_text()
+    both = text.replace("title: Short", "titel: Short").replace("seconds: 2", "seconds: 1")
+    assert {"1 titel", "5 trials.seconds"} <= set(faults(study, both))
+    assert faults(study, text.replace("./alpha.webm", "./none.webm")) == ["3 conditions.alpha.film"]
+    assert faults(study, text.replace(".naturalness", ".beauty")) == ["9 hypotheses.0.measure"]
+    assert faults(study, text.replace("than: beta", "than: gamma")) == ["9 hypotheses.0.than"]
+    assert faults(study, text.replace("2 }\n", "3 }\n")) == ["10 plan.participants"]
+    same = text.replace("film: ./alpha.webm", "").replace("film: ./beta.webm", "")
+    assert faults(study, same) == ["4 conditions.beta"]
+    assert faults(study, text.replace("{ film: ./beta.webm }", "{ profile: none }")) == [
+        "4 conditions.beta"
+    ]
+
+
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
+def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_path: Path) -> None:
+    study = load_study(name)
+    folder = StudyFolder(tmp_path / "data")
+    simulate_study(study, folder, 24, 1.5, 1, lambda share: None)
+    found = analyse_study(folder.path)
+    assert [one.verdict for one in found.decisions] == ["supported"] * len(study.design.hypotheses)
+    page = write_report(found, tmp_path / "report").read_text()
+    assert "simulated participants" in page and page.count("<svg") == len(found.scores)
+    with pytest.raises(SetupError, match="--data"):
+        simulate_study(study, folder, 1, 1.5, 1, lambda share: None)
+
+
+def test_answers_that_do_not_count(study: Path, tmp_path: Path) -> None:
+    loaded, folder = load_study(str(study)), StudyFolder(tmp_path / "data")
+    folder.claim(loaded)
+    for number, ms in ((1, 900.0), (2, 100.0)):
+        journal = Journal(folder.participant(number))
+        session = session_of(study, journal)
+        session.handle(Event(session.page, "consent"))
+        while session.place.step != "questions":
+            session.film_fetched()
+            session.handle(
+                Event(session.page, "begin" if session.place.step == "ready" else "seen")
+            )
+        session.handle(Event(session.page, "answer", [4, 5], [ms, ms]))
+        if number == 1:
+            session.handle(Event(session.page, "leave"))
+        else:
+            events(session)
+        journal.close()
+    found = analyse_study(folder.path)
+    assert found.left_out == {"P001": "withdrew"}
+    reasons = [one.left_out for one in found.answers]
+    assert reasons == ["withdrew"] * 2 + ["answered too fast"] * 2 + [""] * 3
+    assert answers_csv(found).count("\n") == 8
+    assert found.decisions[0].verdict == "too few"
+
+
+def test_pages_do_not_distinguish_conditions(study: Path, tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "data")
+    session = session_of(study, journal)
+    assert "difference" not in json.dumps(session.page_json())
+    events_of = events(session)
+    assert events_of == ["consent", *2 * ["ready", "presentation", "questions"], "questions"]
+    assert session.page_json()["debriefing"] == ("It was the difference.",)
+    journal.close()
+
+
+def test_events_that_do_not_fit_change_nothing(study: Path, tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "data")
+    session = session_of(study, journal)
+    with pytest.raises(WrongEvent):
+        session.handle(Event(session.page, "answer", [3], [1.0]))
+    assert not session.handle(Event("P001-ready-0-0-", "begin"))
+    assert len(journal.records) == 1
+    journal.close()
+
+
+def test_a_film_that_is_cut_short_starts_again(study: Path, tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "data")
+    session = session_of(study, journal)
+    session.handle(Event(session.page, "consent"))
+    session.handle(Event(session.page, "begin"))
+    session.handle(Event(session.page, "seen"))  # it was not even fetched
+    assert session.place.step == "ready"
+    journal.close()
+
+
+def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path) -> None:
+    journal = Journal(tmp_path / "data")
+    session_of(study, journal)
+    with pytest.raises(SetupError, match="another program"):
+        Journal(tmp_path / "data")
+    journal.close()
+    path = tmp_path / "data" / "journal.jsonl"
+    whole = path.read_bytes()
+    path.write_bytes(whole + b'[{"kind":"Cons')
+    Journal(tmp_path / "data").close()
+    assert path.read_bytes() == whole
+    path.write_bytes(b"nonsense\n" + whole)
+    with pytest.raises(SetupError, match="jsonl:1"):
+        Journal(tmp_path / "data")
+
+
+def test_a_step_that_cannot_be_written_is_repeated(
+    tmp_path: Path, study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path / "data")
+    session = session_of(study, journal)
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(SetupError, match="No space"):
+            session.handle(Event(session.page, "consent"))
+    assert session.place.step == "consent"
+    assert events(session)
+    journal.close()
+    assert [type(one).__name__ for one in journal.records].count("ConsentGiven") == 1
+
+
+def test_a_design_does_not_change_after_the_first_participant(study: Path, tmp_path: Path) -> None:
+    folder = StudyFolder(tmp_path / "data")
+    folder.claim(load_study(str(study)))
+    journal = Journal(folder.participant(1))
+    session_of(study, journal)
+    journal.close()
+    folder.claim(load_study(str(study)))
+    study.write_text(study.read_text().replace("seconds: 2", "seconds: 2.1"))
+    with pytest.raises(SetupError, match="another design"):
+        folder.claim(load_study(str(study)))
+
+
+def test_the_example_is_a_study(tmp_path: Path) -> None:
+    path = str(tmp_path / "study.yaml")
+    assert invoked("study", "design", "--example", path).code == 0
+    assert "good" in invoked("study", "design", path).out
+
+
+@pytest.mark.pty
+def test_a_killed_session_resumes_with_every_answer(study: Path, program: Start) -> None:
+    first = program(str(study))
+    assert first.do(first.page(), "consent") == 200
+    assert first.fetch("/film/x")[0] == 404
+    _see_film(first)
+    page = first.page()
+    assert page["step"] == "questions"
+    assert first.do(page, "answer", values=[9, 1], ms=[1.0, 1.0]) == 400
+    assert first.do(page, "answer", values=[2, 5], ms=[1000.0, 1000.0]) == 200
+    first.process.kill()
+    again = program(str(study))
+    assert again.token == first.token
+    assert again.do(page, "answer", values=[1, 1], ms=[1000.0, 1000.0]) == 409
+    _see_film(again)
+    assert again.do(again.page(), "answer", values=[4, 4], ms=[1000.0, 1000.0]) == 200
+    assert again.do(again.page(), "answer", values=["remark"], ms=[1000.0]) == 200
+    assert again.page()["step"] == "end"
+    again.process.send_signal(signal.SIGINT)
+    assert again.process.wait() == 0
+    found = analyse_study(study.parent / "data")
+    assert [one.record.value for one in found.answers] == [2, 5, 4, 4, "remark"]
+
+
+def _see_film(one: Program) -> None:
+    assert one.do(one.page(), "begin") == 200
+    page = one.page()
+    status, film = one.fetch(f"/film/{page['page']}")
+    assert status == 200 and film[:4] == b"\x1aE\xdf\xa3"
+    time.sleep(2.0)
+    assert one.do(page, "seen") == 200
+
+
+@pytest.mark.pty
+def test_a_session_with_a_live_head(tmp_path: Path, program: Start) -> None:
+    path = tmp_path / "head.yaml"
+    shipped = (HOME / "studies" / "nakamoto_2.yaml").read_text()
+    path.write_text(shipped.replace("seconds: 30", "seconds: 2"))
+    one = program(str(path), "--mock")
+    assert one.do(one.page(), "consent") == 200
+    for _ in range(2):
+        assert one.do(one.page(), "begin") == 200
+        assert one.page()["step"] == "presentation"
+        assert one.do(one.page(), "seen") == 400  # the clock decides
+        while one.page()["step"] == "presentation":
+            time.sleep(0.1)
+        assert one.do(one.page(), "answer", values=[4, 4], ms=[1000.0, 1000.0]) == 200
+    assert invoked("stop").code == 0
+    assert one.process.wait(30) == 2
+    assert one.process.stderr is not None and "stopped" in one.process.stderr.read()
+    again = program(str(path), "--mock")
+    assert again.do(again.page(), "answer", values=[""], ms=[1000.0]) == 200
+    assert again.page()["step"] == "end"
+    again.process.send_signal(signal.SIGINT)
+    assert again.process.wait(30) == 0
+
+
+@pytest.mark.browser
+def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start) -> None:
+    one = program(str(study))
+    with browsing() as tab:
+
+        def press(key: str) -> None:
+            text = {"text": "\r"} if key == "Enter" else {"text": key} if len(key) == 1 else {}
+            for kind in ("keyDown", "keyUp"):
+                more = text if kind == "keyDown" else {}
+                tab.ask("Input.dispatchKeyEvent", type=kind, key=key, **more)
+
+        def wait_for(words: str) -> None:
+            until = time.monotonic() + 60.0
+            while words not in tab.words():
+                assert time.monotonic() < until, tab.words()
+                time.sleep(0.05)
+
+        tab.go(f"{one.url}/?token={one.token}")
+        wait_for("Before you begin")
+        tab.run("document.getElementById('agree').click()")
+        press("Enter")
+        for _ in range(2):
+            wait_for("Are you ready?")
+            press("Enter")
+            wait_for("Your impression")
+            press("4")
+            tab.ask("Page.reload")  # the draft stays
+            wait_for("Your impression")
+            press("2")
+            press("Enter")
+        wait_for("What struck you")
+        source = tab.ask("Runtime.evaluate", expression="document.documentElement.outerHTML")
+        shown = source["result"]["value"] + "".join(tab.asked_for)
+        assert "alpha" not in shown and "beta" not in shown
+        tab.run("document.querySelector('button.main').click()")
+        wait_for("It was the difference.")
+    found = analyse_study(study.parent / "data")
+    assert [one.record.value for one in found.answers] == [4, 2, 4, 2, ""]
+
+
+@pytest.mark.slow
+def test_films_are_rendered_once(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    from gazerig.drivers.files.film_writer import film_seconds
+    from gazerig.features.study.film import films
+
+    path = tmp_path / "film.yaml"
+    shipped = (HOME / "studies" / "nakamoto_1.yaml").read_text()
+    path.write_text(shipped.replace("seconds: 30", "seconds: 2"))
+    study = load_study(str(path))
+    try:
+        made = films(study, tmp_path, lambda what, share: None)
+    except SetupError as error:
+        pytest.skip(str(error))
+    assert all(film_seconds(one) == pytest.approx(2.0, abs=0.1) for one in made.values())
+    assert not any(key in one.name for key, one in made.items())
+    before = [one.stat().st_mtime_ns for one in made.values()]
+    assert films(study, tmp_path, lambda what, share: None) == made
+    assert [one.stat().st_mtime_ns for one in made.values()] == before
+    assert not np.array_equal(
+        *(np.frombuffer(one.read_bytes()[-4000:], np.uint8) for one in made.values())
+    )

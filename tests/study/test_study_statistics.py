@@ -1,0 +1,51 @@
+"""Tests of statistics: pingouin's values, enumeration, and known results."""
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gazerig.features.study import statistics as s
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+
+
+def test_p_values_equal_those_of_pingouin() -> None:
+    for one in json.loads((GOLDEN / "study_p_values.json").read_text())["sets"]:
+        rows, figures = np.array(one["ratings"]), one["pingouin"]
+        than, better = rows[:, 0].astype(float), rows[:, 1].astype(float)
+        signed, summed = s.signed_rank_test(better, than), s.rank_sum_test(better, than)
+        counted, any_differ = s.chi_square_test(better, than), s.friedman_test(rows.astype(float))
+        assert [signed.p, signed.effect, summed.p, summed.effect] == pytest.approx(
+            [figures[key] for key in ("signed_rank wilcox two-sided", "matched correlation",
+                                      "rank_sum two-sided", "dominance")], abs=1e-9
+        )  # fmt: skip
+        assert [counted.p, counted.effect, any_differ.p, any_differ.effect] == pytest.approx(
+            [figures[key] for key in ("chi_square", "cramers_v", "friedman", "concordance")],
+            abs=1e-9,
+        )
+
+
+def test_exact_p_values_are_those_of_all_signs() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        scores = rng.integers(-6, 7, 8) / 2.0
+        sums = [np.dot(signs, scores) for signs in itertools.product((-1, 1), repeat=8)]
+        above = np.mean(np.array(sums) >= scores.sum())
+        below = np.mean(np.array(sums) <= scores.sum())
+        assert s.exact_sign_p(scores) == pytest.approx(min(1.0, 2.0 * min(above, below)))
+
+
+def test_nine_people_who_all_answer_higher() -> None:
+    better, than = np.full(9, 5.0), np.full(9, 1.0)
+    assert s.signed_rank_test(better, than).exact_p == pytest.approx(2 / 2**9)
+    assert s.rank_sum_test(better, than).exact_p == pytest.approx(2 / 2**9)
+    assert s.sign_test(better - than).exact_p == pytest.approx(2 / 2**9)
+    assert s.chi_square_test(better, than).statistic == pytest.approx(18.0)
+
+
+def test_holms_correction() -> None:
+    assert s.correct_p_values([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert s.correct_p_values([0.9, 0.8]) == [1.0, 1.0]
