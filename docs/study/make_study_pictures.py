@@ -1,4 +1,4 @@
-"""Photograph a study's questions: python docs/study/make_study_pictures.py (30 s, with Chromium)."""
+"""Photograph a study's questions: python docs/study/make_study_pictures.py (with Chromium)."""
 
 import sys
 from io import BytesIO

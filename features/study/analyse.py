@@ -28,7 +28,6 @@ from gazerig.features.study.statistics import (
     chi_square_test,
     cohens_dz,
     correct_p_values,
-    friedman_test,
     rank_sum_test,
     sign_test,
     signed_rank_test,
@@ -215,12 +214,6 @@ def _run_test(
         return signed_rank_test(better, than)
     if key == "rank_sum":
         return rank_sum_test(better, than)
-    if key == "friedman":
-        rows = [
-            [np.mean(side.get(code, nan)) for side in scores.values()]
-            for code in scores[one.better]
-        ]
-        return friedman_test(np.array([row for row in rows if np.isfinite(row).all()]))
     single = (np.concatenate([*scores[side].values()]) for side in (one.better, one.than))
     return chi_square_test(*single)
 

@@ -28,7 +28,7 @@ welcome: # what participants read first; it must not name the difference
 conditions: # two to six; each contains its differences from the rig below
   blinks: {}
   stares:
-    params: # any key of a rig's YAML; gazerig ctl get lists them. Or profile:, character:, scanpath:
+    params: # any key of a rig's YAML; gazerig ctl get lists them. Or profile:, character:
       gaze.lids.blinks_per_min: 0.0
       gaze.lids.conversation_per_min: 0.0
 presentation:
@@ -200,9 +200,6 @@ def analyse(
     data: Annotated[
         Path, typer.Argument(metavar="DATA", help="Folder of the study's data, such as study-data.")
     ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder to write to; default: DATA/report.")
-    ] = None,
 ) -> None:
     """Analyse a study: one page with tests, tables and figures, and the answers as CSV."""
     with clear_errors():
@@ -210,7 +207,7 @@ def analyse(
         from gazerig.features.study.report import write_report
 
         study = analyse_study(data)
-        page = write_report(study, out or data / "report")
+        page = write_report(study, data / "report")
         for one in study.decisions:
             what = f"{one.hypothesis.measure}: {one.hypothesis.better} > {one.hypothesis.than}"
             print(f"{what}: {one.verdict} (corrected p = {one.corrected_p:.3g}, n = {one.n})")

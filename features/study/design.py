@@ -14,7 +14,7 @@ import numpy as np
 
 from gazerig.params import Bounds
 
-Test = Literal["signed_rank", "rank_sum", "sign", "chi_square", "friedman"]
+Test = Literal["signed_rank", "rank_sum", "sign", "chi_square"]
 Texts = Mapping[str, str]
 """Language -> text; "en" is required, and replaces a missing language."""
 PAIR = "|"
@@ -56,7 +56,6 @@ class Condition:
     label: Annotated[str, "name in the report; participants never see it"] = ""
     profile: Annotated[str | None, "style of gaze by name or path"] = None
     character: Annotated[str | None, "character by name or path"] = None
-    scanpath: Annotated[Literal["markov", "simple", "face_tracking", "random"] | None, "face scanpath"] = None
     params: Annotated[Mapping[str, object], "dotted keys of the rig's YAML and their values"] = field(default_factory=dict)
     film: Annotated[str | None, "film to show (.webm); null: rendered from the condition"] = None
 

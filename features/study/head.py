@@ -7,8 +7,8 @@ from gazerig.features.study.session import HeadLost
 from gazerig.features.study.study_file import Study
 from gazerig.local_head import LocalHead
 
-_HELD_S, _LATE_S = 1.0, 2.0
-"""Times without motion, and without a tick, after which a head has lost its condition, seconds."""
+_HELD_S = 1.0
+"""Time without motion after which a head has lost its condition, seconds."""
 
 
 class HeadPresenter:
@@ -23,7 +23,7 @@ class HeadPresenter:
     def __init__(self, study: Study, head: LocalHead, now_s: Callable[[], float]) -> None:
         self._study, self._head, self._now_s = study, head, now_s
         self._condition: str | None = None
-        self._moved_s, self._tick_s, self._ticked_s = now_s(), 0.0, now_s()
+        self._moved_s = now_s()
 
     def show(self, condition: str) -> None:
         """Show a condition from the next tick on.
@@ -51,11 +51,7 @@ class HeadPresenter:
         now_s = self._now_s()
         if state.stopped:
             raise HeadLost(f"stopped: {state.stopped}")
-        if state.t_s != self._tick_s:
-            self._tick_s, self._ticked_s = state.t_s, now_s
         if state.level not in ("hold", "torque_off"):
             self._moved_s = now_s
         if now_s - self._moved_s > _HELD_S:
             raise HeadLost(f"the joints are held: {'; '.join(state.reasons[:3])}")
-        if now_s - self._ticked_s > _LATE_S:
-            raise HeadLost("its control loop does not run")

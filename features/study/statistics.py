@@ -6,7 +6,6 @@ signs or swaps of the participants' answers, including midranks (Streitberg & Ro
 
 import warnings
 from collections.abc import Callable, Sequence
-from itertools import product
 from math import nan
 from typing import Any, NamedTuple
 
@@ -17,8 +16,6 @@ from gazerig.features.study.design import Test
 from gazerig.gaze.types import Floats
 
 RESAMPLES, SEED = 2000, 20020401
-_MOST_ANSWERS = 60
-"""Largest number of answers for which all tables of a chi-square test are enumerated."""
 
 
 class StatisticalTest(NamedTuple):
@@ -26,7 +23,7 @@ class StatisticalTest(NamedTuple):
 
     p: from the statistic's distribution in large samples; exact_p: nan if it was not computed
     effect, low, high: effect size with its 95 % interval: matched rank-biserial correlation,
-        Cliff's delta, net share of participants, Cramer's V or Kendall's W
+        Cliff's delta, net share of participants or Cramer's V
     """
 
     key: Test
@@ -75,29 +72,14 @@ def sign_test(leans: Floats) -> StatisticalTest:
 def chi_square_test(better: Floats, than: Floats) -> StatisticalTest:
     """Test whether single answers have one distribution: Pearson's chi-square of the counts.
 
-    Without correction for continuity, and with each answer as another person's. The exact p value
-    is the share of all tables with the same margins that are as extreme.
+    Without correction for continuity, and with each answer as another person's.
     """
     table = np.array(
         [[np.sum(side == x) for x in np.union1d(better, than)] for side in (better, than)]
     )
     found = stats.chi2_contingency(table, correction=False)
-    columns, row, exact = table.sum(axis=0), len(better), nan
-    if len(better) + len(than) <= _MOST_ANSWERS:
-        counts = product(*(range(column + 1) for column in columns))
-        first = np.array([table[0], *(one for one in counts if sum(one) == row)])
-        distance = ((first - found.expected_freq[0]) ** 2 / columns).sum(axis=1)
-        extreme = first[1:][distance[1:] >= distance[0] - 1e-9]
-        exact = float(stats.multivariate_hypergeom.pmf(extreme, columns, row).sum())
     effect = float(np.sqrt(found.statistic / table.sum()))
-    return StatisticalTest("chi_square", float(found.statistic), float(found.pvalue), exact, effect)
-
-
-def friedman_test(rows: Floats) -> StatisticalTest:
-    """Test whether any of (participants, conditions) differ: Friedman's test."""
-    found = stats.friedmanchisquare(*rows.T)
-    effect = float(found.statistic) / (len(rows) * (rows.shape[1] - 1))
-    return StatisticalTest("friedman", float(found.statistic), float(found.pvalue), nan, effect)
+    return StatisticalTest("chi_square", float(found.statistic), float(found.pvalue), nan, effect)
 
 
 def exact_sign_p(scores: Floats) -> float:

@@ -96,10 +96,8 @@ def condition_rig(design: StudyDesign, condition: Condition, folder: Path) -> Ri
     """
     files = (design.presentation.rig, condition.character, condition.profile)
     rig, character, profile = (name and _locate(folder, name) for name in files)
-    changes = dict(cast(Mapping[str, Value], condition.params))
-    if condition.scanpath is not None:
-        changes["gaze.scanpath.model"] = condition.scanpath
     loaded = load_rig(rig or "", character, profile)
+    changes = cast(Mapping[str, Value], condition.params)
     return apply_changes(loaded, changes) if changes else loaded
 
 

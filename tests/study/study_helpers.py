@@ -55,7 +55,7 @@ def session_of(study: Path, journal: Journal) -> Session:
 
 def events(session: Session) -> list[str]:
     """Do what each page asks for to the end; return the steps."""
-    steps = []
+    steps: list[str] = []
     do = {"consent": "consent", "ready": "begin", "presentation": "seen", "questions": "answer"}
     while (step := session.place.step) != "end":
         steps.append(step)

@@ -8,7 +8,6 @@ from collections import Counter
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 from browser import browsing
 from command_line import invoked
@@ -312,6 +311,4 @@ def test_films_are_rendered_once(tmp_path: Path) -> None:
     before = [one.stat().st_mtime_ns for one in made.values()]
     assert films(study, tmp_path, lambda what, share: None) == made
     assert [one.stat().st_mtime_ns for one in made.values()] == before
-    assert not np.array_equal(
-        *(np.frombuffer(one.read_bytes()[-4000:], np.uint8) for one in made.values())
-    )
+    assert len({one.read_bytes()[-4000:] for one in made.values()}) == 2
