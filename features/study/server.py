@@ -16,7 +16,7 @@ from aiohttp.typedefs import Handler
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.features.study.session import Event, Session, WrongEvent
+from gazerig.features.study.session import Event, HeadLost, Session, WrongEvent
 from gazerig.robot.dashboard.door.admission import Admission, page_url
 
 _FILES = Path(__file__).parent / "browser"
@@ -63,6 +63,7 @@ class StudyServer:
         say: Callable[[str], None],
     ) -> None:
         self._session, self._address, self._films, self._say = session, address, films, say
+        self._lost: HeadLost | None = None
         token = _page_token(folder)
         self.url = f"{page_url(*address)}/?token={token}"
         self._admission = Admission(
@@ -93,6 +94,8 @@ class StudyServer:
                     "name another address with --page HOST:PORT"
                 ) from error
             while stopped() is None:
+                if self._lost is not None:
+                    raise self._lost
                 self._session.poll()
                 await asyncio.sleep(_POLL_S)
         finally:
@@ -126,6 +129,11 @@ class StudyServer:
             self._say(str(error))
             # The message may contain file names, which are not for participants.
             return _text(507, "not saved")
+        except HeadLost as lost:
+            self._lost = lost
+            return _text(503, "not saved")
+        if self._session.closed:
+            self._say("the session is over: Ctrl-C ends the program")
         return self._present_page(200 if applied else 409)
 
     async def _get_film(self, request: web.Request) -> web.Response:

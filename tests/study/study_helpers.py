@@ -1,4 +1,4 @@
-"""Short studies with films that are made in an instant, and a participant without a browser."""
+"""A participant without a browser."""
 
 import itertools
 import json
@@ -12,39 +12,9 @@ from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
-from shown_page import free_port
-
-from gazerig.drivers.files.film_writer import film_writer
 from gazerig.features.study.journal import Journal
 from gazerig.features.study.session import Event, Session
 from gazerig.features.study.study_file import load_study
-
-STUDY = """\
-title: Short
-conditions:
-  alpha: { film: ./alpha.webm }
-  beta: { film: ./beta.webm }
-trials: { seconds: 2, practice: 0 }
-questionnaires: [nakamoto_tsuruno]
-after: [free_text]
-debriefing: [It was the difference.]
-hypotheses: [{ measure: nakamoto_tsuruno.naturalness, better: alpha, than: beta }]
-plan: { participants: 2 }
-"""
-
-
-@pytest.fixture
-def study(tmp_path: Path) -> Path:
-    """A study of two films of two seconds."""
-    for shade, name in enumerate(("alpha", "beta")):
-        with film_writer(tmp_path / f"{name}.webm", (64, 64), 10.0) as write:
-            for _ in range(20):
-                write(np.full((64, 64, 3), 100 * shade, np.uint8))
-    path = tmp_path / "short.yaml"
-    path.write_text(STUDY)
-    return path
 
 
 def session_of(study: Path, journal: Journal) -> Session:
@@ -106,23 +76,6 @@ class Program:
 
     def do(self, page: dict[str, Any], do: str, **more: Any) -> int:
         return self.fetch("/event", {"page": page["page"], "do": do, **more})[0]
-
-
-@pytest.fixture
-def program(tmp_path: Path) -> Any:
-    """Starts ``gazerig study run`` at one address; kills it at the end."""
-    started: list[Program] = []
-    address = f"127.0.0.1:{free_port()}"
-
-    def start(*words: str) -> Program:
-        data = ("--data", str(tmp_path / "data"), "--page", address, "--no-browser")
-        started.append(Program(*words, "--participant", "1", *data))
-        return started[-1]
-
-    yield start
-    for one in started:
-        one.process.kill()
-        one.process.wait()
 
 
 Start = Callable[..., Program]

@@ -50,7 +50,7 @@ async function send(action) {
 
 // Follow the session: a head's presentation ends by the clock of the study.
 async function follow() {
-  for (;;) {
+  while (current?.step !== "end") {
     try {
       const page = await (await fetch("/page", { signal: AbortSignal.timeout(15000) })).json();
       byId("notice").textContent = "";
