@@ -243,7 +243,7 @@ SAID = {
         "ok",
         "signed_rank",
         "rank_sum",
-        "friedman",
+        "chi_square",
         "chi_square",
         "cup: {held_by: anna, side: left}",
         "bus ok",
@@ -305,7 +305,7 @@ def test_every_span_names_something_that_is_there() -> None:
     words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD, script.BASE}
     forms = (
         *(design.StudyDesign, design.Presentation, design.Trials, design.StatisticalPlan),
-        *(design.Questionnaire, design.Item),
+        *(design.Questionnaire, design.Item, design.Condition, design.Hypothesis),
     )
     words |= {field.name for form in forms for field in fields(form)}
     words |= {*shipped_names("studies", HOME), *shipped_names("questionnaires", HOME)}
