@@ -6,9 +6,8 @@ import numpy as np
 
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 
 

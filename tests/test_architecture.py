@@ -56,12 +56,12 @@ OWNERS = {
     ),
     "cv2": (
         "drivers.",
+        "features.lab.analysis.drawn_face",
         "features.bringup.calibration.camera_calibration",
         "features.bringup.calibration.charuco_",
         "robot.model.charuco_board",
         "robot.perception.face_pose",
         "features.bringup.calibration.hand_eye",
-        "robot.analysis.heatmap",
         "robot.description.mesh_files",
         "robot.model.intrinsics",
         "robot.dashboard.",

@@ -11,10 +11,10 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
+from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back

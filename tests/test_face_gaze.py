@@ -5,7 +5,10 @@ from math import cos, radians, sin
 import pytest
 
 from gazerig.gaze.angles import rotation, sub, unit
-from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
+
+gaze_point_on_face = pytest.importorskip(
+    "gazerig.features.lab.analysis.gaze_on_face"
+).gaze_point_on_face
 
 NOSE = (1.0, 0.2, 0.25)
 TOWARDS = rotation((radians(180.0), 0.0, 0.0))

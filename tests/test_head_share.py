@@ -12,7 +12,8 @@ from gazerig.gaze.angles import angle_between, direction
 from gazerig.gaze.oculomotor.head import HeadModel, HeadShare
 from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.types import Angles2, Floats, Target
-from gazerig.robot.analysis.human_norms import STAHL_FREE_DEG, STAHL_SLOPE
+
+human_norms = pytest.importorskip("gazerig.features.lab.analysis.human_norms")
 
 NECK = ((-2.0, 2.0), (-1.2, 1.2))
 ROLL = (radians(-25.0), radians(25.0))
@@ -94,7 +95,9 @@ def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(
     start: float, place: float
 ) -> None:
     arc, went, _ = ends("stahl", 75.0, (start, 0.0), (place, 0.0), 0.5)
-    assert went == pytest.approx(STAHL_SLOPE * max(0.0, arc - STAHL_FREE_DEG), abs=1.0)
+    assert went == pytest.approx(
+        human_norms.STAHL_SLOPE * max(0.0, arc - human_norms.STAHL_FREE_DEG), abs=1.0
+    )
 
 
 def flight(seconds: float, *places: tuple[float, float]) -> Floats:

@@ -26,7 +26,7 @@ SIZES = {
     "small": (800, 600),
     "narrow": (1000, 700),
 }
-TABS = ("watch", "steer", "tune", "health", "report")
+TABS = ("watch", "steer", "tune", "health")
 MENUS = {"track": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
 LEADS = {
     "awake": ControlSource(),

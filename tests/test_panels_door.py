@@ -48,7 +48,7 @@ def test_the_panels_are_for_those_who_may_come_in(near: Rig, wrong: dict[str, st
 def test_what_is_shown_comes_and_what_is_done_is_heard(near: Rig) -> None:
     widgets = near.door.widgets
     heard: list[object] = []
-    panel = widgets.panel("report")
+    panel = widgets.panel("health")
     slider = panel.slider("neck", (-10.0, 10.0), 0.1, 0.0)
     slider.on_change(lambda value, client: heard.append((value, widgets.browser(client))))
     image = panel.image("heat map")
@@ -79,7 +79,7 @@ def test_a_long_message_ends_its_connection_and_no_other(near: Rig) -> None:
 
 
 def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:
-    slider = near.door.widgets.panel("report").slider("neck", (0.0, 1.0), 0.1, 0.0)
+    slider = near.door.widgets.panel("health").slider("neck", (0.0, 1.0), 0.1, 0.0)
     over = threading.Event()
     slider.on_change(lambda value, client: over.wait(0.05))  # as slow as a rig that is busy
     before = len(near.stops)

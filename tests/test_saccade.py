@@ -8,7 +8,8 @@ import pytest
 
 from gazerig.gaze.minimum_jerk import min_jerk
 from gazerig.gaze.oculomotor.saccade import MinJerkProfile, SaccadeModel, SaccadeParams
-from gazerig.robot.analysis import human_norms
+
+human_norms = pytest.importorskip("gazerig.features.lab.analysis.human_norms")
 
 SACCADE = SaccadeModel(SaccadeParams(profile="min_jerk"))
 

@@ -15,9 +15,8 @@ from six_joints import SIX
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.analysis.blink_finder import UPPER, lid_openings
-from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.run_summary import Summary
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
@@ -117,6 +116,8 @@ class _Still:
 
 
 def test_absent_lids_count_for_nothing() -> None:
+    blinks = pytest.importorskip("gazerig.features.lab.analysis.blink_finder")
+    lid_openings, UPPER = blinks.lid_openings, blinks.UPPER  # noqa: N806
     assert lid_openings(0.2, 0.4, SIX, UPPER) == (0.2, 0.4)
     assert lid_openings(0.2, 1.0, ("left_upper_lid",), UPPER) == (0.2, 0.2)
     assert lid_openings(1.0, 1.0, ("eyes_pan",), UPPER) is None

@@ -18,7 +18,6 @@ from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
 from gazerig.drivers.files.file_output import output_file, output_text, refuse_existing, write_file
-from gazerig.robot.analysis.heatmap import align_face
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.remote.live_server import read_file_state
 
@@ -50,7 +49,6 @@ READERS: dict[str, Callable[[str], object]] = {
     "profile": lambda path: load_rig("desk", None, path),
     "rules": load_rules,
     "walk": load_walk,
-    "face": lambda path: align_face(Path(path)),
 }
 
 
@@ -263,7 +261,6 @@ def test_folders_are_told_apart(tmp_path: Path) -> None:
         ("schema", "{}"),
         ("calibrate-board", "{}"),
         ("run", "--mock", "--fast", "--seconds", "1", "--summary", "{}"),
-        ("run", "--mock", "--fast", "--seconds", "1", "--heatmap", "{}"),
         ("run", "--mock", "--fast", "--seconds", "1", "--record", "{}"),
         ("record-camera", "{}", "--video", "none.avi"),
         ("calibrate", "desk", "--mock", "--out", "{}"),

@@ -17,10 +17,10 @@ from features_there import skip_without
 import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, SetupError
-from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_summary import Summary
 from gazerig.robot.cli.run import report_faults
 from gazerig.robot.control.interrupts import SAME_REQUEST_S, Interrupts
 from gazerig.robot.control.loop import Robot

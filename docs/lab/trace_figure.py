@@ -11,14 +11,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.analysis.human_norms import evoked_blink_probability, mean_head_deg
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import yaw_pitch
-from gazerig.robot.analysis.human_norms import evoked_blink_probability, mean_head_deg
-from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.scene_files import load_scene
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, cyclopean_direction
 
 BEGIN_S, SECONDS, RATE_HZ = 8.0, 20.0, 200.0
 PROFILES = ("robot", "mitake", "nakamoto")

@@ -39,7 +39,6 @@ class RunOptions:
         seconds: duration of the run.
         page: HOST:PORT of the live page; no_page: without it; token_file: file with its token, None
             for a new token.
-        heatmap: PNG to write; heatmap_face: image of a face behind it.
         record: file to record to; record_pictures: camera frames per second in it.
         force: overwrite older files.
         recover: move joints that are far outside their ranges inside, instead of refusing to start.
@@ -77,8 +76,6 @@ class RunOptions:
     page: str | None = None
     no_page: bool = False
     token_file: Path | None = None
-    heatmap: Path | None = None
-    heatmap_face: Path | None = None
     record: Path | None = None
     record_pictures: float = 2.0
     force: bool = False
@@ -134,7 +131,7 @@ class RunOptions:
     def output_files(self) -> tuple[Path, ...]:
         """Return the files whose names must be free before the run starts."""
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
-        return tuple(path for path in (self.record, self.heatmap, named) if path is not None)
+        return tuple(path for path in (self.record, named) if path is not None)
 
     @property
     def initial_choices(self) -> tuple[tuple[str, str], ...]:

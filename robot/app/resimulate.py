@@ -17,9 +17,9 @@ from gazerig.config.save_text import params_text, track_files
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.process.own_folder import OwnFolder
-from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_summary import Summary
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import LoopCount, Tick
@@ -42,7 +42,7 @@ class Resimulation(NamedTuple):
     first_difference_s: time of the first difference from the first tick, None if all agree;
     differs: the difference there
     sent_bytes_same: whether the bytes on the emulated bus are the same too, None if unknown
-    recorded_figures, rerun_figures: the figures of both (gazerig.robot.analysis.summary)
+    recorded_figures, rerun_figures: the figures of both (gazerig.robot.app.run_summary)
     notes: further messages for the user
     """
 

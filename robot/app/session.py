@@ -2,20 +2,16 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
-from gazerig.robot.analysis.gaze_on_face import GazeOnFace
-from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_info, run_rig
+from gazerig.robot.app.run_summary import Summary
+from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore
 from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.event_text import group_events, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
@@ -212,7 +208,6 @@ class Session:
         self._score = (
             SceneScore.from_scene(scene, start_s) if summarised and scene is not None else None
         )
-        self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
@@ -225,8 +220,6 @@ class Session:
         if self._score is not None:
             observers.add("the scene's score", self._score.behaviours.update)
             observers.add("the planner's score", self._score.planner.update)
-        if self._face_gaze is not None:
-            observers.add("the heat map", self._face_gaze.update)
         observers.add("the log", self._print_events)
         if watch is not None:
             observers.add("the program", watch)
@@ -265,7 +258,7 @@ class Session:
         figures = run_figures(
             self._made, self._summary, self._score, self._count, wall_s, self._faults
         )
-        unwritten = self._run_observers.incomplete_file() or self._unwritten_heatmap()
+        unwritten = self._run_observers.incomplete_file()
         if unwritten is not None:
             figures["not_written"] = str(unwritten)
         if self._unreleased:
@@ -316,25 +309,6 @@ class Session:
                 run_observers.close(self._count)
             else:
                 run_observers.remove_files()
-
-    def _unwritten_heatmap(self) -> Path | None:
-        """Write the heat map if requested; return its file if that failed."""
-        options, face_gaze = self._options, self._face_gaze
-        if face_gaze is None or (out := options.heatmap) is None:
-            return None
-        if not face_gaze.points_face_m:
-            self._say(f"no heat map in {out}: the gaze was never on a face")
-            return None
-        from gazerig.robot.analysis.heatmap import write_heatmap  # imports a face detector
-
-        points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
-        try:
-            write_heatmap(points, seconds, out, options.heatmap_face, options.force)
-        except SetupError as error:  # the figures of the run are printed nevertheless
-            self._say(str(error))
-            return out
-        self._say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
-        return None
 
 
 def _longest_s(assembly: Assembly, options: RunOptions) -> float | None:

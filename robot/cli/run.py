@@ -65,8 +65,6 @@ def run(
     token_file: options.TokenFile = None,
     no_browser: options.NoBrowser = False,
     verbose: options.Verbose = False,
-    heatmap: options.Heatmap = None,
-    heatmap_face: options.HeatmapFace = None,
     record: options.Record = None,
     record_pictures: options.RecordPictures = 2.0,
     force: options.Force = False,

@@ -132,10 +132,6 @@ Verbose = Annotated[
         "--verbose", help="Also print which registers are set and which tables are adjusted."
     ),
 ]
-Heatmap = Annotated[
-    Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
-]
-HeatmapFace = Annotated[Path | None, typer.Option(help="Frame of a face behind the heat map.")]
 Record = Annotated[
     Path | None, typer.Option(help="Record every tick, for reruns and reports: FILE.mcap.")
 ]
@@ -144,7 +140,7 @@ RecordPictures = Annotated[
 ]
 Force = Annotated[
     bool,
-    typer.Option("--force", help="Overwrite an existing recording, heat map or summary."),
+    typer.Option("--force", help="Overwrite an existing recording or summary."),
 ]
 Recover = Annotated[
     bool,

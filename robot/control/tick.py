@@ -3,7 +3,9 @@
 from typing import NamedTuple
 
 from gazerig.drivers.types import Detections
-from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
+from gazerig.gaze.angles import add, unit
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
@@ -82,3 +84,8 @@ def stopped_result(
     return GuardResult(
         joints.position_rad, "torque_off", (reason,), desired_rad, each, (reason,), names
     )
+
+
+def cyclopean_direction(tick: Tick) -> Vec3:
+    """Return the unit mean of both measured lines of sight, in the world."""
+    return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))

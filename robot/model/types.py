@@ -276,20 +276,11 @@ class LoopFigures(NamedTuple):
 
 
 class SeenSaccade(NamedTuple):
-    """A measured saccade."""
+    """A saccade, with the angle by which the measured gaze has moved."""
 
     onset_s: float
     duration_s: float
     amplitude_deg: float
-    peak_deg_s: float
-
-
-class SeenFixation(NamedTuple):
-    """A fixation, with the code of the face part if it was on a face."""
-
-    start_s: float
-    duration_s: float
-    part: str | None
 
 
 class SeenBlink(NamedTuple):
@@ -299,7 +290,7 @@ class SeenBlink(NamedTuple):
     duration_s: float
 
 
-SeenEvent = SeenSaccade | SeenFixation | SeenBlink
+SeenEvent = SeenSaccade | SeenBlink
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,8 @@ import pytest
 from human.eye_steps import steps
 from human.measured_run import Runner
 
-from gazerig.robot.analysis import human_norms as people
-
 pytest.importorskip("gazerig.features.lab")  # its measures
+from gazerig.features.lab.analysis import human_norms as people  # noqa: E402
 from gazerig.features.lab.report.saccades import saccade_table  # noqa: E402
 
 SCENES = ("visitor", "face-to-face")

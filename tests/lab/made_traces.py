@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from gazerig.features.lab.analysis.blink_finder import BlinkEvent
+from gazerig.features.lab.analysis.event_detector import CommandedSaccade, SaccadeEvent
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
 from gazerig.features.lab.report.report import judge_run
 from gazerig.features.lab.report.statistics import MeasureResult
-from gazerig.robot.analysis.blink_finder import BlinkEvent
-from gazerig.robot.analysis.event_detector import CommandedSaccade, SaccadeEvent
 
 EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 

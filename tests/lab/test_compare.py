@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 
 from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import compare, measure_differences, permutation_p_value
 from gazerig.features.lab.report.page import RunHeader
 from gazerig.features.lab.report.statistics import MeasuredValue, correct_p_values, mean, median
-from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run

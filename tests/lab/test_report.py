@@ -20,13 +20,24 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.analysis import human_norms as bands
+from gazerig.features.lab.analysis import human_norms as human
+from gazerig.features.lab.analysis.blink_finder import BlinkEvent, BlinkFinder
+from gazerig.features.lab.analysis.event_detector import (
+    CommandedSaccade,
+    EventDetector,
+    FixationEvent,
+    MeasuredSaccade,
+    SaccadeEvent,
+    SaccadeFinder,
+)
 from gazerig.features.lab.analysis.eye_tracker_csv import read_recording
 from gazerig.features.lab.cli.report import app, page_file
 from gazerig.features.lab.report import blinks as blink_measures
 from gazerig.features.lab.report import eye_contact, face, landing, rests
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import compare_page, measure_differences
-from gazerig.features.lab.report.face import published_walk, rig_walk
+from gazerig.features.lab.report.face import GRID_M, gaze_density, published_walk, rig_walk
 from gazerig.features.lab.report.gaze_trace import (
     GazeTrace,
     GazeTraceBuilder,
@@ -58,20 +69,10 @@ from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
-from gazerig.robot.analysis import human_norms as bands
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
-from gazerig.robot.analysis.event_detector import (
-    CommandedSaccade,
-    EventDetector,
-    FixationEvent,
-    MeasuredSaccade,
-    SaccadeEvent,
-    SaccadeFinder,
-)
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 RIG = load_rig("desk")
@@ -787,3 +788,12 @@ def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> Non
     assert finder.update(tick(2.5, (1, 2), 2, 3)) is None  # no longer new
     assert finder.update(tick(3.0, (1, 2, 3), 2, 3)) is None
     assert finder.update(tick(4.5, (1, 2, 3), 3, 4)) is None  # a choice
+
+
+def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
+    for part in ("LE", "M"):
+        _, y, z = PARTS_FACE_M[part]
+        once, twice = (gaze_density(np.array([(y, z, seconds)])) for seconds in (1.0, 2.0))
+        assert np.allclose(twice, 2.0 * once)
+        row, column = np.unravel_index(once.argmax(), once.shape)
+        assert (GRID_M[0][column], GRID_M[1][row]) == pytest.approx((y, z), abs=0.0021)

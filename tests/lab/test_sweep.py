@@ -26,6 +26,7 @@ from gazerig.config.parameters import apply_changes
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import (
     Axis,
@@ -54,7 +55,6 @@ from gazerig.features.lab.sweep.run_outcome import (
 from gazerig.features.lab.sweep.sweep import RUNS, run_store
 from gazerig.features.lab.sweep.worker import figures_at
 from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool
-from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 

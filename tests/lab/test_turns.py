@@ -5,9 +5,9 @@ from typing import get_args
 import pytest
 from reported_turns import model_alone, whole_product
 
+from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.report.statistics import judge_without_interval
 from gazerig.features.lab.report.turns import Role, measures
-from gazerig.robot.analysis.human_norms import BY_KEY
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -16,10 +16,10 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Camera, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, norm, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.tick import cyclopean_direction
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.tracker_params import TrackerParams

@@ -26,7 +26,6 @@ from gazerig.features.world.opponent_motion import (  # noqa: E402
 from gazerig.features.world.run.run_world import world_scene  # noqa: E402
 from gazerig.features.world.world_scene import WorldScene  # noqa: E402
 from gazerig.gaze.types import Vec3  # noqa: E402
-from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore  # noqa: E402
 from gazerig.robot.app.assemble import (  # noqa: E402
     Assembly,
     assemble,
@@ -34,6 +33,7 @@ from gazerig.robot.app.assemble import (  # noqa: E402
 )
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.app.resimulate import rerun  # noqa: E402
+from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.robot.model.command_json import as_json, from_json  # noqa: E402
 from gazerig.robot.model.commands import OPPONENT_BOX_M, MoveOpponent  # noqa: E402

@@ -270,7 +270,7 @@ def _column(name: str) -> str:
     Raises:
         SetupError: there is no measure of that name.
     """
-    from gazerig.robot.analysis.human_norms import BY_KEY  # with NumPy
+    from gazerig.features.lab.analysis.human_norms import BY_KEY  # with NumPy
 
     if name in BY_KEY or name in _COLUMNS[:2]:
         return f"report.{name}"

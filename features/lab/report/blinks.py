@@ -5,6 +5,7 @@ from math import nan
 
 import numpy as np
 
+from gazerig.features.lab.analysis.blink_finder import BlinkEvent
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
@@ -14,7 +15,6 @@ from gazerig.features.lab.report.statistics import (
     spread_over_mean,
 )
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.blink_finder import BlinkEvent
 
 _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0

@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from gazerig.features.lab.analysis.human_norms import BY_KEY, GROUPS
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.page import (
     PageFigure,
@@ -41,7 +42,6 @@ from gazerig.features.lab.report.statistics import (
     measured_values,
     unbiased_interval,
 )
-from gazerig.robot.analysis.human_norms import BY_KEY, GROUPS
 from gazerig.robot.control.tick import Tick
 
 LEVEL = 0.05

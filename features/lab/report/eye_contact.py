@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.analysis.mutual_gaze import BRIDGED_S, HALF_HIGH_M, HALF_WIDE_M
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, longest, mean, median
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.mutual_gaze import BRIDGED_S, HALF_HIGH_M, HALF_WIDE_M
 
 _FACING_DEG = 12.0
 

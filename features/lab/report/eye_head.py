@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.analysis import human_norms as human
+from gazerig.features.lab.analysis.event_detector import THRESHOLD_DEG_S
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, median
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.event_detector import THRESHOLD_DEG_S
 
 LEAST_DEG = 5.0
 _AFTER_S, _BEFORE_S, _LEAST_AFTER_S = 0.9, 0.15, 0.45

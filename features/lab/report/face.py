@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
 from gazerig.gaze.scanpath.dwell import Draw, dwell_distribution
@@ -18,7 +19,6 @@ from gazerig.gaze.scanpath.scanpath import (
     steps_and_dwells,
 )
 from gazerig.gaze.types import PARTS, Floats
-from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 N = len(PARTS)

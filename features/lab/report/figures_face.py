@@ -4,6 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gazerig.features.lab.analysis import human_norms as human
+from gazerig.features.lab.analysis.drawn_face import HEIGHT_PX, WIDTH_PX, canvas_pixels, draw_face
+from gazerig.features.lab.analysis.human_norms import FACE
 from gazerig.features.lab.report import face
 from gazerig.features.lab.report.face import published_walk
 from gazerig.features.lab.report.plotting import (
@@ -21,9 +24,6 @@ from gazerig.features.lab.report.plotting import (
     label_axes,
 )
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.heatmap import HEIGHT_PX, WIDTH_PX, canvas_pixels, draw_face
-from gazerig.robot.analysis.human_norms import FACE
 
 _NAMES = [PART_NAMES[part] for part in PARTS]
 _NONE = "no fixation on a face part"

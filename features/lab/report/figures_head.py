@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gazerig.features.lab.analysis import human_norms as human
+from gazerig.features.lab.analysis.human_norms import FOLLOWING, HEAD
 from gazerig.features.lab.report import eye_head
 from gazerig.features.lab.report import pursuit as following
 from gazerig.features.lab.report.plotting import (
@@ -16,8 +18,6 @@ from gazerig.features.lab.report.plotting import (
     draw_no_data,
     label_axes,
 )
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.human_norms import FOLLOWING, HEAD
 
 
 def _contribution(figure: Figure, runs: Sequence[ShownRun]) -> None:

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gazerig.features.lab.analysis import human_norms as human
+from gazerig.features.lab.analysis.human_norms import LIDS, SOCIAL
 from gazerig.features.lab.report import blinks
 from gazerig.features.lab.report import eye_contact as social
 from gazerig.features.lab.report.plotting import (
@@ -18,8 +20,6 @@ from gazerig.features.lab.report.plotting import (
     draw_no_data,
     label_axes,
 )
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.human_norms import LIDS, SOCIAL
 
 _SHOWN_S = np.arange(-0.1, 0.5, 0.005)
 _PHASES = (("closing", 60.0, 100.0), ("shut", 20.0, 60.0), ("opening", 130.0, 250.0))

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gazerig.features.lab.analysis import human_norms as human
+from gazerig.features.lab.analysis.human_norms import SACCADES
 from gazerig.features.lab.report import saccades
 from gazerig.features.lab.report.plotting import (
     HUMAN,
@@ -16,8 +18,6 @@ from gazerig.features.lab.report.plotting import (
     draw_no_data,
     label_axes,
 )
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.human_norms import SACCADES
 
 _OVERVIEW_S = 12.0
 

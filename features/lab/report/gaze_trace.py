@@ -9,6 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.analysis.blink_finder import LOWER, UPPER, BlinkEvent, lid_openings
+from gazerig.features.lab.analysis.event_detector import (
+    NEAR_FACE_M,
+    EventDetector,
+    FixationEvent,
+    SaccadeEvent,
+    miss_distance_m,
+)
+from gazerig.features.lab.analysis.gaze_on_face import gaze_point_on_face
 from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
 from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.features.lab.report.turns import STATES, TurnTrace
@@ -16,18 +25,8 @@ from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scal
 from gazerig.gaze.attention.aversion import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.analysis.blink_finder import LOWER, UPPER, BlinkEvent, lid_openings
-from gazerig.robot.analysis.event_detector import (
-    NEAR_FACE_M,
-    EventDetector,
-    FixationEvent,
-    SaccadeEvent,
-    miss_distance_m,
-)
-from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
-from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.feedback_basis import estimated_joints
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.model.commands import Ask
 
 _LONGEST_S = 1.0

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from gazerig.robot.analysis.blink_finder import UPPER
-from gazerig.robot.analysis.human_norms import GROUPS, LIDS, PARALLEL
+from gazerig.features.lab.analysis.blink_finder import UPPER
+from gazerig.features.lab.analysis.human_norms import GROUPS, LIDS, PARALLEL
 from gazerig.robot.control.feedback_basis import Basis, basis_of
 from gazerig.robot.model.types import order_joints
 

@@ -8,8 +8,8 @@ lids at rest with the same gaze has neither fault.
 
 import numpy as np
 
+from gazerig.features.lab.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 
 _BIN_DEG = 2.0
 _LEAST_SHARE = 0.002

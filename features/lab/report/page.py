@@ -13,11 +13,11 @@ import jinja2
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
+from gazerig.features.lab.analysis.human_norms import BANDS, GROUPS, NormBand
 from gazerig.features.lab.report.face import ReferenceWalk
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.statistics import MeasureResult, format_number
-from gazerig.robot.analysis.human_norms import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
 
 

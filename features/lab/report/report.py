@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.analysis.human_norms import BY_KEY, band_applies
 from gazerig.features.lab.report import (
     blinks,
     eye_contact,
@@ -25,7 +26,6 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.page import PageFigure, RunHeader, report_page, write_all
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, basis_text, drawing_png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
-from gazerig.robot.analysis.human_norms import BY_KEY, band_applies
 from gazerig.robot.control.tick import Tick
 
 Progress = Callable[[str, float], None]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
@@ -13,7 +14,6 @@ from gazerig.features.lab.report.statistics import (
     one_over_mean,
 )
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis import human_norms as human
 
 LEAST_DEG = 1.0
 """Smaller saccades depend on the threshold and the encoder's resolution."""

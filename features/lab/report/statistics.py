@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.analysis.human_norms import NormBand
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.human_norms import NormBand
 
 VerdictWord = Literal["pass", "uncertain", "outside", "too few events"]
 """uncertain: the figure is outside, but its interval reaches into the band"""

@@ -15,10 +15,10 @@ from gazerig.config.parameters import differences, flatten_changes
 from gazerig.config.save_text import changes_text
 from gazerig.config.schema import NO_CHARACTER, load_rig
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.analysis.human_norms import BANDS, BY_KEY
 from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
 from gazerig.features.lab.sweep.run_outcome import REPORT, VERDICT, Outcome, grade
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.human_norms import BANDS, BY_KEY
 from gazerig.robot.app.options import RunOptions
 
 Scores = Callable[[Sequence[Point]], Sequence[float]]

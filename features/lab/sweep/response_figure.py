@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.features.lab.analysis.human_norms import BANDS, BY_KEY, NormBand
 from gazerig.features.lab.report.plotting import (
     COLOURS,
     HUMAN_FILL,
@@ -18,7 +19,6 @@ from gazerig.features.lab.report.plotting import (
 from gazerig.features.lab.sweep.axes import Axis
 from gazerig.features.lab.sweep.run_outcome import OUTSIDE, REPORT, Outcome
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.human_norms import BANDS, BY_KEY, NormBand
 
 PICTURE = "response.png"
 

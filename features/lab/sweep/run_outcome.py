@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.drivers.files.file_output import output_file, write_file
+from gazerig.features.lab.analysis.human_norms import BANDS, BY_KEY
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.report import measure_run
 from gazerig.features.lab.report.statistics import MeasureResult, judge_without_interval
 from gazerig.features.lab.sweep.axes import Point
-from gazerig.robot.analysis.human_norms import BANDS, BY_KEY
 
 Column = float | int | str | bool | None
 Figures = Mapping[str, Column]

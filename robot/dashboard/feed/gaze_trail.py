@@ -1,4 +1,4 @@
-"""Past gaze points, for frames that arrive late and for the trail and the heat map."""
+"""Past gaze points, for frames that arrive late and for the trail."""
 
 from collections import deque
 

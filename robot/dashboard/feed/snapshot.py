@@ -2,16 +2,16 @@
 
 from collections import Counter, deque
 from dataclasses import replace
+from math import degrees
 from typing import NamedTuple
 
 import numpy as np
 
+from gazerig.gaze.angles import angle_between
 from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
-from gazerig.gaze.types import GazeState
-from gazerig.robot.analysis.blink_finder import BlinkEvent
-from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
+from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.control.tick_text import control_text, head_activity, tick_control_source
 from gazerig.robot.description.build import RigShape
 from gazerig.robot.model.control_source import control_sentence, playing
@@ -29,7 +29,6 @@ from gazerig.robot.model.types import (
     SeenCamera,
     SeenEvent,
     SeenFace,
-    SeenFixation,
     SeenSaccade,
     ServoLimits,
     Servos,
@@ -77,6 +76,34 @@ class SnapshotTexts(NamedTuple):
     expression: str = ""
 
 
+class EyeMovements:
+    """Finds the saccades and blinks that the models have made, in consecutive ticks."""
+
+    def __init__(self) -> None:
+        self._last: Tick | None = None
+        self._onset: tuple[float, Vec3] | None = None
+        self._shut_s: float | None = None
+
+    def update(self, tick: Tick) -> list[SeenEvent]:
+        """Return the movements that have ended with this tick."""
+        found: list[SeenEvent] = []
+        gaze, last, self._last = tick.gaze, self._last, tick
+        is_other = last is not None and gaze.saccades != last.gaze.saccades
+        if self._onset is not None and (is_other or gaze.phase != "saccade"):
+            onset_s, before = self._onset
+            moved_deg = degrees(angle_between(before, cyclopean_direction(tick)))
+            found.append(SeenSaccade(onset_s, tick.t_s - onset_s, moved_deg))
+            self._onset = None
+        if self._onset is None and gaze.phase == "saccade":
+            self._onset = tick.t_s, cyclopean_direction(tick)
+        if gaze.blink and self._shut_s is None:
+            self._shut_s = tick.t_s
+        elif not gaze.blink and self._shut_s is not None:
+            found.append(SeenBlink(self._shut_s, tick.t_s - self._shut_s))
+            self._shut_s = None
+        return found
+
+
 class SnapshotBuilder:
     """Creates snapshots of a running rig, with all events since the previous one.
 
@@ -94,7 +121,7 @@ class SnapshotBuilder:
         self._timing = LoopTiming(self._rate_hz)
         self._figures: LoopFigures | None = None
         self._figures_s = self._trail_s = -np.inf
-        self._events = EventDetector()
+        self._movements = EyeMovements()
         self._unanswered: Counter[str] = Counter()
 
     def retune(self, rate_hz: float) -> None:
@@ -120,7 +147,7 @@ class SnapshotBuilder:
             self._timing.update(tick.t_s)
             if tick.joints.missing:
                 self._unanswered.update(tick.joints.missing)
-            events += map(_shown_event, self._events.update(tick))
+            events += self._movements.update(tick)
             if tick.t_s - self._trail_s >= _TRAIL_S:
                 self._trail_s = tick.t_s
                 trail.append(_trail(tick))
@@ -331,15 +358,3 @@ def _trail(tick: Tick) -> Trail:
     return Trail(
         tick.t_s, tick.desired_rad, tick.guard_result.command_rad, tick.joints.position_rad
     )
-
-
-def _shown_event(event: Event) -> SeenEvent:
-    match event:
-        case SaccadeEvent():
-            return SeenSaccade(
-                event.onset_s, event.duration_s, event.amplitude_deg, event.peak_deg_s
-            )
-        case FixationEvent():
-            return SeenFixation(event.start_s, event.duration_s, event.part)
-        case BlinkEvent():
-            return SeenBlink(event.onset_s, event.duration_s)

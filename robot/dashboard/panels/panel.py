@@ -1,35 +1,24 @@
-"""Panels that show the rig: camera, reasons, traces, statistics and health."""
+"""Panels that show the rig: camera, reasons, traces and health."""
 
 from collections.abc import Callable
 from functools import partial
 from math import inf
 
-import cv2
-import numpy as np
-
-from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
-from gazerig.robot.dashboard.panels.gaze_map import GazeMap
 from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.panels.package_panels import PagePanels
-from gazerig.robot.dashboard.panels.run_figures import (
-    HOW_TO,
-    DwellChart,
-    MainSequenceChart,
-    RunFigures,
-)
 from gazerig.robot.dashboard.panels.servo_health import alarms, health_table
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
-from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
+from gazerig.robot.model.types import Snapshot
 
 # Frames of the page between two drawings of an element; the page has at most 25 a second.
-_WORDS_EVERY, _TRACES_EVERY, _FIGURES_EVERY = 3, 4, 25
+_WORDS_EVERY, _TRACES_EVERY = 3, 4
 
 
 class PanelView:
-    """Camera image, alarms, and the drawers Watch, Health and Report.
+    """Camera image, alarms, and the drawers Watch and Health.
 
     A drawer that no browser has open is not drawn.
 
@@ -51,14 +40,8 @@ class PanelView:
         self.winner = watch.html(note("waiting for the rig"), order=1)
         self.saliences = watch.html(order=2)
         self.traces = JointCharts(watch.section("traces", order=4))
-        statistics = watch.section("statistics", is_open=False, order=5)
-        self.estimation_note = statistics.html(order=1)
-        self.saccades = statistics.html(order=2)
-        self.dwells = statistics.html(order=3)
-        heat = watch.section("heat map on the face", is_open=False, order=6)
-        heat.html(note("gaze points on the face; yellow has the longest time"))
-        self.map = heat.image("heat map: where on a face the gaze has been")
-        self.view = watch.section("view", is_open=False, order=7)
+        self.estimation_note = watch.html(order=5)
+        self.view = watch.section("view", is_open=False, order=6)
         layers = self.layers = OverlayChoices()
 
         def select(name: str, is_on: bool, client: str) -> None:
@@ -70,21 +53,16 @@ class PanelView:
         depth = self.view.checkbox("depth instead of the camera image", value=False, order=99)
         depth.on_change(lambda on, _: self.depth(on))
         self.health = widgets.panel("health").html(note("waiting for the rig"))
-        report = widgets.panel("report")
-        self.figures = report.html(order=1)
-        report.html(HOW_TO, order=2)
 
     def _begin(self) -> None:
         """Reset all data that is collected from snapshots."""
         self._last_s = -inf
         self._last: Snapshot | None = None
         self._traces = JointSeries()
-        self._sequence, self._dwell = MainSequenceChart(), DwellChart()
-        self._map, self._figures = GazeMap(), RunFigures()
         self.panels.begin()
 
     def update(self, snapshots: tuple[Snapshot, ...]) -> None:
-        """Add snapshots to traces and statistics, also those that are not drawn.
+        """Add snapshots to the traces, also those that are not drawn.
 
         A snapshot with an earlier time than the last one, after a restart, resets all.
         """
@@ -95,17 +73,10 @@ class PanelView:
                 self._begin()
             self._last_s, self._last = snapshot.t_s, snapshot
             self._traces.add(snapshot)
-            self._map.update(snapshot)
-            self._figures.update(snapshot)
             self.panels.update(snapshot)
-            for event in snapshot.events:
-                if isinstance(event, SeenSaccade):
-                    self._sequence.update(event)
-                elif isinstance(event, SeenFixation):
-                    self._dwell.update(event)
 
     def show(self) -> None:
-        """Draw the newest text and, less often, traces, strip and statistics."""
+        """Draw the newest text and, less often, traces and strip."""
         if (snapshot := self._last) is None:
             return
         before, self._open = self._open, frozenset(filter(self._widgets.is_visible, PANELS))
@@ -123,14 +94,6 @@ class PanelView:
             self.traces.show(self._traces)
         if "watch" in self._open:
             self.panels.draw(self._shown)
-        if self._shown % _FIGURES_EVERY == 0 and "report" in self._open:
-            self.figures.content = self._figures.table(self._dwell)
-        if self._shown % _FIGURES_EVERY == 0 and "watch" in self._open:
-            self.dwells.content = self._dwell.drawing()
-            self.saccades.content = self._sequence.drawing()
-            if self._map.seconds > 0.0:
-                bgr = cv2.cvtColor(self._map.image(), cv2.COLOR_RGB2BGR)
-                self.map.show(encode(np.asarray(bgr, np.uint8)))
         self._shown += 1
 
     def draw_all(self) -> None:

@@ -32,7 +32,7 @@ Make = Callable[[WidgetPublisher, WidgetPlace, str, dict[str, object]], W]
 """Constructor of one kind of element."""
 
 
-PANELS = ("headline", "camera", "watch", "steer", "play", "tune", "health", "report")
+PANELS = ("headline", "camera", "watch", "steer", "play", "tune", "health")
 """Names of the panels, as in browser/index.html."""
 RECEIVED_BYTES = 16_384
 """Longest message of a browser, bytes."""

@@ -13,11 +13,10 @@ from collections import Counter, deque
 from math import degrees, exp, inf, sqrt
 from typing import NamedTuple, TypeVar
 
+from gazerig.features.lab.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, lid_openings
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import PARTS, Vec3
-from gazerig.robot.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, lid_openings
-from gazerig.robot.analysis.summary import cyclopean_direction
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.model.types import GAZE_JOINTS
 
 THRESHOLD_DEG_S = 30.0

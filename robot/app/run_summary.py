@@ -103,11 +103,6 @@ class Summary:
         }
 
 
-def cyclopean_direction(tick: Tick) -> Vec3:
-    """Return the unit mean of both measured lines of sight, in the world."""
-    return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
-
-
 def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:
     """Return a percentile of counted thousandths of a degree, None without values."""
     if not counts_mdeg:

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.features.lab.analysis.gaze_on_face import gaze_point_on_face
 from gazerig.gaze.angles import add, compose, rotate, scale
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
-from gazerig.robot.analysis.summary import cyclopean_direction
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, cyclopean_direction
 from gazerig.robot.description.head_shape import measures_of
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 
