@@ -1,6 +1,6 @@
 """Poor viewing conditions of a camera: each is reported once when it begins and once when it ends.
 
-Once a second a frame is assessed: too dark, out of focus, turned, of an unmeasured field of view,
+Once a second a frame is assessed: too dark, turned, of an unmeasured field of view,
 or analysed too slowly. Only a lasting condition is reported, with its remedy. The statistics use at
 most 640 pixels of width and take 2 ms. While no upright faces are found, a turned copy is searched
 for faces every few seconds, which takes 10 ms.
@@ -32,13 +32,6 @@ _WIDTH_PX = 640
 # 95 % of the pixels are darker. MTCNN finds faces down to about 12 of 255 without noise; 32
 # leaves room for the noise of a webcam in the dark.
 _DARK, _LIT, _BLACK = 32.0, 45.0, 6.0
-# An edge's width is the contrast in a window divided by its steepest slope. In a quarter of the
-# windows it is below 4.4 px in sharp frames, below 8.9 after a blur of 4 px, at which faces of 60
-# px are lost. Only windows with an edge count: soft shadows on a wall are less steep.
-_WINDOW_PX, _CONTRAST, _STEEP = 48, 40.0, 3.0
-_LEAST_WINDOWS = 0.1
-_BLURRED_PX, _SHARP_PX = 8.5, 7.0
-_LEAST_SIDE_PX = 96
 # Largest roll and lowest confidence of an upright face: MTCNN mistakes one of six upside-down faces
 # for upright, with a lower confidence. Number of assessments in which upright faces are counted.
 _UPRIGHT_DEG, _SURE, _SAMPLES = 25.0, 0.9, 15
@@ -57,7 +50,6 @@ _SHARE, _SLOW_HZ, _SHARE_AGAIN, _AGAIN_HZ = 0.5, 15.0, 0.6, 18.0
 _OVER = {
     "dark": "camera: the picture is bright enough again",
     "turned": "camera: the picture is upright again",
-    "blurred": "camera: the picture is sharp again",
     "field": "camera: the field of view is known now",
     "slow": "camera: frames are analysed in time again",
 }
@@ -74,20 +66,10 @@ FIELD_TEXT = (
 )
 
 
-class PictureStats(NamedTuple):
-    """Image statistics of a frame.
-
-    brightness: 95th percentile of the grey level, 0..255
-    edge_px: width of its edges, scaled to at most 640 px of width; None if it has too few
-    """
-
-    brightness: float
-    edge_px: float | None
-
-
 class CameraObservation(NamedTuple):
     """Observations of a camera for one assessment; None: unknown.
 
+    brightness: 95th percentile of the grey level, 0..255
     has_upright_face: whether a nearly upright face is found
     turned_deg: clockwise angle of the frame, from faces that are upright after turning it back; 0:
         it is upright
@@ -97,7 +79,7 @@ class CameraObservation(NamedTuple):
     is_field_assumed: whether the field of view is not measured
     """
 
-    picture: PictureStats | None = None
+    brightness: float | None = None
     has_upright_face: bool = False
     turned_deg: float | None = None
     delivered_frames: int = 0
@@ -156,33 +138,23 @@ class HealthModel:
     def step(self, seen: CameraObservation) -> tuple[str, ...]:
         """Add observations; return the lines to report."""
         texts = {
-            "dark": self._dark_condition(seen.picture),
+            "dark": self._dark_condition(seen.brightness),
             "turned": self._roll_condition(seen),
-            "blurred": self._blur_condition(seen.picture),
             "field": FIELD_TEXT if seen.is_field_assumed else "",
             "slow": self._slow_condition(seen),
         }
         return tuple([line for name, text in texts.items() if (line := self._on[name].step(text))])
 
-    def _dark_condition(self, picture: PictureStats | None) -> str | None:
-        if picture is None:
+    def _dark_condition(self, brightness: float | None) -> str | None:
+        if brightness is None:
             return None
-        if picture.brightness >= (_LIT if self._on["dark"].text else _DARK):
+        if brightness >= (_LIT if self._on["dark"].text else _DARK):
             return ""
-        if picture.brightness < _BLACK:
+        if brightness < _BLACK:
             return "the picture is black: uncover the lens, switch on a light"
         return (
             "the picture is too dark: switch on a light in front of the person, "
             "or set webcam.exposure_ms and webcam.gain higher"
-        )
-
-    def _blur_condition(self, picture: PictureStats | None) -> str | None:
-        if picture is None or picture.edge_px is None:
-            return None
-        if picture.edge_px <= (_SHARP_PX if self._on["blurred"].text else _BLURRED_PX):
-            return ""
-        return (
-            "the picture is out of focus: clean or turn the lens, or set webcam.focus (oak.focus)"
         )
 
     def _roll_condition(self, seen: CameraObservation) -> str | None:
@@ -274,7 +246,7 @@ class CameraHealth:
         over_s = t_s - self._due_s + EVERY_S if self._last_s <= t_s and self._number else 0.0
         self._due_s, self._last_s = t_s + EVERY_S, t_s
         seen = CameraObservation(
-            picture_stats(shot.image),
+            brightness_of(shot.image),
             _has_upright_face(faces),
             self._search_turned(shot.image, t_s, bool(faces)),
             shot.number - self._number,
@@ -385,29 +357,12 @@ def roll_deg(face: DetectedFace) -> float:
     return roll if isfinite(roll) else 0.0
 
 
-def picture_stats(image: NDArray[Any]) -> PictureStats | None:
-    """Return statistics of a frame; None if it is not an 8-bit picture."""
+def brightness_of(image: NDArray[Any]) -> float | None:
+    """Return the 95th percentile of the grey level; None if it is not an 8-bit picture."""
     if not _is_picture(image):
         return None
     green = _limit_width(image[..., 1], _WIDTH_PX)
-    bright = float(np.percentile(green[::4, ::4], 95))
-    return PictureStats(bright, _edge_px(green) if min(green.shape) >= _LEAST_SIDE_PX else None)
-
-
-def _edge_px(grey: NDArray[Any]) -> float | None:
-    """Return the width of the sharper edges, None if there are too few."""
-    smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # removes noise, which has no edges
-    half = _WINDOW_PX // 2
-    window, middles = np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8), slice(half, None, half)
-    across = cv2.convertScaleAbs(cv2.Sobel(smooth, cv2.CV_16S, 1, 0, ksize=1))
-    down = cv2.convertScaleAbs(cv2.Sobel(smooth, cv2.CV_16S, 0, 1, ksize=1))
-    steep = cv2.dilate(np.maximum(across, down), window)[middles, middles] / 2.0
-    lightest = cv2.dilate(smooth, window)[middles, middles].astype(np.float64)
-    contrast = lightest - cv2.erode(smooth, window)[middles, middles]
-    shown = (contrast > _CONTRAST) & (steep >= _STEEP)
-    if np.count_nonzero(shown) < _LEAST_WINDOWS * shown.size:
-        return None
-    return float(np.percentile(contrast[shown] / steep[shown], 25))
+    return float(np.percentile(green[::4, ::4], 95))
 
 
 def _limit_width(image: NDArray[Any], width_px: int) -> ImageArray:

@@ -16,9 +16,7 @@ from gazerig.drivers.camera.health import (
     CameraHealth,
     CameraObservation,
     HealthModel,
-    PictureStats,
     TurnedFaceSearch,
-    picture_stats,
 )
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
@@ -32,7 +30,7 @@ from gazerig.robot.perception.frame_locator import FrameLocator
 
 WIDTH, HEIGHT = 640, 480
 FAST = {"faces": 0.01}
-GOOD = PictureStats(200.0, 4.0)
+GOOD = 200.0
 
 
 @cache
@@ -81,7 +79,6 @@ def stepped(model: HealthModel, count: int, **seen: Any) -> list[str]:
     [
         (room() // 16, "camera: the picture is too dark: ", "bright enough again"),
         (np.zeros((HEIGHT, WIDTH, 3), np.uint8), "camera: the picture is black: uncover", "bright"),
-        (blurred(room(), 5.0), "camera: the picture is out of focus: ", "sharp again"),
     ],
 )
 def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
@@ -98,13 +95,11 @@ def test_what_comes_and_goes_is_not_told():
     bad, good = room() // 16, np.asarray(room())
     assert looked(([bad] * 3 + [good] * 2) * 6) == ([], ())
     model = HealthModel()
-    stepped(model, 5, picture=PictureStats(20.0, None))
+    stepped(model, 5, brightness=20.0)
     # Between the two limits it stays as it is.
-    assert not stepped(model, 20, picture=PictureStats(40.0, None)) and model.conditions
-    assert stepped(model, 20, picture=PictureStats(50.0, None)) == [
-        "camera: the picture is bright enough again"
-    ]
-    assert not stepped(model, 20, picture=PictureStats(40.0, None))
+    assert not stepped(model, 20, brightness=40.0) and model.conditions
+    assert stepped(model, 20, brightness=50.0) == ["camera: the picture is bright enough again"]
+    assert not stepped(model, 20, brightness=40.0)
 
 
 @pytest.mark.parametrize(
@@ -122,25 +117,6 @@ def test_what_comes_and_goes_is_not_told():
 def test_good_pictures_are_left_alone(image):
     detector = MtcnnDetector(FaceDetectorParams())
     assert looked([image] * 18, detector) == ([], ())
-
-
-def test_a_wall_with_a_soft_shadow_is_not_out_of_focus():
-    y, x = np.mgrid[:HEIGHT, :WIDTH]
-    wall = 200.0 - 75.0 * (((x - 320) / 320.0) ** 2 + ((y - 240) / 240.0) ** 2)
-    wall -= 60.0 / (1.0 + np.exp((x - 250) / 12.0))
-    image = noisy(
-        wall.astype(np.float32)[..., np.newaxis].repeat(3, 2), 2.0, np.random.default_rng(4)
-    )
-    assert present(picture_stats(image)).edge_px is None
-
-
-def test_edges_widen_with_blur_and_not_with_darkness():
-    widths = [
-        present(present(picture_stats(blurred(room(), px))).edge_px) for px in (0.5, 2.0, 4.0, 6.0)
-    ]
-    assert widths == sorted(widths) and widths[0] < 5.0 and widths[2] > 8.5
-    dark = noisy(room() // 3, 2.0, np.random.default_rng(5))
-    assert present(present(picture_stats(dark)).edge_px) < 5.0
 
 
 def test_a_film_is_left_alone():
