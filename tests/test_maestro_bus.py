@@ -148,7 +148,6 @@ def test_a_channel_that_the_board_has_not():
     [
         SETUPS[0]._replace(id=12),
         SETUPS[0]._replace(min_steps=0),
-        SETUPS[0]._replace(max_steps=17_000),
         SETUPS[0]._replace(min_steps=7000, max_steps=6000),
     ],
 )
@@ -324,6 +323,13 @@ def test_goals_never_switch_a_channel_on_that_is_not_held_yet(held):
         assert on[-1] == sum(reading is not None for reading in readings)
     # One more in each tick.
     assert [n for n in on if n][:3] == [1, 2, 3]
+
+
+def test_a_channel_that_meets_an_end_of_the_board_is_told(held):
+    held.board.choose_behaviour("max-us", "1850")
+    held.run(2.0, [7600, 6000, 7000])
+    (line,) = [line for line in held.bus.events() if "sent to" in line]
+    assert "gets 1850 us: widen its range" in line
 
 
 def test_a_running_script_is_stopped_at_engage(bench):
