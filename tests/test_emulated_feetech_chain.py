@@ -106,11 +106,4 @@ def test_broadcast_ping(policy, ids):
     assert [i for i, _, _ in bench.ask(ALL, PING)] == ids
 
 
-def test_a_broadcast_ping_that_mixes_is_no_packet():
-    bench = three()
-    bench.chain.choose_behaviour("broadcast-ping", "mix")
-    said = bench.chain.receive(FeetechBench.instruction(ALL, PING))
-    assert said == bytes((255, 255, 1 & 2 & 3, 2, 0, 0xFC & 0xFB & 0xFA))
-
-
 # --- two clocks, one result

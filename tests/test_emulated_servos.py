@@ -100,12 +100,6 @@ def test_a_lower_status_return_level_answers_reads_and_pings_only(bench):
 # --- writes
 
 
-def test_a_broadcast_write_is_obeyed_in_silence(make):
-    bench = three(make)
-    assert bench.put("goal_position", 700, ALL) == -1
-    assert bench.goals() == [700] * 3
-
-
 def test_a_kept_write_waits_for_action(make):
     bench = three(make)
     before = bench.goals()

@@ -267,6 +267,18 @@ class Both:
         return abs(self.spans.x - self.single.x)
 
 
+@pytest.mark.parametrize(
+    ("case", "places"),
+    [("eye", [1.44, 92.73, 229.32, 299.89]), ("sts", [0.0, 1.01, 5.79, 15.18])],
+)
+def test_a_move_is_as_it_was(case, places):
+    """Friction, sag and smoothing together have no closed form: the numbers are pinned."""
+    model, loop, physics, *pace = CASES[case]
+    made = Shaft(model, physics, 0.0)
+    made.drive(loop)
+    assert go(made, 300, 65, *pace)[4::20] == pytest.approx(places, abs=0.01)
+
+
 @pytest.mark.parametrize("case", CASES)
 @given(
     moves=st.lists(st.tuples(st.integers(-400, 400), st.integers(1, 60)), min_size=1, max_size=8)
