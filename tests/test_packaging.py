@@ -102,11 +102,11 @@ def test_a_commit_is_checked_as_the_host_checks_it() -> None:
         for job in yaml(".github/workflows/ci.yml")["jobs"].values()
         for step in job["steps"]
     ]
-    assert {"make test", "make check", "make docs", "make coverage", "make package"} <= set(steps)
+    assert {"make test", "make check", "make docs", "make package"} <= set(steps)
     targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     for step in steps:
         is_program = step and (ROOT / step).is_file() and os.access(ROOT / step, os.X_OK)
-        assert is_program or step is None or step.removeprefix("make ") in targets, step
+        assert is_program or step is None or step.removeprefix("make ").split()[0] in targets, step
 
 
 def test_the_container_holds_all_sources_and_starts_a_command_that_is_one() -> None:
