@@ -90,7 +90,7 @@ def client():
     rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
     specs = (ServoSpec(1, "scs0009", 511), ServoSpec(2, "scs0009", 300))
     with PtyBus() as bus:
-        opened = rustypot.Scs0009PyController(bus.start_device(FeetechLine(specs, BAUD)), BAUD, 0.2)
+        opened = rustypot.Scs0009PyController(bus.start_device(FeetechLine(specs, BAUD)), BAUD, 1.0)
         yield opened
         opened.close()
 

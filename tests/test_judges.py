@@ -34,7 +34,7 @@ def near(places, goal):
 
 
 def test_rustypot_with_x330(path):
-    client = pytest.importorskip("rustypot").Xl330PyController(path, BAUD, 0.2)
+    client = pytest.importorskip("rustypot").Xl330PyController(path, BAUD, 1.0)
     ids = list(IDS)
     assert [client.ping(i) for i in (1, 2, 3, 4)] == [True, True, True, False]
     assert client.scan(list(range(6))) == {1: 1200, 2: 1200, 3: 1200}

@@ -26,7 +26,7 @@ def client(bus):
     rustypot = pytest.importorskip("rustypot", reason="rustypot is not installed")
     specs = [ServoSpec(i, "sts3215", place) for i, place in zip(IDS, PLACES, strict=True)]
     opened = rustypot.Sts3215PyController(
-        bus.start_device(FeetechLine(tuple(specs), BAUD)), BAUD, 0.2
+        bus.start_device(FeetechLine(tuple(specs), BAUD)), BAUD, 1.0
     )
     yield opened
     opened.close()

@@ -9,7 +9,6 @@ from functools import cache
 
 import cv2
 import numpy as np
-from scipy.spatial import Delaunay
 from seeing.material import portrait
 
 from gazerig.drivers.types import ImageArray
@@ -56,6 +55,8 @@ class Head:
         self.vertices_m = np.concatenate([face, *rings])
         self._photo = shown.image
         self._in_photo = (self.vertices_m @ axes / scale + nose)[:, :2].astype(np.float32)
+        from scipy.spatial import Delaunay
+
         self._triangles = Delaunay(self._in_photo).simplices
 
     def draw(

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 from seeing.material import at_hand
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
@@ -292,6 +291,8 @@ def idf1(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: bool 
         true.update(list(seen))
     people, numbers = sorted(true), sorted(believed)
     table = np.array([[hits[i, n] for n in numbers] for i in people])
+    from scipy.optimize import linear_sum_assignment
+
     rows, columns = linear_sum_assignment(-table)
     return float(2.0 * table[rows, columns].sum() / (true.total() + believed.total()))
 
@@ -300,6 +301,8 @@ def _matched(
     people: dict[int, NDArray[np.float64]], tracks: list[tuple[int, Vec3]]
 ) -> Iterator[tuple[int | None, int]]:
     """Yield the person of each track in one picture, None for no one, and its number."""
+    from scipy.optimize import linear_sum_assignment
+
     p = np.array(list(people.values())).reshape(-1, 3)
     q = np.array([(-y, -z, x) for _, (x, y, z) in tracks]).reshape(-1, 3)
     far, believed = np.linalg.norm(p, axis=1), np.linalg.norm(q, axis=1)

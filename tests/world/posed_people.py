@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
@@ -143,6 +142,8 @@ class PosedPeople:
             skull, p_head, head, body = poses[name]
             turn = head if part in _TURNING else body
             data.mocap_pos[number] = skull + turn @ (found.p_m[at] - p_head)
+            from scipy.spatial.transform import Rotation
+
             R = Rotation.from_matrix(turn @ _matrix(found.quat[at]))
             data.mocap_quat[number] = R.as_quat(scalar_first=True)
 
@@ -160,6 +161,8 @@ class PosedPeople:
 
 
 def _matrix(quat: Floats) -> Floats:
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.from_quat(quat, scalar_first=True).as_matrix())
 
 
