@@ -112,8 +112,6 @@ class Queue:
 
     def __init__(self) -> None:
         self.fed: list = []
-        self.lying = False  # one message is there at every new request
-        self.taken = False
 
     def get(self, timeout):
         item = self.fed.pop(0) if self.fed else None
@@ -122,16 +120,19 @@ class Queue:
         return Group(colour=item) if item is not None else None
 
     def tryGet(self):  # noqa: N802
-        self.taken = self.lying and not self.taken
-        return self.get(None) if self.taken else None
+        return None
 
 
 class Rig:
     """A complete substitute for depthai with one device."""
 
-    def __init__(self, speed="SUPER", start_fault=None) -> None:
+    def __init__(self, speed="SUPER", start_fault=None, gyro=None) -> None:
         self.device = Device(getattr(real().UsbSpeed, speed))
         self.queue = Queue()
+        self.imu = None
+        if gyro is not None:
+            readings = SimpleNamespace(tryGet=lambda: gyro.pop(0) if gyro else None)
+            self.imu = SimpleNamespace(createOutputQueue=lambda maxSize, blocking: readings)
         rig = self
 
         class Sync:
@@ -193,6 +194,6 @@ class Rig:
 
         def nodes(dai, pipeline, params) -> PipelineOutputs:
             self.asked = params
-            return PipelineOutputs(colour)
+            return PipelineOutputs(colour, imu=self.imu)
 
         return OakSource(OakParams(**wanted), nodes, True, lambda: self.dai)

@@ -144,22 +144,6 @@ def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None
     assert lent.number() == 7 and lent.before == [1, 2]
 
 
-def test_an_end_of_a_browser_is_no_lost_camera() -> None:
-    lent = Lent()
-    lent.picture()
-    lent.browsers.said = ["camera lost (no new frame): waiting for it", "something else"]
-    assert lent.camera.events() == ("something else",)
-
-
-def test_closing_closes_both_and_takes_no_more() -> None:
-    lent = Lent()
-    lent.picture()
-    lent.camera.close()
-    assert lent.own.closed and lent.browsers.closed
-    lent.picture()
-    assert lent.before == [1]
-
-
 def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
     rig = load_rig("desk")
     made = assemble(rig, RunOptions(mock=True, scene="visitor", bus="ideal"))

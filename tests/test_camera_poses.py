@@ -22,11 +22,6 @@ def filled(count: int, rate_deg_s: float = 100.0) -> PoseBuffer:
     return ring
 
 
-def test_nothing_is_known_at_first():
-    assert PoseBuffer().rotation_at(1.0) is None
-    assert PoseBuffer().rotation_between(1.0, 0.9) is None
-
-
 @pytest.mark.parametrize("t_s", [10.0, 10.005, 10.0125, 10.1, 10.195])
 def test_orientation_between_ticks(t_s):
     found = filled(40).rotation_at(t_s)

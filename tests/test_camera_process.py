@@ -6,9 +6,9 @@ import threading
 import time
 from functools import partial
 
-import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
 from fakes.waiting import wait_for
 from present import present
 
@@ -26,13 +26,12 @@ from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, S
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
-from gazerig.drivers.errors import CameraError, ModelFileError
+from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.robot.perception.frame_locator import FrameLocator
 
-PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))
 LOCATOR = FrameLocator(None, 1.2)
 
@@ -68,28 +67,14 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     camera.open()
     with pytest.raises(CameraError, match="is already running"):
         camera.open()
-    numbers = set()
     wait_for(lambda: camera.frames >= 5)
-    for _ in range(20):
-        found = wait_for(lambda: whole(camera))
-        k = (present(found).number - 1) % 20
-        assert (present(found).width_px, present(found).height_px, present(found).faces) == (
-            64,
-            48,
-            (),
-        )
-        assert present(found).image is not None and present(found).depth_m is not None
-        assert np.unique(present(present(found).image)).tolist() == [10 * k]
-        assert np.unique(present(present(found).depth_m)).tolist() == [0.5 + k]
-        assert (
-            not present(present(found).image).flags.writeable
-            and not present(present(found).depth_m).flags.writeable
-        )
-        assert present(found).lens == Intrinsics(60.0, 60.0, 32.0, 24.0)
-        assert before_s < present(found).captured_s <= time.monotonic()
-        numbers.add(present(found).number)
-        time.sleep(0.01)
-    assert len(numbers) > 1
+    found = present(wait_for(lambda: whole(camera)))
+    k = (found.number - 1) % 20
+    assert (found.width_px, found.height_px, found.faces) == (64, 48, ())
+    for values, value in ((present(found.image), 10 * k), (present(found.depth_m), 0.5 + k)):
+        assert np.unique(values).tolist() == [value] and not values.flags.writeable
+    assert found.lens == Intrinsics(60.0, 60.0, 32.0, 24.0)
+    assert before_s < found.captured_s <= time.monotonic()
     camera.close()
     camera.close()
     assert not [t for t in threading.enumerate() if t.name == "camera"]
@@ -103,13 +88,6 @@ def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     with pytest.raises(CameraError, match=r"no film or image at .*nope\.avi"):
         camera.open()
     camera.close()
-
-
-def test_detector_that_cannot_be_made_says_so_at_once(recording):
-    params = FaceDetectorParams(kind="yunet", model_file="/nowhere/yunet.onnx")
-    parts = CameraParts(partial(CameraReplay, recording), partial(face_detector, params))
-    with pytest.raises(ModelFileError, match=r"yunet\.onnx"):
-        CameraProcess(parts, time.monotonic).open()
 
 
 QUICK = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
@@ -162,46 +140,6 @@ def test_a_process_is_busy_that_wants_to_run_for_most_of_its_silence():
     assert [demand.is_busy(now_s) for now_s in (1.0, 2.0, 3.0, 4.0)] == [False, True, False, False]
 
 
-def test_where_no_loss_is_borne_a_killed_process_ends_the_run(recording):
-    camera = process(partial(CameraReplay, recording), CameraRecoveryParams(give_up_s=0.0))
-    camera.open()
-    wait_for(lambda: camera.latest(0.0) is not None)
-    os.kill(present(present(camera._process).pid), signal.SIGKILL)
-    wait_for(lambda: camera._failure)
-    with pytest.raises(CameraError, match="has ended"):
-        camera.latest(0.0)
-    camera.close()
-
-
-class Fussy:
-    """A detector that chokes on a picture."""
-
-    def find(self, picture):
-        if picture[0, 0, 0] >= 100:
-            raise ZeroDivisionError("what a picture")
-        return ()
-
-
-def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording):
-    parts = CameraParts(partial(CameraReplay, recording), Fussy)
-    camera = CameraProcess(parts, time.monotonic, QUICK)
-    camera.open()
-    wait_for(lambda: camera._starts > 1 and camera.frames > 11)
-    reported = camera.events()
-    assert "ZeroDivisionError" in reported[0] and reported[0].startswith("camera lost")
-    assert camera.latest(0.0) is not None
-    camera.close()
-
-
-def test_closing_does_not_wait_for_a_process_that_starts_again(recording):
-    camera = process(partial(CameraReplay, recording), QUICK)
-    camera.open()
-    os.kill(present(present(camera._process).pid), signal.SIGKILL)
-    wait_for(lambda: camera._starts > 1)
-    camera.close()
-    wait_for(lambda: not [t for t in threading.enumerate() if t.name == "camera"])
-
-
 def test_silence_is_judged_by_what_is_usual():
     care = CameraRecoveryParams(silent_s=1.0, restart_s=3.0)
     for period_s, lost_s, hung_s in ((0.03, 1.0, 3.0), (0.5, 2.5, 7.5), (2.0, 10.0, 30.0)):
@@ -217,11 +155,7 @@ def test_silence_is_judged_by_what_is_usual():
 
 
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
-    path = tmp_path / "film.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
-    for k in range(3):
-        writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
-    writer.release()
+    path = write_film(tmp_path / "film.avi", 3)
     care = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=5.0, give_up_s=0.1)
     camera = process(partial(VideoFile, path), care)
     camera.open()
@@ -231,32 +165,24 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     def gone() -> bool:
         try:
             camera.latest(0.0)
-        except CameraError:
-            return True
+        except CameraError as error:
+            return "no film or image at" in str(error)
         return False
 
     wait_for(gone)
-    with pytest.raises(CameraError, match="no film or image at"):
-        camera.latest(0.0)
-    reported = camera.events()
-    assert any(line.startswith("camera lost") for line in reported)
+    assert any(line.startswith("camera lost") for line in camera.events())
     camera.close()
 
 
-def test_slots_carry_arrays_of_any_shape_and_give_up_overwritten_ones():
+def test_slots_carry_arrays_of_any_shape():
     writer, reader = SlotWriter(), SlotReader()
     try:
         for shape in ((3, 4, 3), (480, 640, 3), (2, 2), (600, 800, 3)):
             array = np.random.default_rng(1).integers(0, 255, shape, np.uint8)
-            where = writer.put(array)
-            assert np.array_equal(present(reader.take(where)), array)
+            assert np.array_equal(present(reader.take(writer.put(array))), array)
         depth = np.array([[1.5, np.nan]], np.float32)
-        assert np.array_equal(present(reader.take(writer.put(depth))), depth, equal_nan=True)
-        old = writer.put(np.zeros((4, 4), np.uint8))
-        for _ in range(6):
-            newest = writer.put(np.ones((4, 4), np.uint8))
-        assert reader.take(old) is None
-        assert present(reader.take(newest)).all()
+        newest = writer.put(depth)
+        assert np.array_equal(present(reader.take(newest)), depth, equal_nan=True)
     finally:
         reader.close()
         writer.close()
@@ -279,13 +205,3 @@ def test_a_frame_is_copied_when_it_is_asked_for_and_then_stays():
     assert late.image is None
     reader.close()
     writer.close()
-
-
-def test_memory_of_a_writer_that_died_is_freed_though_nothing_was_read():
-    writer, reader = SlotWriter(), SlotReader()
-    where = writer.put(np.zeros((2, 3), np.uint8))
-    reader.record_memory(where)
-    reader.forget()
-    assert SlotReader().take(where) is None
-    reader.forget()
-    present(writer._memory).close()

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
@@ -61,17 +60,6 @@ class TestWebcam(CameraSuite):
             lambda: Webcam(device.file, capture=lambda name: device),
             device.lose, device.restore, device.held.clear, device.held.set,
         )  # fmt: skip
-
-
-class TestFilm(CameraSuite):
-    @pytest.fixture
-    def bench(self, tmp_path):
-        file = str(tmp_path / "film.avi")
-        out = cv2.VideoWriter(file, cv2.VideoWriter.fourcc(*"MJPG"), 100.0, (32, 24))
-        for k in range(20):
-            out.write(np.full((24, 32, 3), 10 * k, np.uint8))
-        out.release()
-        return of_source(lambda: VideoFile(file))
 
 
 @pytest.mark.parametrize("pixels", [False, True], ids=["ideal", "drawn"])

@@ -10,12 +10,11 @@ from fakes.waiting import wait_for
 from present import present
 
 from gazerig.drivers.camera.params import CameraRecoveryParams
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import DetectedFace, MovingBlob
+from gazerig.drivers.types import DetectedFace
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 
@@ -91,10 +90,6 @@ def feed(source: Source, camera: CameraThread, count: int) -> None:
     wait_for(lambda: camera.frames == goal and present(camera.latest(0.0)).number == goal)
 
 
-def test_nothing_before_the_first_picture(camera):
-    assert camera.latest(0.0) is None
-
-
 def test_slot_holds_the_newest_find(source, camera):
     feed(source, camera, 1)
     first = camera.latest(0.0)
@@ -163,16 +158,6 @@ def test_open_again_starts_anew(source, camera):
     assert source.opened == 2
 
 
-def test_open_again_after_a_fault(source, camera):
-    source.fault = CameraError("camera gone: check its cable")
-    source.fed.release()
-    wait_for(lambda: source.closed)
-    camera.close()
-    source.fault = None
-    camera.open()
-    feed(source, camera, 1)
-
-
 def lose(source: Source) -> None:
     source.fault = CameraError("camera gone: check its cable")
     source.fed.release()
@@ -197,18 +182,6 @@ def test_camera_that_comes_back_is_told_and_counts_on(source):
     (back,) = camera.events()
     assert back.startswith("camera back after ")
     assert camera.events() == ()
-    camera.close()
-
-
-def test_camera_that_cannot_be_opened_anew_is_tried_until_it_can(source):
-    camera = CameraThread(source, EveryOther(), time.monotonic, QUICKLY)
-    camera.open()
-    feed(source, camera, 1)
-    source.fails_to_open = True
-    lose(source)
-    wait_for(lambda: source.closed >= 3)
-    source.fault, source.fails_to_open = None, False
-    feed(source, camera, 1)
     camera.close()
 
 
@@ -243,58 +216,6 @@ def test_close_does_not_wait_for_a_lost_camera(source):
     camera.close()
     wait_for(lambda: not [t for t in threading.enumerate() if t.name == "camera"])
     assert camera.latest(0.0) is None
-
-
-def test_news_of_the_source_are_handed_on(source, camera):
-    source.news = ["it states 30 and gives 15"]
-    feed(source, camera, 1)
-    wait_for(lambda: not source.news)
-    feed(source, camera, 1)
-    assert camera.events() == ("it states 30 and gives 15",)
-
-
-def test_depth_lens_motion_and_the_cameras_own_faces_come_through(source):
-    blob = MovingBlob(1, "thing", (0.0, 0.0, 2.0), 0.1)
-    depth, lens = np.full((24, 32), 2.0, np.float32), Intrinsics(30.0, 30.0, 16.0, 12.0)
-    seen: list[Shot] = []
-
-    def motion(shot: Shot) -> tuple[MovingBlob, ...]:
-        seen.append(shot)
-        return (blob,)
-
-    detector = EveryOther()
-    camera = CameraThread(source, detector, time.monotonic, AT_ONCE, motion)
-    plain = source.take
-    source.take = lambda now_s, stop: (
-        shot and shot._replace(depth_m=depth, lens=lens, faces=(FACE,))
-        if (shot := plain(now_s, stop)) is not None
-        else None
-    )
-    camera.open()
-    feed(source, camera, 1)
-    found = camera.latest(0.0)
-    assert present(found).depth_m is depth and present(found).lens == lens
-    assert present(found).faces == (FACE,) and detector.looked == 0
-    assert present(found).blobs == (blob,) and seen[0].depth_m is depth
-    camera.close()
-
-
-def test_film_runs_at_its_own_pace(tmp_path):
-    camera = CameraThread(
-        VideoFile(write_film(tmp_path / "film.avi", rate_hz=100.0)), EveryOther(), time.monotonic
-    )
-    camera.open()
-    wait_for(lambda: camera.latest(0.0) is not None)
-    start = camera.latest(0.0)
-    wait_for(
-        lambda: present(camera.latest(0.0)).number >= present(start).number + 25
-    )  # past its end, twice
-    later = camera.latest(0.0)
-    camera.close()
-    assert present(later).captured_s - present(start).captured_s == pytest.approx(
-        (present(later).number - present(start).number) / 100.0
-    )
-    assert present(later).captured_s <= time.monotonic()
 
 
 def test_slow_detector_skips_pictures_and_queues_none(tmp_path):

@@ -69,14 +69,6 @@ def test_a_cover_whose_face_is_missed_in_a_frame_still_covers() -> None:
     assert reader.add_clothing(image, 1.0, (far,))[0][0].clothing is not None
 
 
-def test_clothes_below_the_picture_are_not_seen() -> None:
-    close, low = face(0.0, 0.5, 0.1), face(0.0, 0.9, 0.1)
-    (partly,) = worn(picture((low, RED)), low)
-    assert partly is not None and partly.share < 0.5
-    assert worn(picture((close, RED)), close) == [None]
-    assert worn(np.zeros((0, 0, 3), np.uint8), close) == [None]
-
-
 def test_a_person_without_a_face_wears_the_same() -> None:
     p = np.array([0.1, -0.2, 2.0])
     one, ((x, y),) = face(0.1, 2.0), project(p[None], LENS).tolist()

@@ -1,7 +1,5 @@
 """Identities end at a cut of a film; pans, switched light, saccades and crossings end none."""
 
-import pickle
-from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -11,12 +9,11 @@ from seeing import row_09_identities as row
 from test_perception import Neck, face_at
 
 from gazerig.drivers.camera.process import offset_ids
-from gazerig.drivers.types import Detections, MovingBlob
+from gazerig.drivers.types import Detections
 from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.tracker_params import TrackerParams
-from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -31,17 +28,6 @@ def test_cuts_are_found_and_nothing_else_is_one(seed: int) -> None:
 def test_e89_identities_end_at_a_cut_and_at_nothing_else() -> None:
     rng = np.random.default_rng(5)
     assert row.went_on(row.cut_film(rng), rng) == (0, 0)
-
-
-@pytest.mark.parametrize(
-    "shape", [(32, 48, 3), (400, 640, 3), (1080, 1920, 3), (400, 640), (5, 7, 3)]
-)
-def test_any_size_of_picture_will_do_and_may_change(shape: tuple[int, ...]) -> None:
-    rng, cuts = np.random.default_rng(0), CutDetector()
-    cuts.scene(row.room(rng)[:400, :640])
-    image = rng.integers(0, 255, shape).astype(np.uint8)
-    first = cuts.scene(image)
-    assert cuts.scene(image) == first <= 1
 
 
 def test_a_covered_lens_shows_the_same_scene_afterwards() -> None:
@@ -83,54 +69,3 @@ def test_a_camera_process_that_was_started_again_shows_another_scene() -> None:
     ids = [percept.faces[0].id for percept in percepts]
     assert ids[1] == ids[2] and len({*ids}) == 3
     assert [percept.scene for percept in percepts] == [0, 1, 1, 2]
-
-
-def test_a_hand_at_rest_ends_with_its_scene() -> None:
-    perception, poses = row.perception()
-    patch = MovingBlob(
-        7, "thing", (0.35, 0.25, 1.0), 0.05, v_camera_m_s=(1.2, 0.0, 0.0), depth_known=True,
-        depth_sd_m=0.02, fastest_m=(0.35, 0.25, 1.0), fastest_m_s=(1.2, 0.0, 0.0),
-    )  # fmt: skip
-    rests = replace(patch, v_camera_m_s=(0.1, 0.0, 0.0), fastest_m_s=(0.1, 0.0, 0.0))
-    kinds = []
-    for number in range(1, 30):
-        blobs = () if number > 8 else (rests,) if number > 6 else (patch,)
-        scene = int(number > 20)
-        face = face_at((0.0, 0.0, 1.0))
-        found = Detections(number / 30, number, 640, 400, (face,), blobs, scene=scene)
-        percept = perception.see(found, poses)
-        assert percept is not None
-        kinds.append(percept.bodies.kinds)
-    assert "hand" in kinds[19] and "hand" not in kinds[20]
-
-
-def test_a_camera_without_the_count_of_scenes_goes_on_as_ever() -> None:
-    perception, poses = (
-        Perception(CameraMount(CameraParams(mount="base")), 69.0, Tracker(TrackerParams())),
-        PoseHistory(Neck()),
-    )
-    poses.remember(0.0, (0.0, 0.0, 0.0))
-    ids = set()
-    for number in range(1, 5):
-        percept = perception.see(
-            Detections(number / 30, number, 640, 400, (face_at((0.0, 0.0, 1.0)),)), poses
-        )
-        assert percept is not None
-        ids |= set(percept.bodies.ids)
-    assert len(ids) == 1
-
-
-def test_the_scene_comes_through_the_pipe_and_the_locator() -> None:
-    found = Detections(0.0, 1, 640, 400, scene=3)
-    assert pickle.loads(pickle.dumps(found)).scene == 3
-    assert found.locate_in_camera(FrameLocator(None, radians(69.0))).scene == 3
-
-
-def test_six_who_walk_to_and_fro_keep_their_identities_by_their_clothes() -> None:
-    name = "six walk to and fro, turning behind others"
-    found = []
-    for seed in (0, 1):
-        rng = np.random.default_rng(seed)
-        ways, _ = row.crossings(rng)[name]
-        found.append(row.idf1(ways, 8.0, rng))
-    assert np.mean(found) >= row.WANTED[f"{name}: IDF1"][0]

@@ -60,17 +60,8 @@ def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
     assert apart[1] > 3.0 * apart[0]
 
 
-def test_a_source_that_is_told_nothing_waits_and_can_be_stopped() -> None:
-    stop = threading.Event()
-    stop.set()
-    assert source("face-to-face", PoseSlot()).take(lambda: 1.0, stop) is None
-
-
 def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = load_rig("desk")
-    made = assemble(rig, RunOptions(mock=True, fast=True, pixels=True, scene="visitor"))
-    assert not isinstance(made.robot.camera, DrawnCamera)
-    made.close()
     made = assemble(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
     try:
         lent = made.robot.camera
@@ -78,12 +69,7 @@ def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.Monke
         camera = lent.own
         assert isinstance(camera, DrawnCamera)
         asked: list[object] = []
-
-        def retune(*given: object) -> bool:
-            asked.append(given)
-            return True
-
-        monkeypatch.setattr(camera.process, "retune", retune)
+        monkeypatch.setattr(camera.process, "retune", lambda *given: asked.append(given) or True)
         changed = load_rig("desk", character="shy")
         assert retune_camera(lent, rig, changed, rig.camera) == "" and not asked
         slower = replace(rig, motion=replace(rig.motion, enabled=not rig.motion.enabled))

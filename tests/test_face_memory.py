@@ -99,9 +99,3 @@ def test_after_a_turn_of_talk_the_gaze_goes_to_who_is_out_of_view(talked: bool) 
     if talked:
         assert after.index(2) <= 0.5 * 30
         assert after[-1] == 1  # who is not found is forgotten
-
-
-def test_who_speaks_in_view_keeps_the_gaze_from_who_spoke_before() -> None:
-    model = attention()
-    looks(model, [FACE, OTHER], 0.0, 2.0, speaker=2)
-    assert {t.id for t in looks(model, [FACE], 2.0, 5.0, speaker=1)[10:]} == {1}

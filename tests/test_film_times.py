@@ -16,7 +16,6 @@ from gazerig.drivers.camera.video_file import (
     timestamps_from_rate,
     timestamps_from_times,
 )
-from gazerig.drivers.errors import CameraError
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
@@ -70,19 +69,6 @@ def test_uneven_film_runs_by_the_times_of_its_pictures(folder):
     assert round(float(film.image(21).mean()) / 12.0) == 0
 
 
-def test_film_that_lies_about_its_rate_is_noticed(folder):
-    film = opened(retimed(folder / "plain.mp4", folder / "slow.mkv", range(0, 40, 2)))
-    assert film.rate_hz == pytest.approx(15.0, rel=0.01)
-    assert film.due_s(11) == pytest.approx(10 / 15.0, rel=0.01)
-    assert "states 30 frames a second and shows 15" in film.note
-
-
-def test_honest_film_is_left_alone(folder):
-    film = opened(folder / "plain.mp4")
-    assert (film.rate_hz, film.note, film.events()) == (30.0, "", ())
-    assert film.due_s(7) == 6 / 30.0
-
-
 def times_s(rate_hz, count=40):
     return [k / rate_hz for k in range(count)]
 
@@ -114,64 +100,19 @@ def test_every_due_time_belongs_to_its_own_picture(steps, number):
     assert times.number_at(-0.001) <= 0
 
 
-class NoFaces:
-    def find(self, picture):
-        assert picture.ndim == 3 and picture.shape[2] == 3
-        return ()
-
-
 @pytest.mark.parametrize(
     "pixels",
     [
         np.full((1, 1, 3), 9, np.uint8),
-        np.full((40, 30), 9, np.uint8),
         np.full((40, 30, 4), 9, np.uint8),
-        np.full((40, 30, 3), 9 << 8, np.uint16),
-        np.full((1, 3000, 3), 9, np.uint8),
+        np.full((40, 30), 9 << 8, np.uint16),
     ],
-    ids=["1x1", "grey", "alpha", "16 bits", "thin"],
+    ids=["1x1", "alpha", "grey of 16 bits"],
 )
 def test_odd_stills_become_plain_pictures(tmp_path, pixels):
     file = tmp_path / "odd.png"
     cv2.imwrite(str(file), pixels)
-    for detector in (NoFaces(), face_detector(FaceDetectorParams())):
-        film = opened(file)
-        found = FrameAnalyzer(detector).analyze(film.shot(1))
-        assert found.faces == ()
-        assert (found.height_px, found.width_px) == pixels.shape[:2]
-        assert (
-            present(found.image).shape == (*pixels.shape[:2], 3)
-            and present(found.image).dtype == np.uint8
-        )
-
-
-def test_picture_beyond_all_memory_is_named(tmp_path):
-    file = tmp_path / "huge.bmp"
-    # A header that promises 60000 x 60000 pixels, and none of them.
-    header = b"BM" + (10_800_000_054).to_bytes(8, "little")[:4] + bytes(4)
-    header += (54).to_bytes(4, "little") + (40).to_bytes(4, "little")
-    header += (60_000).to_bytes(4, "little") * 2 + b"\x01\x00\x18\x00" + bytes(24)
-    file.write_bytes(header)
-    with pytest.raises(CameraError, match="too large an image|damaged image"):
-        VideoFile(file).open()
-
-
-def test_small_film_of_grey_is_a_film(tmp_path):
-    writer = cv2.VideoWriter(
-        str(tmp_path / "g.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (16, 16), isColor=False
-    )
-    for k in range(12):
-        writer.write(np.full((16, 16), 20 * k, np.uint8))
-    writer.release()
-    assert opened(tmp_path / "g.avi").image(1).shape == (16, 16, 3)
-
-
-def test_empty_file_and_file_of_text_are_named(tmp_path):
-    for name, content in (("a.avi", b""), ("b.mp4", b"this is no film"), ("c.png", b"")):
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(CameraError, match="is not a readable film or image|damaged image"):
-            VideoFile(tmp_path / name).open()
-    with pytest.raises(CameraError, match="is not a file"):
-        VideoFile(tmp_path).open()
-    with pytest.raises(CameraError, match="no film or image at"):
-        VideoFile(tmp_path / "nope.avi").open()
+    found = FrameAnalyzer(face_detector(FaceDetectorParams())).analyze(opened(file).shot(1))
+    assert found.faces == () and (found.height_px, found.width_px) == pixels.shape[:2]
+    image = present(found.image)
+    assert image.shape == (*pixels.shape[:2], 3) and image.dtype == np.uint8

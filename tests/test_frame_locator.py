@@ -1,15 +1,10 @@
 """Faces and things are located next to the detector; the tick only places and associates them."""
 
-import pickle
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from math import radians, tan
 
 import numpy as np
 import pytest
-from fakes.cameras import QuietCamera
 from present import present
 from retuned_run import started
 from test_perception import STILL, face_at, picture, standing
@@ -18,7 +13,6 @@ from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import LensParams
@@ -98,13 +92,6 @@ def test_places_of_another_calibration_are_not_used(monkeypatch: pytest.MonkeyPa
     assert fits == []
 
 
-def test_the_lens_that_a_camera_reports_is_a_calibration_of_its_own() -> None:
-    own = Intrinsics(500.0, 500.0, 320.0, 200.0)
-    found = picture(1, faces=(FACE,), lens=own)
-    assert LOCATOR(found).intrinsics == own
-    assert FrameLocator(LENS, 1.0)(found).intrinsics == Intrinsics(520.0, 520.0, 319.5, 199.5)
-
-
 def test_a_frame_comes_with_what_it_shows_located() -> None:
     frames = FrameAnalyzer(OneFace(), lambda shot: (BALL,), LOCATOR)
     found = frames.analyze(shot(1))
@@ -114,15 +101,6 @@ def test_a_frame_comes_with_what_it_shows_located() -> None:
     frames.retune(None, None, other)
     assert frames.analyze(shot(2)).located == other(found)
     assert FrameAnalyzer(OneFace()).analyze(shot(3)).located is None
-
-
-def test_faces_of_a_recording_that_holds_no_poses_are_located_as_it_is_played() -> None:
-    """A camera recording keeps images and the faces that the camera found, and nothing of this."""
-    recorded = shot(1)._replace(faces=(FACE,))
-    played = FrameAnalyzer(OneFace(), None, LOCATOR).analyze(recorded)
-    wanted = percept_of(perception(), picture(1, faces=(FACE,)))
-    assert played.located is not None
-    assert percept_of(perception(), played).faces == wanted.faces
 
 
 def test_a_lens_tuned_while_running_reaches_the_camera() -> None:
@@ -140,47 +118,10 @@ def test_a_lens_tuned_while_running_reaches_the_camera() -> None:
     assert used_px() == before_px
 
 
-def test_a_locator_and_what_it_locates_pass_between_processes() -> None:
-    found = located(picture(1, faces=(FACE,), blobs=(BALL,)))
-    assert pickle.loads(pickle.dumps(LOCATOR))(found) == found.located
-    assert pickle.loads(pickle.dumps(found.located)) == found.located
-
-
 def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
     found = offset_ids(located(picture(1, blobs=(BALL,))), 2)
     assert [blob.id for blob in found.blobs] == [2_000_003]
     assert [thing.detector_id for thing in present(found.located).things] == [2_000_003]
-
-
-class Frames(QuietCamera):
-    """A source of frames that gives one after another."""
-
-    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        self.number += 1
-        return None if stop.wait(0.001) else shot(self.number)
-
-
-def test_a_camera_in_a_thread_takes_another_calibration() -> None:
-    camera = CameraThread(Frames(), OneFace(), time.monotonic, locate=LOCATOR)
-    camera.open()
-    other = FrameLocator(LENS, 1.0)
-
-    def used() -> Intrinsics | None:
-        found = camera.latest(0.0)
-        return None if found is None else present(found.located).intrinsics
-
-    def wait_for(wanted: Intrinsics) -> None:
-        end_s = time.monotonic() + 40.0
-        while used() != wanted:
-            assert time.monotonic() < end_s, "the calibration does not reach the frames"
-            time.sleep(0.001)
-
-    try:
-        wait_for(LOCATOR.intrinsics(picture(1)))
-        assert camera.retune(None, None, other)
-        wait_for(other.intrinsics(picture(1)))
-    finally:
-        camera.close()
 
 
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[object]:
@@ -197,13 +138,21 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
 
 @pytest.mark.parametrize(
-    ("box_px", "area_px", "compact"),
-    [((9.0, 9.0, 50.0, 48.0), 1800.0, True), ((9.0, 9.0, 50.0, 30.0), 1200.0, False),
-     ((9.0, 9.0, 50.0, 48.0), 1200.0, False), (None, 1800.0, False),
-     ((9.0, 9.0, 0.0, 0.0), 0.0, False)],
-)  # fmt: skip
+    ("height_px", "area_px", "compact"),
+    [(48.0, 1800.0, True), (30.0, 1200.0, False), (48.0, 1200.0, False), (0.0, 0.0, False)],
+)
 def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(
-    box_px: tuple[float, float, float, float] | None, area_px: float, compact: bool
+    height_px: float, area_px: float, compact: bool
 ) -> None:
-    found = frame_locator.thing_in_camera(replace(BALL, box_px=box_px, area_px=area_px))
-    assert found is not None and found.compact is compact
+    patch = replace(BALL, box_px=(9.0, 9.0, 50.0, height_px), area_px=area_px)
+    assert present(frame_locator.thing_in_camera(patch)).compact is compact
+
+
+def test_the_lower_half_of_a_face_with_a_hand_before_its_mouth_is_smaller() -> None:
+    right_eye, left_eye, nose, right, left = FACE.landmarks_px
+    covered = np.array([right_eye, left_eye, nose, 0.75 * right + 0.25 * left, left])
+    whole, hidden = (
+        LOCATOR(picture(1, faces=(replace(FACE, landmarks_px=points),))).faces[0].lower_face
+        for points in (FACE.landmarks_px, covered)
+    )
+    assert hidden == pytest.approx(0.75 * whole, rel=0.02)

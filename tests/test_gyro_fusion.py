@@ -5,30 +5,18 @@ from math import degrees, exp, pi, radians, sin
 import cv2
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS, LIDS
-from fakes.cameras import QuietCamera
 from oak_packets import R_CAMERA_IMU, at_rest, readings
-from seeing.moving_room import CLOSE, Board, frames, pan, rotation, shake
+from seeing.moving_room import CLOSE, frames, pan, rotation, shake
 from seeing.row_02_camera_motion import judged
 
-import gazerig
-from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.oak.gyro import Gyro
-from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import CameraTurn, DetectedFace, Detections
+from gazerig.drivers.types import CameraTurn
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.angles import compose
-from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
-from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.face_fit import rotation_by
 from gazerig.robot.perception.gyro_fusion import GyroFusion, rotation_vector
 from gazerig.robot.perception.motion_source import MotionSource
-from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 
 HZ = 30.0
 OPTICAL = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
@@ -121,13 +109,6 @@ def test_joints_that_tell_late_and_in_steps_are_corrected():
     assert np.sqrt((both**2).mean()) < 0.6 * np.sqrt((alone**2).mean())
 
 
-def test_bias_that_is_left_costs_little():
-    base = Base(lambda t: (0.05 * t, 0.0, 0.0), 20.0)  # .05 deg/s that is no motion
-    fusion = GyroFusion(lambda line: None)
-    found = [fusion.orientation(k / HZ, OPTICAL, base.turn(k / HZ)) for k in range(600)]
-    assert apart_deg(found[-1], OPTICAL) < 0.07
-
-
 def test_gyro_that_turns_while_the_joints_stand_is_told_once_and_left_out():
     told: list[str] = []
     fusion, base = GyroFusion(told.append), Base(lambda t: (0.0, 90.0 * t, 0.0), 10.0)
@@ -135,43 +116,6 @@ def test_gyro_that_turns_while_the_joints_stand_is_told_once_and_left_out():
     assert len(told) == 1 and "does not turn with the joints" in told[0]
     assert found[-1] is OPTICAL
     assert max(apart_deg(R, OPTICAL) for R in found) <= 15.0
-
-
-def test_gyro_is_tried_again_after_a_minute_and_told_no_second_time():
-    told: list[str] = []
-    fusion = GyroFusion(told.append)
-    for k in range(round(200 * HZ)):
-        t = k / HZ
-        turning = t < 5.0 or t > 150.0  # carried about, at rest, carried again
-        turn = CameraTurn(1, rows(rotation_by((0.0, 0.2 * k * turning, 0.0))))
-        R = fusion.orientation(t, OPTICAL, turn)
-        if 70.0 < t < 149.0:
-            assert R is not OPTICAL and apart_deg(R, OPTICAL) < 1.0
-    assert len(told) == 1
-
-
-def test_camera_that_is_placed_anew_is_there_at_once():
-    mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
-    fusion, base = GyroFusion(lambda line: None), Base(shaken, 3.0)
-    perception = Perception(mount, 69.0, Tracker(TrackerParams()), gyro=fusion)
-    poses = PoseHistory(KINEMATICS)
-    poses.remember(0.0, (0.0, 0.0, 0.0))
-    places = []
-    for k in range(1, 70):
-        if k == 60:
-            mount.retune(CameraParams(position_mm=(20.0, 0.0, 45.0), yaw_deg=10.0))
-            perception.retune(69.0, None, None)
-        t = k / HZ
-        found = Detections(t, k, WIDTH, HEIGHT, turn=base.turn(t))
-        perception.see(found, poses)
-        places.append(fusion._before[2])  # type: ignore[index]
-    assert apart_deg(places[58], places[59]) == pytest.approx(10.0, abs=1.5)
-
-
-def test_without_a_gyro_nothing_changes():
-    fusion = GyroFusion(lambda line: None)
-    for k in range(3):
-        assert fusion.orientation(k / HZ, OPTICAL, None) is OPTICAL
 
 
 def test_gap_another_epoch_and_time_that_runs_back_begin_with_the_joints():
@@ -191,40 +135,6 @@ def test_rotation_vectors_there_and_back():
 
 
 WIDTH, HEIGHT = 640, 400
-LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
-
-
-def wander_deg(gyro):
-    """Return how far a still face 2 m away seems to move while the table shakes."""
-    base = Base(shaken, 4.0)
-    mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
-    fusion = GyroFusion(lambda line: None)
-    perception = Perception(mount, 69.0, Tracker(TrackerParams()), gyro=fusion)
-    poses = PoseHistory(KINEMATICS)
-    poses.remember(0.0, (0.0, 0.0, 0.0))
-    frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
-    places = []
-    for k in range(1, 120):
-        t = k / HZ
-        R = rotation_by(tuple(np.radians(shaken(t))))
-        seen = (LANDMARKS_FACE_M @ frontal.T + (0.2, 0.1, 2.0)) @ np.array(R)
-        points = project(seen, LENS)
-        (x, y), (right, bottom) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-        face = DetectedFace((x, y, right - x, bottom - y), points, 0.9)
-        turn = base.turn(t)
-        found = Detections(t, k, WIDTH, HEIGHT, (face,), turn=turn if gyro else None)
-        percept = perception.see(found, poses)
-        assert percept is not None
-        x_m, _, z_m = percept.faces[0].p_world_m
-        places.append(degrees(z_m / x_m))
-    return float(np.std(places[30:]))
-
-
-def test_still_face_stays_where_it_is_while_the_table_shakes():
-    without, with_gyro = wander_deg(False), wander_deg(True)
-    assert without > 0.2
-    assert with_gyro < 0.15 * without
 
 
 def gyro_of(motion, seconds):
@@ -243,23 +153,12 @@ def gyro_of(motion, seconds):
     return turn
 
 
-HALF_OF_THE_IMAGE = (Board((0.0, 0.2, 0.9), (0.55, 0.8), 4, True, 0.5, 0.4),)
-
-
 @pytest.mark.parametrize("motion", [shake, pan])
 def test_e94_things_are_told_from_a_moved_camera_even_if_somebody_fills_the_image(motion):
     score = judged(frames(motion, 0.8, CLOSE), turn_of=gyro_of(motion, 0.8))
     figures = score.figures("close")
     assert figures["close: false things a picture"] <= 0.05
     assert figures["close: recall"] >= 0.95
-
-
-@pytest.mark.parametrize("motion", [shake, pan])
-def test_e94_what_the_gyro_adds_where_somebody_fills_half_of_the_image(motion):
-    seen = list(frames(motion, 0.8, HALF_OF_THE_IMAGE))
-    with_gyro, without = judged(seen, turn_of=gyro_of(motion, 0.8)), judged(seen)
-    assert with_gyro.false <= 0.05 * with_gyro.pictures
-    assert without.false >= 0.3 * without.pictures
 
 
 def test_turn_of_the_gyro_goes_before_that_of_the_joints():
@@ -276,30 +175,3 @@ def test_turn_of_the_gyro_goes_before_that_of_the_joints():
         source(Shot(k / HZ, k + 1, image, turn=unit))
     with pytest.raises(AssertionError, match="joints were asked"):
         source(Shot(3 / HZ, 4, image, turn=CameraTurn(2, rows(np.eye(3)))))
-
-
-class Spinning(QuietCamera):
-    """A camera of a program whose gyro turns while the head is still."""
-
-    def latest(self, now_s: float) -> Detections:
-        number = int(now_s * HZ)
-        turn = CameraTurn(1, rows(rotation_by((0.0, number * 0.1, 0.0))))
-        return Detections(number / HZ, number, WIDTH, HEIGHT, turn=turn)
-
-
-def test_wrong_gyro_is_told_once_in_a_run_which_goes_on():
-    with gazerig.open("desk", fast=True, camera=Spinning()) as head:
-        head.step(2.0)
-        texts = [event.text for event in head.events(timeout_s=0)]
-    assert sum("does not turn with the joints" in text for text in texts) == 1
-
-
-def test_recording_keeps_the_turn():
-    turn = CameraTurn(7, rows(rotation_by((0.1, -0.2, 0.3))))
-    shot = Shot(1.0, 1, np.zeros((4, 6, 3), np.uint8), turn=turn)
-    messages = dict(fmt.encode_shot(shot, None))
-    found = fmt.decode_turn(messages[fmt.TURN])
-    assert found.epoch == 7 and np.allclose(found.R_start_camera, turn.R_start_camera)
-    for wrong in (b"{}", b'{"epoch": 1, "R": [1, 0]}', b'{"epoch": 1, "R": [1,0,0,0,1,0,0,0,2]}'):
-        with pytest.raises(fmt.BadMessage):
-            fmt.decode_turn(wrong)

@@ -5,17 +5,9 @@ from math import dist
 
 import numpy as np
 import pytest
-from attention_scene import looking
 from seeing.drawn_scene import frames, off_deg
 
-from gazerig.config.schema import load_rules
-from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
-from gazerig.gaze.attention.idle import Idle, IdleParams
-from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.persons import Persons
-from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.perception.hands import HAND, Hands, Known
@@ -83,14 +75,6 @@ def test_what_moves_within_reach_is_a_thing_without_evidence_of_a_hand(
     assert kinds(Hands(), *[seen] * 6) == ["thing"] * 6
 
 
-def test_what_is_left_of_an_arm_remains_a_hand_under_a_new_number() -> None:
-    """The hand moves on while the elbow has come to rest; far away it would be nothing known."""
-    left = patch(p=(2.0, 0.98, 0.4), fastest_m=(2.0, 0.98, 0.4), radius_m=0.12, mark=8)
-    arm = led((2.0, 0.9, 0.3), (2.0, 0.6, 0.0))
-    assert kinds(Hands(), *[arm] * 3, *[left] * 3)[-1] == HAND
-    assert kinds(Hands(), *[left] * 6) == ["thing"] * 6
-
-
 def test_the_legs_of_somebody_who_walks_are_no_hands_and_a_wave_while_walking_is() -> None:
     walks: Known = (FACE[0], (0.0, 1.0, 0.0))
     assert HAND not in kinds(Hands(), *[patch(v=(0.0, 0.4, 0.0))] * 4, faces=(walks,))
@@ -118,15 +102,6 @@ def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
     assert there[11][0][0] == HAND
     assert there[12:71] == [[(HAND, (0.0, 0.0, 0.0))] if stays else []] * 59
     assert there[-1] == [] and not hands.has_resting
-
-
-def test_a_hand_that_moves_again_is_one_hand() -> None:
-    hands = Hands()
-    for k in range(6):
-        hands.label([patch(v=(0.0, 1.2 if k < 4 else 0.1, 0.0))], [FACE], EYE, k / 30)
-    for k in range(30, 34):
-        found = hands.label([patch(mark=8)], [FACE], EYE, k / 30)
-    assert [one.kind for one in found] == [HAND] and not hands.has_resting
 
 
 def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> None:
@@ -178,25 +153,6 @@ def test_e91_a_punch_is_a_hand_before_it_lands() -> None:
         if frame.t_s > 4.2 and any(off_deg(p, frame.hands[1]) < 15.0 for _, p in frame.seen(HAND))
     )
     assert first < 4.45
-
-
-def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
-    """The visitor raises a hand at 17.5 s; the rule's salience is that of `show`."""
-    rules = replace(load_rules("conversation"), behaviour="show")
-    attention = Attention(
-        AttentionParams(),
-        FieldOfView(FieldOfViewParams()),
-        BottomUp(BottomUpParams()),
-        TopDown(rules),
-        Idle(IdleParams()),
-    )
-    at_rest = looking()._replace(p_world_head_m=HEAD_M)
-    targets = []
-    for frame in frames(load_scene("visitor"), 17.2, 18.2):
-        target = attention.choose(frame.percept, at_rest, frame.t_s - 17.2)
-        targets.append((frame.t_s, target.kind, target.saliences[0].rule))
-    assert {kind for t_s, kind, _ in targets if t_s < 17.4} == {"face"}
-    assert {(kind, rule) for t_s, kind, rule in targets if t_s > 18.0} == {(HAND, 0.9)}
 
 
 @pytest.mark.parametrize(("scene", "start_s"), [("walks-past", 5.2), ("sits-still", 0.0)])
@@ -285,13 +241,6 @@ def test_an_arm_that_moved_before_it_touched_the_side_does_not_reach_in() -> Non
     assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
 
 
-def test_nor_is_it_the_persons_arm_because_it_moves_before_their_shoulder() -> None:
-    hands, seen = Hands(), reaching(0.17, p=(2.0, 0.68, -0.24))
-    for k in range(3):
-        (found,) = hands.label([seen], [FACE], EYE, k / 30)
-    assert found.kind == HAND and level(found.p_world_m) == pytest.approx(0.5, abs=0.03)
-
-
 @pytest.mark.parametrize(
     "seen",
     [reaching(0.1), reaching(0.17, from_side=False),
@@ -307,34 +256,6 @@ def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
     for k, one in enumerate([patch(from_side=True)] * 2 + [seen] * 4):
         (found,) = hands.label([one], [FACE], EYE, k / 30)
     assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.07)
-
-
-def test_a_known_hand_beside_one_at_rest_does_not_take_its_place() -> None:
-    """A glove that its colour shows is where it was; the hand that came to rest is another one."""
-    hands, rests = Hands(), patch(v=(0.0, 0.0, 0.0), thickness_m=0.1)
-    glove = patch(p=(0.95, 0.3, -0.1), mark=99, kind=HAND, depth_measured=True)
-    for k, one in enumerate([patch()] * 3 + [rests] * 2):
-        hands.label([one, glove], [FACE], EYE, k / 30)
-    later = hands.label([glove], [FACE], EYE, 1.0)
-    assert {one.mark for one in later} == {99, 7}
-
-
-def test_one_large_frame_brings_no_hand_near() -> None:
-    hands = Hands()
-    for k, seen in enumerate([patch()] * 4 + [FIST] + [patch()] * 2):
-        (found,) = hands.label([seen], [FACE], EYE, k / 30)
-        assert k == 0 or level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
-
-
-def test_a_hand_that_was_near_and_moves_again_at_the_person_leaves_none_behind() -> None:
-    hands = Hands()
-    for k in range(10):
-        v: Vec3 = (0.0, 1.2 if k < 8 else 0.1, 0.0)
-        hands.label([replace(FIST, v_world_m_s=v, fastest_m_s=v)], [FACE], EYE, k / 30)
-    assert hands.has_resting
-    for k in range(10, 14):
-        found = hands.label([patch(mark=8)], [FACE], EYE, k / 30)
-    assert [one.kind for one in found] == [HAND] and not hands.has_resting
 
 
 @pytest.mark.parametrize(("start_s", "side"), [(23.3, 1.0), (35.8, -1.0)])

@@ -16,9 +16,6 @@ from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.overlays import CommandedPoseView
-from gazerig.robot.description import head_mesh
-from gazerig.robot.description.mesh_params import MeshParams
-from gazerig.robot.description.own_meshes import OwnMesh
 from gazerig.robot.model.types import CommandedPose, JointState, Snapshot
 
 
@@ -33,18 +30,10 @@ def test_the_head_has_the_lids_that_the_rig_has(server: viser.ViserServer) -> No
     view, ghost = HeadView(server.scene), CommandedPoseView(server.scene)
     handles = server.scene._handle_from_node_name
 
-    def drawn(shot: Snapshot) -> set[str]:
+    def draw(shot: Snapshot) -> None:
         shot = replace(shot, commanded_pose=_wanted(shot))
         view.show(shot)
         ghost.show(shot, view.lid_edges)
-        ghosts = {"ghost's upper": "/ghost/lid_left", "ghost's lower": "/ghost/lower_lid_left"}
-        found = {name for name, node in ghosts.items() if handles[node].visible}
-        head = {look.name.rpartition("/look_")[2] for look in view.links["head"].looks}
-        if "left_upper_lid_link" in view.links:
-            found.add("upper")
-        if "left_lower_lid_link" in view.links or "left_still_lid" in head:
-            found.add("lower")
-        return found
 
     def edge_deg(lid: str) -> float:
         """Return the elevation of a lid's edge above the eye's equator, by the turned mesh."""
@@ -53,20 +42,18 @@ def test_the_head_has_the_lids_that_the_rig_has(server: viser.ViserServer) -> No
         x, _, z = turn.apply(np.array((1.0, 0.0, 0.0)))
         return degrees(atan2(z, x))
 
-    assert drawn(SHOT) == {"upper", "lower", "ghost's upper"}
-    assert drawn(of_six(SHOT)) == {
-        "upper", "lower", "ghost's upper", "ghost's lower",
-    }  # fmt: skip
-    drawn(replace(of_six(SHOT), lids=(0.0, 0.0), lower_lids=(0.0, 0.0)))
+    draw(SHOT)
+    assert "left_lower_lid_link" not in view.links
+    draw(replace(of_six(SHOT), lids=(0.0, 0.0), lower_lids=(0.0, 0.0)))
     met = edge_deg("left_lower_lid")
     assert met == pytest.approx(edge_deg("left_upper_lid"), abs=0.1)
-    drawn(replace(of_six(SHOT), lids=(0.5, 1.0), lower_lids=(1.0, 0.5)))
+    draw(replace(of_six(SHOT), lids=(0.5, 1.0), lower_lids=(1.0, 0.5)))
     assert edge_deg("left_lower_lid") < edge_deg("right_lower_lid") - 3.0 < met - 6.0
     assert met + 30.0 < edge_deg("left_upper_lid") < edge_deg("right_upper_lid") - 30.0
     w, _, y, _ = handles["/ghost/lid_left"].wxyz
     assert -2.0 * degrees(atan2(y, w)) == pytest.approx(edge_deg("left_upper_lid"), abs=0.1)
-    bare = replace(SHOT, joints=("eyes_pan", "eyes_tilt", "neck_yaw"), measured_rad=(0.0,) * 3)
-    assert drawn(bare) == set()
+    draw(replace(SHOT, joints=("eyes_pan", "eyes_tilt", "neck_yaw"), measured_rad=(0.0,) * 3))
+    assert "left_upper_lid_link" not in view.links and not handles["/ghost/lid_left"].visible
 
 
 def _wanted(shot: Snapshot) -> CommandedPose:
@@ -111,46 +98,6 @@ def _in_world(view: HeadView, link: str) -> transforms.SE3:
     return found
 
 
-def test_another_camera_is_drawn_without_the_head_anew(server: viser.ViserServer) -> None:
-    view, rig = HeadView(server.scene), load_rig("desk")
-    view.shape = shape_of(rig)
-    view.show(SHOT)
-    skin, before = view.links["head"].looks[0], view.links["camera_link"].frame.position[0]
-    assert not view.links["camera_link"].looks[0].visible
-    view.shape = shape_of(replace(rig, camera=replace(rig.camera, position_mm=(50.0, 0.0, 45.0))))
-    view.show(SHOT, camera=True)
-    assert view.links["head"].looks[0] is skin
-    assert view.links["camera_link"].frame.position[0] == pytest.approx(before + 0.03)
-    assert view.links["camera_link"].looks[0].visible
-    view.shape = shape_of(load_rig("expressive"))
-    view.show(replace(SHOT, joints=tuple(load_rig("expressive").names)))
-    assert view.links["head"].looks[0] is not skin and "jaw_link" in view.links
-
-
-def test_a_head_without_a_neck_stands_on_a_base_below_it(server: viser.ViserServer) -> None:
-    view = HeadView(server.scene)
-    view.show(replace(of_six(SHOT), p_world_head_m=(0.038, 0.0, 0.12)))
-    assert view.links["head"].frame.position[2] == pytest.approx(0.12, abs=1e-3)
-    assert {look.name.rpartition("_")[2] for look in view.links["base_link"].looks} == {
-        "bust", "column",
-    }  # fmt: skip
-    assert not any(name.startswith("neck") for name in view.links)
-
-
-def test_the_chin_opens_with_the_jaw_about_its_hinge(server: viser.ViserServer) -> None:
-    view, rig = HeadView(server.scene), load_rig("expressive")
-    view.shape = shape_of(rig)
-    rest = replace(SHOT, joints=tuple(rig.names), measured_rad=(0.0,) * len(rig.names))
-    view.show(rest)
-    frame, (chin,) = view.links["jaw_link"]
-    hinge, shut = tuple(frame.position), _in_world(view, "jaw_link").rotation()
-    opened = tuple(0.2 if name == "jaw" else 0.0 for name in rig.names)
-    view.show(replace(rest, measured_rad=opened))
-    assert tuple(frame.position) == hinge and tuple(chin.position) == (0.0, 0.0, 0.0)
-    turned = shut.inverse() @ _in_world(view, "jaw_link").rotation()
-    assert turned.log() == pytest.approx((0.0, 0.2, 0.0), abs=1e-3)
-
-
 def _turned_deg(view: HeadView, link: str) -> float:
     """Return how far a part of the face is turned about its axis across the head, upwards."""
     _, y, _ = transforms.SO3(np.array(view.links[link].frame.wxyz)).log()
@@ -174,17 +121,3 @@ def test_a_rig_without_brows_and_jaw_shows_expressions_drawn_only(
     assert _turned_deg(view, "jaw_link") == pytest.approx(-12.0, abs=0.1)
     view.show(replace(SHOT, t_s=SHOT.t_s + 3.0, expressed=("", "neutral")))
     assert _turned_deg(view, "left_brow_link") == pytest.approx(0.0, abs=0.01)
-
-
-def test_joints_of_the_rig_and_meshes_of_its_own_are_shown_as_they_are(
-    server: viser.ViserServer,
-) -> None:
-    view, rig = HeadView(server.scene), load_rig("expressive")
-    view.shape = shape_of(rig)
-    rest = replace(SHOT, joints=tuple(rig.names), measured_rad=(0.0,) * len(rig.names))
-    view.show(replace(rest, t_s=5.0, expressed=("surprised", "")))
-    assert all(_turned_deg(view, f"{name}_link") == 0.0 for name in ("left_brow", "jaw"))
-    mesh = OwnMesh("head", MeshParams("skull.stl"), head_mesh.cap())
-    view.shape = shape_of(load_rig("desk"))._replace(meshes=(mesh,))
-    view.show(replace(SHOT, t_s=6.0, expressed=("surprised", "")))
-    assert "jaw_link" not in view.links

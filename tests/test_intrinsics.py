@@ -6,19 +6,12 @@ from math import radians
 import cv2
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS, LIDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
-from gazerig.drivers.types import DetectedFace, Detections
-from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
-from gazerig.robot.model.frames import CameraMount, CameraParams, LensParams, PoseHistory
-from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays, undistort
-from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.tracker_params import TrackerParams
-from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.model.frames import LensParams
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays
 
 BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
 LENS = LensParams(640, 400, 480.0, 482.0, 327.0, 190.0, BENT.distortion)
@@ -49,17 +42,6 @@ def test_what_is_behind_the_camera_has_no_pixel() -> None:
     assert np.isnan(project([(0.1, 0.1, -1.0), (0.1, 0.1, 0.0)], BENT)).all()
 
 
-def test_straight_lines_are_straight_again() -> None:
-    line = np.stack((np.linspace(-0.5, 0.5, 9), np.full(9, 0.25), np.ones(9)), axis=1)
-    seen = project(line, BENT)
-    assert np.ptp(seen[:, 1]) > 3.0  # it was bent
-    assert np.ptp(undistort(seen, BENT)[:, 1]) < 1e-4
-
-
-def test_no_points_are_no_rays() -> None:
-    assert rays(np.zeros((0, 2)), BENT).shape == (0, 3)
-
-
 @pytest.mark.parametrize("distortion", [(0.0,) * 4, (0.0, 0.0, 0.0, 0.0, float("nan"))])
 def test_distortion_that_is_none_is_refused(distortion: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match="five finite numbers"):
@@ -79,22 +61,3 @@ def test_a_measured_lens_serves_every_picture_of_its_shape() -> None:
     assert intrinsics_of_lens(LENS, view, 640, 480) == intrinsics_of_view(view, 640, 480)
     assert intrinsics_of_lens(None, view, 640, 400) == intrinsics_of_view(view, 640, 400)
     assert not lens_fits(LENS, 0, 0)
-
-
-def test_a_face_is_placed_through_the_lens_as_measured() -> None:
-    where = np.array([0.34, -0.16, 0.9])  # far out in the picture, with the largest distortion
-    frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
-    landmarks = project(LANDMARKS_FACE_M @ frontal.T + where, BENT)
-    found = Detections(0.0, 1, 640, 400, (DetectedFace((0.0, 0.0, 9.0, 9.0), landmarks, 0.9),))
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
-    poses = PoseHistory(kinematics)
-    poses.remember(0.0, (0.0, 0.0, 0.0))
-    mount = CameraMount(CameraParams("base", (0.0, 0.0, 0.0)))
-    off = []
-    for lens in (LENS, None):
-        percept = Perception(mount, 67.4, Tracker(TrackerParams()), lens=lens).see(found, poses)
-        assert percept is not None
-        x, y, z = percept.faces[0].p_world_m
-        off.append(np.linalg.norm(np.array((-y, -z, x)) - where))
-    assert off[0] < 0.02
-    assert off[1] > 2.0 * off[0]

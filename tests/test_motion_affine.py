@@ -5,18 +5,11 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector
-from gazerig.drivers.vision.motion.lucas_kanade import (
-    affine_residual,
-    fit_affine_warp,
-    patch_motion,
-)
 from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30
@@ -112,49 +105,3 @@ def reaches_edge(blob: MovingBlob) -> bool:
     assert blob.box_px is not None
     x, y, width, height = blob.box_px
     return x <= 1.5 or y <= 1.5 or x + width >= WIDTH - 2.5 or y + height >= HEIGHT - 2.5
-
-
-def test_all_three_at_once() -> None:
-    blobs = seen(40, (60.0, 20.0), 3.0, 1.0)
-    assert np.median([b.spin_rad_s for b in blobs]) == pytest.approx(3.0, rel=0.1)
-    assert np.median([b.loom_1_s for b in blobs]) == pytest.approx(1.0, rel=0.1)
-    flow = np.median([b.flow_px_s for b in blobs], axis=0)
-    assert flow == pytest.approx((60.0, 20.0), abs=0.05 * 63.0)
-
-
-@given(
-    spin=st.floats(-1.0, 1.0),
-    growth=st.floats(-0.5, 0.5),
-    slide=st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0)),
-    outliers=st.integers(0, 30),
-)
-def test_a_map_is_taken_apart_again(
-    spin: float, growth: float, slide: tuple[float, float], outliers: int
-) -> None:
-    rng = np.random.default_rng(0)
-    places = rng.uniform(0.0, 60.0, (200, 2))
-    centre = np.array([30.0, 30.0])
-    c, s = np.cos(spin), np.sin(spin)
-    forward = np.exp(growth) * np.array([[c, -s], [s, c]])
-    before = (places - centre - slide) @ np.linalg.inv(forward).T + centre
-    flow = places - before
-    flow[:outliers] += 5.0
-    motion = patch_motion(*fit_affine_warp(places, flow, centre, 200.0))
-    assert motion.spin_rad == pytest.approx(spin, abs=0.02)
-    assert motion.growth == pytest.approx(growth, abs=0.02)
-
-
-def test_points_in_a_row_tell_a_slide_only() -> None:
-    places = np.column_stack((np.arange(20.0), np.zeros(20)))
-    back, rest = fit_affine_warp(places, np.tile((2.0, 1.0), (20, 1)), places.mean(axis=0), 20.0)
-    motion = patch_motion(back, rest)
-    assert motion.slide_px == pytest.approx((2.0, 1.0), abs=0.01)
-    assert motion.spin_rad == 0.0 and motion.growth == 0.0 and motion.spin_sd == np.inf
-
-
-def test_what_one_map_explains_leaves_nothing() -> None:
-    places = np.random.default_rng(1).uniform(0.0, 60.0, (100, 2))
-    flow = places @ np.array([[0.1, -0.2], [0.2, 0.1]]) + 3.0
-    assert affine_residual(places, flow) < 1e-9
-    flow[:50] += 4.0
-    assert affine_residual(places, flow) > 1.0

@@ -1,7 +1,5 @@
 """Any picture, any order of times, any depth: an honest answer, and the same one each time."""
 
-from dataclasses import astuple
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -91,69 +89,18 @@ def test_depth_is_the_median_of_what_is_known() -> None:
     assert blob.p_camera_m[0] == pytest.approx(x, abs=0.03)
 
 
-@pytest.mark.parametrize(
-    "depth_m",
-    [
-        np.full((240, 320), np.nan),
-        np.zeros((240, 320)),
-        np.full((240, 320), -1.0),
-        np.zeros((0, 0)),
-        np.full((240, 320, 1), 1.0),
-    ],
-)
+@pytest.mark.parametrize("depth_m", [np.full((240, 320), np.nan), np.zeros((0, 0))])
 def test_a_depth_picture_of_holes_is_none(depth_m: NDArray[np.float64]) -> None:
     blob = last(FIVE, depth_m)
     assert not blob.depth_known and np.isfinite(blob.p_camera_m).all()
 
 
-def test_grey_colour_and_alpha_say_the_same() -> None:
-    three = FIVE[:3]
-    plain = last(three)
-    for code in (cv2.COLOR_GRAY2BGR, cv2.COLOR_GRAY2BGRA):
-        assert astuple(last([np.asarray(cv2.cvtColor(p, code)) for p in three])) == astuple(plain)
-    assert astuple(last([picture[..., None] for picture in three])) == astuple(plain)
-
-
-def test_a_large_picture_says_the_same_in_its_own_pixels() -> None:
-    large = [np.asarray(cv2.resize(p, (960, 720), interpolation=cv2.INTER_CUBIC)) for p in FIVE]
-    small, blob = last(FIVE), last(large)
-    assert small.centre_px is not None and blob.centre_px is not None
-    assert blob.centre_px == pytest.approx(np.array(small.centre_px) * 3 + 1, abs=9)
-    assert blob.flow_px_s == pytest.approx(np.array(small.flow_px_s) * 3, rel=0.1, abs=9)
-    assert blob.p_camera_m == pytest.approx(small.p_camera_m, abs=0.05)
-
-
-@pytest.mark.parametrize(
-    "shape", [(1, 1), (1, 320), (240, 1), (8, 8), (16, 200), (47, 300), (60, 1000), (3000, 64)]
-)
+@pytest.mark.parametrize("shape", [(1, 1), (47, 300), (3000, 64)])
 def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]) -> None:
     detector = MotionDetector(MotionParams())
     for k in range(3):
         assert look(detector, np.full(shape, 9 * k, dtype=np.uint8), k * DT_S) == ()
     assert detector.report.no_result_reason == "frame too small"
-
-
-@pytest.mark.parametrize("preset", ["ultrafast", "fast", "medium"])
-@pytest.mark.parametrize("finest_level", [0, 1, 2])
-@pytest.mark.parametrize("shape", [(48, 48), (48, 192), (192, 48), (64, 65)])
-def test_the_smallest_allowed_are_borne(
-    shape: tuple[int, int], preset: Any, finest_level: int
-) -> None:
-    detector = MotionDetector(MotionParams(preset=preset, finest_level=finest_level))
-    for k in range(3):
-        look(detector, GROUND[k : k + shape[0], : shape[1]], k * DT_S)
-    assert detector.report.no_result_reason != "frame too small"
-
-
-def test_a_change_of_size_begins_anew() -> None:
-    detector = MotionDetector(MotionParams())
-    for k in range(3):
-        look(detector, scene(k), k * DT_S)
-    assert look(detector, scene(3)[:200], 3 * DT_S) == ()
-    assert detector.report.no_result_reason == "first frame"
-    for k in range(4, 7):
-        blobs = look(detector, scene(k)[:200], k * DT_S)
-    assert len(blobs) == 1
 
 
 @pytest.mark.parametrize("level", [0, 255])
@@ -181,23 +128,12 @@ def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -
     assert detector.report.no_result_reason == "no frame shortly before"
 
 
-def test_joints_without_a_number_count_as_unknown() -> None:
-    detector = MotionDetector(MotionParams())
-    for k, picture in enumerate(FIVE):
-        blobs = detector.find(picture, k * DT_S, lens(320, 240), np.full((3, 3), np.nan))
-    assert len(blobs) == 1
-
-
 @pytest.mark.parametrize(
     "picture", [np.zeros((240, 320)), np.zeros((2, 2, 5), np.uint8), np.zeros((0, 4), np.uint8)]
 )
 def test_what_is_no_picture_is_refused_in_words(picture: NDArray[np.uint8]) -> None:
     with pytest.raises(ValueError, match="an image is"):
         scale_down(picture, 320, lens(320, 240), 0.0)
-
-
-def test_same_pictures_same_answer() -> None:
-    assert astuple(last(FIVE)) == astuple(last(FIVE))
 
 
 def test_forgotten_is_forgotten_and_numbers_are_not_used_again() -> None:
@@ -217,46 +153,3 @@ def test_the_turn_between_two_orientations() -> None:
     before, now = np.eye(3), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
     ahead = relative_rotation(now, before) @ (0.0, 0.0, 1.0)
     assert ahead == pytest.approx((-s, 0.0, c))  # who turns right sees the room go left
-
-
-# People who walk in a square, against a mask that knows nothing of flow
-
-
-FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
-RATE_HZ, LEARN, LOOK = 10.0, 40, 40
-BEGIN = 210
-
-
-@pytest.mark.skipif(not FILM.exists(), reason=f"no film at {FILM}")
-def test_what_moves_lies_on_people_who_walk() -> None:
-    film = cv2.VideoCapture(str(FILM))
-    ground = cv2.createBackgroundSubtractorMOG2(detectShadows=True)
-    detector = MotionDetector(MotionParams())
-    speck, near = np.ones((3, 3), np.uint8), np.ones((11, 11), np.uint8)
-    on = reported = peopled = noticed = 0
-    for k in range(BEGIN + LOOK):
-        good = film.grab()
-        assert good
-        if k < BEGIN - LEARN * 5 or (k < BEGIN and k % 5):
-            continue
-        _, picture = film.retrieve()
-        moving = (ground.apply(picture) == 255).astype(np.uint8)
-        if k < BEGIN:
-            continue
-        height, width = picture.shape[:2]
-        lens = Intrinsics(
-            fx_px=0.73 * width, fy_px=0.73 * width, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2
-        )
-        blobs = detector.find(picture, k / RATE_HZ, lens, np.eye(3))
-        if k < BEGIN + RATE_HZ:
-            continue
-        mask = cv2.dilate(cv2.morphologyEx(moving, cv2.MORPH_OPEN, speck), near)
-        centres = [blob.centre_px for blob in blobs if blob.centre_px is not None]
-        on += sum(int(mask[round(y), round(x)]) for x, y in centres)
-        reported += len(centres)
-        peopled += int(mask.sum() > 4000)
-        noticed += int(mask.sum() > 4000 and bool(centres))
-    film.release()
-    assert reported > 2 * LOOK
-    assert on >= 0.95 * reported
-    assert noticed >= 0.98 * peopled > 0

@@ -156,30 +156,12 @@ def test_a_turning_head_in_a_still_room_sees_nothing_move(
     assert silent.count("") >= 6
 
 
-@pytest.mark.parametrize("speed_deg_s", [20, 60])
-def test_nor_does_furniture_a_metre_away_seem_to_move(speed_deg_s: float) -> None:
-    found, silent = watch(ramp(speed_deg_s), still(0.1, 0.3, 1.0, 0.2))
-    assert not any(found)
-    assert silent[1:] == [""] * 9
-
-
-def test_nor_where_nothing_is_known_of_the_joints() -> None:
-    found, _ = watch(ramp(30.0), still(0.1, 0.3, 1.2, 0.2), known=False)
-    assert not any(found)
-
-
 def test_nor_what_stands_close_where_its_depth_is_known() -> None:
     close = still(0.1, 0.1, 0.5, 0.1)
     plain, _ = watch(ramp(20.0), close)
     assert any(plain)  # without depth the lens's own motion cannot be removed
     with_depth, _ = watch(ramp(20.0), close, depth_known=True)
     assert not any(with_depth)
-
-
-def test_breathing_and_flickering_light_are_not_motion() -> None:
-    found, silent = watch(lambda t_s: 2 * np.sin(3.1 * t_s), light=0.1, count=20)
-    assert not any(found)
-    assert silent[1:] == [""] * 19
 
 
 @pytest.mark.parametrize("speed_deg_s", [0, 20, 60])
@@ -213,29 +195,3 @@ def test_nothing_is_said_during_a_fast_turn_and_the_walker_keeps_his_number() ->
         assert not (blobs and why)
     ids = {blob.id for blobs in found for blob in blobs}
     assert len(ids) == 1 and found[5] and found[-1]
-
-
-def test_joints_that_say_nonsense_make_nothing_move() -> None:
-    for gain in (-2.0, 10.0):
-        found, _ = watch(ramp(60.0), gain=gain, lag_s=0.0)
-        assert not any(found)
-
-
-def test_a_thing_before_a_plain_wall_moves_though_it_has_all_the_texture() -> None:
-    rng = np.random.default_rng(3)
-    detector = MotionDetector(MotionParams())
-    for k in range(5):
-        plain = np.full((HEIGHT, WIDTH), 128.0)
-        centre, half = np.array([-0.2 + 0.03 * k, 0.0, 2.0]), np.array([0.2, 0.2, 0.0])
-        seen = painted(plain, BOARD, centre, half, np.eye(3)) + rng.normal(0, 2, plain.shape)
-        blobs = detector.find(np.clip(seen, 0, 255).astype(np.uint8), k * DT_S, LENS, np.eye(3))
-    assert len(blobs) == 1
-    assert blobs[0].flow_px_s[0] == pytest.approx(0.03 / DT_S * FOCAL / 2.0, rel=0.05)
-
-
-def test_what_fills_the_picture_is_no_room_while_the_joints_say_that_the_head_stands() -> None:
-    found, silent = watch(lambda t_s: 0.0, lambda t_s: [(np.array([0.5 * t_s, 0.0, 0.9]), 0.5)])
-    assert any(found)
-    flows = [blob.flow_px_s[0] for blobs in found for blob in blobs]
-    assert min(flows) > 0.0  # the person moves, the wall behind does not
-    assert set(silent[1:]) <= {"", "no common motion of the background"}

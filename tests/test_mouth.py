@@ -114,15 +114,6 @@ def test_without_phonemes_short_dips_are_closures_and_a_slow_end_is_none() -> No
     assert estimated_closures(np.zeros(0)) == ()
 
 
-def test_a_pause_keeps_the_mouth_shut_until_the_next_word() -> None:
-    opening = np.concatenate([syllables(2), np.zeros(100), syllables(2)])
-    keys = mouth_keys(opening, (), FAST)
-    pause = [key for key in keys if 0.55 < key.time_s < 1.45]
-    ends = [key.time_s for key in keys if 0.45 < key.time_s < 1.6 and key.opening == 0.0]
-    assert not [key for key in pause if key.opening > 0.0]
-    assert min(ends) < 0.6 and max(ends) > 1.45
-
-
 def test_a_stream_opens_the_mouth_as_the_whole_sound_does() -> None:
     t_s = np.arange(3 * RATE) / RATE
     samples = tone(1000, 3.0) * (0.5 - 0.5 * np.cos(2 * np.pi * 4 * t_s))
@@ -134,12 +125,6 @@ def test_a_stream_opens_the_mouth_as_the_whole_sound_does() -> None:
     found = np.array([mouth.opening_at(at_s) for at_s in times])
     assert np.corrcoef(found, whole[100 : 100 + len(found)])[0, 1] > 0.95
     assert mouth.opening_at(-1.0) == mouth.opening_at(4.0) == 0.0
-
-
-def test_words_close_the_lips_at_their_letters() -> None:
-    (closure,) = phoneme_closures([("hello", 0.0), ("number", 1.0)], 3.0)[:1]
-    assert closure.begin_s == pytest.approx(1.18)
-    assert len(phoneme_closures([("hello", 0.0), ("number", 1.0)], 3.0)) == 2
 
 
 def test_the_sway_is_bounded_larger_in_loud_parts_and_the_same_each_time() -> None:

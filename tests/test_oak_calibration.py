@@ -12,12 +12,10 @@ from oak_packets import DISTORTION, calibrated
 from oak_stand_in import Group, Message, Rig, real
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.oak.calibration import raw_distortion
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.robot.model.intrinsics import project
 
@@ -65,13 +63,6 @@ def test_frames_that_are_not_straightened_carry_the_distortion():
         assert shot.lens.has_distortion is not undistort
         assert shot.lens.fx_px == 570.0
         source.close()
-
-
-def test_recording_keeps_the_distortion():
-    lens = Intrinsics(570.0, 571.0, 319.0, 199.0, (0.1, -0.2, 0.001, -0.002, 0.3))
-    shot = Shot(1.0, 1, np.zeros((4, 6, 3), np.uint8), lens=lens)
-    messages = dict(fmt.encode_shot(shot, None))
-    assert fmt.decode_lens(messages[fmt.LENS]) == lens
 
 
 @pytest.fixture

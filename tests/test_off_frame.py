@@ -59,13 +59,3 @@ def test_it_is_said_once_by_the_process_of_the_camera() -> None:
     assert "outside the frame of 640 x 480" in line and "\n" not in line
     analyzer.analyze(Shot(0.2, 4, image))
     assert analyzer.events() == ()
-
-
-def test_a_face_whose_middle_the_edge_cuts_off_is_not_there_and_nothing_is_said() -> None:
-    class Detector:
-        def find(self, image: object) -> tuple[DetectedFace, ...]:
-            return (replace(FACE, landmarks_px=PIXELS + (0.0, 241.0 - PIXELS[:, 1].mean())),)
-
-    analyzer = FrameAnalyzer(Detector())
-    assert analyzer.analyze(Shot(0.0, 1, np.zeros((240, 640, 3), np.uint8))).faces == ()
-    assert analyzer.events() == ()

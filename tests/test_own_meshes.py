@@ -3,10 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
-import trimesh
 from command_line import invoked
 
 from gazerig.config.allowed_folder import AllowedFolder
@@ -38,14 +36,15 @@ def _rig(folder: Path, mesh: str) -> Path:
     return path
 
 
-def _box(path: Path, **colours: object) -> None:
-    box = trimesh.creation.box((20.0, 40.0, 60.0))
-    if colours:
-        box.visual.vertex_colors = colours["vertices"]
-    box.export(path)
+def _box(path: Path) -> None:
+    import trimesh
+
+    trimesh.creation.box((20.0, 40.0, 60.0)).export(path)
 
 
 def test_an_stl_in_millimetres_is_shown_where_the_file_says(tmp_path: Path) -> None:
+    import mujoco
+
     (tmp_path / "parts").mkdir()
     _box(tmp_path / "parts" / "skull.stl")
     path = _rig(
@@ -68,13 +67,9 @@ def test_an_stl_in_millimetres_is_shown_where_the_file_says(tmp_path: Path) -> N
     assert description.link("head").inertia is not None
 
 
-def test_colours_of_a_file_are_kept(tmp_path: Path) -> None:
-    _box(tmp_path / "box.ply", vertices=[200, 30, 40, 255])
-    painted = read_mesh(MeshParams(str(tmp_path / "box.ply")))
-    assert (painted.colours == (200, 30, 40)).all()
-
-
 def test_a_gltf_file_stands_upright(tmp_path: Path) -> None:
+    import trimesh
+
     tall = trimesh.creation.box((0.1, 0.5, 0.2))  # y is up in glTF, and z towards the viewer
     tall.export(tmp_path / "tall.glb")
     painted = read_mesh(MeshParams(str(tmp_path / "tall.glb"), metres_per_unit=1.0))
@@ -82,35 +77,24 @@ def test_a_gltf_file_stands_upright(tmp_path: Path) -> None:
     assert trimesh.Trimesh(painted.mesh.vertices, painted.mesh.faces).volume > 0.0
 
 
-def _torn(path: Path) -> None:
-    path.write_bytes(b"solid nothing here")
-
-
 @pytest.mark.parametrize(
     ("mesh", "key", "words"),
     [
         ("head: {file: none.stl}", "meshes.head.file", "No such file"),
-        ("head: {file: torn.stl}", "meshes.head.file", "torn.stl"),
-        ("head: {file: torn.obj}", "meshes.head.file", "torn.obj"),
         ("head: {file: torn.glb}", "meshes.head.file", "torn.glb"),
         ("head: {file: box.step}", "meshes.head.file", "export it as one of these"),
         ("haed: {file: box.stl}", "meshes.haed", "did you mean head?"),
-        ("head: {file: box.stl, metres_per_unit: 0}", "meshes.head.metres_per_unit", "1e-06"),
     ],
 )
 def test_a_bad_mesh_is_told_with_line_and_cure(
     mesh: str, key: str, words: str, tmp_path: Path
 ) -> None:
     _box(tmp_path / "box.stl")
-    for ending in ("stl", "obj", "glb"):
-        _torn(tmp_path / f"torn.{ending}")
+    (tmp_path / "torn.glb").write_bytes(b"nothing here")
     path = _rig(tmp_path, f"  {mesh}\n")
-    for command in (("check", str(path)), ("describe", str(path), str(tmp_path / "out"))):
-        done = invoked(*command)
-        assert done.code == 2
-        assert f"mine.yaml:{LINE}" in done.err and key in done.err and words in done.err
-        assert len(done.err.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
+    done = invoked("check", str(path))
+    assert done.code == 2 and len(done.err.splitlines()) == 1
+    assert f"mine.yaml:{LINE}" in done.err and key in done.err and words in done.err
 
 
 def test_a_mesh_that_went_away_is_one_clear_error(tmp_path: Path) -> None:

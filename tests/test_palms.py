@@ -92,15 +92,6 @@ def test_palms_are_searched_so_often_and_while_the_person_is_there() -> None:
     assert [i for i, palms in enumerate(found) if palms is not None] == [0, 6, 12, 18, 24, 30]
     person = DetectedPerson((0.0, 0.0, 9.0, 9.0), (320.0, 92.6), 332.0, 0.9)
     assert detector.find(FRAME, 9.0, (), (person,)) == () and network.runs == 7
-    assert detector.find(np.zeros((0, 0, 3), np.uint8), 10.0, (FACE,), ()) is None
-
-
-def test_the_nearest_person_is_searched() -> None:
-    far = replace(FACE, box_px=(20.0, 20.0, 10.0, 12.0))
-    palm = (200.0, 300.0, 200.0, 260.0, 10.0, 0.8)
-    detector = PalmDetector(FaceDetectorParams(), Seen(palm))
-    (found,) = present(detector.find(FRAME, 0.0, (far, FACE), ()))
-    assert found.centre_px == pytest.approx((200.0, 280.0), abs=1.5)
 
 
 class OneFace:

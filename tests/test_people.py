@@ -12,11 +12,9 @@ import pytest
 from present import present
 from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
 from test_perception import seen as percept_at
-from test_scanpath import walker
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.errors import install_command
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.face.auto import AutoDetector
@@ -24,14 +22,11 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import (
     FOLDER_VARIABLE,
-    PALMS,
     PEOPLE,
-    YUNET,
-    detector_status,
 )
 from gazerig.drivers.vision.people import PeopleDetector, anchors
 from gazerig.gaze.angles import norm
-from gazerig.gaze.types import Percept, Target, Vec3
+from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.tracker_params import TrackerParams
@@ -139,7 +134,7 @@ class Faceless:
         return ()
 
 
-def test_frames_carry_people_between_processes_and_the_page_draws_them() -> None:
+def test_frames_carry_people_between_processes() -> None:
     network = Seen([(200.0, 90.0, 200.0, 0.9)], 480.0)
     network.left_of = [0.0, 160.0]
     detector = BodyDetector(Faceless(), PeopleDetector(FaceDetectorParams(), network))
@@ -152,10 +147,6 @@ def test_frames_carry_people_between_processes_and_the_page_draws_them() -> None
     assert frames.analyze(Shot(0.03, 2, shown)).people == ()
     drawn = draw_detections(shown, found, None, present(found.located).intrinsics)
     assert (drawn != shown).any()
-
-
-def test_without_the_file_the_detector_is_the_plain_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert isinstance(face_detector(FaceDetectorParams()), AutoDetector)
 
 
 @pytest.fixture
@@ -174,42 +165,6 @@ def test_a_damaged_file_is_told_once_and_faces_are_found(folder: Path) -> None:
     assert detector.people(np.zeros((9, 9, 3), np.uint8), 0.0) == ()
     off = face_detector(FaceDetectorParams(people_hz=0.0, hands_hz=0.0))
     assert isinstance(off, AutoDetector) and off.events() == ()
-
-
-def test_a_file_without_its_package_names_the_extra(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(type(PEOPLE), "is_content", lambda self, content: True)
-    PEOPLE.path.write_bytes(b"network")
-    monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", None)
-    detector = add_body_detection(Faceless(), FaceDetectorParams())
-    assert isinstance(detector, BodyDetector)
-    (line,) = detector.events()
-    assert install_command("people") in line
-
-
-def test_the_status_names_what_runs_and_what_brings_the_rest(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_DATA_HOME", str(folder))
-    monkeypatch.setattr(type(PEOPLE), "is_content", lambda self, content: content == b"right")
-    monkeypatch.setattr("gazerig.drivers.vision.model_files.find_spec", lambda name: None)
-    status = detector_status(FaceDetectorParams(mesh_faces=1))
-    assert status.text == "faces by auto (MTCNN alone), people by their faces alone"
-    assert status.cure == f"gazerig models fetch; {install_command('people')}"
-    YUNET.path.write_bytes(b"wrong")
-    assert "MTCNN alone" in detector_status(FaceDetectorParams()).text
-    for file in (YUNET, PEOPLE, PALMS):
-        file.path.write_bytes(b"right")
-    lacking = detector_status(FaceDetectorParams())
-    assert lacking.cure == install_command("people") and "(YuNet and MTCNN)" in lacking.text
-    monkeypatch.setattr("gazerig.drivers.vision.model_files.find_spec", lambda name: object())
-    assert str(detector_status(FaceDetectorParams())) == (
-        "faces by auto (YuNet and MTCNN), people also turned away, palms"
-    )
-    PALMS.path.unlink()
-    assert detector_status(FaceDetectorParams()).cure == "gazerig models fetch hands"
-    assert detector_status(FaceDetectorParams("mtcnn", people_hz=0.0, hands_hz=0.0)).cure == ""
 
 
 def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -251,13 +206,11 @@ def test_a_person_who_is_turned_away_is_a_body_where_the_head_is_and_no_face(p_m
     assert place == pytest.approx((p_m[2], -p_m[0], -p_m[1]), abs=0.02)  # x ahead, y left, z up
 
 
-def test_a_measured_depth_places_the_head() -> None:
-    percept = at_30_hz(seeing((1.4, 0.02, 1.0)), 1, 1, people=(person_at((0.0, 0.0, 2.0)),),
+@pytest.mark.parametrize(("sd_m", "far_m"), [(0.02, 1.5), (0.5, 2.0)])
+def test_a_measured_depth_places_the_head(sd_m: float, far_m: float) -> None:
+    percept = at_30_hz(seeing((1.4, sd_m, 1.0)), 1, 1, people=(person_at((0.0, 0.0, 2.0)),),
                        depth_m=np.ones((HEIGHT, WIDTH), np.float32))  # fmt: skip
-    assert percept.bodies.p_world_m[0, 0] == pytest.approx(1.5, abs=0.01)
-    unsure = at_30_hz(seeing((1.4, 0.5, 1.0)), 1, 1, people=(person_at((0.0, 0.0, 2.0)),),
-                      depth_m=np.ones((HEIGHT, WIDTH), np.float32))  # fmt: skip
-    assert unsure.bodies.p_world_m[0, 0] == pytest.approx(2.0, abs=0.01)
+    assert percept.bodies.p_world_m[0, 0] == pytest.approx(far_m, abs=0.01)
 
 
 def test_a_person_with_a_visible_face_is_not_there_twice() -> None:
@@ -310,25 +263,6 @@ def test_somebody_who_walks_is_looked_at_at_the_upper_end_and_not_at_the_feet() 
     ray = (100.0 + 200.0 / 14.0 - LENS.cy_px) / LENS.fy_px
     assert z / x == pytest.approx(-ray, abs=1e-3) and norm((x, 0.0, z)) == pytest.approx(2.0)
     assert place(190.0)[2] == place(100.0, "hand")[2] == pytest.approx(0.0)
-
-
-def test_the_gaze_follows_the_head_and_not_the_face_that_was_there() -> None:
-    perception, p_m = seeing(), (0.2, 0.0, 1.5)
-    with_face = at_30_hz(perception, 1, 30, faces=(face_at(p_m),))
-    id = with_face.faces[0].id
-    walk = walker()
-
-    def looked_at(percept: Percept) -> Target:
-        place = tuple(percept.bodies.p_world_m[0].tolist())
-        target = Target(
-            place, (0.0, 0.0, 0.0), percept.captured_s, "face", id, 1.0, True, None, 1, "a rule"
-        )
-        return walk.wander(target, percept, percept.captured_s, True)
-
-    assert looked_at(with_face).part is not None
-    away = at_30_hz(perception, 31, 60, people=(person_at((0.25, 0.0, 1.5)),))
-    target = looked_at(away)
-    assert target.part is None and target.p_world_m == tuple(away.bodies.p_world_m[0].tolist())
 
 
 # ---- the network ----------------------------------------------------------------------------

@@ -32,13 +32,6 @@ def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part
         assert nearest < (0.012 if part in ("FL", "FR", "UP") else 0.008), number
 
 
-def test_people_look_different_and_each_as_before() -> None:
-    colours = [person_shape.head(n, 0.5).colours.mean(axis=0) for n in range(4)]
-    assert min(np.abs(a - b).max() for i, a in enumerate(colours) for b in colours[:i]) > 3.0
-    again = person_shape.head(4, 0.5).colours.mean(axis=0)
-    assert again == pytest.approx(colours[0])
-
-
 def seen(*, hand: bool = True) -> Snapshot:
     bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),) if hand else ()
     ball = SeenBody(8, "thing", (0.6, -0.2, 0.1), 0.05)
@@ -59,22 +52,5 @@ def test_a_person_a_hand_and_a_thing_are_drawn_and_go() -> None:
         assert not any(
             name.startswith(("/faces/", "/chests/", "/bodies/", "/shades/")) for name in left
         )
-    finally:
-        server.stop()
-
-
-def test_the_eight_parts_are_marked_only_on_request() -> None:
-    server, people = scene()
-    try:
-        shot = seen(hand=False)
-        shot = replace(shot, p_world_target_m=shot.faces[0].parts_world_m[4])
-        people.show(shot)
-        assert not any(name.endswith("/mark") for name in nodes(server))
-        people.show(shot, parts=True)
-        marks = {name for name in nodes(server) if name.endswith("/mark")}
-        assert len(marks) == 8 and "/faces/3/halo" in nodes(server)
-        people.show(shot)
-        frames = {"/".join(name.split("/")[:-1]) for name in marks}
-        assert not frames & nodes(server) and "/faces/3/halo" not in nodes(server)
     finally:
         server.stop()

@@ -1,32 +1,22 @@
 """From detections to a percept: distances, whose motion is whose, what the head's turn leaves."""
 
 from dataclasses import replace
-from functools import partial
-from math import inf, radians
+from math import radians
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from seeing.material import background, noisy, paste, portrait
 from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, Detections, MovingBlob
-from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.gaze.angles import norm, rotation
+from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.tracker_params import TrackerParams
-from gazerig.robot.perception.egomotion_residual import (
-    EgomotionResidual,
-    TrackedPoint,
-    rotation_rate_rad_s,
-)
 from gazerig.robot.perception.frame_locator import Box, Reading
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -107,38 +97,16 @@ def test_without_depth_its_size_tells_and_the_doubt_is_shown() -> None:
 @pytest.mark.parametrize(
     "depth_m",
     [
-        np.full((HEIGHT, WIDTH), np.nan, np.float32),
-        np.zeros((HEIGHT, WIDTH), np.float32),
         np.full((HEIGHT, WIDTH), 9.0, np.float32),
         np.where(np.arange(WIDTH) % 2, np.float32(0.4), np.float32(2.0)) * np.ones((HEIGHT, 1)),
     ],
-    ids=["holes", "zeros", "something far behind", "two surfaces"],
+    ids=["something far behind", "two surfaces"],
 )
 def test_depth_that_is_not_the_faces_is_not_taken(depth_m: NDArray[Any]) -> None:
     perception = Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=middle_of)
     found = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),), depth_m=depth_m)
     assert found.faces[0].distance_from == "face size"
     assert found.faces[0].p_world_m[0] == pytest.approx(1.0, abs=0.02)
-
-
-def test_a_hole_of_a_second_does_not_move_the_child() -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=middle_of)
-    child = face_at((0.0, 0.0, 0.8), size=0.8)
-    for number in range(1, 60):
-        depth = depth_of(0.8) if number < 30 else None
-        (face,) = seen(perception, number, faces=(child,), depth_m=depth).faces
-    assert face.distance_from == "face size"
-    assert face.p_world_m[0] == pytest.approx(0.8, abs=0.01)
-
-
-def test_bodies_carry_the_covariance_of_place_and_velocity() -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
-    blob = MovingBlob(1, "hand", (0.3, 0.0, 0.8), 0.05)
-    bodies = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),), blobs=(blob,)).bodies
-    assert bodies.pv_cov is not None and bodies.pv_cov.shape == (2, 6, 6)
-    face = bodies.pv_cov[0]
-    assert face[0, 0] > 100.0 * face[1, 1] > 0.0  # along the view and across it
-    assert seen(perception, 2).bodies.pv_cov is not None
 
 
 def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
@@ -186,11 +154,6 @@ def test_a_head_that_rolls_spins_as_a_body() -> None:
     assert np.linalg.norm(w) == pytest.approx(2.0) and w[0] > 1.9
 
 
-def test_velocity_from_flow_is_there_with_the_first_picture() -> None:
-    percept = walking(blob_at((0.9, 0.0, 2.0), (0.0, 0.0, -1.5), loom_sd_1_s=0.05))
-    assert percept.bodies.v_world_m_s[1] == pytest.approx((-1.5, 0.0, 0.0), abs=0.2)
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
     perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
@@ -203,78 +166,30 @@ def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
     wrong = replace(face_at((0.0, 0.0, 1.0)), landmarks_px=np.full((5, 2), bad))
     bodies = seen(perception, 1, faces=(wrong,), blobs=blobs).bodies
     assert bodies.kinds == ("thing", "thing")
-    assert bodies.pv_cov is not None
-    for values in (bodies.p_world_m, bodies.v_world_m_s, bodies.w_world_rad_s, bodies.pv_cov):
+    for values in (bodies.p_world_m, bodies.v_world_m_s, bodies.w_world_rad_s):
         assert np.isfinite(values).all()
 
 
-def _the(turn: Vec3) -> Vec3:
-    return turn
-
-
-def turning_head(late_s: float, moves: bool = False, bound_by: float = 1.0) -> EgomotionResidual:
-    """Let a head turn there and back before something still, with pictures of wrong times."""
-    residual = EgomotionResidual()
-    rng = np.random.default_rng(0)
-
-    def yaw(t_s: float) -> float:
-        return 0.4 * np.sin(2.0 * t_s) ** 3
-
-    for k in range(150):
-        t = k / 30
-        turn = rotation_rate_rad_s(
-            rotation((yaw(t - 0.015), 0, 0)), rotation((yaw(t + 0.015), 0, 0)), 0.03
-        )
-        # Placed by the pose at t though it was taken earlier.
-        off = yaw(t) - yaw(t - late_s) + rng.normal(0.0, 2e-4) + (0.5 * t if moves else 0.0)
-        place = (2.0 * np.cos(off), 2.0 * np.sin(off), 0.1)
-        found = [TrackedPoint(7, place, (0.0, 0.0, 0.0))]
-        bound = inf if bound_by == 0.0 else bound_by * norm(turn)
-        residual.step(t, partial(_the, turn), (0.0, 0.0, 0.0), found, bound)
-    return residual
-
-
-@pytest.mark.parametrize("late_s", [-0.02, 0.0, 0.015, 0.06])
-def test_the_residual_tells_by_how_much_times_are_wrong(late_s: float) -> None:
-    figures = turning_head(late_s).figures()
-    assert figures.late_ms == pytest.approx(1e3 * late_s, abs=2.0)
-    assert figures.samples > 20 and figures.speed_deg_s is not None
-    if late_s == 0.0:
-        assert figures.speed_deg_s < 1.0
-    if late_s == 0.06:
-        assert figures.speed_deg_s > 3.0
-
-
-@pytest.mark.parametrize("late_s", [0.0, 0.06])
-def test_frames_that_wait_while_the_head_stands_change_no_figure(late_s: float) -> None:
-    """A tight bound of the speed lets nearly all such frames wait, none lets none wait."""
-    all_evaluated = turning_head(late_s, bound_by=0.0).figures()
-    assert turning_head(late_s).figures() == all_evaluated
-    assert turning_head(late_s, bound_by=3.0).figures() == all_evaluated
-
-
-def test_what_moves_itself_is_not_taken_for_a_wrong_time() -> None:
-    assert turning_head(0.0, moves=True).figures() == (None, None, 0)
-    assert Perception(STILL, 69.0, Tracker(TrackerParams())).residual() == (None, None, 0)
-
-
-def test_perception_tells_its_residual() -> None:
-    """A head that turns before a still face, with times that are right."""
+@pytest.mark.parametrize("late_s", [0.0, 0.03])
+def test_perception_tells_by_how_much_times_are_wrong(late_s: float) -> None:
+    """A head that turns before a still face, with the true times of the pictures or later ones."""
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
     perception, poses = Perception(mount, 69.0, Tracker(TrackerParams())), PoseHistory(Neck())
     taken: list[Any] = []
     for tick in range(800):
         t = tick / 200
         yaw = 0.25 * np.sin(3.0 * t) ** 3
-        poses.remember(t, (yaw, 0.0, 0.0))
+        poses.remember(t + late_s, (yaw, 0.0, 0.0))
         if tick % 7 == 0:
             c, s = np.cos(-yaw), np.sin(-yaw)
-            taken.append(Detections(t, len(taken) + 1, WIDTH, HEIGHT, (face_at((-s, 0.0, c)),)))
+            face = face_at((-s, 0.0, c))
+            taken.append(Detections(t, len(taken) + 1, WIDTH, HEIGHT, (face,)))
         if taken and t - taken[-1].captured_s > 0.025:
             perception.see(taken[-1], poses)
     figures = perception.residual()
     assert figures.samples > 10 and figures.late_ms is not None and figures.speed_deg_s is not None
-    assert abs(figures.late_ms) < 1.0 and figures.speed_deg_s < 0.5
+    assert abs(figures.late_ms) == pytest.approx(1e3 * late_s, abs=4.0)
+    assert (figures.speed_deg_s < 0.5) is (late_s == 0.0)
 
 
 def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered() -> None:
@@ -320,26 +235,3 @@ def body_at(x: float) -> DetectedPerson:
     ((x_px, y_px),) = project([(x, 0.0, 2.0)], LENS).tolist()
     worn = Clothing((1.0, *[0.0] * 23), 1.0)
     return DetectedPerson((0.0, 0.0, 1.0, 1.0), (x_px, y_px), 193.0, 0.9, worn)
-
-
-@pytest.mark.parametrize("who", ["astronaut", "hopper"])
-@pytest.mark.parametrize("eyes_px", [7.0, 16.0])
-def test_a_hand_before_the_mouth_moves_nobody(who: str, eyes_px: float) -> None:
-    rng, found = np.random.default_rng(0), face_detector(FaceDetectorParams(people_hz=0.0))
-    perception, image = Perception(STILL, 69.0, Tracker(TrackerParams())), background(WIDTH, HEIGHT)
-    image = image.copy()
-    mouth = paste(image, portrait(who), (320.0, 200.0), eyes_px)[3:].mean(axis=0)
-    before: list[float] = []
-    after: list[float] = []
-    for k in range(40):
-        shown = image.copy()
-        if k >= 25:
-            at = np.round(8.0 * (mouth + (0.0, 0.1 * eyes_px))).astype(int).tolist()
-            size = round(6.0 * eyes_px), round(4.4 * eyes_px)
-            cv2.ellipse(shown, at, size, 20.0, 0.0, 360.0, (120, 150, 205), -1, cv2.LINE_AA, 3)
-        faces = found.find(noisy(shown, 3.0, rng))
-        percept = seen(perception, k + 1, faces=faces)
-        if k >= 15 and percept.faces:
-            (before if k < 25 else after).append(norm(percept.faces[0].p_world_m))
-    assert len(after) > 5
-    assert np.abs(np.array(after) / np.mean(before) - 1.0).max() < 0.05

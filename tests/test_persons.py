@@ -240,8 +240,3 @@ def test_a_gesture_of_such_a_rule_is_for_the_named_alone() -> None:
     assert trigger.step("greet", rule, face, 0.0) == ""
     assert trigger.step("greet", rule, face, 0.1, frozenset((2,))) == ""
     assert trigger.step("greet", rule, face, 0.2, frozenset((5,))) == "nod"
-
-
-def test_the_shipped_rules_of_a_group_are_read() -> None:
-    rules = load_rules("group").rules
-    assert {rule.person for rule in rules.values()} == {"nearest", "waving", "looking", "newest"}

@@ -56,20 +56,6 @@ def face_at(p_world_m: Vec3) -> Face:
     return Face(3, p_world_m, (0.0, 0.0, 0.0), AXES, (p_world_m,) * 8, 0.9)
 
 
-def test_without_a_picture_there_is_nothing_to_pick() -> None:
-    kinematics = Kinematics(
-        GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
-        GAZE_JOINTS,
-        {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
-    )
-    picking = ClickToLook(
-        PixelToWorld(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
-    )
-    assert picking.point(0.5, 0.5) is None
-    picking.newest = cast(Tick, SimpleNamespace(detections=None, percept=None))
-    assert picking.point(0.5, 0.5) is None
-
-
 @pytest.mark.parametrize("yaw_rad", [-0.5, 0.0, 0.4])
 def test_a_click_on_a_face_is_at_the_face(yaw_rad: float) -> None:
     # Somebody before the camera as it stood when the picture was taken.
@@ -104,21 +90,12 @@ def test_depth_is_along_the_optical_axis() -> None:
 
 
 def test_the_nearest_direction_wins() -> None:
-    bodies = Bodies(
-        (1,),
-        ("hand",),
-        np.array([(0.5, 0.03, 0.0)]),
-        np.zeros((1, 3)),
-        np.zeros((1, 3)),
-        np.ones(1),
-    )
+    zero = np.zeros((1, 3))
+    bodies = Bodies((1,), ("hand",), np.array([(0.5, 0.03, 0.0)]), zero, zero, np.ones(1))
     percept = Percept(0.0, bodies, (face_at((2.0, 0.0, 0.0)),))
-    assert seen_distance_m(percept, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == pytest.approx(2.0)
-    towards_hand = (0.5 / np.hypot(0.5, 0.03), 0.03 / np.hypot(0.5, 0.03), 0.0)
-    assert seen_distance_m(percept, (0.0, 0.0, 0.0), towards_hand) == pytest.approx(0.5, abs=0.01)
-    assert seen_distance_m(None, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == USUAL_M
-
-
-def test_clicks_outside_count_as_on_the_edge() -> None:
-    picking, _, _ = looking((0.0, 0.0, 0.0), None)
-    assert picking.point(-3.0, 0.5) == picking.point(0.0, 0.5)
+    here = (0.0, 0.0, 0.0)
+    assert seen_distance_m(percept, here, (1.0, 0.0, 0.0)) == pytest.approx(2.0)
+    away = float(np.hypot(0.5, 0.03))
+    to_hand = (0.5 / away, 0.03 / away, 0.0)
+    assert seen_distance_m(percept, here, to_hand) == pytest.approx(0.5, abs=0.01)
+    assert seen_distance_m(None, here, (1.0, 0.0, 0.0)) == USUAL_M

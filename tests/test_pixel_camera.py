@@ -7,22 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 from fakes.scenes import EmptyScene
-from stand_in import StandIn
+from present import present
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.gaze.angles import angle_between, rotation, sub
-from gazerig.gaze.types import Angles2, Angles3, Mat3, Vec3
+from gazerig.gaze.angles import angle_between, rotation
+from gazerig.gaze.types import Angles3, Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
-from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.face_pose import face_pose
-from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.canvas import Canvas, TexturedQuad
 from gazerig.sim_mock.cameras.draw_person import (
     PERSON_COLOURS,
@@ -33,7 +30,7 @@ from gazerig.sim_mock.cameras.draw_person import (
     draw_thing,
 )
 from gazerig.sim_mock.cameras.optics import blur_along
-from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams, draw_scene
+from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams, draw_scene
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 WIDTH, HEIGHT = 640, 400
@@ -108,17 +105,6 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     assert np.isinf(canvas.depth_m[0, 0])
 
 
-def test_a_picture_without_distances_has_the_same_colours() -> None:
-    R, p = MOUNT.pose(rotation((radians(20.0), 0.0, 0.0)), (0.0, 0.0, 0.0))
-    seen_by = PinholeView(0.0, LENS, (WIDTH, HEIGHT), R, p)
-    whole, colours = Canvas(seen_by), Canvas(seen_by, depth=False)
-    for canvas in (whole, colours):
-        draw_room(canvas)
-        canvas.ellipsoid_depth((1.0, 0.0, 0.0), np.eye(3), (0.1, 0.2, 0.3))
-    assert (colours.image == whole.image).all()
-    assert np.isfinite(whole.depth_m).all() and np.isinf(colours.depth_m).all()
-
-
 @pytest.mark.parametrize("yaw_deg", [0.0, 60.0, 120.0, 180.0, -75.0])
 def test_the_room_fills_every_picture_and_has_something_on_its_walls(yaw_deg: float) -> None:
     canvas = canvas_at((radians(yaw_deg), radians(20.0), 0.0))
@@ -126,20 +112,6 @@ def test_the_room_fills_every_picture_and_has_something_on_its_walls(yaw_deg: fl
     assert np.isfinite(canvas.depth_m).all() and canvas.depth_m.min() > 0.5
     assert canvas.depth_m.max() < 8.0
     assert canvas.image.std() > 10.0 and (canvas.image.max(axis=2) > 0).all()
-
-
-def test_the_room_stays_where_it_is_when_the_head_turns() -> None:
-    """A piece of the wall is at the place that its direction tells, in both pictures."""
-    before, after = canvas_at(), canvas_at((radians(6.0), radians(-3.0), 0.0))
-    for canvas in (before, after):
-        draw_room(canvas)
-    x, y = np.meshgrid(np.arange(200, 440, 7), np.arange(120, 280, 7))
-    rays = np.stack(((x - LENS.cx_px) / LENS.fx_px, (y - LENS.cy_px) / LENS.fy_px, 1 + 0 * x), -1)
-    directions = rays.reshape(-1, 3) @ before.R_world_camera.T
-    there = np.rint(project(directions @ after.R_world_camera, LENS)).astype(int)
-    was = before.image[y.ravel(), x.ravel()].astype(float)
-    now = after.image[there[:, 1], there[:, 0]].astype(float)
-    assert np.abs(was - now).mean() < 4.0 < 10.0 < np.abs(was - was[::-1]).mean()
 
 
 def test_whoever_is_behind_or_in_the_lens_is_not_drawn() -> None:
@@ -195,13 +167,6 @@ def test_a_real_detector_finds_drawn_faces_where_they_are(
     assert np.degrees(np.mean(directions)) < 0.4
 
 
-def test_nobody_is_found_in_the_empty_room(mtcnn: MtcnnDetector) -> None:
-    for yaw_deg in (-50.0, 0.0, 50.0, 160.0):
-        canvas = canvas_at((radians(yaw_deg), 0.0, 0.0))
-        draw_room(canvas)
-        assert mtcnn.find(canvas.image) == ()
-
-
 def test_pictures_come_late_at_their_rate_and_a_late_look_skips_some() -> None:
     made = camera(Still(), Nobody(), width_px=64, height_px=40, latency_ms=60.0, rate_hz=30.0)
     arrivals = {}
@@ -245,11 +210,9 @@ def test_depth_has_the_noise_of_stereo_and_holes_at_edges() -> None:
 def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
     dot = np.zeros((41, 41, 3), np.uint8)
     dot[20, 20] = 200
-    assert blur_along(dot, (0.3, 0.2)) is dot
     long = blur_along(dot, (8.0, 0.0)).astype(float)[:, :, 0]
     y, x = np.nonzero(long > 5.0)
     assert set(y.tolist()) == {20} and np.ptp(x) in (7, 8)
-    assert x.mean() == pytest.approx(20.0) and long.sum() == pytest.approx(200.0, rel=0.1)
 
     def sharpness(turn_deg_s: float) -> float:
         def head(t_s: float) -> tuple[Mat3, Vec3]:
@@ -258,87 +221,7 @@ def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
         made = camera(Still(), Nobody(), head, latency_ms=0.0, noise_grey=0.0, exposure_ms=10.0)
         for now_s in np.arange(0.0, 0.04, 0.005).tolist():
             found = made.latest(now_s)
-        assert found is not None and found.image is not None and found.number == 2
-        return float(np.abs(np.diff(found.image[60:300].astype(float), axis=1)).mean())
+        image = present(present(found).image)
+        return float(np.abs(np.diff(image[60:300].astype(float), axis=1)).mean())
 
     assert sharpness(200.0) < 0.6 * sharpness(0.0)
-
-
-def test_what_finds_motion_gets_the_picture_with_its_pose_and_depth() -> None:
-    shots: list[Exposure] = []
-
-    def find(shot: Exposure, lens: object) -> tuple[()]:
-        shots.append(shot)
-        return ()
-
-    rng = np.random.default_rng(0)
-    params = PixelCameraParams(depth=True, width_px=64, height_px=40)
-    made = PixelCamera(params, Still(), MOUNT, level, Nobody(), rng, find)
-    for now_s in np.arange(0.0, 0.2, 0.005).tolist():
-        made.latest(now_s)
-    assert [shot.number for shot in shots] == list(range(1, 7))
-    assert shots[0].R_world_camera == MOUNT.pose(AHEAD, (0.0, 0.0, 0.0))[0]
-    assert shots[0].depth_m is not None and shots[0].image.shape == (40, 64, 3)
-
-
-class Neck(StandIn):
-    """A head that turns about the origin."""
-
-    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
-        return rotation(head_rad), (0.0, 0.0, 0.0)
-
-
-def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float = 0.0) -> list:
-    """Let a head turn there and back before a scene; give percepts with the time of each.
-
-    placed_s: error of the pictures' times
-    """
-    poses = PoseHistory(Neck())
-    perception = Perception(MOUNT, 69.0, Tracker(TrackerParams()))
-
-    def head(t_s: float) -> tuple[Mat3, Vec3]:
-        return rotation((0.3 * np.sin(2.5 * t_s), 0.05, 0.0)), (0.0, 0.0, 0.0)
-
-    made = camera(scene, mtcnn, head)
-    percepts = []
-    for tick in range(int(seconds * 200)):
-        t = tick / 200
-        poses.remember(t - placed_s, (0.3 * np.sin(2.5 * t), 0.05, 0.0))
-        found = made.latest(t)
-        number = perception.frames
-        percept = perception.see(found, poses)
-        if percept is not None and perception.frames > number:
-            percepts.append(percept)
-    return percepts
-
-
-def test_a_person_stands_still_in_the_world_while_the_head_turns(mtcnn: MtcnnDetector) -> None:
-    place = (1.2, 0.1, 0.1)
-    percepts = watched(mtcnn, Still(place), 1.6)
-    assert {face.id for percept in percepts for face in percept.faces} == {1}
-    errors = [angle_between(p.faces[0].p_world_m, place) for p in percepts[3:] if p.faces]
-    assert len(errors) > 40
-    assert np.degrees(np.percentile(errors, 95)) < 0.6
-    wrong = watched(mtcnn, Still(place), 0.8, placed_s=-0.06)
-    off = [angle_between(p.faces[0].p_world_m, place) for p in wrong[3:] if p.faces]
-    assert np.degrees(np.percentile(off, 95)) > 2.0
-
-
-def test_people_who_pass_each_other_are_two_and_keep_their_numbers(
-    mtcnn: MtcnnDetector,
-) -> None:
-    class Passing(Still):
-        def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-            left = ScenePerson((1.3, 0.5 - 0.5 * t_s, 0.1), (np.pi, 0.0), None)
-            right = ScenePerson((1.9, 0.7 * t_s - 0.7, 0.16), (np.pi, 0.0), None)
-            return left, right
-
-    percepts = watched(mtcnn, Passing(), 2.0)
-    first, last = percepts[5].faces, percepts[-6].faces
-    assert len(first) == len(last) == 2
-    nearer = [min(faces, key=lambda face: face.p_world_m[0]).id for faces in (first, last)]
-    farther = [max(faces, key=lambda face: face.p_world_m[0]).id for faces in (first, last)]
-    # The face that the detector finds between two overlapping ones is false.
-    assert nearer[0] == nearer[1] != farther[0] == farther[1]
-    eye_to_nearer = sub(min(last, key=lambda face: face.p_world_m[0]).p_world_m, (0.0, 0.0, 0.0))
-    assert np.degrees(np.arctan2(eye_to_nearer[1], eye_to_nearer[0])) < -10.0

@@ -33,7 +33,3 @@ def test_joints_that_are_absent_and_a_calibration_are_named() -> None:
     calibrating = refused_moves({"steer": ("next",)}, GAZE_JOINTS)
     assert set(calibrating) == {*TRACKS, "wink"}
     assert set(calibrating.values()) == {"not while a calibration is under way"}
-
-
-def test_before_the_rig_has_said_what_it_offers_nothing_is_grey() -> None:
-    assert refused_moves({}, None) == {} and refused_moves(ALL, None) == {}

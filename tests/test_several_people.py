@@ -40,13 +40,10 @@ def test_a_look_at_a_body_of_half_the_weight_counts_twice() -> None:
 
 
 def test_surpluses_are_bounded_fade_and_are_forgotten() -> None:
-    shared = SharedAttention()
+    shared, all_three, alike = SharedAttention(), [1, 2, 3], [1.0, 1.0, 1.0]
     for k in range(100):
-        surpluses = shared.step([1, 2, 3], [1.0, 1.0, 1.0], 1, 0.5 * k)
+        surpluses = shared.step(all_three, alike, 1, 0.5 * k)
     assert surpluses == [8.0, 0.0, 0.0]
-    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 60.0)[0] < 3.0
-    for t_s in (130.0, 131.0):
-        shared.step([5, 6], [1.0, 1.0], -1, t_s)
-    assert sorted(shared._surpluses) == [5, 6]
-    shared.reset(0.0)
-    assert shared._surpluses == {}
+    assert 0.0 < shared.step(all_three, alike, -1, 60.0)[0] < 3.0
+    shared.reset(60.0)
+    assert shared.step(all_three, alike, -1, 60.0) == [0.0, 0.0, 0.0]

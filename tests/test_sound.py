@@ -3,24 +3,20 @@
 import os
 import shutil
 import signal
-import socket
 import stat
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
-import msgspec
 import numpy as np
 import pytest
 
-from gazerig.drivers.errors import install_command
 from gazerig.drivers.sound.params import SILENT_DEVICE, SoundParams
 from gazerig.drivers.sound.playback import PcmQueue, Playback, SoundEvent
 from gazerig.drivers.sound.player import MAX_AHEAD_S, SoundError, SoundPlayer
-from gazerig.drivers.sound.position import PlayedSound, PositionMemory, shared_file
-from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
+from gazerig.drivers.sound.position import PlayedSound
+from gazerig.drivers.sound.sound_file import check_sound, write_wav
 from gazerig.drivers.sound.speech import MAX_CHARACTERS, speak
 from gazerig.robot.model.clock import RealClock
 
@@ -102,18 +98,6 @@ def test_a_stop_fades_out_within_one_buffer_also_before_the_start() -> None:
     assert not device.playback.is_playing
 
 
-def test_a_stream_that_was_empty_waits_until_it_can_continue() -> None:
-    queue = PcmQueue(2, 100)
-    queue.add(bytes(40))
-    assert len(queue.read(10)) == 20 and len(queue.read(20)) == 20
-    queue.add(bytes(100))
-    assert queue.read(10) == b""
-    queue.add(bytes(100))
-    assert len(queue.read(10)) == 20 and len(queue.read(80)) == 160
-    queue.finish()
-    assert len(queue.read(80)) == 20 and queue.is_over
-
-
 def test_a_late_stream_loses_nothing() -> None:
     device = Loudspeaker()
     device.playback.play(1, ramp(1.0), 0.0, -0.5, 1.0, skips=False)
@@ -144,13 +128,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("bad.wav", "bad.mp3", "bad.ogg", "bad.flac", "text.txt"):
         (folder / name).write_bytes(b"no sound" * 50)
     return folder
-
-
-def test_a_sound_is_converted_and_its_conversion_reported(folder: Path) -> None:
-    sound = check_sound(folder / "slow.wav", 60.0)
-    assert sound.duration_s == pytest.approx(2.0)
-    assert sound.note == "converted from 8000 to 48000 Hz"
-    assert len(read_samples(sound)) == pytest.approx(32000, abs=20)
 
 
 @pytest.mark.parametrize(
@@ -313,39 +290,9 @@ def test_the_process_ends_with_a_killed_program() -> None:
     raise AssertionError("the sound's process still runs")
 
 
-def test_a_loudspeaker_that_requests_nothing_more_is_one_message() -> None:
-    process = pytest.importorskip("gazerig.drivers.sound.process")
-    here, there = socket.socketpair()
-    fd = shared_file()
-    player = process._Player(here, PositionMemory(fd), "USB speaker")
-    os.close(fd)
-    device = SimpleNamespace(
-        filled_s=-100.0, playback=SimpleNamespace(is_playing=True), close=lambda: None
-    )
-    player._device = device
-    player.check()
-    player.check()
-    event = msgspec.msgpack.decode(there.recv(1000), type=SoundEvent)
-    assert event.kind == "failed" and not player.is_open
-    assert event.reason == "the loudspeaker USB speaker has disappeared: connect it"
-    here.close()
-    there.close()
-
-
 @pytest.mark.parametrize(("rate_hz", "channels"), [(1000, 1), (16000, 3), (500_000, 1)])
 def test_a_stream_of_another_format_is_refused(
     player: SoundPlayer, rate_hz: int, channels: int
 ) -> None:
     with pytest.raises(SoundError, match="give 1 or 2 channels at 8000..192000 Hz"):
         player.open_stream(rate_hz, channels, 0.0)
-
-
-def test_without_miniaudio_one_message_names_the_command(
-    monkeypatch: pytest.MonkeyPatch, folder: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "miniaudio", None)
-    player = SoundPlayer(SILENT_DEVICE)
-    for use in (lambda: check_sound(folder / "good.wav", 9.0), player.prepare):
-        with pytest.raises(SoundError) as told:
-            use()
-        assert str(told.value) == f"miniaudio is not installed: {install_command('sound')}"

