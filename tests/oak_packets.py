@@ -44,8 +44,6 @@ def face_archive(
     parser: str = "YuNetParser",
     points: int | None = 5,
     network: str = "dlc",
-    heads: int = 1,
-    height_px: int = 256,
     outputs: tuple[str, ...] = ("cls", "obj", "bbox", "kps"),
 ) -> Path:
     """Write an NNArchive of a face network, without weights that would run."""
@@ -53,13 +51,13 @@ def face_archive(
     about = {"n_classes": 1, "classes": ["face"], "iou_threshold": 0.3, "conf_threshold": 0.5}
     head = {"parser": parser, "outputs": [], "metadata": {**about, "n_keypoints": points}}
     grey = {"mean": [0.0, 0.0, 0.0], "scale": [1.0, 1.0, 1.0]}
-    shape = {"shape": [1, 3, height_px, 320], "layout": "NCHW", "preprocessing": grey}
+    shape = {"shape": [1, 3, 256, 320], "layout": "NCHW", "preprocessing": grey}
     inputs = {"name": "input", "dtype": "float32", "input_type": "image", **shape}
     model = {
         "metadata": {"name": "faces", "path": f"faces.{network}"},
         "inputs": [inputs],
         "outputs": [{"name": name, "dtype": "float32"} for name in names],
-        "heads": [head] * heads,
+        "heads": [head],
     }
     files = {"config.json": json.dumps({"config_version": "1.0", "model": model}).encode()}
     files[f"faces.{network}"] = bytes(64)

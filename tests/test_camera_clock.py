@@ -10,9 +10,7 @@ from gazerig.drivers.camera.clock_sync import ClockSync
 RATE_HZ = 30.0
 
 
-def run(
-    bridge, seconds, drift=0.0, offset_s=0.0, delay_s=0.02, jitter_s=0.008, seed=1, start_s=0.0
-):
+def run(bridge, seconds, drift=0.0, offset_s=0.0, seed=1, start_s=0.0):
     """Return errors of the translation (translated less true, s), with exponential jitter."""
     rng = np.random.default_rng(seed)
     true_s = start_s + np.arange(int(seconds * RATE_HZ)) / RATE_HZ

@@ -19,7 +19,6 @@ from gazerig.drivers.types import DetectedFace
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 
 AT_ONCE = CameraRecoveryParams(give_up_s=0.0)
-QUICKLY = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=4.0, give_up_s=PATIENCE_S)
 
 FACE = DetectedFace((1.0, 2.0, 3.0, 4.0), np.zeros((5, 2)), 0.9)
 
@@ -107,13 +106,6 @@ def test_pictures_and_pictures_with_a_face_are_counted(source, camera):
     assert (camera.frames, camera.frames_with_face) == (7, 3)
 
 
-def test_camera_that_cannot_be_opened_says_so_at_once():
-    thread = CameraThread(Source(fails_to_open=True), EveryOther(), time.monotonic)
-    with pytest.raises(CameraError, match="plug it in"):
-        thread.open()
-    thread.close()
-
-
 def test_fault_of_the_source_reaches_the_loop(source, camera):
     source.fault = CameraError("camera gone: check its cable")
     source.fed.release()
@@ -147,42 +139,9 @@ def test_close_ends_the_thread_and_frees_the_source(source, camera):
     assert camera.latest(0.0).number == 1
 
 
-def test_open_again_starts_anew(source, camera):
-    feed(source, camera, 3)
-    with pytest.raises(CameraError, match="is already running"):
-        camera.open()
-    camera.close()
-    camera.open()
-    assert (camera.latest(0.0), camera.frames, camera.frames_with_face) == (None, 0, 0)
-    feed(source, camera, 1)
-    assert source.opened == 2
-
-
 def lose(source: Source) -> None:
     source.fault = CameraError("camera gone: check its cable")
     source.fed.release()
-
-
-def test_camera_that_comes_back_is_told_and_counts_on(source):
-    camera = CameraThread(source, EveryOther(), time.monotonic, QUICKLY)
-    camera.open()
-    feed(source, camera, 3)
-    lose(source)
-    wait_for(lambda: source.closed)
-    old = camera.latest(0.0)
-    assert (present(old).number, present(old).captured_s) == (
-        3,
-        3.0,
-    )  # the old one stays; its age shows it
-    assert camera.events() == ("camera lost (camera gone: check its cable): trying it again",)
-    source.fault = None
-    feed(source, camera, 1)
-    assert present(camera.latest(0.0)).number == 4
-    assert source.opened >= 2
-    (back,) = camera.events()
-    assert back.startswith("camera back after ")
-    assert camera.events() == ()
-    camera.close()
 
 
 def test_waits_between_tries_double_up_to_the_longest(source):

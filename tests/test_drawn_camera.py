@@ -69,7 +69,12 @@ def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.Monke
         camera = lent.own
         assert isinstance(camera, DrawnCamera)
         asked: list[object] = []
-        monkeypatch.setattr(camera.process, "retune", lambda *given: asked.append(given) or True)
+
+        def retune(*given: object) -> bool:
+            asked.append(given)
+            return True
+
+        monkeypatch.setattr(camera.process, "retune", retune)
         changed = load_rig("desk", character="shy")
         assert retune_camera(lent, rig, changed, rig.camera) == "" and not asked
         slower = replace(rig, motion=replace(rig.motion, enabled=not rig.motion.enabled))

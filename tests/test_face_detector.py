@@ -65,11 +65,8 @@ def error_of_eyes(face: DetectedFace, truth: Pixels) -> float:
     ("size", "eyes_px", "roll_deg", "bound"),
     [
         ((320, 240), 15, 0, 0.06),
-        ((320, 240), 25, 0, 0.06),
         ((320, 240), 60, 0, 0.06),
-        ((640, 400), 80, 0, 0.06),
         ((1280, 720), 120, 0, 0.06),
-        ((320, 240), 30, 20, 0.08),
         ((320, 240), 30, -20, 0.08),
         ((320, 240), 30, -35, 0.12),
     ],
@@ -200,16 +197,6 @@ def test_yunet_finds_the_photographed_face(yunet, astronaut, size, eyes_px, boun
     picture, truth = scene(astronaut, size, eyes_px)
     (face,) = yunet.find(picture)
     assert error_of_eyes(face, truth) < bound
-
-
-@needs_yunet
-def test_yunet_is_deterministic_and_obeys_the_smallest_size(yunet, astronaut):
-    picture, _ = scene(astronaut, (320, 240), 20)
-    first = yunet.find(picture)[0]
-    yunet.find(astronaut)
-    assert yunet.find(picture)[0].landmarks_px.tobytes() == first.landmarks_px.tobytes()
-    params = FaceDetectorParams(kind="yunet", model_file=str(YUNET_FILE), min_face_px=120)
-    assert face_detector(params).find(picture) == ()
 
 
 # ---- films and photos -------------------------------------------------------------------

@@ -49,12 +49,6 @@ def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there(
         assert after.p_world_m == FACE[2]
 
 
-def test_a_remembered_face_never_wins_against_a_visible_one() -> None:
-    model = attention(face_memory_s=15.0)
-    looks(model, [FACE, OTHER], 0.0, 0.5)
-    assert {t.id for t in looks(model, [FACE], 0.5, 14.0)} == {1}
-
-
 def test_a_remembered_face_is_looked_for_when_no_other_is_there() -> None:
     model = attention()
     looks(model, [FACE, OTHER], 0.0, 0.5)

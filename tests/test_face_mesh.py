@@ -154,8 +154,7 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
     assert shut.looks_at_head is True and shut.gaze_world is None
     # Eyes that move are not looked at in every frame: in those between, they go on.
     between = mesh_of(R, p)._replace(irises_px=None, lids_px=None)
-    turns = seen_faces([mesh_of(R, p), between, between, *[between] * 8])
-    assert [face.looks_at_head for face in turns[:3]] == [True] * 3
+    turns = seen_faces([mesh_of(R, p), *[between] * 10])
     assert turns[2].gaze_world is not None and turns[-1].gaze_world is None
     aside = np.array((sin(radians(25)), 0.0, -np.cos(radians(25))))
     (away,) = seen_faces([mesh_of(turned(0.0, 0.0, 0.0), p, aside)])

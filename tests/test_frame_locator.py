@@ -10,7 +10,6 @@ from retuned_run import started
 from test_perception import STILL, face_at, picture, standing
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
@@ -52,14 +51,10 @@ def located(found: Detections, locator: FrameLocator = LOCATOR) -> Detections:
     return replace(found, located=locator(found))
 
 
-def test_the_tick_fits_no_face_that_the_camera_has_located(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_the_camera_has_located_is_where_the_tick_would_put_it() -> None:
     found = located(picture(1, faces=(FACE,), blobs=(BALL,)))
     wanted = percept_of(perception(), replace(found, located=None))
-    fits = counted(monkeypatch)
     percept = percept_of(perception(), found)
-    assert fits == []
     assert percept.faces == wanted.faces
     assert percept.bodies.p_world_m.tolist() == wanted.bodies.p_world_m.tolist()
     assert percept.bodies.v_world_m_s.tolist() == wanted.bodies.v_world_m_s.tolist()
@@ -78,18 +73,12 @@ def test_a_face_printed_on_a_shirt_is_no_second_face(
     assert len(LOCATOR(picture(1, faces=(one, other))).faces) == faces
 
 
-def test_places_of_another_calibration_are_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_of_another_calibration_are_not_used() -> None:
     under_way = located(picture(1, faces=(FACE,)))
     wanted = percept_of(perception(LENS), replace(under_way, located=None))
-    fits = counted(monkeypatch)
     seeing = perception()
     seeing.retune(FIELD_DEG, None, LENS)
     assert percept_of(seeing, under_way).faces == wanted.faces
-    assert len(fits) == 1
-    after = located(picture(2, faces=(FACE,)), FrameLocator(LENS, radians(FIELD_DEG)))
-    fits.clear()
-    percept_of(seeing, after)
-    assert fits == []
 
 
 def test_a_frame_comes_with_what_it_shows_located() -> None:
@@ -122,19 +111,6 @@ def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
     found = offset_ids(located(picture(1, blobs=(BALL,))), 2)
     assert [blob.id for blob in found.blobs] == [2_000_003]
     assert [thing.detector_id for thing in present(found.located).things] == [2_000_003]
-
-
-def counted(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Count the fits of a face to landmarks."""
-    fits: list[object] = []
-    fit = frame_locator.face_pose
-
-    def noted(landmarks_px: np.ndarray, lens: Intrinsics) -> object:
-        fits.append(lens)
-        return fit(landmarks_px, lens)
-
-    monkeypatch.setattr(frame_locator, "face_pose", noted)
-    return fits
 
 
 @pytest.mark.parametrize(

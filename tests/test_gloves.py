@@ -56,17 +56,6 @@ def test_what_is_not_red_or_too_far_or_too_small_is_no_glove() -> None:
     assert found(GloveDetector(), scene((0.0, 0.1, 0.6))[:, :, 0]) == ()
 
 
-def test_a_number_is_kept_for_a_moment_without_the_glove_and_not_for_long() -> None:
-    finder = GloveDetector()
-    (first,) = found(finder, scene((0.1, 0.1, 0.8)), 0.0)
-    assert found(finder, scene(), 0.2) == ()
-    (again,) = found(finder, scene((0.12, 0.1, 0.8)), 0.4)
-    assert again.id == first.id
-    found(finder, scene(), 1.2)
-    (later,) = found(finder, scene((0.12, 0.1, 0.8)), 1.3)
-    assert later.id > first.id
-
-
 def test_a_glove_of_which_a_part_is_hidden_is_as_far_away_as_it_was() -> None:
     """It goes behind the other glove, which is nearer."""
     other: Ball = (0.2, 0.1, 0.4)

@@ -5,7 +5,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
@@ -16,16 +15,15 @@ WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30
 LENS = Intrinsics(fx_px=FOCAL, fy_px=FOCAL, cx_px=(WIDTH - 1) / 2, cy_px=(HEIGHT - 1) / 2)
 
 
-def textured(seed: int, size: int) -> NDArray[np.float64]:
-    rng = np.random.default_rng(seed)
-    out = np.zeros((size, size))
+def textured(seed: int) -> np.ndarray:
+    rng, out = np.random.default_rng(seed), np.zeros((400, 400))
     for sigma in (1.2, 4.0, 12.0):
-        grain = cv2.GaussianBlur(rng.standard_normal((size, size)), (0, 0), sigma)
+        grain = cv2.GaussianBlur(rng.standard_normal((400, 400)), (0, 0), sigma)
         out += grain / grain.std()
     return np.clip(128 + 50 * out / out.std(), 0, 255)
 
 
-GROUND, DISC = textured(1, 400)[:HEIGHT, :WIDTH], textured(2, 400)
+GROUND, DISC = (textured(seed) for seed in (1, 2))
 
 
 def seen(
@@ -51,7 +49,9 @@ def seen(
         centre = np.array(at) + np.array(slide) * t_s
         H = np.column_stack((A, centre - A @ (200.0, 200.0)))
         mask = cv2.warpAffine(cover, H, (WIDTH, HEIGHT))
-        picture = GROUND * (1 - mask) + cv2.warpAffine(DISC, H, (WIDTH, HEIGHT)) * mask
+        picture = (
+            GROUND[:HEIGHT, :WIDTH] * (1 - mask) + cv2.warpAffine(DISC, H, (WIDTH, HEIGHT)) * mask
+        )
         picture += rng.normal(0, 2, picture.shape)
         grey = np.clip(picture, 0, 255).astype(np.uint8)
         out += detector.find(grey, k * DT_S, LENS, np.eye(3))[:1]

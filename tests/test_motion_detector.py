@@ -128,10 +128,8 @@ def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -
     assert detector.report.no_result_reason == "no frame shortly before"
 
 
-@pytest.mark.parametrize(
-    "picture", [np.zeros((240, 320)), np.zeros((2, 2, 5), np.uint8), np.zeros((0, 4), np.uint8)]
-)
-def test_what_is_no_picture_is_refused_in_words(picture: NDArray[np.uint8]) -> None:
+def test_what_is_no_picture_is_refused_in_words() -> None:
+    picture: Any = np.zeros((240, 320))
     with pytest.raises(ValueError, match="an image is"):
         scale_down(picture, 320, lens(320, 240), 0.0)
 

@@ -69,7 +69,7 @@ def depth_mm(dai, frame):
 
 
 def found_faces(dai, frame):
-    """Return a message with two faces, one without landmarks and an unsure one."""
+    """Return a message with two faces and one without landmarks."""
     detections = []
     for scale, confidence, points in ((0.1, 0.99, POINTS), (0.3, 0.8, POINTS)):
         box = dai.RotatedRect(dai.Point2f(0.5, 0.5), dai.Size2f(scale, scale), 0.0)
@@ -78,7 +78,6 @@ def found_faces(dai, frame):
         detections.append(face)
     box = dai.RotatedRect(dai.Point2f(0.2, 0.2), dai.Size2f(0.1, 0.1), 0.0)
     detections.append(dai.ImgDetection(box, 0.95, 0))  # without landmarks
-    detections.append(dai.ImgDetection(box, 0.1, 0))  # unsure
     message = dai.ImgDetections()
     message.detections = detections
     message.setTransformation(frame.getTransformation())

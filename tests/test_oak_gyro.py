@@ -169,6 +169,8 @@ def test_frames_carry_the_turn(dai):
     rig = Rig(gyro=[imu_message(dai, [packet(dai, t_s, one)]) for t_s, one in found])
     source = rig.opened()
     rig.queue.fed += [Message(10.2, 100.2), Message(10.7, 100.7)]
-    first, last = (source.take(lambda: 100.8, threading.Event()) for _ in range(2))
+    first, last = (
+        present(present(source.take(lambda: 100.8, threading.Event())).turn) for _ in range(2)
+    )
     assert source.events() == ()
-    assert moved(present(last).turn, present(first).turn) == pytest.approx((0, 15.0, 0), abs=0.1)
+    assert moved(last, first) == pytest.approx((0, 15.0, 0), abs=0.1)

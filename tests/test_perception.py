@@ -134,11 +134,10 @@ def walking(blob: MovingBlob, v_m_s: float = 0.5) -> Percept:
         (blob_at((0.26, 0.02, 1.5), (-0.4, 0.4, 0.0)), True),
         (blob_at((0.25, 0.3, 1.5), (-0.8, 0.6, 0.0)), False),
         (blob_at((0.25, 0.8, 2.4), (0.5, 0.0, 0.0)), False),
-        (blob_at((0.95, 0.5, 1.5), (0.5, 0.0, 0.0)), False),
         (blob_at((0.25, -0.5, 1.5), (0.5, 0.0, 0.0)), False),
         (replace(blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), kind="hand"), False),
     ],
-    ids=["trunk", "trunk, distance unknown", "on the head", "waving arm", "far behind", "beside",
+    ids=["trunk", "trunk, distance unknown", "on the head", "waving arm", "far behind",
          "above", "a hand that is known as one"],
 )  # fmt: skip
 def test_a_persons_own_motion_is_no_second_body(blob: MovingBlob, own: bool) -> None:

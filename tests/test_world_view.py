@@ -43,36 +43,22 @@ def test_people_of_a_world_are_where_they_are_at_the_time() -> None:
 
 def test_with_a_world_what_was_seen_is_only_marked() -> None:
     server = viser.ViserServer(port=0, verbose=False)
-    seen = replace(
-        SNAPSHOT,
-        faces=(face_at((0.9, 0.1, 0.25)),),
-        bodies=(SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06), SeenBody(8, "thing", (0.6, 0, 0), 0.1)),
-    )
+    bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),)
+    seen = replace(SNAPSHOT, faces=(face_at((0.9, 0.1, 0.25)),), bodies=bodies)
+    drawn = {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/shades/3", "/shade"}
     try:
         people, head = PeopleView(server.scene), HeadView(server.scene)
-        people.show(seen)
-        head.show(seen)
-        assert {"/faces/3/head", "/bodies/7/hand", "/shades/3"} <= shown(server, "/")
-        people.mark_only(True)
-        head.on_table = True
-        people.show(seen, parts=True)
-        head.show(seen)
-        marks = shown(server, "/")
-        assert {
-            "/faces/3/outline",
-            "/faces/3/label",
-            "/bodies/7/outline",
-            "/bodies/8/outline",
-        } <= marks
-        assert not {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/shade"} & marks
-        assert not shown(server, "/shades")
-        outline = server.scene._handle_from_node_name["/faces/3/outline"]
-        assert isinstance(outline, viser.MeshHandle)
-        assert outline.scale == pytest.approx((1.0, 0.8, 1.12), abs=0.02)
-        people.mark_only(False)
-        head.on_table = False
-        people.show(seen)
-        head.show(seen)
-        assert {"/faces/3/head", "/chests/3", "/shade"} <= shown(server, "/")
+        for marked in (False, True, False):
+            people.mark_only(marked)
+            head.on_table = marked
+            people.show(seen)
+            head.show(seen)
+            found = shown(server, "/")
+            assert drawn.isdisjoint(found) if marked else drawn <= found
+            if marked:
+                outline = server.scene._handle_from_node_name["/faces/3/outline"]
+                assert isinstance(outline, viser.MeshHandle)
+                assert outline.scale == pytest.approx((1.0, 0.8, 1.12), abs=0.02)
+            assert ({"/faces/3/outline", "/faces/3/label", "/bodies/7/outline"} <= found) is marked
     finally:
         server.stop()
