@@ -100,8 +100,6 @@ def model_of(params: type) -> type[BaseModel]:
         if shape.unit:
             described = f"{described} [{shape.unit}]".strip()
         column: dict[str, Any] = {"description": described or None}
-        if shape.unit:
-            column["json_schema_extra"] = {"unit": shape.unit}
         if declared[name].default is not dataclasses.MISSING:
             column["default"] = declared[name].default
         elif declared[name].default_factory is not dataclasses.MISSING:

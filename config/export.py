@@ -1,15 +1,13 @@
-"""JSON Schema of a Params dataclass, and its errors as text."""
+"""Errors of a Params dataclass as text."""
 
 import difflib
 import reprlib
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pydantic_core import ErrorDetails
 
-from gazerig.config.bounds import Shape, Step, model_of, shapes_of
-
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
+from gazerig.config.bounds import Shape, Step, shapes_of
 
 _TYPE_WORDS: dict[type, str] = {
     bool: "a truth value",
@@ -27,15 +25,6 @@ class Violation(NamedTuple):
     path: tuple[Step, ...]
     value: str
     rule: str
-
-
-def json_schema(into: type) -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of files that are loaded into ``into``.
-
-    Bounds, choices, descriptions and units are those of the fields; unknown keys are rejected.
-    Rules between fields and the difference of 1 and 1.0 cannot be expressed in the schema.
-    """
-    return {"$schema": DIALECT, **model_of(into).model_json_schema()}
 
 
 def violation(into: type, details: ErrorDetails) -> Violation:

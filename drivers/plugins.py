@@ -2,7 +2,7 @@
 
 A package registers a part by an entry point. Our own parts are listed in ``SHIPPED`` in the same
 form and are found by the same code, but without a search of the installed packages, which takes
-some milliseconds. Nothing is imported before its name is used or listed with its abilities.
+some milliseconds. Nothing is imported before its name is used.
 """
 
 import sys
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
 ATTENTION, TRACKS, RIGS = "gazerig.attention", "gazerig.tracks", "gazerig.rigs"
-COMMAND, SCHEMA, PAGE_PANEL = "gazerig.command", "gazerig.schema", "gazerig.page_panel"
+COMMAND, PAGE_PANEL = "gazerig.command", "gazerig.page_panel"
 SURROUNDINGS, DOOR = "gazerig.surroundings", "gazerig.door"
 GROUPS: Mapping[str, str] = {
     BUS: "bus",
@@ -34,7 +34,6 @@ GROUPS: Mapping[str, str] = {
     TRACKS: "tracks",
     RIGS: "rigs",
     COMMAND: "command",
-    SCHEMA: "schema",
     SURROUNDINGS: "surroundings",
     PAGE_PANEL: "page panel",
     DOOR: "door",
@@ -62,7 +61,6 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
     RIGS: {"gazerig": "gazerig.config.load:RIGS_FOLDER"},
     COMMAND: {
         "report": "gazerig.features.lab.commands:REPORT",
-        "compare": "gazerig.features.lab.commands:COMPARE",
         "sweep": "gazerig.features.lab.commands:SWEEP",
         "study": "gazerig.features.study.commands:STUDY",
         "scan": "gazerig.features.bringup.commands:SCAN",
@@ -70,19 +68,10 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "doctor": "gazerig.features.bringup.commands:DOCTOR",
         "calibrate": "gazerig.features.bringup.commands:CALIBRATE",
         "jog": "gazerig.features.bringup.commands:JOG",
-        "home": "gazerig.features.bringup.commands:HOME",
-        "look-at": "gazerig.features.bringup.commands:LOOK_AT",
         "monitor": "gazerig.features.bringup.commands:MONITOR",
-        "reboot": "gazerig.features.bringup.commands:REBOOT",
         "record-track": "gazerig.features.bringup.commands:RECORD_TRACK",
         "fit-scanpath": "gazerig.features.lab.commands:FIT_SCANPATH",
         "import": "gazerig.features.animation.commands:IMPORT",
-        "export-track": "gazerig.features.animation.commands:EXPORT_TRACK",
-    },
-    SCHEMA: {
-        "rig": "gazerig.config.schema:Rig",
-        "study": "gazerig.features.study.design:StudyDesign",
-        "questionnaire": "gazerig.features.study.design:Questionnaire",
     },
     PAGE_PANEL: {},
     SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:WorldSurroundings"},
@@ -97,9 +86,8 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
 Tracks and rigs are folders of YAML files: a module of that folder, or its path. A command is a
-``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills;
-surroundings a subclass of ``gazerig.robot.app.surroundings.Surroundings``, a door a
-``gazerig.doors.door.Door``.
+``gazerig.robot.cli.command_list.CommandEntry``, surroundings a subclass of
+``gazerig.robot.app.surroundings.Surroundings``, a door a ``gazerig.doors.door.Door``.
 """
 
 OUR_PACKAGE = "gazerig"
@@ -111,52 +99,16 @@ class NoParams:
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Test status of a part.
-
-    Attributes:
-        emulated: Whether it was tested with an emulated device.
-        tested: Other material that it was tested with, e.g. "photographs".
-        judge: Independent client or program that agreed with the emulated device, "" for none.
-        hardware: Real device on which it was run, "" for none.
-    """
-
-    emulated: bool = False
-    tested: str = ""
-    judge: str = ""
-    hardware: str = ""
-
-    def describe(self) -> str:
-        """Return the evidence as text: "emulated; judged by rustypot; not run on hardware"."""
-        parts = [
-            *(["emulated"] if self.emulated else []),
-            *([f"tested with {self.tested}"] if self.tested else []),
-            *([f"judged by {self.judge}"] if self.judge else []),
-            *([f"run on {self.hardware}"] if self.hardware else []),
-        ]
-        if self.emulated and not self.hardware:
-            parts.append("not run on hardware")
-        return "; ".join(parts)
-
-
-NOTHING_PROVEN = Evidence()
-
-
-@dataclass(frozen=True)
 class Plugin:
     """A part that can be created by its name.
 
     Attributes:
         make: Creates it from its parameters.
         params: Dataclass of its section in the rig file; the section has the part's name.
-        abilities: Its capabilities as text, for ``gazerig kinds``.
-        evidence: Its test status.
     """
 
     make: Callable[..., Any]
     params: type = NoParams
-    abilities: tuple[str, ...] = ()
-    evidence: Evidence = NOTHING_PROVEN
 
 
 @dataclass(frozen=True)
@@ -305,17 +257,6 @@ def registrations(group: str) -> tuple[Registration, ...]:
         ),
         *_package_parts(group, tuple(sys.path)),
     )
-
-
-def name_conflicts(group: str) -> tuple[str, ...]:
-    """Return one line for each part whose name is already taken."""
-    owner: dict[str, Registration] = {}
-    lines = []
-    for one in registrations(group):
-        first = owner.setdefault(one.name, one)
-        if first is not one:
-            lines.append(f"{one.label} is ignored: {first.maker} already uses that name")
-    return tuple(lines)
 
 
 def is_ours(group: str, name: str) -> bool:

@@ -3,7 +3,7 @@
     comfort_deg: Annotated[float, Bounds(0, 90), "comfortable eccentricity of an eye"] = 8.0
     profile: Annotated[Literal["min_jerk", "main_sequence"], "profile of saccades"] = "min_jerk"
 
-The configuration, its JSON Schema, live tuning, the page and the documents read this line.
+The configuration, live tuning, the page and the documents read this line.
 Every part of the program may import this module; it needs the standard library only.
 """
 

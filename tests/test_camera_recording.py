@@ -4,20 +4,26 @@ import json
 import os
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fakes.films import write_film
 from mcap.reader import make_reader
 from present import present
 
 from gazerig.drivers.camera import recording_format as fmt
+from gazerig.drivers.camera.camera_plugins import recorded
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay, Recording
 from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
 from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import CameraTurn, DetectedFace
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.clock import RealClock
 
 GO_ON = threading.Event()
 LENS = Intrinsics(310.5, 311.25, 31.5, 23.5, (0.1, -0.2, 0.001, -0.002, 0.3))
@@ -271,3 +277,18 @@ def test_slow_disk_leaves_pictures_out_and_says_so(tmp_path, monkeypatch):
     assert 25 <= recorder.dropped_frames <= 30
     (reported,) = [line for line in recorder.events() if "is slower than the camera" in line]
     assert "--jpeg" in reported
+
+
+def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
+    film = write_film(tmp_path / "film.avi", rate_hz=50.0)
+    out = tmp_path / "seen.mcap"
+    for path in (out, tmp_path / "seen-2.mcap"):
+        source = recorded(partial(VideoFile, str(film)), out)
+        assert isinstance(source, CameraRecorder)
+        source.open()
+        assert present(source.take(RealClock(), threading.Event())).number == 1
+        source.close()
+        source.finish()
+        assert Recording(path).shot(0).image.shape == (48, 64, 3)
+    with pytest.raises(SetupError, match="--oak or --camera"):
+        RunOptions(mock=True, record_camera=out).check_and_complete()

@@ -92,8 +92,8 @@ HEAVY = ("numpy", "cv2", "scipy", "ruamel", "serial", "mcap", "dynamixel_sdk", "
 """What no help needs; each takes a twentieth of a second of a fast processor or more."""
 
 LIGHT_HELP = (
-    *("", "run", "ctl", "stop", "rerun", "report", "compare", "sweep", "export", "check"),
-    *("kinds", "schema", "record-camera", "fit-scanpath", "ctl set", "study"),
+    *("", "run", "ctl", "stop", "rerun", "report", "sweep", "export", "check"),
+    *("fit-scanpath", "ctl set", "study"),
 )
 """Commands whose help is there at once; that of others imports what speaks to servos."""
 

@@ -81,7 +81,7 @@ def test_one_wrong_bit_anywhere_before_the_end_is_known(run: bytes, tmp_path: Pa
         ("rerun", "{}"),
         ("export", "{}"),
         ("report", "{}"),
-        ("compare", "{}", "{}"),
+        ("report", "{}", "{}"),
     ],
     ids=" ".join,
 )

@@ -132,7 +132,7 @@ LEFT_OUT = {
     r".*(--camera|--oak)|calibrate (camera|face)": "needs a camera",
     r"setup |calibrate |doctor --port": "asks for one servo after the other: tests/bringup",
     r"run .*(--port|--world|--record)": "needs another program, a renderer or minutes: tests/world",
-    r"(report|compare|sweep|fit-scanpath|rerun|import|study) ": "needs minutes, a browser "
+    r"(report|sweep|fit-scanpath|rerun|import|study) ": "needs minutes, a browser "
     "or other data: tests/lab, tests/study, tests/test_rerun_commands.py, tests/test_track_files.py",
 }
 """Commands that no test here runs, and why."""

@@ -57,7 +57,7 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
         python,
         tmp_path,
         ("report", "--scene", "face-to-face"),
-        ("compare", "a.mcap", "b.mcap"),
+        ("report", "a.mcap", "b.mcap"),
         ("sweep", "--set", "gaze.head.comfort_deg=4:16:7"),
         ("calibrate", "camera", "--oak", "--what", "lens", "--out", "copy.yaml"),
         ("calibrate", "camera", "desk", "--mock", "--yes"),

@@ -1,6 +1,5 @@
 """Parts of other packages are found by name, loaded when used, and refused in one line."""
 
-import json
 import pickle
 import sys
 from dataclasses import replace
@@ -20,14 +19,12 @@ from gazerig.drivers import plugins
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import (
     ATTENTION,
-    BUS,
     CAMERA,
     COMMAND,
     DETECTOR,
     DOOR,
     GROUPS,
     RIGS,
-    SCHEMA,
     SHIPPED,
     SURROUNDINGS,
     TRACKS,
@@ -37,7 +34,6 @@ from gazerig.drivers.plugins import (
 )
 from gazerig.robot.app.camera_factory import real_camera
 from gazerig.robot.app.options import RunOptions, parse_camera
-from gazerig.robot.cli import kinds
 from gazerig.robot.model.clock import RealClock
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
@@ -102,7 +98,7 @@ def test_ours_are_found_and_loaded_by_the_same_code(group, name):
         assert any(plugins.folder_of(found).glob("*.yaml"))
     if group == RIGS:
         assert plugins.folder_of(found).joinpath("desk.yaml").is_file()
-    elif group not in (ATTENTION, TRACKS, COMMAND, SCHEMA, SURROUNDINGS, DOOR):
+    elif group not in (ATTENTION, TRACKS, COMMAND, SURROUNDINGS, DOOR):
         assert isinstance(part, Plugin)
 
 
@@ -142,10 +138,6 @@ def test_a_name_that_is_taken_is_named_with_both_packages(folder):
     ):
         plugins.find(DETECTOR, "eyes")
     assert plugins.find(DETECTOR, "mtcnn").is_ours
-    assert [line.replace(plugins._version(), "V") for line in plugins.name_conflicts(DETECTOR)] == [
-        "detector 'mtcnn' of one 1.2 is ignored: gazerig V already uses that name",
-        "detector 'eyes' of two 3.0 is ignored: one 1.2 already uses that name",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -245,33 +237,6 @@ def test_a_package_that_names_no_folder_is_refused(folder):
 
 
 # --- the list
-
-
-def test_kinds_lists_all_with_package_abilities_and_proof(folder, capsys):
-    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
-    install(
-        folder, "bad", {CAMERA: {"fish": "nowhere:x"}, BUS: {"dynamixel": "nowhere:x"}}, {}, "7"
-    )
-    kinds.kinds(as_json=True)
-    listed = json.loads(capsys.readouterr().out)
-    by_name = {
-        (row["group"], row["name"]): row for row in listed["kinds"] if row["package"] != "bad"
-    }
-    assert {name for group, name in by_name if group == "bus"} == set(SHIPPED[BUS])
-    dynamixel = by_name["bus", "dynamixel"]
-    assert {"scan", "watchdog", "torque off", "feedback"} <= set(dynamixel["abilities"])
-    assert dynamixel["proven"].startswith("emulated; judged by rustypot")
-    assert "not run on hardware" in dynamixel["proven"]
-    assert by_name["attention", "tallest"]["version"] == "1.2"
-    assert "desk" in by_name["rigs", "gazerig"]["abilities"]
-    assert "nod" in by_name["tracks", "gazerig"]["abilities"]
-    (fish,) = [row for row in listed["kinds"] if row["name"] == "fish"]
-    assert "camera 'fish' of bad 7 cannot be loaded: ModuleNotFoundError" in fish["fault"]
-    (taken,) = listed["left_out"]
-    assert taken.startswith("bus 'dynamixel' of bad 7 is ignored: gazerig")
-    kinds.kinds(as_json=False)
-    shown = capsys.readouterr().out
-    assert "tallest" in shown and taken in shown
 
 
 # --- cameras

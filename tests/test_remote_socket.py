@@ -404,7 +404,7 @@ def test_a_servo_that_refuses_torque_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse() -> None:
-        raise SetupError("neck_yaw: overload; gazerig reboot")
+        raise SetupError("neck_yaw: overload; gazerig doctor")
 
     rig.stop("test")
     with monkeypatch.context() as patch:

@@ -9,7 +9,6 @@ from sts_rig import Rig as StsRig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.protocol import ALERT, instruction
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.servo_bus.discovery import reboot
 from gazerig.drivers.servo_bus.family import Identity
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -134,14 +133,6 @@ def test_what_looks_like_a_header_passes_both_ways(rig):
         assert rig.registers.write_bytes(2, 224, data + b"\xff\xff\xfd\xff\xfd\xfd")
         assert b"\xff\xff\xfd\xfd" in rig.sent[0][8:]
         assert rig.registers.read_bytes(2, 224, 10) == data + b"\xff\xff\xfd\xff\xfd\xfd"
-
-
-def test_nothing_is_left_behind_by_a_reboot(rig):
-    reboot(rig.port, DYNAMIXEL, 3)
-    assert rig.registers.identify(2) == Identity(1190, 53)
-    assert rig.registers.identify(3) is None
-    rig.now_s += 1.0
-    assert rig.registers.identify(3).model_number == 1190
 
 
 # --- a family with a lock, and answers that echoes look like

@@ -258,11 +258,9 @@ def test_folders_are_told_apart(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ("schema", "{}"),
         ("calibrate-board", "{}"),
         ("run", "--mock", "--fast", "--seconds", "1", "--summary", "{}"),
         ("run", "--mock", "--fast", "--seconds", "1", "--record", "{}"),
-        ("record-camera", "{}", "--video", "none.avi"),
         ("calibrate", "desk", "--mock", "--out", "{}"),
     ],
     ids=lambda words: words[0] + words[-1][:9],

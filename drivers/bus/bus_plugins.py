@@ -11,7 +11,7 @@ from gazerig.drivers.maestro.board import MaestroBus
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.plugins import BusPlugin, Evidence
+from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.params import BusParams
@@ -28,27 +28,7 @@ def _plugin(kind: str, **facts: Any) -> BusPlugin:
     return BusPlugin(models=models, **facts)
 
 
-_BRINGUP = ("scan", "setup", "doctor", "reboot", "monitor", "calibrate")
-
-# fmt: off
-DYNAMIXEL = _plugin(
-    "dynamixel", make=_create_smart_bus, params=DynamixelParams,
-    abilities=(*_BRINGUP, "feedback", "torque off", "watchdog", "emulated"),
-    evidence=Evidence(emulated=True, judge="rustypot, ROBOTIS' SDK in two versions"),
-)
-FEETECH = _plugin(
-    "feetech", make=_create_smart_bus, params=FeetechParams,
-    abilities=(*_BRINGUP, "feedback", "torque off", "guardian", "emulated"),
-    evidence=Evidence(emulated=True, judge="rustypot (STS)"),
-)
-MAESTRO = _plugin(
-    "maestro", make=MaestroBus, params=MaestroParams,
-    abilities=(*_BRINGUP, "torque off", "guardian", "emulated"),
-    evidence=Evidence(emulated=True),
-)
-PCA9685 = _plugin(
-    "pca9685", make=Pca9685Bus, params=Pca9685Params, moves=("hobby",),
-    abilities=(*_BRINGUP, "torque off", "guardian", "emulated"),
-    evidence=Evidence(emulated=True, judge="Adafruit's library"),
-)
-# fmt: on
+DYNAMIXEL = _plugin("dynamixel", make=_create_smart_bus, params=DynamixelParams)
+FEETECH = _plugin("feetech", make=_create_smart_bus, params=FeetechParams)
+MAESTRO = _plugin("maestro", make=MaestroBus, params=MaestroParams)
+PCA9685 = _plugin("pca9685", make=Pca9685Bus, params=Pca9685Params, moves=("hobby",))

@@ -3,13 +3,16 @@
 OpenCV and depthai are large, so the control loop's process only names the source.
 """
 
+import atexit
+from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any, cast
 
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.plugins import CAMERA, CameraPlugin, Evidence, create, load
+from gazerig.drivers.plugins import CAMERA, CameraPlugin, create, load
 
 
 def _webcam(params: WebcamParams) -> FrameSource:
@@ -24,8 +27,8 @@ def _oak(params: OakParams) -> FrameSource:
     return OakSource(params)
 
 
-WEBCAM = CameraPlugin(_webcam, WebcamParams, ("frames",), Evidence(emulated=True))
-OAK = CameraPlugin(_oak, OakParams, ("frames", "depth", "lens"), Evidence(emulated=True))
+WEBCAM = CameraPlugin(_webcam, WebcamParams)
+OAK = CameraPlugin(_oak, OakParams)
 
 
 def create_camera_part(name: str, params: Any) -> object:
@@ -56,6 +59,19 @@ def recording(file: Path) -> FrameSource:
     from gazerig.drivers.camera.playback import CameraReplay
 
     return CameraReplay(file)
+
+
+def recorded(make: Callable[[], FrameSource], file: Path) -> FrameSource:
+    """Return a source whose frames are also written to a file, until this process ends.
+
+    An existing file is kept: after a restart of the camera's process it is FILE-2, and so on.
+    """
+    from gazerig.drivers.camera.recorder import CameraRecorder
+
+    paths = (file.with_stem(f"{file.stem}-{n}") if n > 1 else file for n in count(1))
+    recorder = CameraRecorder(make(), next(path for path in paths if not path.exists()))
+    atexit.register(recorder.finish)
+    return recorder
 
 
 def film(path: str) -> FrameSource:

@@ -21,7 +21,7 @@ from gazerig.drivers.files.file_input import MAGIC, open_mcap
 
 _HEAD = 9  # bytes of a record before its content: kind and length
 _LARGEST = 1 << 30  # bytes of a message; more is damage
-_CURE = "make one with gazerig record-camera; use --video for films"
+_CURE = "make one with gazerig run --record-camera; use --video for films"
 _FIXED = 22  # bytes of a message before its data
 
 
@@ -126,7 +126,7 @@ class Recording:
                         if profile != fmt.PROFILE:
                             raise CameraError(
                                 f"{self._path} is not a camera recording of gazerig (its profile is "
-                                f"{profile!r}): make one with gazerig record-camera"
+                                f"{profile!r}): make one with gazerig run --record-camera"
                             )
                     else:
                         channel = Channel.read(self._content(place, place.length))

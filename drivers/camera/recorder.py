@@ -184,7 +184,7 @@ class CameraRecorder:
                 if self.dropped_frames == 0:
                     self._events.append(
                         f"{self._path}: this machine is slower than the camera, frames are omitted "
-                        "from the recording; --jpeg makes them smaller and faster"
+                        "from the recording"
                     )
                 self.dropped_frames += 1
             elif self._encoders is not None:

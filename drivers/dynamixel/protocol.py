@@ -19,7 +19,7 @@ HEADER = b"\xff\xff\xfd\x00"
 RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 BROADCAST = 0xFE
 STATUS = 0x55
-PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08
+PING, READ, WRITE = 0x01, 0x02, 0x03
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
 
 STATUS_OVERHEAD = 11
@@ -67,11 +67,6 @@ def parse_identity(status: Status) -> Identity | None:
     if len(status.params) != IDENTITY_LENGTH or status.error & ERROR_NUMBER:
         return None
     return Identity(*_IDENTITY.unpack(status.params))
-
-
-def reboot(servo_id: int) -> bytes:
-    """Build a reboot instruction."""
-    return instruction(servo_id, REBOOT)
 
 
 def read(servo_id: int, address: int, length: int) -> bytes:

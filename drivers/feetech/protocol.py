@@ -70,11 +70,6 @@ def ping(servo_id: int) -> bytes:
     return instruction(servo_id, PING)
 
 
-def reboot(servo_id: int) -> bytes:
-    """Build a reboot instruction."""
-    return instruction(servo_id, REBOOT)
-
-
 def identity_request(servo_id: int) -> bytes:
     """Build a read of the first registers, which contain model and firmware."""
     return read(servo_id, 0, IDENTITY_LENGTH)

@@ -195,13 +195,6 @@ def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANS
     return max(bad, SHARED if wide else 0)
 
 
-def reboot(port: BusPort, family: Family, servo_id: int) -> None:
-    """Send a reboot instruction; only a later ping shows whether it was executed."""
-    port.drain()
-    port.write(family.codec.reboot(servo_id))
-    port.drain()  # some firmware confirms it
-
-
 def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
     """Return all bytes that arrive until the line has been quiet for ``quiet_s``."""
     end_s = port.now_s() + BABBLE_S

@@ -145,9 +145,6 @@ class Codec(Protocol):
     def ping(self, servo_id: int) -> bytes:
         """Build a ping."""
 
-    def reboot(self, servo_id: int) -> bytes:
-        """Build a reboot instruction."""
-
     def read(self, servo_id: int, address: int, length: int) -> bytes:
         """Build a request for registers of one servo."""
 

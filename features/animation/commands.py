@@ -14,11 +14,3 @@ IMPORT = CommandEntry(
         )
     },
 )
-EXPORT_TRACK = CommandEntry(
-    "gazerig.features.animation.cli.export_track",
-    "Export a track as an animation of the rig's glTF model, for Blender and browsers.",
-    SPECIALIST,
-    examples={
-        "export-track": (("export-track my.yaml nod nod.glb", "to edit it in Blender"),),
-    },
-)

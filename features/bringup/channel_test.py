@@ -15,8 +15,6 @@ from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.release import switch_off
 from gazerig.drivers.hobby_board.start import HoldResult, hold_channel, read_every_pulse
-from gazerig.drivers.maestro.commands import name_errors
-from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.types import ServoConfig
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
@@ -127,19 +125,3 @@ def _wait_for_channel(board: Board, channel: Channel, sleep_until: Callable[[flo
         if pulses is not None:
             return pulses[0]
     return read_every_pulse(board, [channel.setup])[0]
-
-
-def send_home(line: MaestroLink) -> tuple[str, ...]:
-    """Send all channels home and clear the errors; return those that the board held, by name.
-
-    Raises:
-        ServoMissing: the board does not answer.
-        BusLost: the port has disappeared.
-    """
-    register = line.wait_for_answer()
-    if register is None:
-        raise ServoMissing(
-            f"{line.port.port_name}: no Maestro answers: gazerig doctor names the cure"
-        )
-    line.send(line.codec.go_home())
-    return name_errors(register)

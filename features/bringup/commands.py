@@ -59,29 +59,11 @@ JOG = CommandEntry(
     "Bring-up",
     examples={"jog": (("jog my.yaml neck_yaw 20", "turn the neck 20 deg to the left, slowly"),)},
 )
-HOME = CommandEntry(
-    "gazerig.features.bringup.cli.motion",
-    "Move slowly to the centre: all joints to 0 deg, lids open; then torque off.",
-    "Bring-up",
-    examples={"home": (("home my.yaml", "all joints to 0 deg, then torque off"),)},
-)
-LOOK_AT = CommandEntry(
-    "gazerig.features.bringup.cli.motion",
-    "Turn eyes and head to a point and report the gaze error: X Y Z in metres.",
-    "Bring-up",
-    examples={"look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),)},
-)
 MONITOR = CommandEntry(
     "gazerig.features.bringup.cli.monitor",
     "Show the readings of all servos; nothing is written to them, the torque stays as it is.",
     "Bring-up",
     examples={"monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),)},
-)
-REBOOT = CommandEntry(
-    "gazerig.features.bringup.cli.reboot",
-    "Restart servos, which clears latched errors; their torque is off afterwards.",
-    "Bring-up",
-    examples={"reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),)},
 )
 RECORD_TRACK = CommandEntry(
     "gazerig.features.bringup.cli.record_track",

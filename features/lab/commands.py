@@ -9,16 +9,9 @@ REPORT = CommandEntry(
     examples={
         "report": (
             ("report evening.mcap", "how human was the gaze? one HTML file and frames"),
+            ("report shy.mcap bold.mcap", "two recordings side by side"),
             ("report --scene face-to-face --seconds 120", "the same of a simulated scene"),
         ),
-    },
-)
-COMPARE = CommandEntry(
-    "gazerig.features.lab.cli.report",
-    "Show two runs side by side, with the differences that exceed chance.",
-    "Look back",
-    examples={
-        "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
     },
 )
 SWEEP = CommandEntry(

@@ -425,4 +425,6 @@ def _source_factory(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     else:
         number = options.camera if isinstance(options.camera, int) else 0
         source = partial(camera_plugins.webcam, number, rig.webcam)
+    if options.record_camera is not None:
+        source = partial(camera_plugins.recorded, source, options.record_camera)
     return upright(source, frame_orientation(rig.camera))

@@ -58,6 +58,7 @@ class RunOptions:
     camera: int | str | None = None
     oak: bool = False
     replay: Path | None = None
+    record_camera: Path | None = None
     world: str | None = None
     no_pictures: bool = False
     pixels: bool = False
@@ -163,6 +164,8 @@ class RunOptions:
         if len(asked) > 1:
             options = " and ".join(f"--{name}" for name in asked)
             raise SetupError(f"{options} exclude each other: the head looks at one of them")
+        if self.record_camera is not None and self.camera is None and not self.oak:
+            raise SetupError("--record-camera writes the frames of --oak or --camera: give one")
         scene = self.scene
         if not asked and not blind:
             if not self.mock:

@@ -87,21 +87,9 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "describe",
             "Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them.",
         ),
-        "kinds": CommandEntry(
-            "kinds",
-            "List buses, cameras, detectors, rules, tracks and rigs, of this program and of "
-            "packages.",
-        ),
-        "schema": CommandEntry(
-            "rig_check",
-            "Export the JSON Schema of rig files, for editors; also of studies and questionnaires.",
-        ),
         "emulate": CommandEntry(
             "emulate",
             "Emulate servos on a pseudo-terminal; print its path as JSON and accept fault commands.",
-        ),
-        "record-camera": CommandEntry(
-            "record", "Record the frames of a camera, for gazerig run --camera-recording FILE."
         ),
     },
 }

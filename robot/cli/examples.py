@@ -16,6 +16,10 @@ EXAMPLES: dict[str, Examples] = {
         ("run --mock --video party.mp4", "an emulated rig that watches a film"),
         ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
         ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other computers too"),
+        (
+            "run my.yaml --oak --record-camera seen.mcap",
+            "record frames, depth and times of a camera",
+        ),
         ("run my.yaml --oak --record evening.mcap", "record every tick, for reruns and reports"),
     ),
     "new": (
@@ -27,22 +31,11 @@ EXAMPLES: dict[str, Examples] = {
         ("describe my.yaml", "MJCF, URDF and glTF with meshes, in a folder named as the rig"),
         ("describe my.yaml --urdf out/", "only URDF, in a given folder"),
     ),
-    "schema": (
-        ("schema rig.schema.json", "make an editor complete and check rig files"),
-        ("schema study.schema.json --of study", "and studies"),
-    ),
-    "kinds": (
-        ("kinds", "list buses, cameras, detectors and rules, and their packages"),
-        ("kinds --json", "the same for programs"),
-    ),
     "models": (
         ("models list", "list the files with their licences and whether they are installed"),
         ("models fetch", "download the missing files"),
         ("models fetch yunet", "only this one"),
         ("models fetch people --from ~/downloads", "offline, from downloaded files"),
-    ),
-    "record-camera": (
-        ("record-camera seen.mcap --oak", "record frames, depth and times of a camera"),
     ),
     "door": (
         ("door", "list the doors"),

@@ -1,14 +1,8 @@
-"""Commands check and schema, for files of rigs and studies; no hardware is used."""
-
-import json
-from pathlib import Path
-from typing import Annotated, Any
+"""Command check, for files of rigs; no hardware is used."""
 
 import typer
 
-from gazerig.drivers.files.file_output import write_file
-from gazerig.drivers.plugins import SCHEMA, SHIPPED, find
-from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
+from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
 
 app = typer.Typer()
 
@@ -101,31 +95,3 @@ def track_lines(rig: str) -> list[str]:
             loaded.name, file, fit_to_rig(loaded, load_track(track_path(file)))
         )
     ]
-
-
-@app.command()
-def schema(
-    out: Annotated[
-        Path | None, typer.Argument(help="File to write; default: standard output.")
-    ] = None,
-    of: Annotated[
-        str,
-        typer.Option(
-            help=f"Kind of the files: {', '.join(SHIPPED[SCHEMA])}, or of a package.",
-            autocompletion=lambda incomplete: [
-                n for n in SHIPPED[SCHEMA] if n.startswith(incomplete)
-            ],
-        ),
-    ] = "rig",
-    force: ForceOption = False,
-) -> None:
-    """Export the JSON Schema of rig files, for editors; also of studies and questionnaires."""
-    from gazerig.config.export import json_schema
-
-    with clear_errors():
-        kind: Any = find(SCHEMA, of).load()
-        text = json.dumps(json_schema(kind), indent=2) + "\n"
-        if out is None:
-            print(text, end="")
-        else:
-            write_file(out, text, force)

@@ -46,6 +46,7 @@ def run(
     camera: options.Camera = None,
     oak: options.Oak = False,
     replay: options.Replay = None,
+    record_camera: options.RecordCamera = None,
     pixels: options.Pixels = False,
     seconds: options.Seconds = None,
     seed: options.Seed = 0,

@@ -59,7 +59,13 @@ Camera = Annotated[
 Oak = Annotated[bool, typer.Option(help="Look through an OAK-D camera.")]
 Replay = Annotated[
     Path | None,
-    typer.Option("--camera-recording", help="Look at a recording of record-camera, in a loop."),
+    typer.Option("--camera-recording", help="Look at a recording of --record-camera, in a loop."),
+]
+RecordCamera = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Record every frame of the camera: FILE.mcap, or FILE-2 if it exists."
+    ),
 ]
 Pixels = Annotated[
     bool, typer.Option(help="Draw the scene, and detect faces and motion in the frames.")

@@ -129,8 +129,8 @@ class LineWriter:
 
 
 _SUGGESTED = re.compile(
-    r"\bgazerig (?P<command>doctor|setup|calibrate|reboot|scan|home|run(?= --recover))\b"
-    r"(?P<words>(?: --fix\b| --recover\b| --joint \w+| --kind \w+|(?<=reboot) \d+)*)"
+    r"\bgazerig (?P<command>doctor|setup|calibrate|scan|run(?= --recover))\b"
+    r"(?P<words>(?: --fix\b| --recover\b| --joint \w+| --kind \w+)*)"
 )
 _given: list[Mapping[str, object]] = [{}]
 """Parameters of the current command (last item). Shared by all threads, as monitor threads also
@@ -174,8 +174,6 @@ def complete_suggestions(text: str, given: Mapping[str, object] | None = None) -
     def whole(found: re.Match[str]) -> str:
         if text[found.end() :].startswith((f" {shlex.quote(str(known['rig']))}", " --port ")):
             return found[0]  # it already has these arguments
-        if found["command"] == "reboot" and not found["words"]:
-            return found[0]  # a description, not a command
         port, mock = known.get("port"), known.get("mock") is True
         more = f" --port {shlex.quote(str(port))}" if isinstance(port, str) else ""
         more += " --mock" if mock else ""

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.features.animation.animation import joint_map
 from gazerig.features.animation.animation_file import read_animation
-from gazerig.features.animation.cli.export_track import app as export_app
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.gltf import gltf
 
@@ -40,7 +38,7 @@ def run_blender(source: Path, result: Path, moves: list[tuple[str, int, int, flo
 
 
 @pytest.mark.skipif(not PYTHON, reason="BLENDER_PYTHON names no Python with bpy")
-def test_blender_animates_the_model_and_keeps_an_exported_track(tmp_path: Path) -> None:
+def test_blender_animates_the_model(tmp_path: Path) -> None:
     (tmp_path / "rig.glb").write_bytes(gltf(description_of(DESK)))
     # In Blender's local axes yaw turns about -y, pitch about -z and roll about x.
     moves = [
@@ -52,11 +50,3 @@ def test_blender_animates_the_model_and_keeps_an_exported_track(tmp_path: Path) 
     series = read_animation(tmp_path / "moved.glb", DESK, joint_map(DESK, [])).series
     for joint, ends in (("neck_yaw", (30, 0)), ("neck_pitch", (-10, 5)), ("neck_roll", (8, 0))):
         assert np.interp([1.0, 2.0], *series[joint]) == pytest.approx(ends, abs=0.01)
-    out, back = tmp_path / "out.glb", tmp_path / "back.glb"
-    assert CliRunner().invoke(export_app, ["desk", "nod", str(out)]).exit_code == 0
-    run_blender(out, back, [])
-    first, second = (read_animation(path, DESK, joint_map(DESK, [])).series for path in (out, back))
-    assert set(first) == set(second)
-    at = np.linspace(0.0, 1.0, 200)
-    for joint, keys in first.items():
-        assert np.abs(np.interp(at, *keys) - np.interp(at, *second[joint])).max() < 0.01

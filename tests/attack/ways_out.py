@@ -78,8 +78,6 @@ def commands(name: str, rig: str = "") -> dict[str, list[str]]:
     return {
         "run": ["run", rig, "--scene", "visitor", "--no-page"],
         "jog": ["jog", rig, joint, "8", "--hold", "--yes"],
-        "look-at": ["look-at", rig, "1", "0.1", "0.3", "--seconds", "60", "--yes"],
-        "home": ["home", rig, "--hold", "--yes"],
         "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, *by, "--yes"],
         "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page", *out],
         "monitor": ["monitor", rig, "--json"],

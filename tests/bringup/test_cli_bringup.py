@@ -23,10 +23,8 @@ from typer.testing import CliRunner
 
 from gazerig.config.save import copy_shipped, save_rig
 from gazerig.config.schema import load_rig
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.drivers.serial.port import BlockingPort, port_at_path
-from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.serial.port import BlockingPort
 from gazerig.features.bringup.cli import ports
 from gazerig.features.bringup.cli.manual_session import holding_text, unreleased_text
 from gazerig.features.bringup.manual_control import ManualControl
@@ -117,8 +115,6 @@ def test_fresh_servos_all_connected_at_once_are_noticed():
         (("scan", "--kind", "feetech", "--bauds", "9600", "--port", "/dev/x"), "none of them is"),
         (("doctor", "dsk"), "nothing named 'dsk'"),
         (("setup", "--joint", "neck"), "--joint neck: unknown; joints are left_eye_pan"),
-        (("reboot", "neck"), "neither an id from 0 to 252 nor a joint"),
-        (("reboot", "253"), "neither an id from 0 to 252 nor a joint"),
     ],
 )
 def test_what_is_asked_wrongly(words, says):
@@ -167,7 +163,7 @@ def test_doctor_on_a_port_served_elsewhere_names_what_is_wrong():
         code, out, _ = invoked("doctor", "--port", path)
         assert code == 1
         assert "neck_yaw (servo 7): has latched: overload" in out
-        assert f"then gazerig reboot desk 7 --port {path}" in out
+        assert "then switch its power off and on" in out
         assert "does not answer" in out and "neck_pitch" in out
         code, out, _ = invoked("doctor", "--port", path, "--json")
         found = json.loads(out)
@@ -296,46 +292,6 @@ def test_a_rig_of_ones_own_names_its_port(tmp_path):
 # --- reboot
 
 
-@pytest.mark.parametrize(
-    ("rig", "before", "after"),
-    [
-        ("desk", "latched: overload, torque off", "nothing latched, torque off"),
-        ("feetech", "reports: overload", "no errors, torque off"),
-    ],
-)
-def test_reboot_clears_an_error(rig, before, after):
-    with PtyBus() as bus:
-        model = {"desk": "xc330-m288", "feetech": "sts3215"}[rig]
-        path = bus.start_device(LINE[rig]((ServoSpec(7, model),), 1_000_000))  # type: ignore[arg-type]
-        bus.command("overload 7")
-        code, _, err = invoked("reboot", rig, "neck_yaw", "--port", path)
-    assert code == 0 and f"neck_yaw (servo 7): {before}" in err
-    assert "back after" in err and after in err
-
-
-@pytest.mark.pty
-def test_reboot_asks_before_the_torque_goes_off():
-    with PtyBus() as bus:
-        path = bus.start(SMALL, baud=1_000_000)
-        port = BlockingPort(path)
-        port.setBaudRate(1_000_000)
-        assert Registers(port, DYNAMIXEL).write(7, "torque_enable", 1)
-        port.closePort()
-        code, _, err = invoked("reboot", "7", "--port", path, answers="n\n")
-        assert code == 0 and "torque goes off" in err and "left as it is" in err
-        code, _, err = invoked("reboot", "7", "--port", path, "--yes")
-        assert code == 0 and "torque on" in err and "back after" in err
-        code, _, err = invoked("reboot", "9", "--port", path)
-        assert code == 2 and "servo 9 does not answer" in err
-
-
-def test_reboot_by_a_number_needs_one_bus_that_has_it(mixed):
-    code, _, err = invoked("reboot", mixed, "1", "--mock")
-    assert code == 2 and "1: which bus (the main bus, bus tilt)? name the joint instead" in err
-    code, _, err = invoked("reboot", mixed, "7", "--mock")
-    assert code == 0 and "neck_yaw (servo 7): back after" in err
-
-
 # --- every remedy that the doctor suggests can be typed and reaches the same rig and port
 
 DESK = Path(__file__).parents[2] / "config/rigs/desk.yaml"
@@ -344,8 +300,8 @@ DESK = Path(__file__).parents[2] / "config/rigs/desk.yaml"
 def commands_in(text: str) -> list[list[str]]:
     """Return every command of the family that reaches servos, as it would be typed."""
     token = r"(?: (?:--[a-z]+|'[^']+'|/\S*[\w]|\w+\.yaml|\d+\b|(?<=--joint )\w+|desk\b))*"
-    found = re.findall(rf"gazerig (?:doctor|setup|reboot|calibrate|scan|home)\b{token}", text)
-    return [shlex.split(one)[1:] for one in found if one != "gazerig reboot"]
+    found = re.findall(rf"gazerig (?:doctor|setup|calibrate|scan)\b{token}", text)
+    return [shlex.split(one)[1:] for one in found]
 
 
 def parsed(words: list[str]) -> dict[str, object]:
@@ -451,21 +407,6 @@ def test_jog_beyond_the_range_is_refused_at_once_with_the_range() -> None:
     assert done.err == "left_eye_pan 500.0 deg is outside its range, -35..35 deg\n"
 
 
-def test_home_goes_to_the_centre() -> None:
-    done = invoked("home", "--mock", "--speed", "60")
-    assert done.code == 0, done.err
-    assert "left_upper_lid: desired 20.0" in done.err
-    assert "arrived" in done.err and "parked" not in done.err
-
-
-def test_look_at_tells_error_and_vergence() -> None:
-    done = invoked("look-at", "1", "-0.2", "0.3", "--mock", "--seconds", "3", "--no-park")
-    assert done.code == 0, done.err
-    errors = re.search(r"gaze error: left eye (\S+), right eye (\S+) deg", done.err)
-    assert errors is not None and max(map(float, errors.groups())) < 2.0
-    assert re.search(r"vergence: 3\.\d+ deg, the point needs 3\.5", done.err)
-
-
 def test_monitor_as_lines_of_json() -> None:
     done = invoked("monitor", "--mock", "--json", "--seconds", "1.5", "--rate", "10")
     lines = [json.loads(line) for line in done.out.splitlines()]
@@ -478,8 +419,6 @@ def test_monitor_as_lines_of_json() -> None:
     "words",
     [
         ("jog", "neck_yaw", "10"),
-        ("home",),
-        ("look-at", "1", "0", "0.3"),
         ("monitor", "--once"),
         ("calibrate", "--dry-run", "--joint", "neck_yaw"),
     ],
@@ -492,7 +431,7 @@ def test_an_absent_port_is_said_with_what_there_is(words: tuple[str, ...]) -> No
 
 
 def test_nonsense_is_refused_before_the_torque_is_on() -> None:
-    for words in (("jog", "nose", "3"), ("jog", "neck_yaw", "nan"), ("look-at", "nan", "0", "0")):
+    for words in (("jog", "nose", "3"), ("jog", "neck_yaw", "nan")):
         done = invoked(*words, "--mock")
         assert done.code == 2 and "torque on" not in done.err
 
@@ -533,21 +472,6 @@ def test_on_real_wires_hobby_servos_are_asked_for_first(rigs: dict[str, str]) ->
         assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
 
 
-def test_home_opens_all_four_lids() -> None:
-    done = invoked("home", "maker", "--mock", "--speed", "60")
-    assert done.code == 0, done.err
-    assert "left_lower_lid: desired 22.0, estimated 22.0" in done.err
-    assert "pulses on: 6 hobby servos" in done.err
-
-
-def test_look_at_of_a_maker_s_head_says_what_it_cannot_do() -> None:
-    words = ("maker", "1", "-0.2", "0.1", "--mock", "--seconds", "1.5", "--no-park")
-    done = invoked("look-at", *words)
-    assert done.code == 0, done.err
-    assert "mean line of sight" in done.err and "vergence: none" in done.err
-    assert "head:" not in done.err and "estimated, not measured" in done.err
-
-
 def test_what_servos_do_alone_is_said_for_the_kinds_that_there_are(rigs: dict[str, str]) -> None:
     mixed = unreleased_text(load_rig(rigs["mixed"]))
     assert "watchdog" in mixed and "Feetech" in mixed and "Maestro" in mixed
@@ -556,7 +480,7 @@ def test_what_servos_do_alone_is_said_for_the_kinds_that_there_are(rigs: dict[st
     assert holding_text(load_rig("desk")) == "torque on: 9 servos hold where they are"
 
 
-# --- scan, doctor, setup and reboot of boards that move hobby servos, as people type them
+# --- scan, doctor and setup of boards that move hobby servos, as people type them
 
 
 @pytest.fixture
@@ -589,7 +513,6 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
             ("scan", "--port", path, "--kind", "dynamixel"),
             ("setup", "--port", path, "--joint", "neck_yaw", "--yes"),
             ("setup", "feetech", "--port", path, "--joint", "neck_yaw", "--yes"),
-            ("reboot", "neck_yaw", "--port", path),
             ("doctor", "--port", path),
         ):
             code, _, err = invoked(*words)
@@ -669,22 +592,6 @@ def test_setup_of_a_pca9685_moves_one_channel_after_another(on_pca9685):
         status = json.loads(command("status"))["servos"]
         assert not any(one["target"] for one in status)
         assert abs(status[0]["place"] - 6000) < 80 and status[2]["place"] == 5920
-
-
-def test_reboot_of_a_maestro_says_what_there_is_instead():
-    with served("maker") as (port, _, command):
-        line = port_at_path(port)
-        line.setBaudRate(115_200)
-        line.write(bytes.fromhex("84 00 70 2E 2B"))
-        line.closePort()
-        words = ("reboot", "maker", "eyes_pan", "--port", port)
-        code, _, err = invoked(*words, answers="n\n")
-        assert code == 0 and "has no restart over its serial line" in err and "left as it is" in err
-        assert json.loads(command("status"))["servos"][0]["position"] == 6000
-        command("error crc")
-        code, _, err = invoked(*words, "--yes")
-        assert code == 0 and "cleared now: serial CRC error" in err
-        assert json.loads(command("status"))["servos"][0]["position"] == 0
 
 
 def test_the_command_port_is_the_first_of_the_two_of_a_maestro(monkeypatch):

@@ -7,10 +7,9 @@ import pytest
 from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one, setups_of
 from present import present
 
-from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.errors import PortError
 from gazerig.drivers.feetech.memory_table import TABLE_END
 from gazerig.drivers.i2c import bridge
-from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.registers import (
@@ -27,7 +26,6 @@ from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.bus_search import SearchRound
-from gazerig.features.bringup.channel_test import send_home
 from gazerig.features.bringup.cli.scan import scan_remarks
 from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9685, stop_script
 from gazerig.features.bringup.doctor.diagnostics import (
@@ -132,7 +130,7 @@ DYNAMIXEL_RULES = [
     ),
     ({"status_return_level": 1}, "warn", "does not confirm commands", "--fix"),
     ({"protocol_type": 20}, "warn", "Protocol Type 20", "Wizard"),
-    ({"hardware_error_status": 0x20}, "error", "latched: overload", "gazerig reboot 1"),
+    ({"hardware_error_status": 0x20}, "error", "latched: overload", "switch its power off and on"),
     ({"hardware_error_status": 0x04}, "error", "latched: overheating", "cool"),
     ({"hardware_error_status": 0x01}, "error", "latched: input voltage", "supply"),
     ({"present_input_voltage": 34}, "error", "3.4 V, its limits are 3.5..7.0 V", "supply"),
@@ -142,7 +140,7 @@ DYNAMIXEL_RULES = [
     ({"baud_rate": 1}, "warn", "its Baud Rate is 57600", "gazerig setup"),
 ]
 FEETECH_RULES = [
-    ({"status": 0x20}, "error", "reports: overload", "gazerig reboot 1"),
+    ({"status": 0x20}, "error", "reports: overload", "switch its "),
     ({"status": 0x08}, "error", "reports: overcurrent", "shorts"),
     ({"status": 0x04}, "error", "reports: overheating", "cool"),
     ({"status": 0x02}, "error", "reports: encoder", "replace"),
@@ -306,7 +304,7 @@ def test_that_nobody_guards_servos_without_a_watchdog_is_said():
 def test_the_voltage_latch_is_explained_where_it_is_armed():
     findings = Rig(DYNAMIXEL).check()
     note = one(findings, "note", PAN, "switches its torque off until it is restarted")
-    assert "gazerig reboot" in note.remedy and "3.5..7.0 V" in note.what
+    assert "power off and on" in note.remedy and "3.5..7.0 V" in note.what
     assert not any(f.level == "note" and f.where == YAW for f in findings)
 
 
@@ -704,23 +702,10 @@ def test_pulses_without_a_program():
     rig = BoardRig()
     rig.do("84 00 70 2E")
     found = one(rig.check(), "warn", "eyes_pan (channel 0)", "1500 us though no program runs it")
-    assert "gazerig home" in found.remedy
+    assert "gazerig jog" in found.remedy
     rig.do("84 00 00 1F")
     found = one(rig.check(), "error", "eyes_pan (channel 0)", "outside its range 1100..1900 us")
     assert "switch the servo supply off" in found.remedy
-
-
-def test_home():
-    rig = BoardRig()
-    rig.do("84 00 70 2E")
-    rig.do("55")
-    rig.do("84 00 70 2E")
-    rig.port.setBaudRate(115_200)
-    assert send_home(MaestroLink(rig.port, rig.params)) == ("serial protocol error",)
-    assert [c["position"] for c in rig.board.faults.reports()] == [0] * 12
-    rig.board.choose_behaviour("mode", "mute")
-    with pytest.raises(ServoMissing, match="no Maestro answers"):
-        send_home(MaestroLink(rig.port, rig.params))
 
 
 # --- what to set in Pololu's program
@@ -808,7 +793,7 @@ def test_a_channel_that_no_board_has() -> None:
 
 @pytest.mark.parametrize(
     ("counts", "level", "remedy"),
-    [(307, "warn", "gazerig home"), (500, "error", "reboot eyes_pan")],
+    [(307, "warn", "gazerig jog"), (500, "error", "board's power off and on")],
 )
 def test_pulses_of_a_pca9685_that_were_left_on(counts: int, level: str, remedy: str) -> None:
     rig = Pca9685Rig()

@@ -624,7 +624,7 @@ def test_a_wrong_model_is_named() -> None:
 @pytest.mark.parametrize(
     ("joint", "fault", "says"),
     [
-        (EYE, "overload {id}", "overload: .*gazerig reboot 1"),
+        (EYE, "overload {id}", "overload: .*switch its power off and on"),
         (STS, "overheat {id}", "overheating: let it cool"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Setting servos up one at a time, and restarting them: on emulated servos, byte for byte."""
+"""Setting servos up one at a time: on emulated servos, byte for byte."""
 
 from dataclasses import replace
 
@@ -11,7 +11,6 @@ from gazerig.drivers.servo_bus.discovery import FoundServo, has_any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
-from gazerig.features.bringup.servo_reboot import ServoSnapshot, reboot_servo
 from gazerig.features.bringup.servo_setup import assign_servo, find_alone, search_order
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
@@ -52,10 +51,6 @@ class Bench:
         return assign_servo(
             self.port, self.kind, found, setup or self.yaw, baud, self.reported.append
         )
-
-    def restart(self, servo_id=1, sleep_until=None):
-        sleep_until = sleep_until or self.sleep_until
-        return reboot_servo(self.port, self.kind, servo_id, self.baud, sleep_until)
 
     def hold(self, servo_id=1):
         """Open the port at the servo's rate, and switch the torque on."""
@@ -189,81 +184,6 @@ def test_a_servo_that_falls_silent_is_said_to_be_where_it_was(kind):
         assign_servo(bench.port, kind, found, bench.yaw._replace(id=5), bench.baud, print)
 
 
-@each
-def test_a_restart_ends_an_overload_and_takes_the_torque(kind):
-    bench = Bench(kind=kind)
-    bench.hold()
-    bench.port.faults.command("overload 1")
-    result = bench.restart()
-    assert result.before.errors == ("overload",)
-    assert (result.after.errors, result.after.torque) == ((), False)
-    assert result.after.position == 2000 and 0.3 < result.away_s < 1.5
-    verb = "latched" if kind.family.faults_latch else "reports"
-    assert str(result.before).startswith(f"{verb}: overload, torque ")
-
-
-@each
-def test_a_restart_of_a_servo_that_holds_leaves_it_limp(kind):
-    bench = Bench(kind=kind)
-    bench.hold()
-    result = bench.restart()
-    assert (result.before.torque, result.after.torque) == (True, False)
-
-
-@each
-def test_firmware_that_does_not_know_how_to_restart_is_told_by_the_torque(kind, monkeypatch):
-    bench = Bench(kind=kind)
-    bench.hold()
-    monkeypatch.setattr("gazerig.features.bringup.servo_reboot.reboot", lambda *what: None)
-    with pytest.raises(ServoFault, match="servo 1 has not restarted, its torque is still on"):
-        bench.restart()
-
-
-@each
-def test_servos_that_do_not_answer_before_or_after_a_restart(kind):
-    bench = Bench(kind=kind)
-    bench.port.setBaudRate(bench.baud)
-    with pytest.raises(ServoMissing, match=f"servo 5 does not answer at {bench.baud}"):
-        bench.restart(5)
-
-    def sleep_and_lose(t_s):
-        bench.sleep_until(t_s)
-        bench.port.faults.command("lose 1")
-
-    with pytest.raises(ServoMissing, match="does not come back"):
-        bench.restart(sleep_until=sleep_and_lose)
-
-
-@pytest.mark.parametrize("habit", ["mute", "answer"])
-def test_a_restart_that_some_firmware_confirms(habit):
-    bench = Bench(kind=FEETECH)
-    bench.chain.choose_behaviour("reboot", habit)
-    bench.hold()
-    assert bench.restart().after.torque is False
-
-
-@pytest.mark.parametrize(
-    ("standing", "text"),
-    [
-        (ServoSnapshot((), None, None, None), "nothing latched, torque unknown, at step None"),
-        (
-            ServoSnapshot(("overload", "encoder"), True, 5, 4.9),
-            "latched: overload and encoder, torque on, at step 5, 4.9 V",
-        ),
-        (
-            ServoSnapshot((), False, 5, 7.4, latching=False),
-            "no errors, torque off, at step 5, 7.4 V",
-        ),
-        (
-            ServoSnapshot(("overload",), None, None, None, latching=False),
-            "reports: overload, torque unknown, at step None",
-        ),
-    ],
-)
-def test_a_standing_in_words(standing, text):
-    assert str(standing) == text
-
-
 def test_kinds_write_firmware_as_their_makers_do():
     assert [FEETECH.family.format_firmware(number) for number in (353, 310)] == ["3.53", "3.10"]
     assert DYNAMIXEL.family.format_firmware(53) == "53"
@@ -359,20 +279,3 @@ def test_a_lost_confirmation_does_not_matter(address):
     bench = Bench()
     bench.port = Lossy(bench.chain)
     assert bench.assign().after == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
-
-
-def test_a_lost_status_of_the_restart_does_not_matter():
-    bench = Bench()
-    bench.port.setBaudRate(57_600)
-    tapped = []
-    write = bench.port.write
-
-    def lossy(data):
-        tapped.append(data)
-        write(data)
-        if data[7] == 0x08:
-            bench.port.drain()
-
-    bench.port.write = lossy  # type: ignore[method-assign]
-    assert bench.restart().after.torque is False
-    assert bytes.fromhex("FFFFFD00010300082F4E") in tapped

@@ -334,9 +334,9 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
     for arguments in (["report"], ["report", "x.mcap", "--scene", "visitor"]):
         done = runner.invoke(app, arguments)
         assert done.exit_code == 2 and "report takes either" in done.output
-    done = runner.invoke(app, ["report", "--scene", "nowhere", "--seconds", "5"])
+    done = runner.invoke(app, ["--scene", "nowhere", "--seconds", "5"])
     assert done.exit_code == 2 and "unknown; scenes" in done.output
-    done = runner.invoke(app, ["report", "nothing.mcap"])
+    done = runner.invoke(app, ["nothing.mcap"])
     assert done.exit_code == 2 and len(done.output.strip().splitlines()) == 1
 
 
@@ -357,9 +357,9 @@ def test_a_pipe_is_no_eye_tracker_recording(tmp_path: Path) -> None:
     "words",
     [
         ("report", "--scene", "visitor", "--out", "{}.html"),
-        ("compare", "a.mcap", "b.mcap", "--out", "{}.html"),
+        ("report", "a.mcap", "b.mcap", "--out", "{}.html"),
     ],
-    ids=lambda words: words[0],
+    ids=lambda words: words[1],
 )
 def test_no_report_writes_over_a_file_of_yours(
     words: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -384,35 +384,30 @@ def test_a_report_leaves_the_summary_of_the_run_and_is_refused_before_any_work(
     with pytest.raises(SetupError, match="already exists"):
         write_all(tmp_path / "x.html", "another page", (), [])
     capfd.readouterr()
-    for reporting in (["report"], ["compare", str(run), "--out", str(tmp_path / "x.html")]):
+    for reporting in (["report"], ["report", str(run), "--out", str(tmp_path / "x.html")]):
         assert typed(*reporting, str(run)) == 2
         said = capfd.readouterr().err
         assert "x.html already exists" in said and said.count("\n") == 1
     assert (tmp_path / "x.html").read_text() == f"{made}a newer page"
-    assert typed("export", str(run), "--csv") == 0
-    assert typed("export", str(run), "--csv") == 2
-    assert typed("export", str(run), "--csv", "--force") == 0
-    theirs = tmp_path / "theirs"
-    theirs.mkdir()
-    (theirs / "participants.tsv").write_text("precious")
-    assert typed("export", str(run), "--bids", "--out", str(theirs)) == 2
-    assert (theirs / "participants.tsv").read_text() == "precious"
+    assert typed("export", str(run)) == 0
+    assert typed("export", str(run)) == 2
+    assert typed("export", str(run), "--force") == 0
 
 
 @pytest.mark.parametrize(
     "name", ["notes.html", "notes_measures.json", "notes_figures/overview.png"]
 )
-@pytest.mark.parametrize("command", ["report", "compare"])
+@pytest.mark.parametrize("files", [["a.mcap"], ["a.mcap", "b.mcap"]], ids=["one", "two"])
 def test_a_report_writes_over_nothing_that_no_report_has_made(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, command: str
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, files: list[str]
 ) -> None:
     page, theirs = tmp_path / "notes.html", tmp_path / name
     theirs.parent.mkdir(exist_ok=True)
     theirs.write_text("somebody's own")
     # Refused before any work: neither recording is there.
-    words = [command, "a.mcap", *(["b.mcap"] if command == "compare" else []), "--out", str(page)]
+    words = ["report", *files, "--out", str(page)]
     for force, text in (((), "already exists: name another file, or use --force"),
-                        (("--force",), "was not made by gazerig report or compare")):  # fmt: skip
+                        (("--force",), "was not made by gazerig report")):  # fmt: skip
         assert typed(*words, *force) == 2
         said = capfd.readouterr().err
         assert said.count("\n") == 1 and str(theirs) in said and text in said

@@ -19,10 +19,10 @@ from seeing.material import at_hand
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between
-from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import cyclopean_direction
 
 SECONDS, BEGIN_S, RATE_HZ = 18.0, 1.0, 10.0
 WIDTH, HEIGHT = 768, 576

@@ -7,7 +7,7 @@ from -0.5 to w - 0.5.
 
 from typing import cast
 
-from gazerig.drivers.plugins import DETECTOR, DetectorPlugin, Evidence, create, is_ours, load
+from gazerig.drivers.plugins import DETECTOR, DetectorPlugin, create, is_ours, load
 from gazerig.drivers.types import FaceDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
@@ -31,13 +31,9 @@ def _yunet(params: FaceDetectorParams) -> FaceDetector:
     return YunetDetector(params, params.model_file)
 
 
-AUTO = DetectorPlugin(
-    _auto, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
-)
-MTCNN = DetectorPlugin(
-    mtcnn, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
-)
-YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",))
+AUTO = DetectorPlugin(_auto, FaceDetectorParams)
+MTCNN = DetectorPlugin(mtcnn, FaceDetectorParams)
+YUNET = DetectorPlugin(_yunet, FaceDetectorParams)
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:

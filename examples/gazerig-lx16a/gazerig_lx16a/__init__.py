@@ -1,6 +1,6 @@
 """Hiwonder LX-16A bus servos for gazerig."""
 
-from gazerig.drivers.plugins import BusPlugin, Evidence
+from gazerig.drivers.plugins import BusPlugin
 from gazerig_lx16a.bus import MODEL, Lx16aBus, Lx16aParams, release
 from gazerig_lx16a.emulated import device
 
@@ -10,6 +10,4 @@ LX16A = BusPlugin(
     models={"lx-16a": MODEL},
     device=device,
     release=release,
-    abilities=("feedback", "torque off", "guardian", "emulated"),
-    evidence=Evidence(emulated=True),
 )

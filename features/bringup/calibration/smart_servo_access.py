@@ -113,7 +113,7 @@ class SmartServoAccess:
         if status:
             remedy = "let it cool, free it, check its supply"
             if self._family.faults_latch:
-                remedy = f"find the cause, then gazerig reboot {self._id}"
+                remedy = "find the cause, then switch its power off and on"
             names = " and ".join(self._family.name_errors(status))
             raise ServoFault(f"{self.who}: {names}: {remedy}")
         for setting in driving.settings:

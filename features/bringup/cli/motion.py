@@ -1,10 +1,10 @@
-"""The commands jog, home and look-at: a rig moved slowly, without a camera."""
+"""The command jog: one joint moved slowly, without a camera."""
 
 import contextlib
 import select
 import sys
 from collections.abc import Iterable, Iterator
-from math import degrees, inf
+from math import inf
 from typing import Annotated
 
 import typer
@@ -13,12 +13,6 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.manual_session import holding_rig, holding_text
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
-from gazerig.features.bringup.look_at import (
-    gaze_result_text,
-    joints_at_limits,
-    look_at,
-    refuse_not_finite,
-)
 from gazerig.features.bringup.manual_control import (
     PASSING,
     JogParams,
@@ -27,7 +21,7 @@ from gazerig.features.bringup.manual_control import (
     Step,
     refuse_angle,
 )
-from gazerig.robot.app.rig_limits import lid_ends, limits
+from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, record_signals, say, status
 from gazerig.robot.control.event_text import group_events
@@ -77,76 +71,6 @@ def jog(
         _report(moved, (joint,))
         _hold(control, seconds, hold)
     _exit_unless(moved.arrived)
-
-
-@app.command()
-def home(
-    rig: RigArgument = "desk",
-    speed: SpeedOption = 20.0,
-    hold: HoldOption = False,
-    yes: YesOption = False,
-    mock: MockOption = False,
-    port: PortOption = None,
-) -> None:
-    """Move slowly to the centre: all joints to 0 deg, lids open; then torque off."""
-    with clear_errors(rig, port, mock):
-        loaded = load_rig(rig)
-    centre = dict.fromkeys(loaded.names, 0.0)
-    centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
-    with _manual_control(loaded, rig, mock, port, yes, speed, hold, False) as control:
-        moved = control.pose(centre)
-        _report(moved, loaded.names)
-        _hold(control, 0.0, hold)
-    _exit_unless(moved.arrived)
-
-
-@app.command("look-at", cls=RigCommand, context_settings=_NEGATIVE)
-def look_at_command(
-    rig: RigArgument = "desk",
-    *,
-    x: Annotated[float, typer.Argument(metavar="X", help="Metres forward of the neck base.")],
-    y: Annotated[float, typer.Argument(metavar="Y", help="Metres to the left.")],
-    z: Annotated[float, typer.Argument(metavar="Z", help="Metres up.")],
-    seconds: Annotated[float, typer.Option(min=1.0, help="Look for S seconds.")] = 4.0,
-    hold: HoldOption = False,
-    no_park: NoParkOption = False,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of blinks.")] = 0,
-    yes: YesOption = False,
-    mock: MockOption = False,
-    port: PortOption = None,
-) -> None:
-    """Turn eyes and head to a point and report the gaze error: X Y Z in metres."""
-    with clear_errors(rig, port, mock):
-        refuse_not_finite((x, y, z))
-        loaded = load_rig(rig)
-        # This import also loads vision, so only this command does it, and before the torque is on:
-        # otherwise the servos' watchdog would trip in the meantime.
-        from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
-
-        kinematics, oculomotor = kinematics_and_oculomotor(loaded, seed)
-    with _manual_control(loaded, rig, mock, port, yes, 20.0, hold, not no_park) as control:
-        looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
-        good = looked.error <= 2.0
-        ranges = loaded.ranges
-        narrower = {
-            "eye_pan": ranges.eye_yaw_deg,
-            "eyes_pan": ranges.eye_yaw_deg,
-            "eye_tilt": ranges.eye_pitch_deg,
-            "eyes_tilt": ranges.eye_pitch_deg,
-            "neck_yaw": ranges.neck_yaw_deg,
-        }
-        _print_events(looked.moved.events)
-        if any(name.startswith("neck") for name in loaded.names):
-            yaw, pitch, roll = looked.head
-            say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
-        for line in gaze_result_text(looked):
-            say(line)
-        for applied in looked.moved.remarkable_joints():
-            say(f"limited: {applied}")
-        for line in () if good else joints_at_limits(loaded.joints, narrower, looked.moved):
-            say(f"limited: {line}")
-        _hold(control, 0.0, hold)
-    _exit_unless(good)
 
 
 @contextlib.contextmanager

@@ -96,7 +96,7 @@ def refuse_packages(rig: Rig, command: str) -> None:
         kind = rig.bus_named(name).kind
         if not is_ours(BUS, kind):
             label = find(BUS, kind).label
-            raise SetupError(f"{command} cannot ask the {label}: run, jog, home and look-at can")
+            raise SetupError(f"{command} cannot ask the {label}: run and jog can")
 
 
 @contextlib.contextmanager

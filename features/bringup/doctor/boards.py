@@ -109,7 +109,7 @@ class BoardRules(NamedTuple):
 
 MAESTRO = BoardRules(
     highest_input=MOST_INPUT,
-    left_on_remedy="gazerig home ends with its pulses off; for good set 'On startup or error' to Off in "
+    left_on_remedy="gazerig jog ends with its pulses off; for good set 'On startup or error' to Off in "
     "Pololu's program",
     outside_range_remedy="switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
     note=Advice(
@@ -121,8 +121,8 @@ MAESTRO = BoardRules(
 )
 PCA9685 = BoardRules(
     highest_input=0,
-    left_on_remedy="gazerig home ends with its pulses off",
-    outside_range_remedy="switch the servo supply off, then gazerig reboot {name} ends its pulses",
+    left_on_remedy="gazerig jog ends with its pulses off",
+    outside_range_remedy="switch the servo supply off, then the board's power off and on",
     note=Advice(
         "note",
         "has no watchdog: when the cable or the computer dies it goes on with its last pulses",

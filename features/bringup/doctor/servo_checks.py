@@ -218,10 +218,10 @@ _FEETECH = ServoChecks(
         "input voltage": "",
         "encoder": "its angle sensor fails: replace the servo if it comes again",
         "overheating": "let it cool for 20 minutes and find what makes it work so hard",
-        "overcurrent": "free the joint and check plugs and wires for shorts; gazerig reboot {setup.id} "
-        "ends it",
-        "overload": "free the joint: something holds it or its range is too wide; gazerig reboot "
-        "{setup.id} ends it",
+        "overcurrent": "free the joint and check plugs and wires for shorts; then switch its "
+        "power off and on",
+        "overload": "free the joint: something holds it or its range is too wide; then "
+        "switch its power off and on",
     },
     unlimited_at_zero=True,
     wanted_settings=(

@@ -45,7 +45,7 @@ ADVICE = {
     "mute": Advice("error", "answers pings and nothing else (Status Return Level 0)", FIX),
     "unread": Advice("error", "gave no good answer about {named}",
         "check its plug and its neighbours' and try again"),
-    "latched": Advice("error", "has latched: {error}", "{remedy}; then gazerig reboot {setup.id}"),
+    "latched": Advice("error", "has latched: {error}", "{remedy}; then switch its power off and on"),
     "reported": Advice("error", "reports: {error}", "{remedy}"),
     "voltage": Advice("error", "{limits}{checks.out_of_voltage}", "{remedy}"),
     "weak": Advice("warn", "{limits}; made for {model.rated_v:g} V, it is slow and weak here",
@@ -64,7 +64,7 @@ ADVICE = {
         FIX),
     "latch": Advice("note", "a moment outside {low:.1f}..{high:.1f} V switches its torque off "
         "until it is restarted ({register} {value})", "size the supply for all servos at once, and "
-        "feed long chains at both ends; gazerig reboot brings a latched servo back"),
+        "feed long chains at both ends; switching the power off and on brings a latched servo back"),
     "overload": Advice("warn", "its overload protection cannot act as meant (Overload Torque "
         "{share} %, Protection Time {seconds:g} s)",
         "set Overload Torque (36) to 80 and Protection Time (35) to 200 with {checks.maker_program}"),
@@ -334,7 +334,7 @@ RULES: tuple[Rule, ...] = (
     RegisterRule(("torque_enable",), lambda _, torque: torque != 0,
         Advice("warn",
             "its torque is on though no program runs it; its settings cannot be changed so",
-            "hold the joint, its torque goes off: gazerig reboot {setup.id}")),
+            "hold the joint and switch its power off and on")),
     RegisterRule(("bus_watchdog",), lambda _, watchdog: watchdog == TRIPPED,
         Advice("warn",
             "its bus watchdog has tripped: it refuses goals (a program ended without notice)", FIX),

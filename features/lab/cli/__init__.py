@@ -1,1 +1,1 @@
-"""The commands report, compare, sweep and fit-scanpath."""
+"""The commands report, sweep and fit-scanpath."""

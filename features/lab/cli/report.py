@@ -1,4 +1,4 @@
-"""The commands ``gazerig report`` and ``gazerig compare``: human likeness of the gaze of a run."""
+"""The command ``gazerig report``: human likeness of the gaze of a run, or of two side by side."""
 
 from collections import Counter
 from dataclasses import replace
@@ -37,6 +37,10 @@ def report(
             f"(default: {DEFAULT_RIG}).",
         ),
     ] = None,
+    other: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="A second recording, to show side by side."),
+    ] = None,
     scene: Annotated[
         str | None, typer.Option(help="Instead of a file: run this scene in simulated time.")
     ] = None,
@@ -68,8 +72,13 @@ def report(
             rig, file = str(file), None
         if (file is None) == (scene is None):
             raise SetupError("report takes either a recording or --scene NAME")
+        if file is None and other is not None:
+            raise SetupError("report compares two recordings: leave --scene out")
         if file is not None and bus is not None:
             raise SetupError("--bus needs --scene: a recording already has its bus")
+        if file is not None and other is not None:
+            _compare(file, other, out, force)
+            return
         # Drawing and models are slow to import; `--help` does not need them.
         from gazerig.features.lab.report.page import banner, refuse_foreign, report_files
         from gazerig.features.lab.report.report import FIGURE_KEYS, make_report, read_run
@@ -112,45 +121,32 @@ def report(
         say(f"{made.page}: the whole report; {len(made.figures)} figures in the folder next to it")
 
 
-@app.command()
-def compare(
-    first: Annotated[Path, typer.Argument(metavar="A", help="A recording.")],
-    second: Annotated[Path, typer.Argument(metavar="B", help="Another recording.")],
-    out: Annotated[
-        Path, typer.Option(help="Page to write; .html is added if it is missing.")
-    ] = Path("compare.html"),
-    force: ForceOption = False,
-) -> None:
-    """Show two runs side by side, with the differences that exceed chance."""
-    with clear_errors():
-        from gazerig.features.lab.report.compare import LEVEL
-        from gazerig.features.lab.report.compare import compare as comparing
-        from gazerig.features.lab.report.page import refuse_foreign, report_files
-        from gazerig.features.lab.report.report import FIGURE_KEYS
-        from gazerig.robot.recording.read import RunRecording, report_bad_contents
+def _compare(first: Path, second: Path, out: Path | None, force: bool) -> None:
+    """Write a page with two recorded runs side by side."""
+    from gazerig.features.lab.report.compare import compare
+    from gazerig.features.lab.report.page import refuse_foreign, report_files
+    from gazerig.features.lab.report.report import FIGURE_KEYS
+    from gazerig.robot.recording.read import RunRecording, report_bad_contents
 
-        target = page_file(out)
-        refuse_foreign(report_files(target, FIGURE_KEYS), force)
-        recordings = RunRecording(first), RunRecording(second)
-        names = _names(first, second)
-        abouts = (
-            _recording_header(recordings[0], names[0]),
-            _recording_header(recordings[1], names[1]),
-        )
-        with report_bad_contents(Path(f"{first} or {second}")), progress_bar() as tell:
-            ticks = recordings[0].ticks(), recordings[1].ticks()
-            made = comparing(ticks, abouts, target, tell, force)
-        if made.warning:
-            say(made.warning)
-        for difference in made.differences:
-            if difference.word == "more than chance":
-                a, b = difference.a, difference.b
-                unit = "" if a.band.unit in ("", "share") else f" {a.band.unit}"
-                how = " (the figure may be chance, its distribution is not)"
-                shape = how if difference.p_value >= LEVEL else ""
-                say(f"{a.band.title}: {a.value:.3g} and {b.value:.3g}{unit}{shape}")
-        count = sum(d.word == "more than chance" for d in made.differences)
-        say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
+    target = page_file(out or Path("compare.html"))
+    refuse_foreign(report_files(target, FIGURE_KEYS), force)
+    recordings = RunRecording(first), RunRecording(second)
+    names = _names(first, second)
+    abouts = (
+        _recording_header(recordings[0], names[0]),
+        _recording_header(recordings[1], names[1]),
+    )
+    with report_bad_contents(Path(f"{first} or {second}")), progress_bar() as tell:
+        ticks = recordings[0].ticks(), recordings[1].ticks()
+        made = compare(ticks, abouts, target, tell, force)
+    if made.warning:
+        say(made.warning)
+    for one in made.differences:
+        if one.a.verdict != one.b.verdict:
+            unit = "" if one.a.band.unit in ("", "share") else f" {one.a.band.unit}"
+            verdicts = f"{one.a.verdict}, {one.b.verdict}"
+            say(f"{one.a.band.title}: {one.a.value:.3g} and {one.b.value:.3g}{unit} ({verdicts})")
+    say(f"{made.page}: {len(made.differences)} measures of both runs beside those of people")
 
 
 def _simulate_run(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":

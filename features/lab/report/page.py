@@ -259,7 +259,7 @@ def refuse_foreign(paths: Collection[Path], force: bool = False) -> None:
             raise SetupError(f"cannot read {path} ({error.strerror}): name another file") from error
         if head and _MARKS.get(path.suffix, _PAGE_MARK) not in head:
             raise SetupError(
-                f"{path} was not made by gazerig report or compare, and is kept even with --force: "
+                f"{path} was not made by gazerig report, and is kept even with --force: "
                 "name another file, or remove it"
             )
 
