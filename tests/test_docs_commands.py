@@ -130,6 +130,7 @@ LEFT_OUT = {
     r"new ": "asks questions: tests/test_new_rig.py",
     r"record-track ": "needs a hand that moves the head",
     r".*(--camera|--oak)|calibrate (camera|face)": "needs a camera",
+    r"run my_?rig\.yaml --scene": "needs servos",
     r"setup |calibrate |doctor --port": "asks for one servo after the other: tests/bringup",
     r"run .*(--port|--world|--record)": "needs another program, a renderer or minutes: tests/world",
     r"(report|sweep|fit-scanpath|rerun|import|study) ": "needs minutes, a browser "

@@ -137,12 +137,6 @@ class Robot:
         """Return the reason for a stop, "" while the robot moves."""
         return self._stop.stop_reason
 
-    @property
-    def newest_tick(self) -> Tick | None:
-        """Return the last tick, None before the first."""
-        known = self._looks.newest
-        return known if isinstance(known, Tick) else None
-
     def command(self, command: Command) -> Ticket:
         """Queue a command for the next tick. Thread-safe.
 

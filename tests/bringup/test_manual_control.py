@@ -13,11 +13,8 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.look_at import GazeResult, gaze_result_text, joints_at_limits, look_at
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, duration_s
-from gazerig.gaze.types import Vec3
 from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.control.body import Body
 from gazerig.robot.safety.guard import Guard
@@ -63,10 +60,6 @@ class Bench(EmulatedRig):
 
     def torque(self) -> list[bool]:
         return [servo.torque for servo in cast(Any, self.devices[""]).servos]
-
-    def look(self, point: Vec3, seconds: float) -> GazeResult:
-        kinematics, oculomotor = kinematics_and_oculomotor(self.rig, 0)
-        return look_at(self.control, kinematics, oculomotor, point, seconds)
 
 
 @pytest.fixture
@@ -251,65 +244,3 @@ def test_joints_of_three_kinds_move_together(other: Bench) -> None:
 
 
 # --- looking at a point
-
-
-@pytest.mark.parametrize("point", [(1.0, 0.0, 0.3), (1.0, 0.4, 0.1), (0.4, -0.1, 0.2)])
-def test_both_eyes_meet_a_point(bench: Bench, point: Vec3) -> None:
-    looked = bench.look(point, 4.0)
-    assert max(looked.left_error, looked.right_error) < 2.0
-    assert looked.vergence == pytest.approx(looked.desired_vergence, abs=2.0)
-    assert looked.moved.arrived
-
-
-def test_a_point_behind_is_missed_and_the_error_says_so(bench: Bench) -> None:
-    looked = bench.look((-1.0, 0.1, 0.2), 4.0)
-    assert min(looked.left_error, looked.right_error) > 20.0
-    ends = joints_at_limits(RIG.joints, {"eye_pan": 34.0}, looked.moved)
-    assert any("left_eye_pan is at the end of its range (-34..34 deg)" in line for line in ends)
-    assert not any("tilt" in line for line in ends)
-
-
-@pytest.mark.parametrize("point", [(nan, 0.0, 0.0), (0.038, 0.0, 0.125)])
-def test_no_point_and_a_point_in_the_head_are_refused(bench: Bench, point: Vec3) -> None:
-    with pytest.raises(SetupError, match=r"e\.g\. 1\.0 0\.2 0\.3"):
-        bench.look(point, 4.0)
-
-
-@on("maker")
-@pytest.mark.parametrize("point", [(1.0, 0.2, 0.2), (0.3, 0.0, 0.09)])
-def test_eyes_on_one_linkage_are_judged_by_their_mean_line_of_sight(
-    other: Bench, point: Vec3
-) -> None:
-    looked = other.look(point, 2.0)
-    assert not looked.converges and looked.error < 1.0
-    assert looked.vergence == pytest.approx(0.0, abs=1e-6)
-    # Each eye alone is off the point by half its vergence.
-    worst = max(looked.left_error, looked.right_error)
-    assert worst == pytest.approx(looked.desired_vergence / 2.0, abs=1.0)
-    words = "\n".join(gaze_result_text(looked))
-    assert "estimated, not measured" in words and "vergence: none, as one servo" in words
-
-
-@on("maker")
-def test_eyes_that_cannot_turn_so_far_are_said_to_be_at_their_end(other: Bench) -> None:
-    looked = other.look((0.2, 1.0, 0.1), 2.0)
-    assert looked.error > 10.0
-    narrower = {"eyes_pan": other.rig.ranges.eye_yaw_deg}
-    ends = joints_at_limits(other.rig.joints, narrower, looked.moved)
-    assert any("eyes_pan is at the end" in line for line in ends)
-
-
-@on("feetech")
-def test_separate_eyes_converge_and_are_measured(other: Bench) -> None:
-    looked = other.look((0.5, 0.0, 0.14), 3.0)
-    assert looked.converges and looked.error == max(looked.left_error, looked.right_error) < 2.0
-    assert "estimated" not in "\n".join(gaze_result_text(looked))
-
-
-@on("mixed")
-def test_a_mixed_head_looks_with_a_neck_that_is_measured_and_eyes_that_are_not(
-    other: Bench,
-) -> None:
-    looked = other.look((1.0, 0.5, 0.1), 3.0)
-    assert not looked.converges and looked.error < 2.0 and looked.head[0] > 3.0
-    assert "estimated" in gaze_result_text(looked)[0]
