@@ -23,7 +23,6 @@ from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import CameraTurn, DetectedFace
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.model.clock import RealClock
 
 GO_ON = threading.Event()
 LENS = Intrinsics(310.5, 311.25, 31.5, 23.5, (0.1, -0.2, 0.001, -0.002, 0.3))
@@ -286,7 +285,7 @@ def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
         source = recorded(partial(VideoFile, str(film)), out)
         assert isinstance(source, CameraRecorder)
         source.open()
-        assert present(source.take(RealClock(), threading.Event())).number == 1
+        assert present(source.take(time.monotonic, threading.Event())).number == 1
         source.close()
         source.finish()
         assert Recording(path).shot(0).image.shape == (48, 64, 3)
