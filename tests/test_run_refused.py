@@ -60,7 +60,7 @@ def test_a_missing_argument_is_named(
     pytest.importorskip("gazerig.features.bringup")
     assert typed("jog", *rig, "neck_yaw") == 2
     said = " ".join(re.sub(r"[│\n]", " ", capfd.readouterr().err).split())
-    assert "DEG is missing" in said or "DEG" in said
+    assert "DEG (Joint angle in degrees): DEG is missing" in said
 
 
 def test_an_unknown_key_of_a_joint_is_the_only_error(

@@ -331,7 +331,7 @@ def test_a_page_ends_as_a_browser_wants_it(given: str, written: str) -> None:
 
 def test_the_command_takes_a_file_or_a_scene() -> None:
     runner = CliRunner()
-    for arguments in (["report"], ["report", "x.mcap", "--scene", "visitor"]):
+    for arguments in ([], ["x.mcap", "--scene", "visitor"]):
         done = runner.invoke(app, arguments)
         assert done.exit_code == 2 and "report takes either" in done.output
     done = runner.invoke(app, ["--scene", "nowhere", "--seconds", "5"])
