@@ -4,6 +4,8 @@ import errno
 from dataclasses import replace
 
 import pytest
+from board_rig import SECTION, on_pca9685
+from command_line import typed
 from pca9685_world import GRAIN, QUICK, SPEED_STEPS_S, World, setup
 from smbus2 import i2c_msg
 
@@ -402,3 +404,13 @@ def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
 
 
 # --- the same head on either board
+
+
+@pytest.mark.parametrize("words", [("run", "--no-page", "--scene", "visitor"), ("doctor",)])
+def test_a_rig_without_its_i2c_bus_is_told_to_switch_it_on(words, tmp_path, capfd):
+    file = on_pca9685(tmp_path, SECTION.replace("i2c-1", "i2c-97"))
+    verb, *rest = words
+    assert typed(verb, file, *rest) in (1, 2)
+    out, err = capfd.readouterr()
+    assert "I2C bus" in out + err and "switch I2C on" in out + err
+    assert "serial port" not in out + err and "adaptor" not in out + err

@@ -62,6 +62,15 @@ def long_track(seconds: float, seed: int, size: float = 1.0) -> Track:
     return Track("a show", frames, fit="slow", cues={"middle": seconds / 2})
 
 
+@pytest.mark.parametrize("action", ["pause", "seek"])
+def test_without_a_track_nothing_can_be_controlled(action: str) -> None:
+    it = show(a=long_track(20.0, 1))
+    assert it.do(action, 0.0) == f"no track is playing: play one first, then {action}"
+    it.play("a", 0.0)
+    assert "has no cue" in it.do("seek", 1.0, value="no cue")
+    assert it.do("end", 1.0) == "" == it.do("end", 9.0)
+
+
 def test_a_show_of_an_hour_with_1000_commands_keeps_all_limits() -> None:
     it, random = show(hour=long_track(3600.0, 1)), np.random.default_rng(2)
     t = 0.0
