@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import threading
-from concurrent.futures import Executor
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import thread as pool_threads
 from types import FrameType
 from typing import Protocol
@@ -14,43 +14,34 @@ from gazerig.robot.control.interrupts import SAME_REQUEST_S
 from gazerig.robot.model.clock import RealClock
 
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
+_ENDS = (KeyboardInterrupt, SystemExit)
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
 
 
 def is_left_waiting_for(worker: threading.Thread) -> bool:
     """Return whether the program is ending, and waits for a thread of a pool to end first.
 
-    A pool (``concurrent.futures``, ``asyncio.to_thread``) is joined where its block is left, and by
-    the interpreter before the main thread counts as ended. Ctrl-C, which only the main thread
-    gets, therefore never reaches the work of such a thread.
+    A pool (``concurrent.futures``, ``asyncio.to_thread``) waits for its threads when it is shut
+    down, by its block, a call or the event loop, and the interpreter does so before the main thread
+    counts as ended. Ctrl-C, which only the main thread gets, therefore never reaches their work.
     """
-    if worker not in pool_threads._threads_queues:
-        return False
     if pool_threads._shutdown:
-        return True
-    frame = sys._current_frames().get(threading.main_thread().ident or 0)
+        return worker in pool_threads._threads_queues
+    # An exception that the program may handle ends neither the program nor the work.
+    handled = sys._current_exceptions().get(threading.main_thread().ident or 0)
+    error = handled[1] if isinstance(handled, tuple) else handled  # a tuple up to Python 3.11
+    if not isinstance(error, _ENDS):
+        return False
+    return any(_shuts_down_pool_of(worker, frame) for frame in sys._current_frames().values())
+
+
+def _shuts_down_pool_of(worker: threading.Thread, frame: FrameType | None) -> bool:
+    """Return whether a thread with this frame shuts down the pool of a worker."""
     while frame is not None:
-        if frame.f_code.co_name == "__exit__" and _leaves_pool_of(worker, frame):
-            return True
+        if frame.f_code is ThreadPoolExecutor.shutdown.__code__:
+            return worker in tuple(frame.f_locals["self"]._threads)
         frame = frame.f_back
     return False
-
-
-def _leaves_pool_of(worker: threading.Thread, frame: FrameType) -> bool:
-    """Return whether a frame leaves the block of a worker's pool because of Ctrl-C or alike."""
-    runners = sys.modules.get("asyncio.runners")
-    runner_exit = getattr(getattr(runners, "Runner", None), "__exit__", None)
-    words = frame.f_locals
-    if frame.f_code is Executor.__exit__.__code__:
-        pool = words.get("self")
-    elif runner_exit is not None and frame.f_code is runner_exit.__code__:
-        pool = getattr(getattr(words.get("self"), "_loop", None), "_default_executor", None)
-    else:
-        return False
-    kind = words.get("exc_type")
-    # An exception that the program may handle ends neither the program nor the work.
-    ends = isinstance(kind, type) and not issubclass(kind, Exception)
-    return ends and worker in tuple(getattr(pool, "_threads", ()))
 
 
 def interrupt(worker: threading.Thread) -> None:

@@ -83,7 +83,12 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
         ({"do": "tune", "changes": [["a", 1, 2]]}, "pairs"),
         ({"do": "say", "what": " \n"}, "a text without a word is no speech"),
         ({"do": "say", "what": ""}, "a text without a word is no speech"),
+        ({"do": "say", "what": "\u200b\x07 \u00a0"}, "a text without a word is no speech"),
         ({"do": "talk", "state": "speaking", "text": "  "}, "a text without a word is no speech"),
+        (
+            {"do": "talk", "state": "speaking", "text": "\ufeff"},
+            "a text without a word is no speech",
+        ),
     ],
 )
 def test_what_is_no_order_is_refused_with_the_rule(data: object, words: str) -> None:

@@ -33,6 +33,8 @@ def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[byte
         ("maker", "daemon thread", "the main thread ends"),
         ("desk", "to_thread", "SIGINT"),
         ("maker", "thread pool", "SIGINT"),
+        ("maker", "thread pool, shut down", "SIGINT"),
+        ("desk", "event loop", "SIGINT"),
         ("desk", "thread pool, left open", "SIGINT"),
         ("desk", "thread pool", "SIGTERM"),
         ("maker", "two heads", "SIGUSR1"),

@@ -109,6 +109,9 @@ def play(
     pid: PidOption = None,
 ) -> None:
     """Play a track on the running head, or list all tracks with their fit to this rig."""
+    with clear_errors():
+        if track is None and (speed, count, from_s, loop) != (1.0, 0, 0.0, False):
+            raise SetupError("--speed, --count, --from and --loop need a track, e.g. nod")
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
         action: TrackAction | None = (
             "pause" if pause else "resume" if resume else "seek" if seek is not None else None

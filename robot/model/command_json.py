@@ -221,7 +221,7 @@ def _check_talk(command: Talk) -> None:
     for name, text in (("text", command.text), ("sound", command.sound)):
         if not isinstance(text, str) or len(text) > MAX_TALK_CHARACTERS:
             raise ValueError(f"{name} must be text of at most {MAX_TALK_CHARACTERS} characters")
-    if command.text and not command.text.strip():
+    if command.text and not _has_words(command.text):
         raise ValueError(NO_SPEECH)
     pairs = isinstance(words, tuple) and len(words) <= MAX_TALK_WORDS
     last_s = 0.0
@@ -250,6 +250,11 @@ def _check_person(person: object) -> None:
         raise ValueError(f"a person must be given by a whole number from 0 on, not {person!r:.40}")
 
 
+def _has_words(text: str) -> bool:
+    """Return whether a text has any visible character."""
+    return any(letter.isprintable() and letter != " " for letter in text)
+
+
 def _check_speech(command: Say | Speak) -> None:
     _check_who(command.who, isinstance(command, Say) and command.sway)
     if not _is_within(command.volume, 1.0) or command.volume < 0.0:
@@ -264,7 +269,7 @@ def _check_speech(command: Say | Speak) -> None:
             raise ValueError(
                 "say a file or a text; spoken must be pairs of a word and its begin in s"
             )
-        if not command.what.strip():
+        if not _has_words(command.what):
             raise ValueError(NO_SPEECH)
         return
     if not isinstance(command.sound, str) or not isinstance(command.level, str):

@@ -97,6 +97,22 @@ from concurrent.futures import ThreadPoolExecutor
 with ThreadPoolExecutor() as pool:
     pool.submit(work).result()
 """,
+    "thread pool, shut down": """
+from concurrent.futures import ThreadPoolExecutor
+pool = ThreadPoolExecutor()
+try:
+    pool.submit(work).result()
+finally:
+    pool.shutdown(wait=True)
+""",
+    "event loop": """
+import asyncio
+loop = asyncio.new_event_loop()
+try:
+    loop.run_until_complete(loop.run_in_executor(None, work))
+finally:
+    loop.run_until_complete(loop.shutdown_default_executor())
+""",
     "thread pool, left open": """
 from concurrent.futures import ThreadPoolExecutor
 ThreadPoolExecutor().submit(work).result()
