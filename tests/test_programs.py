@@ -15,9 +15,11 @@ import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
+import aiohttp
 import jsonschema
 import pytest
 from branch import Branch, gazerig
@@ -151,6 +153,11 @@ def heard(end: Connection, key: str, value: object = None) -> dict[str, Any]:
 
 def ask(end: Connection, **message: object) -> None:
     end.send(json.dumps(message))
+
+
+def client_frame(text: str) -> bytes:
+    """Return a text message of a client, whose mask changes nothing."""
+    return bytes((0x81, 0x80 | len(text))) + bytes(4) + text.encode()
 
 
 LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
@@ -456,6 +463,16 @@ def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig: Rig, mes
         assert time.monotonic() - sent_s < 3.0  # at most .3 on a quiet machine
 
 
+@pytest.mark.parametrize("stop", ["stop", "st\\u006fp"])
+def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(rig: Rig, stop: str) -> None:
+    with rig.dial() as end:
+        heard(end, "tag", "hello")
+        level = client_frame('{"do": "set_level", "level": "jaw", "value": 1}')
+        end.socket.sendall(3000 * level + client_frame(f'{{"do": "{stop}", "why": "at last"}}'))
+        end.socket.close()
+        assert rig.until(lambda now: now["stopped"])["stopped"] == "at last"
+
+
 def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig) -> None:
     with rig.dial() as flood:
 
@@ -478,6 +495,69 @@ def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig) -> None
     assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
     assert closed.value.rcvd.reason.startswith("too many requests: more than 200 refused in 1 s")
     assert rig.until(lambda now: now["stopped"])["stopped"] == "before the end"
+
+
+def test_a_failed_answer_leaves_time_to_receive_the_rest() -> None:
+    received = asyncio.Event()
+
+    async def send() -> None:
+        raise ConnectionResetError
+
+    async def receive() -> None:
+        await asyncio.sleep(0.05)
+        received.set()
+
+    asyncio.run(programs.until_one_ends(programs._outlasted(send()), receive()))
+    assert received.is_set()
+
+
+def test_a_stop_in_the_buffer_of_a_connection_that_is_closed_is_carried_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is read late: the computer is busy, and much was sent before it."""
+    monkeypatch.setattr(programs, "REST_S", 0.02)
+    stop = aiohttp.WSMessage(aiohttp.WSMsgType.TEXT, '{"do": "stop"}', None)
+    end = aiohttp.WSMessage(aiohttp.WSMsgType.CLOSED, None, None)
+    carried_out: list[object] = []
+
+    async def carry_out(frame: object, *rest: object, late: bool) -> None:
+        carried_out.append(frame)
+
+    async def receive(sends: socket.socket) -> None:
+        due_s, frames = asyncio.get_running_loop().time() + 0.07, iter((stop, end))
+
+        async def next_frame() -> aiohttp.WSMessage:
+            await asyncio.sleep(due_s - asyncio.get_running_loop().time())
+            return next(frames)
+
+        excess = programs.ExcessCount()
+        excess.is_over = True
+        routes = SimpleNamespace(_receive_frame=carry_out)
+        program = programs.ProgramSocket(0.0, False)
+        request = SimpleNamespace(transport=SimpleNamespace(get_extra_info=lambda name: sends))
+        web_socket: Any = SimpleNamespace(receive=next_frame)
+        arguments: Any = (routes, web_socket, program, asyncio.Queue(), request, excess)
+        await programs.ProgramRoutes._receive(*arguments)
+
+    here, there = socket.socketpair()
+    with here, there:
+        asyncio.run(receive(here))
+        assert carried_out == []  # nothing waits in the kernel
+        there.sendall(b"more")
+        asyncio.run(receive(here))
+    assert carried_out == [stop]
+
+
+def test_messages_that_are_dropped_are_refused_together() -> None:
+    async def drop() -> list[Any]:
+        program = programs.ProgramSocket(0.0, False)
+        for _ in range(3):
+            program.drop_message()
+        await program.news.wait()
+        return [json.loads(text) for text in iter(program.outgoing, "")]
+
+    (refusal,) = asyncio.run(drop())
+    assert "too many requests" in refusal["refused"] and refusal["messages"] == 3
 
 
 def test_a_program_that_sends_a_little_too_much_stays(rig: Rig) -> None:

@@ -774,6 +774,39 @@ def test_who_sends_far_too_much_is_hung_up_on_after_his_stop(
     rig.resume(confirmed=True)
 
 
+@pytest.mark.parametrize("stop", [STOP, b'{"do": "st\\u006fp", "why": "at last"}\n'])
+def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(
+    rig: RobotClient, folder: Path, stop: bytes
+) -> None:
+    with raw(folder) as end:
+        end.sendall(3000 * LEVEL + stop)
+    stop_s = time.monotonic() + 20.0
+    while not (stopped := rig.status()["stopped"]):
+        assert time.monotonic() < stop_s
+    assert stopped == "at last"
+    rig.resume(confirmed=True)
+
+
+def test_who_sends_rubbish_and_reads_slowly_is_disconnected(rig: RobotClient, folder: Path) -> None:
+    with raw(folder) as end:
+        over = threading.Event()
+
+        def read() -> None:
+            with contextlib.suppress(OSError):
+                while not over.wait(0.05):
+                    end.recv(200)
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        began_s = time.monotonic()
+        with pytest.raises(ConnectionError):
+            while time.monotonic() < began_s + 20.0:
+                end.sendall(500 * b"rubbish\n")
+        assert time.monotonic() < began_s + 10.0  # 2 s on a quiet machine
+        over.set()
+        reader.join()
+
+
 def test_an_answer_does_not_end_the_wait_for_the_next_request(
     rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

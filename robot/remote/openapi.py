@@ -116,7 +116,7 @@ def api_description(base: str) -> dict[str, Any]:
         "type": "object",
         "properties": {
             "ok": {}, "refused": text, "failed": text, "outcome": outcome, "why": text,
-            "tag": {"type": ["string", "integer"]},
+            "tag": {"type": ["string", "integer"]}, "messages": {"type": "integer"},
         },
     }  # fmt: skip
     named = {**schemas.named, **requests, "Answer": answer}

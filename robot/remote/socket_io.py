@@ -10,7 +10,7 @@ import os
 import socket
 import stat
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, Self
 
@@ -275,6 +275,17 @@ class Wire:
     def has_line(self) -> bool:
         """Return whether a line has been received that was not read yet."""
         return b"\n" in self._rest
+
+    def drop_lines(self, find: Callable[[bytes], int]) -> int:
+        """Drop the received lines before that in which ``find`` finds a place; return their number.
+
+        Args:
+            find: Returns a place in received data, -1 if there is none.
+        """
+        place = find(self._rest)
+        end = self._rest.rfind(b"\n", 0, place if place >= 0 else len(self._rest)) + 1
+        dropped, self._rest = self._rest[:end], self._rest[end:]
+        return dropped.count(b"\n")
 
     def close(self) -> None:
         """Close the connection; readers at both ends get its end."""

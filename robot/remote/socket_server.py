@@ -4,7 +4,7 @@ One receives the requests and executes stops at once, the other one answers the 
 
 The threads never touch the control loop: they use the tuning and queue commands, which the loop
 executes at its next tick. A program that sends malformed data, stops within a request or reads no
-answers only occupies a thread.
+answers only occupies a thread. What is too much is dropped a packet at a time, with a pause.
 """
 
 import os
@@ -19,7 +19,14 @@ from typing import NamedTuple
 from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_io as remote_socket
-from gazerig.robot.remote.excess import CLOSED, REST_S, STOPPED, TOO_MANY, ExcessCount
+from gazerig.robot.remote.excess import (
+    CLOSED,
+    REST_S,
+    STOPPED,
+    TOO_MANY,
+    ExcessCount,
+    find_stop,
+)
 from gazerig.robot.remote.request_handler import RequestHandler, is_stop
 from gazerig.robot.remote.socket_io import (
     REQUEST_BYTES,
@@ -85,6 +92,7 @@ _MOST = 16
 
 MOST_AHEAD = 64
 """Largest number of requests of one program that wait for their answers; more are refused."""
+_TOO_MANY: dict[str, object] = {"refused": f"{TOO_MANY}: {MOST_AHEAD} wait for their answers"}
 _PAUSE_S = 0.005
 """Pause between two packets of a program that sends more."""
 
@@ -115,10 +123,10 @@ class RequestsAhead:
             self._waiting.append(WaitingRequest(request))
             self._changed.notify()
 
-    def add_answer(self, answer: dict[str, object]) -> None:
+    def add_answer(self, answer: dict[str, object], times: int = 1) -> None:
         """Add an answer, which is sent after those of the earlier requests."""
         with self._changed:
-            self._waiting.append(WaitingRequest(None, answer))
+            self._waiting.extend([WaitingRequest(None, answer)] * times)
             self._changed.notify()
 
     def refuse(self, reason: str, names: Container[str]) -> None:
@@ -139,6 +147,11 @@ class RequestsAhead:
         with self._changed:
             self._over = True
             self._changed.notify()
+
+    def wait_for_end(self, within_s: float) -> None:
+        """Wait until no request can follow."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._over, within_s)
 
     def take(self) -> WaitingRequest | None:
         """Wait for the next request and remove it; return None after the last one."""
@@ -259,26 +272,37 @@ class RemoteServer:
             if excess.is_over:
                 ahead.refuse(CLOSED, QUESTIONS | CHANGES | ORDERS)
                 ahead.add_answer({"refused": CLOSED})
-                end_s = self._clock.now_s() + REST_S
-                while (left_s := end_s - self._clock.now_s()) > 0.0:
-                    if not self._receive(wire, peer, ahead, excess, left_s):
-                        break
+                self._receive_for(REST_S, wire, peer, ahead, excess)
         finally:
             ahead.end()
-        while excess.is_over and self._receive(wire, peer, ahead, excess):
-            pass  # stops, until the other thread has sent the last answer
+        if excess.is_over:  # stops, while the other thread sends the last answers
+            self._receive_for(REST_S, wire, peer, ahead, excess)
+            wire.close()
+
+    def _receive_for(
+        self, seconds: float, wire: Wire, peer: str, ahead: RequestsAhead, excess: ExcessCount
+    ) -> None:
+        end_s = self._clock.now_s() + seconds
+        while (left_s := end_s - self._clock.now_s()) > 0.0:
+            if not self._receive(wire, peer, ahead, excess, left_s):
+                break
 
     def _receive(
         self,
         wire: Wire,
         peer: str,
-        ahead: "RequestsAhead",
+        ahead: RequestsAhead,
         excess: ExcessCount,
         within_s: float | None = None,
     ) -> bool:
         """Receive one line, and execute a stop; return whether another line can follow."""
-        if ahead.is_full and not wire.has_line:  # let other threads work between two packets
-            self._clock.sleep_until(self._clock.now_s() + _PAUSE_S)
+        if ahead.is_full or excess.is_over:
+            late_lines = wire.drop_lines(find_stop)
+            excess.add(late_lines, self._clock.now_s())
+            if not excess.is_over:
+                ahead.add_answer(_TOO_MANY, late_lines)
+            if not wire.has_line:  # let other threads work between two packets
+                self._clock.sleep_until(self._clock.now_s() + _PAUSE_S)
         try:
             line = wire.read_line(within_s, _REST_S)
             late = ahead.is_full or excess.is_over
@@ -286,7 +310,7 @@ class RemoteServer:
             with self._lock:
                 if wire in self._wires:
                     self._wires[wire] = self._wires.pop(wire)
-            request = parse_line(line) if not late or b'"stop"' in line else None
+            request = parse_line(line) if not late or find_stop(line) >= 0 else None
         except MalformedMessage as error:
             if not excess.is_over:
                 ahead.add_answer({"refused": str(error)})
@@ -300,7 +324,7 @@ class RemoteServer:
         elif not late:
             ahead.add_request(request)
         elif not excess.is_over:
-            ahead.add_answer({"refused": f"{TOO_MANY}: {MOST_AHEAD} wait for their answers"})
+            ahead.add_answer(_TOO_MANY)
         return True
 
     def _answer_all(self, wire: Wire, peer: str, ahead: "RequestsAhead") -> None:
@@ -318,6 +342,8 @@ class RemoteServer:
                 own.spend(used_s, now_s)
                 self._budget.spend(used_s, now_s)
         finally:
+            # A client that has closed, or reads nothing, may have sent a stop before.
+            ahead.wait_for_end(REST_S)
             with self._lock:
                 self._wires.pop(wire, None)
             wire.close()

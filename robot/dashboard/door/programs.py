@@ -7,9 +7,12 @@ GET  /api/v1/openapi.json   description; /api/v1/ shows it as a page
 """
 
 import asyncio
+import fcntl
 import html
 import json
 import os
+import struct
+import termios
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import suppress
@@ -35,7 +38,14 @@ from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED, Resume, Stop
 from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.remote.excess import CLOSED, REST_S, STOPPED, TOO_MANY, ExcessCount
+from gazerig.robot.remote.excess import (
+    CLOSED,
+    REST_S,
+    STOPPED,
+    TOO_MANY,
+    ExcessCount,
+    find_stop,
+)
 from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
 
@@ -49,6 +59,10 @@ _ALL_PER_S, _ALL_BURST = 100.0, 200.0
 _READ_S = 5.0
 _MOST_QUEUED = 16
 _MOST_OUT = 256
+_MOST_RESTS = 10
+"""Stops are received for so many times REST_S while more of a program's data waits to be read."""
+_REPORT_S = 0.25
+"""Time in which dropped messages are counted for one refusal, s."""
 _MOST_OPEN = 64
 """Largest number of orders of one program without an outcome."""
 _WHO_CHARACTERS = 60
@@ -133,6 +147,7 @@ class ProgramSocket:
         self._state = ""
         self._out: deque[str] = deque(maxlen=_MOST_OUT)
         self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
+        self._dropped = 0
         self.news, self.alive = asyncio.Event(), asyncio.Event()
         self.ping: bytes | None = None
         self.held: set[str] = set()
@@ -177,6 +192,16 @@ class ProgramSocket:
         """Send a message as soon as the program reads it."""
         self._out.append(json.dumps(message, separators=(",", ":")))
         self.news.set()
+
+    def drop_message(self) -> None:
+        """Count a message that is too many; one refusal follows for all of a short time."""
+        if not self._dropped:
+            asyncio.get_running_loop().call_later(_REPORT_S, self._refuse_dropped)
+        self._dropped += 1
+
+    def _refuse_dropped(self) -> None:
+        self.queue_message({"refused": BUSY, "messages": self._dropped})
+        self._dropped = 0
 
     def queue_answer(
         self, message: Mapping[str, object], answer: Mapping[str, object], now_s: float
@@ -352,10 +377,10 @@ class ProgramRoutes:
         try:
             with self._limits.occupy(request.remote or "") as leave:
                 await until_one_ends(
-                    self._send(socket, program),
+                    _outlasted(self._send(socket, program)),
                     self._receive(socket, program, orders, request, excess),
                     self._carry_out(program, orders),
-                    self._renew(socket, program),
+                    _outlasted(self._renew(socket, program)),
                     self._over.wait(),
                     leave.wait(),
                 )
@@ -395,15 +420,23 @@ class ProgramRoutes:
             frame = await socket.receive()
             if frame.type in _ENDS:
                 return
-            late = frame.type is aiohttp.WSMsgType.TEXT and not rate.take(loop.time())
-            await self._receive_frame(frame, program, orders, request, late)
-            excess.add(late, loop.time())
+            now_s = loop.time()
+            late = frame.type is aiohttp.WSMsgType.TEXT and not rate.take(now_s)
+            if late and not _may_stop(frame):
+                program.drop_message()
+            else:
+                await self._receive_frame(frame, program, orders, request, late)
+            excess.add(late, now_s)
         program.queue_message({"refused": CLOSED})
-        with suppress(TimeoutError):
-            async with asyncio.timeout(REST_S):
-                while (frame := await socket.receive()).type not in _ENDS:
-                    if _may_stop(frame):
-                        await self._receive_frame(frame, program, orders, request, late=True)
+        for _ in range(_MOST_RESTS):
+            with suppress(TimeoutError):
+                async with asyncio.timeout(REST_S):
+                    while (frame := await socket.receive()).type not in _ENDS:
+                        if _may_stop(frame):
+                            await self._receive_frame(frame, program, orders, request, late=True)
+                    return
+            if not _unread_bytes(request):
+                return
 
     async def _receive_frame(
         self,
@@ -421,8 +454,6 @@ class ProgramRoutes:
             program.alive.set()
         elif frame.type is not aiohttp.WSMsgType.TEXT:
             program.queue_message({"refused": "not text: one JSON object in each message"})
-        elif late and not _may_stop(frame):
-            program.queue_message({"refused": BUSY})
         else:
             try:
                 message = _add_client(parse_message(frame.data), request, program.name)
@@ -505,8 +536,27 @@ def _add_client(
     return {**message, "who": f"{name[:_WHO_CHARACTERS]} at {request.remote}{here}"}
 
 
+def _unread_bytes(request: web.Request) -> int:
+    """Return how much of what a program has sent waits in the kernel."""
+    end = request.transport and request.transport.get_extra_info("socket")
+    if not end:
+        return 0
+    (unread,) = struct.unpack("i", fcntl.ioctl(end.fileno(), termios.FIONREAD, bytes(4)))
+    return int(unread)
+
+
 def _may_stop(frame: aiohttp.WSMessage) -> bool:
-    return frame.type is aiohttp.WSMsgType.TEXT and '"stop"' in frame.data[:REQUEST_BYTES]
+    return (
+        frame.type is aiohttp.WSMsgType.TEXT and find_stop(frame.data[:REQUEST_BYTES].encode()) >= 0
+    )
+
+
+async def _outlasted(sending: Awaitable[None]) -> None:
+    """Await a task that sends; if it fails, leave time to receive what the program has sent."""
+    try:
+        await sending
+    except (ConnectionError, TimeoutError):
+        await asyncio.sleep(REST_S)
 
 
 def _refuse_commands(program: ProgramSocket, orders: "asyncio.Queue[dict[str, Any]]") -> None:
