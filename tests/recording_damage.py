@@ -137,12 +137,6 @@ def with_bomb(data: bytes, size: int, honest: bool) -> bytes:
     )
 
 
-def _replaced(data: bytes, at: int, length: int, body: bytes) -> bytes:
-    """Put another content into the record at a place."""
-    head = data[at : at + 1] + struct.pack("<Q", len(body))
-    return data[:at] + head + body + data[at + HEAD + length :]
-
-
 def _unsummed(data: bytes) -> bytes:
     """Return the data without the checksum of the whole, as an attacker would send it."""
     out = bytearray(data)

@@ -1,6 +1,5 @@
 """A head next to its program in real time: however its block ends, it parks and releases."""
 
-import asyncio
 import os
 import re
 import signal
@@ -180,36 +179,6 @@ def test_more_signals_skip_what_is_left_of_parking(
     assert said[-1] == f"stopped by {why}: not parked (interrupted), torque off"
 
 
-def test_one_signal_that_comes_twice_still_parks(said: list[str], opened: Open) -> None:
-    with pytest.raises(KeyboardInterrupt), opened():
-        threading.Timer(0.03, os.kill, (os.getpid(), signal.SIGINT)).start()
-        signal.raise_signal(signal.SIGINT)
-    assert_let_go(said)
-
-
-def test_the_end_of_a_daemon_that_opened_it(tmp_path: Path) -> None:
-    file = tmp_path / "daemon.py"
-    file.write_text(textwrap.dedent(DAEMON), encoding="utf-8")
-    done = run_script(file, fresh=True)
-    last = done.stdout.splitlines()[-1]
-    assert re.fullmatch(f"stopped by the end of the program: {LET_GO}", last), done.stderr
-
-
-DAEMON = """
-import threading, time
-import gazerig
-from ideal_bus import ideal_buses
-ready = threading.Event()
-def work():
-    with ideal_buses():
-        with gazerig.open("desk", mock=True, say=lambda line: print(line, flush=True)):
-            ready.set()
-            time.sleep(60.0)
-threading.Thread(target=work, daemon=True).start()
-ready.wait()
-"""
-
-
 def test_the_death_of_the_thread_that_opened_it(said: list[str], opened: Open) -> None:
     kept: list[gazerig.Head] = []
 
@@ -286,48 +255,6 @@ def test_two_heads_in_one_program_are_found_by_their_rigs(
     assert len(ends) == 2 and all(
         re.fullmatch(f"stopped by the program: {LET_GO}", e) for e in ends
     )
-
-
-def test_the_first_of_two_heads_may_end_first(opened: Open) -> None:
-    switching_s = sys.getswitchinterval()
-    first, second = opened(), opened("feetech")
-    with first:
-        second.__enter__()
-        shortened_s = sys.getswitchinterval()
-    try:
-        assert sys.getswitchinterval() == shortened_s < switching_s
-        assert second.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
-    finally:
-        second.__exit__(None, None, None)
-    assert sys.getswitchinterval() == switching_s
-
-
-def test_orders_of_another_program_are_awaited(head: gazerig.Head) -> None:
-    async def show() -> None:
-        with pytest.raises(gazerig.NotFound, match="no rig named eva is running: .*process"):
-            await gazerig.aio.connect(name="eva").__aenter__()
-        async with gazerig.aio.connect(os.getpid(), who="a show") as far:
-            order = far.look_at(1.0, -0.4, 0.3)
-            assert (await order.reply()).control_number and await order == "arrived"
-            assert await far.look_at_person(99) == "refused"
-            with pytest.raises(gazerig.Refused, match="three finite numbers"):
-                await far.look_at(float("nan"), 0.0, 0.0)
-            first, second = far.look_at(1.0, 0.4, 0.3), far.look_at(1.0, -0.2, 0.3)
-            assert await asyncio.gather(first, second) in (
-                ["taken over", "arrived"],
-                ["arrived", "taken over"],
-            )
-            assert await far.set({"gaze.head.comfort_deg": 11.0}) and await far.menus()
-            async for state in far.states(rate_hz=50.0):
-                assert state.controlled_by.startswith("a show")
-                break
-            async for event in far.events():
-                assert event.number == 1
-                break
-            assert await far.stop("a hand") == "arrived"
-            assert (await far.state()).stopped == "a hand"
-
-    asyncio.run(show())
 
 
 def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
@@ -418,26 +345,3 @@ def test_the_end_of_the_interpreter(tmp_path: Path, end: str, status: int, why: 
     last = done.stdout.splitlines()[-1]
     assert re.fullmatch(f"stopped by {why}: {LET_GO}", last), done.stderr
     assert done.returncode in (status, -signal.SIGINT if status == 1 else status)
-
-
-FILM = """
-import cv2, numpy, sys
-import gazerig
-from ideal_bus import ideal_buses
-print("the script runs", flush=True)
-cv2.imwrite(sys.argv[1], numpy.zeros((120, 160, 3), numpy.uint8))
-with ideal_buses(), gazerig.open("desk", mock=True, video=sys.argv[1]) as head:
-    for state in head.states(rate_hz=20.0):
-        if state.frame_s is not None:
-            break
-    print("it sees", flush=True)
-"""
-
-
-@pytest.mark.slow
-def test_a_plain_script_may_have_a_camera(tmp_path: Path) -> None:
-    """The camera's process does not run the script again, though nothing in it is guarded."""
-    file = tmp_path / "plain.py"
-    file.write_text(FILM, encoding="utf-8")
-    done = run_script(file, str(tmp_path / "image.png"))
-    assert done.stdout.splitlines() == ["the script runs", "it sees"], done.stderr

@@ -7,12 +7,9 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.computer import (
-    LEVELS,
     LOWEST_HZ,
     ComputerFigures,
-    level_text,
     load_level,
-    measure,
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
@@ -26,47 +23,20 @@ CARD, SOFTWARE, NOTHING = False, True, None
     ("cores", "late", "share", "software", "level"),
     [
         (8, 0.00, 1.00, CARD, "full"),
-        (8, 0.00, 1.00, SOFTWARE, "full"),
-        (4, 0.02, 0.98, NOTHING, "full"),
         (2, 0.00, 1.00, CARD, "full"),
         (2, 0.00, 1.00, SOFTWARE, "small"),
-        (2, 0.02, 1.00, NOTHING, "small"),
         (1, 0.00, 1.00, CARD, "small"),
         (8, 0.08, 1.00, CARD, "small"),
         (8, 0.02, 0.70, CARD, "small"),
-        (8, 0.20, 0.95, CARD, "small"),
         (8, 0.30, 0.95, CARD, "busy"),
         (2, 0.02, 0.67, SOFTWARE, "least"),  # two busy processes
-        (2, 0.20, 0.90, SOFTWARE, "least"),
-        (2, 0.02, 0.40, SOFTWARE, "least"),  # four
-        (2, 0.45, 0.90, CARD, "least"),
         (1, 0.00, 1.00, SOFTWARE, "least"),
-        (64, 0.00, 0.30, CARD, "least"),
     ],
 )
 def test_the_level_of_a_computer(
     cores: int, late: float, share: float, software: bool | None, level: str
 ) -> None:
     assert load_level(ComputerFigures(cores, late, share, software)) == level
-
-
-def test_a_worse_computer_never_has_a_higher_level() -> None:
-    order = list(LEVELS)
-    for cores in (1, 2, 3, 8):
-        for software in (CARD, SOFTWARE):
-            found = [
-                order.index(load_level(ComputerFigures(cores, late / 50, share / 20, software)))
-                for late, share in ((n, 20 - m) for n in range(40) for m in range(20))
-            ]
-            rows = [found[20 * n : 20 * n + 20] for n in range(40)]
-            assert all(row == sorted(row) for row in rows)
-            assert all(list(column) == sorted(column) for column in zip(*rows, strict=True))
-
-
-def test_figures_are_in_their_ranges() -> None:
-    figures = measure(SOFTWARE)
-    assert figures.cores >= 1 and figures.software is True
-    assert 0.0 <= figures.late_share <= 1.0 and 0.0 < figures.core_share <= 1.01
 
 
 @pytest.mark.parametrize(
@@ -123,9 +93,3 @@ def test_a_busy_computer_renders_no_pictures_of_a_world() -> None:
 def test_an_unknown_level_is_refused_with_the_known_ones() -> None:
     with pytest.raises(SetupError, match="full, small, busy, least"):
         RunOptions(mock=True, computer="huge").check_and_complete()
-
-
-def test_the_text_is_one_line_and_names_what_overrides_it() -> None:
-    for level in LEVELS:
-        text = level_text(level)
-        assert level in text and "--rate" in text and "--world" in text and "\n" not in text

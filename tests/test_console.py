@@ -4,10 +4,8 @@ import pytest
 
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli import browser
-from gazerig.robot.cli.browser import has_desktop, open_page
-from gazerig.robot.cli.run import report_faults, start_text
-from gazerig.robot.control.event_text import is_register_change
+from gazerig.robot.cli.browser import has_desktop
+from gazerig.robot.cli.run import report_faults
 from gazerig.robot.control.interrupts import Interrupts
 
 DESK = {"DISPLAY": ":0"}
@@ -30,36 +28,6 @@ def test_a_browser_is_opened_only_where_somebody_sees_it(
     assert has_desktop(environ, terminal) is opens
 
 
-def test_a_browser_that_fails_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-
-    def refuse(url: str) -> bool:
-        asked.append(url)
-        raise browser.webbrowser.Error("no browser")
-
-    monkeypatch.setattr(browser.webbrowser, "open", refuse)
-    browser._open("http://127.0.0.1:8080/?token=x")
-    monkeypatch.setattr(browser.webbrowser, "open", asked.append)
-    open_page("http://127.0.0.1:8081/?token=x")
-    while len(asked) < 2:
-        pass
-    assert asked[1] == "http://127.0.0.1:8081/?token=x"
-
-
-@pytest.mark.parametrize(
-    ("event", "is_one"),
-    [
-        ("neck_yaw (servo 7): Max Position Limit 4095 -> 2844", True),
-        ("servos 1-9: Indirect Addresses set", True),
-        ("neck_yaw (servo 7): overheating", False),
-        ("neck_yaw (servo 7) restarted: set up again", False),
-        ("this computer is busy: 3 answers late in the last s", False),
-    ],
-)
-def test_register_changes_are_told_from_what_happens(event: str, is_one: bool) -> None:
-    assert is_register_change(event) is is_one
-
-
 @pytest.mark.parametrize("verbose", [False, True])
 def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
     said: list[str] = []
@@ -72,17 +40,6 @@ def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
     assert (len(register) > 10, len(table)) == ((True, 1) if verbose else (False, 0))
     if not verbose:
         assert said == ["stopped by seconds: parked, torque off"]
-
-
-def test_the_first_line_says_what_happens_and_how_it_ends() -> None:
-    mock = RunOptions(mock=True).check_and_complete()
-    assert start_text(mock) == (
-        "desk: emulated servos; it looks at a simulated scene, visitor. "
-        "Ctrl-C parks the head and ends the run."
-    )
-    assert "its servos; it looks at a webcam" in start_text(
-        RunOptions(camera=0).check_and_complete()
-    )
 
 
 def test_a_fault_of_many_joints_is_told_once() -> None:

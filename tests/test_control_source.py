@@ -5,11 +5,9 @@ from collections.abc import Iterator
 import pytest
 from commanded_robot import Running, running_desk
 
-from gazerig.robot.control.head_state import as_json, from_json, head_state
-from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import head_activity, tick_control_source
-from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts, snapshot
+from gazerig.robot.dashboard.feed.snapshot import snapshot
 from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
 from gazerig.robot.dashboard.panels.servo_health import health_table
 from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
@@ -59,15 +57,6 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
         assert "face 1" not in said and "person 1" not in said
 
 
-def test_another_client_leads_from_when_it_took_over(running: Running) -> None:
-    running.order(Jog((("neck_yaw", 0.3),), "ann"))
-    running.go(0.4)
-    running.order(Jog((("neck_yaw", 0.2),), "ben"))
-    took = running.go(0.2)[0]
-    assert tick_control_source(running.ticks[-1]).who == "ben"
-    assert tick_control_source(running.ticks[-1]).since_s == took.t_s
-
-
 @pytest.mark.parametrize(
     ("pointer", "kind", "said"),
     [
@@ -83,19 +72,6 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
         tick = running.go(0.2)[-1]
     assert tick_control_source(tick).kind == kind
     assert head_activity(tick).headline == said
-
-
-def test_what_was_looked_at_before_joints_were_held_leads_again(running: Running) -> None:
-    running.order(LookAt((1.0, 0.2, 0.3), "ann", stay=True))
-    running.go(0.2)
-    running.order(Jog((("neck_yaw", 0.3),), "ann", stay=True))
-    assert tick_control_source(running.go(0.2)[-1]).kind == "joint"
-    running.order(Jog((), "ann"))
-    tick = running.go(0.2)[-1]
-    assert (
-        tick_control_source(tick).kind == "person"
-        and tick_control_source(tick).description == "look at 1 0.2 0.3"
-    )
 
 
 def test_a_person_who_was_chosen_and_a_track(running: Running) -> None:
@@ -135,17 +111,6 @@ def test_a_head_without_torque_looks_at_nobody(running: Running) -> None:
     assert shown(stopped).headline.startswith("stopped: a test")
 
 
-def test_programs_are_told_the_same(running: Running) -> None:
-    running.order(Jog((("neck_yaw", 0.3),), "ann"))
-    tick = running.go(0.2)[-1]
-    state = from_json(as_json(head_state(tick)))
-    assert (
-        state.control_source == tick_control_source(tick)
-        and state.headline == head_activity(tick).headline
-    )
-    assert (state.gaze.target, state.gaze.phase) == ("neck_yaw held", "held")
-
-
 def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), "ann", stay=True))
     running.go(1.0)
@@ -158,43 +123,3 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]
     assert abs(yaw[-1]) < abs(yaw[0])
-
-
-def test_what_holds_all_joints_at_once_is_one_line(running: Running) -> None:
-    said: list[str] = []
-    busy = ["", "the computer is too busy: 40% of ticks came late (worst 90 ms)"]
-    faults = JointFaults(said.append, lambda: busy[0])
-    tick = running.go(0.1)[-1]
-    count = len(tick.guard_result.joints)
-    held = tick.guard_result._replace(
-        level="hold",
-        why=("stale joints",) * count,
-        critical_reasons=tuple(f"{joint}: stale joints" for joint in tick.guard_result.joints),
-    )
-    for k in range(200):
-        faults.update(tick._replace(t_s=0.005 * k, guard_result=held))
-    for k in range(200, 500):
-        faults.update(tick._replace(t_s=0.005 * k))
-    assert said == [
-        f"0.00 s: all {count} joints: stale joints: held",
-        f"0.99 s: all {count} joints: stale joints: over after 1.0 s",
-    ]
-    busy.reverse()
-    for k in range(500, 700):
-        faults.update(tick._replace(t_s=0.005 * k, guard_result=held))
-    assert said[2].endswith(f"stale joints: held, as {busy[0]}")
-
-
-def test_old_joints_of_a_busy_computer_are_put_down_to_it(running: Running) -> None:
-    tick = running.go(0.1)[-1]
-    reasons = ("neck_yaw: stale joints", "neck_pitch: stale joints", "jaw: too fast")
-    held = tick.guard_result._replace(level="hold", reasons=reasons)
-    shown_s = [0.005 * k for k in range(800)]
-    for late, last in ((False, reasons), (True, ("jaw: too fast",))):
-        builder = SnapshotBuilder(200.0)
-        for k, t_s in enumerate(shown_s):
-            if not late or k % 4:
-                builder.update(tick._replace(t_s=t_s, guard_result=held))
-        shot = builder.build(SnapshotTexts())
-        assert shot is not None and bool(shot.busy) is late
-        assert shot.reasons == (*last, *([shot.busy] if late else []))

@@ -2,10 +2,8 @@
 
 import asyncio
 import base64
-import contextlib
 import os
 import socket
-import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,16 +13,14 @@ import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 from fakes.talking_head import TalkingHead, until
 from fakes.voice_assistant import Assistant, free_port, lva
-from fakes.waiting import PATIENCE_S
 from typer.testing import CliRunner
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
 import gazerig
-from gazerig.doors import admission, livekit, openai_realtime, pipecat, voice_assistant, wyoming
+from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
-from gazerig.doors.spoken_sound import SpokenSound
-from gazerig.doors.turn_taking import Orders, TurnOrder, TurnTaking, UnknownMessage
+from gazerig.doors.turn_taking import Orders, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.app.door_processes import load_door
 from gazerig.robot.cli import door as cli_door
@@ -197,18 +193,6 @@ def test_messages_become_orders(name: str) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", CONVERSATIONS)
-def test_any_order_of_messages_gives_orders_for_changes_only(name: str) -> None:
-    make, messages = CONVERSATIONS[name]
-    door, former = make(), "idle"
-    for i in range(7 * len(messages)):
-        for order in door.take(messages[i * 5 % len(messages)][0], i * 0.4):
-            assert order.state != former or order.state == "speaking"
-            assert order.seconds is None or order.seconds >= 0.0
-            former = "listening" if order.state == "interrupt" else order.state
-        assert door.talk.state == former
-
-
 @pytest.mark.parametrize(
     ("make", "message", "remedy"),
     [
@@ -234,26 +218,6 @@ def test_played_speech_ends_by_its_length() -> None:
     assert door.due(8.0) == ()  # the answer may continue
     door.take(event("response.done"), 5.2)
     assert door.due(6.9) == () and brief(door.due(7.1)) == ["listening"] and door.due(9.0) == ()
-
-
-def test_added_text_moves_the_planned_end_once() -> None:
-    talk = TurnTaking()
-    talk.add_text("x" * 30, 0.0)
-    assert brief(talk.speak(1.0)) == [("speaking", "30 characters")]
-    assert brief(talk.add_text("xx", 2.0)) == []
-    assert brief(talk.add_text("x" * 28, 2.0)) == [("speaking", "45 characters")]  # 15 are spoken
-    assert brief(talk.add_text("x" * 9000, 2.0)) == [("speaking", "4985 characters")]
-
-
-def test_a_text_of_spaces_is_no_speech() -> None:
-    talk = TurnTaking()
-    talk.add_text(" " * 60, 0.0)
-    assert talk.speak(0.0) == (TurnOrder("speaking"),)
-    assert talk.speak(1.0, 4.0) == (TurnOrder("speaking", 3.0),)
-    talk = TurnTaking()
-    talk.add_text("Yes." + " " * 60, 0.0)
-    assert talk.speak(0.0)[0].text.strip() == "Yes."
-    assert talk.add_text(" " * 90, 3.0) == (TurnOrder("speaking"),)  # what is left of it
 
 
 # A neighbour on this computer
@@ -311,27 +275,6 @@ def test_a_voice_assistant_is_followed_and_found_again() -> None:
         assert sum(words in line for line in head.said) == 1, head.said
 
 
-def test_a_head_that_ends_is_found_again_with_its_state() -> None:
-    assistant = Assistant()
-
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        async with assistant:
-            await until(lambda: assistant.sockets)
-            await assistant.send(lva("listening"))
-            await until(lambda: head.states == ["listening"])
-            head.refuses = "the rig is stopped"
-            await assistant.send(lva("thinking"))
-            await until(lambda: any("refuses thinking: the rig is stopped" in s for s in head.said))
-            head.ended, head.refuses = True, ""
-            await assistant.send(lva("tts_speaking"))
-            await until(lambda: any("which has ended" in line for line in head.said))
-            head.ended = False
-            await until(lambda: head.states == ["listening", "thinking", "speaking"])
-            assert not any("waiting for a head" in line for line in head.said)
-
-    run(voice_assistant.DOOR, scenario, f"ws://127.0.0.1:{assistant.port}")
-
-
 @pytest.mark.parametrize("door", [pipecat.DOOR, openai_realtime.DOOR], ids=lambda one: one.name)
 def test_web_pages_are_refused_and_programs_are_not(door: Door) -> None:
     """Also a page of this computer, a page in a frame without an address, and a rebound name."""
@@ -366,54 +309,6 @@ def test_web_pages_are_refused_and_programs_are_not(door: Door) -> None:
         assert any("a web page of null was refused; let a program" in line for line in head.said)
 
     run(door, scenario, "ws://127.0.0.1:9", f"127.0.0.1:{port}")
-
-
-def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    bind = f"127.0.0.1:{free_port()}"
-
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
-        async with ClientSession() as session:
-            sockets = [await session.ws_connect(f"ws://{bind}/x?y=1") for _ in range(8)]
-            for one in sockets[1:]:
-                await one.send_json(rtvi("user-started-speaking"))
-            await until(lambda: head.states == ["listening"])
-            sockets.append(await session.ws_connect(f"ws://{bind}"))
-            assert (await sockets[0].receive()).type.name in ("CLOSED", "CLOSE", "ERROR")
-            await sockets[-1].send_json(rtvi("bot-started-speaking"))
-            await until(lambda: head.last == "speaking")
-            with pytest.raises(WSServerHandshakeError, match="503"):  # all have spoken
-                await session.ws_connect(f"ws://{bind}")
-            monkeypatch.setattr(admission, "IDLE_S", 0.0)  # a long time later
-            await session.ws_connect(f"ws://{bind}")
-            assert not sockets[-1].closed  # the idlest one was closed
-            await sockets[-1].send_json({"type": "x"})
-            await sockets[-1].close()
-            await until(lambda: head.last == "idle")
-
-    head = run(pipecat.DOOR, scenario, bind=bind)
-    assert [line.split(" at once")[0] for line in head.said[1:3]] == ["more than 8 connections"] * 2
-    assert "the idlest is closed" in head.said[1] and "the newest is refused" in head.said[2]
-
-
-def test_a_satellite_takes_the_place_of_an_idle_one() -> None:
-    pytest.importorskip("wyoming", reason="it is in the extra doors")
-    port = free_port()
-
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        await until(lambda: head.said)
-        idle = [await asyncio.open_connection("127.0.0.1", port) for _ in range(8)]
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        writer.write(b'{"type": "describe"}\n')
-        await asyncio.wait_for(reader.readuntil(b"gazerig"), PATIENCE_S)
-        with contextlib.suppress(ConnectionError):
-            assert await idle[0][0].read() == b""
-        for _, one in (*idle, (reader, writer)):
-            one.close()
-
-    run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
 
 
 def open_as_a_stranger(port: int, monkeypatch: pytest.MonkeyPatch) -> socket.socket:
@@ -452,26 +347,6 @@ def test_another_user_of_this_computer_cannot_speak(
         writer.close()
 
     run(door, scenario, bind=f"127.0.0.1:{port}")
-
-
-def test_the_user_of_a_connection_is_read_from_the_system_s_table() -> None:
-    mapped = "0000000000000000FFFF0000"
-    rows = [
-        # A server's end, the ends of two programs, one of them on IPv6, and one that has closed.
-        "0: 0100007F:17A8 0100007F:C635 01 0:0 00:0 0 7 0 11 1",
-        "1: 0100007F:C635 0100007F:17A8 01 0:0 00:0 0 1000 0 12 1",
-        f"2: {mapped}0100007F:C636 {mapped}0100007F:17A8 01 0:0 00:0 0 1001 0 13 1",
-        "3: 0100007F:C637 0100007F:17A8 05 0:0 03:1 0 0 0 0 3",
-        f"4: {'0' * 24}01000000:C638 {'0' * 24}01000000:17A8 01 0:0 00:0 0 1002 0 14 1",
-    ]
-    if sys.byteorder == "big":
-        pytest.skip("the rows are those of a little-endian computer")
-    own, users = ("127.0.0.1", 0x17A8), {0xC635: 1000, 0xC636: 1001, 0xC637: None, 0xC639: None}
-    for port, user in users.items():
-        assert admission.socket_user(rows, ("127.0.0.1", port), own) == user
-    own6 = ("::ffff:127.0.0.1", 0x17A8, 0, 0)
-    assert admission.socket_user(rows, ("::ffff:127.0.0.1", 0xC635, 0, 0), own6) == 1000
-    assert admission.socket_user(rows, ("::1", 0xC638, 0, 0), ("::1", 0x17A8, 0, 0)) == 1002
 
 
 def test_realtime_sessions_are_relayed_with_their_key() -> None:
@@ -601,19 +476,6 @@ def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent: bytes) -> None
     run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
 
 
-def test_of_a_flood_of_sound_ten_minutes_wait_and_a_cut_drops_them() -> None:
-    sound, head = SpokenSound(8000, 1), TalkingHead()
-    for _ in range(16_000):
-        sound.feed(b"ab")
-    sound.end()
-    assert sound.say(head.connect) == "" and len(head.sounds[0][2]) == 30_000
-    sound = SpokenSound(8000, 1, volume=0.0)
-    sound.feed(b"ab")
-    sound.cut()
-    assert sound.say(head.connect) == ""
-    assert head.mouths == [(8000, 1, b"")] and head.ended_tracks == ["speech"]
-
-
 # In the neighbour's own process
 
 
@@ -723,19 +585,6 @@ def test_an_agent_in_a_room_steers_the_head() -> None:
     asyncio.run(scenario())
     assert head.mouths == [(16_000, 1, bytes(640))] and "speech" in head.ended_tracks
     assert room.joined == () and not any("token" in line for line in head.said)
-
-
-@pytest.mark.parametrize(
-    ("part", "text"),
-    [
-        ("Hi ", "Hi "),
-        ('{"text": "Hi ", "start_time": 0.1}\n{"text": "you"}\n', "Hi you"),
-        ("{Hi", "{Hi"),
-        ('{"a": 1}', '{"a": 1}'),
-    ],
-)
-def test_a_transcription_may_have_times(part: str, text: str) -> None:
-    assert livekit.plain_text(part) == text
 
 
 def test_a_room_needs_an_address_and_a_token(monkeypatch: pytest.MonkeyPatch) -> None:

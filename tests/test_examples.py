@@ -4,23 +4,17 @@ import re
 import runpy
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import nullcontext
 from math import hypot
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 from fakes.talking_head import TalkingHead
 from papers import ROOT
 
 import gazerig
-from gazerig.drivers.types import DetectedFace, DetectedPalm, ImageArray
-from gazerig.drivers.vision.body_detector import BodyDetector
-from gazerig.drivers.vision.face import detector
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -115,60 +109,6 @@ def test_the_second_head_looks_where_the_first_does(shown: Shown) -> None:
     assert max(other for _, other in yaws) - min(other for _, other in yaws) > 8.0
 
 
-class Drawn(BodyDetector):
-    """Finds a green face and a red palm."""
-
-    def __init__(self) -> None:
-        pass
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        x, y, width, height = cv2.boundingRect(np.ascontiguousarray(image[..., 1]))
-        return (DetectedFace((x, y, width, height), np.zeros((5, 2)), 0.9),) if width else ()
-
-    def palms(self, image: ImageArray, *_: Any) -> tuple[DetectedPalm, ...]:
-        x, y, width, height = cv2.boundingRect(np.ascontiguousarray(image[..., 2]))
-        return (DetectedPalm((x + width / 2.0, y + height / 2.0), height, 0.9),) if width else ()
-
-
-def webcam_frames() -> Iterator[tuple[bool, ImageArray | None]]:
-    """Draw a person at .8 m whose right hand is held up, punches, and drops, 20 a second."""
-    for k in range(80):
-        away_m, down_m = (0.25, 0.05) if 30 <= k < 40 else (0.58, 0.5 if k >= 50 else 0.2)
-        image = np.zeros((720, 640, 3), np.uint8)
-        cv2.rectangle(image, (270, 100), (370, 217), (0, 255, 0), -1)  # .163 m high
-        px_m = 0.9 * 640 / away_m
-        half = round(0.095 * px_m / 2.0)
-        x, y = 320 - round(0.1 * px_m), 158 + round(down_m * px_m)
-        cv2.rectangle(image, (x - half, y - half), (x + half, y + half), (0, 0, 255), -1)
-        yield True, image
-    yield True, np.zeros((720, 640, 3), np.uint8)  # nobody
-    yield False, None
-
-
-def test_the_hand_before_a_webcam_moves_the_fist_of_the_opponent(
-    shown: Shown, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    opponent = pytest.importorskip("gazerig.features.world.opponent_motion")
-    drawn, fists = webcam_frames(), []
-    head = SimpleNamespace(move_opponent=lambda *at_m: fists.append(at_m))
-    camera = SimpleNamespace(read=lambda: next(drawn))
-    monkeypatch.setattr(cv2, "VideoCapture", {0: camera}.__getitem__)
-    monkeypatch.setattr(detector, "face_detector", lambda params: Drawn())
-    monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(head))
-    assert shown("box_by_hand.py", "0") == []
-    assert len(fists) == 80
-    ready, hit, low = fists[10], fists[35], fists[70]
-    assert ready == pytest.approx((0.7, 0.1, 0.01), abs=0.03)  # your right is the head's left
-    assert hit == pytest.approx((0.37, 0.1, 0.16), abs=0.03)
-    assert low[2] == pytest.approx(-0.29, abs=0.03)
-    motion = opponent.OpponentMotion((0.7, 0.0, 0.0))
-    for number in range(400):
-        if number % 5 == 0:
-            motion.set_target(fists[number // 5], 0.01 * number)
-        motion.step(number)
-    assert "punch" in [event.name for event in motion.events]
-
-
 def test_the_own_door_passes_words_on(monkeypatch: pytest.MonkeyPatch, shown: Shown) -> None:
     head, words = TalkingHead(), iter((b"listening\n", b"sing", b"\xff", b"speaking"))
     port = SimpleNamespace(bind=lambda address: None, recv=lambda most: next(words))
@@ -192,26 +132,3 @@ def test_the_sweep_shows_what_speeds_do_and_repeats_itself(shown: Shown) -> None
 
 
 # ---- the list
-
-
-def listed() -> dict[str, int]:
-    """Return the examples of the README with their lines."""
-    text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
-    return {name: int(n) for name, n in re.findall(r"\| \[(\w+\.py)\]\(\1\) \| (\d+) \|", text)}
-
-
-def test_the_readme_lists_every_example_with_its_lines() -> None:
-    there = {path.name: len(path.read_text("utf-8").splitlines()) for path in EXAMPLES.glob("*.py")}
-    assert listed() == there
-
-
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
-def test_an_example_is_short_and_says_what_it_shows_and_how_to_run_it(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 60
-    assert "\nShows: " in text and f"\nRun:   python examples/{path.name}" in text
-
-
-def test_every_example_is_judged_here() -> None:
-    judged = re.findall(r'shown\("(\w+\.py)"', Path(__file__).read_text(encoding="utf-8"))
-    assert set(judged) == {path.name for path in EXAMPLES.glob("*.py")}

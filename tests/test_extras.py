@@ -9,8 +9,6 @@ import pytest
 from features_there import needs_all_features
 from light_python import LightPython
 
-from gazerig.drivers.errors import extra_hint, install_command
-
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
@@ -84,27 +82,6 @@ def test_the_head_runs_without_extras(python: LightPython, tmp_path: Path) -> No
     )
     assert codes == ["0"] * 4, said
     assert (tmp_path / "run.json").is_file()
-
-
-def test_a_clone_installs_an_extra_from_its_own_folder(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(ROOT)
-    assert install_command("world") == "pip install -e '.[world]'"
-    monkeypatch.chdir(tmp_path)
-    assert install_command("world") == f"pip install -e '{ROOT}[world]'"
-    monkeypatch.setattr("gazerig.drivers.errors._CLONE", tmp_path)
-    assert install_command("world") == "pip install 'gazerig[world]'"
-
-
-def test_a_package_that_is_there_and_does_not_load_is_told_with_the_reason() -> None:
-    broken = ImportError("libstdc++.so.6: cannot open\nshared object file", name="depthai")
-    assert extra_hint("depthai", "oak", broken) == (
-        "depthai cannot be loaded (libstdc++.so.6: cannot open shared object file): "
-        f"{install_command('oak')}"
-    )
-    within = ModuleNotFoundError("No module named 'numpy.core'", name="numpy.core")
-    assert extra_hint("depthai", "oak", within).startswith("depthai cannot be loaded (No module")
 
 
 @needs_all_features

@@ -40,10 +40,6 @@ def rig(tmp_path: Path) -> Rig:
     return Rig(tmp_path)
 
 
-def test_an_untouched_file_is_no_news(rig: Rig) -> None:
-    assert rig.looks(20) == []
-
-
 def test_a_new_content_is_told_once_after_it_was_seen_twice(rig: Rig) -> None:
     rig.write(NEW)
     assert rig.looks(1) == []
@@ -64,13 +60,6 @@ def test_same_time_and_size_but_other_content_is_news(rig: Rig) -> None:
     assert rig.looks(3) == [NEW]
 
 
-def test_a_change_taken_back_before_it_counted_is_no_news(rig: Rig) -> None:
-    rig.write(NEW)
-    rig.looks(1)
-    rig.write(OLD)
-    assert rig.looks(10) == []
-
-
 def test_an_editor_that_renames_a_new_file_over_it(rig: Rig) -> None:
     beside = rig.path.with_suffix(".tmp")
     beside.write_text(NEW, encoding="utf-8")
@@ -86,32 +75,12 @@ def test_an_editor_that_removes_it_for_a_moment(rig: Rig, looks_without: int) ->
     assert rig.looks(3) == [NEW]
 
 
-def test_the_same_content_back_after_a_moment_is_no_news(rig: Rig) -> None:
-    rig.path.unlink()
-    rig.looks(2)
-    rig.write(OLD)
-    assert rig.looks(10) == []
-
-
 @pytest.mark.parametrize("first", ["", "name: ne"], ids=["empties it", "cuts a line"])
 def test_an_editor_that_empties_it_first_or_writes_in_pieces(rig: Rig, first: str) -> None:
     rig.write(first)
     assert rig.looks(4) == []
     rig.write(NEW)
     assert rig.looks(3) == [NEW]
-
-
-@pytest.mark.parametrize("text", ["name: newest", ""], ids=["no end of the line", "empty"])
-def test_a_text_that_stays_unfinished_is_told_later(rig: Rig, text: str) -> None:
-    rig.write(text)
-    assert rig.looks(20) == [text]
-
-
-def test_a_file_that_grows_is_told_when_it_has_stopped(rig: Rig) -> None:
-    for lines in range(1, 6):
-        rig.write(NEW + "# and\n" * lines)
-        assert rig.looks(1) == []
-    assert rig.looks(2) == [NEW + "# and\n" * 5]
 
 
 def test_a_file_that_stays_away_is_told_once_and_so_is_its_return(rig: Rig) -> None:
@@ -121,15 +90,6 @@ def test_a_file_that_stays_away_is_told_once_and_so_is_its_return(rig: Rig) -> N
     assert rig.looks(20) == ["(gone)", OLD]
 
 
-def test_a_file_without_rights_counts_as_missing(rig: Rig) -> None:
-    rig.path.chmod(0)
-    if os.access(rig.path, os.R_OK):
-        pytest.skip("this user may read everything")
-    assert rig.looks(3) == []
-    rig.path.chmod(0o600)
-    assert rig.looks(5) == []
-
-
 def test_what_the_program_saved_itself_is_no_news(rig: Rig) -> None:
     rig.write(NEW)
     rig.looks(1)
@@ -137,46 +97,6 @@ def test_what_the_program_saved_itself_is_no_news(rig: Rig) -> None:
     assert rig.looks(10) == []
     rig.write(OLD)
     assert rig.looks(3) == [OLD]
-
-
-def test_saved_finds_a_file_by_any_of_its_names(rig: Rig) -> None:
-    other = rig.path.with_name("link.yaml")
-    other.symlink_to(rig.path)
-    rig.write(NEW)
-    rig.watch.saved(other)
-    assert rig.looks(10) == []
-
-
-def test_files_may_change_while_it_looks(tmp_path: Path) -> None:
-    one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
-    for path in (one, two):
-        path.write_text(OLD, encoding="utf-8")
-    files, reported = [one], list[Path]()
-    watch = FileWatch(lambda: files, reported.append)
-    watch.look()
-    files[:] = [one, two]
-    for _ in range(5):
-        watch.look()
-    assert reported == []  # what it holds when it comes into use is known
-    two.write_text(NEW, encoding="utf-8")
-    for _ in range(5):
-        watch.look()
-    assert reported == [two]
-
-
-def test_an_edit_right_after_a_file_was_saved_under_a_new_name_is_heard(tmp_path: Path) -> None:
-    one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
-    one.write_text(OLD, encoding="utf-8")
-    files, reported = [one], list[Path]()
-    watch = FileWatch(lambda: files, reported.append)
-    watch.look()
-    two.write_text(OLD, encoding="utf-8")
-    watch.saved(two)
-    files[:] = [two]
-    two.write_text(NEW, encoding="utf-8")  # before the first look
-    for _ in range(5):
-        watch.look()
-    assert reported == [two]
 
 
 def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
@@ -191,28 +111,5 @@ def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
     assert threads_named("file watch") == []
 
 
-def test_stop_without_start_is_no_error() -> None:
-    FileWatch(list, lambda _: None).stop()
-
-
 def threads_named(name: str) -> list[threading.Thread]:
     return [thread for thread in threading.enumerate() if thread.name == name]
-
-
-def test_saved_may_be_called_while_somebody_is_told(rig: Rig) -> None:
-    """A save waits for the tuning, which waits for no one that waits for the save."""
-    done: list[bool] = []
-
-    def changed(path: Path) -> None:
-        saver = threading.Thread(target=watch.saved, args=(path,))
-        saver.start()
-        saver.join(timeout=5.0)
-        done.append(not saver.is_alive())
-
-    watch = FileWatch(lambda: [rig.path], changed)
-    watch.look()
-    rig.write(NEW)
-
-    watch.look()
-    watch.look()
-    assert done == [True]

@@ -5,10 +5,9 @@ import re
 from typing import Any
 
 import pytest
-from line_noise import IDS, Noisy
+from line_noise import Noisy
 
 from gazerig.drivers.errors import PortError
-from gazerig.drivers.event_log import SELDOM_S, EventLog, RateLimitedLog
 from gazerig.drivers.process.host_lateness import (
     AFTERMATH_S,
     BUSY,
@@ -18,7 +17,6 @@ from gazerig.drivers.process.host_lateness import (
     HostLateness,
 )
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.servo_bus.faults import NOT_SET_UP
 
 KINDS = ("dynamixel", "feetech")
 SYNC_READ = 0x82
@@ -49,18 +47,6 @@ def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():
     starved.record_late_answer(3.0)
     assert "the emulator was suspended" in starved.cause(3.5)
     assert starved.cause(3.0 + 2 * AFTERMATH_S) == ""
-
-
-def test_the_same_is_said_seldom_and_counted():
-    journal = EventLog()
-    seldom = RateLimitedLog(journal)
-    for k in range(30):
-        seldom.add("late", 7.0 + 0.1 * k)
-    seldom.add("late", 7.0 + SELDOM_S)
-    assert journal.drain() == ("late", "late (29 more times since it was last reported)")
-    seldom.add("late", 8.0 + SELDOM_S)
-    seldom.add("late", 8.0 + 2.0 * SELDOM_S)
-    assert journal.drain() == ("late (once more since it was last reported)",)
 
 
 @pytest.mark.parametrize("kind", (*KINDS, "pca9685"))
@@ -149,26 +135,6 @@ def test_servos_that_stood_still_for_a_while_are_no_bad_plug(kind, seconds):
     assert outcome.wrong == 0
 
 
-def test_servos_that_cannot_be_set_up_in_time_have_no_second_id():
-    """After a brown-out each servo is set up by many questions, whose answers come late here."""
-    noisy = Noisy("dynamixel")
-    noisy.start()
-    for servo_id in IDS:
-        noisy.device.faults.command(f"brown-out {servo_id}")
-    write = noisy.port.write
-
-    def delayed(data):
-        if data[7] == SYNC_READ:  # the loop's own request is another one
-            noisy.device.faults.command("delay all 18 count 6")
-        write(data)
-
-    noisy.port.write = delayed  # type: ignore[method-assign]
-    outcome = noisy.run("clear", 0.0, 900)
-    failed = [text for text in outcome.said if NOT_SET_UP in text]
-    assert failed and all("this computer was busy" in text for text in failed), outcome.said
-    assert not [text for text in outcome.said if re.search(BLAME, text)], outcome.said
-
-
 @pytest.mark.parametrize("since_s", [5.0, None])
 def test_one_rule_decides_whether_a_cable_is_blamed(since_s):
     lateness = HostLateness()
@@ -201,17 +167,6 @@ def test_an_answer_that_may_be_to_an_older_question_is_confirmed_by_another():
     outcome = noisy.run("stall all 5 count 12", 0.0, 20)
     assert asked.count(SYNC_READ) > in_peace + 20
     assert outcome.wrong == 0
-
-
-@pytest.mark.parametrize("kind", (*KINDS, "maestro", "pca9685"))
-def test_servos_without_power_for_a_while_are_told_as_that(kind):
-    noisy = Noisy(kind)
-    noisy.start()
-    noisy.bus.events()
-    outcome = noisy.run("lose all for 0.6", 0.0, 500)
-    about = [text for text in outcome.said if "answer" in text]
-    assert len(about) == 1, about
-    assert "s: check" in about[0]
 
 
 # --- which port it is

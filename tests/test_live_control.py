@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from gazerig.config.load import ConfigError, ConfigFault
-from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Command
@@ -122,17 +121,6 @@ def test_a_file_that_went_away_is_said_and_the_values_stay(rig: Rig) -> None:
     assert rig.tuning.text == "second\n" and len(rig.said) == 2
 
 
-def test_a_file_that_says_what_is_in_force_is_no_change(rig: Rig) -> None:
-    rig.tuning.text = "second\n"
-    assert "without changes" in rig.written("second\n")
-
-
-def test_files_that_cannot_be_named_for_once_are_those_from_before(rig: Rig) -> None:
-    rig.tuning.lost = True
-    rig.tuning.version += 1
-    assert "values are applied" in rig.written("second\n")
-
-
 def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
     (folder / "gazerig").write_text("in the way", encoding="utf-8")
     rig = Rig(folder)
@@ -142,13 +130,3 @@ def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
         assert "values are applied" in rig.written("second\n")
     finally:
         rig.live.close()
-
-
-def test_close_without_open_is_no_error(folder: Path) -> None:
-    Rig(folder).live.close()
-
-
-def test_a_refusal_of_the_robot_is_no_error_of_the_program(rig: Rig) -> None:
-    with connect_to_all()[0] as remote, pytest.raises(SetupError, match="it cannot move a head"):
-        remote.stop()
-    assert rig.said == []

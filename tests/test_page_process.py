@@ -1,13 +1,12 @@
 """The page's process: it delays no one, ends with its parent and finds a free port."""
 
-import json
 import os
 import signal
 import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,17 +16,12 @@ from urllib.parse import urlsplit
 import child_processes
 import pytest
 import shown_page
-from page_visitor import LOOKING, PATIENCE_S, Visitor, unpacked
+from page_visitor import PATIENCE_S, Visitor
 from present import present
 from shown_page import AHEAD, free_port, running_page, wait_for
 
-from gazerig.robot.dashboard.feed.page_process import URL, PageProcess, encode_snapshot
-from gazerig.robot.dashboard.page_main import free_port as first_free_port
-from gazerig.robot.dashboard.page_main import show_until_closed
+from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.requests.inbox import BEAT
-from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.view.viewpoints import BOTH, NAMES, named_view
-from gazerig.robot.dashboard.widgets.widgets import PANELS
 from gazerig.robot.model.types import SeenFace
 
 REPOSITORY = Path(__file__).parents[1]
@@ -75,13 +69,6 @@ def page_process(parent: int) -> int | None:
     return None
 
 
-def in_time(work: Callable[[], None]) -> bool:
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    thread.join(PATIENCE_S)
-    return not thread.is_alive()
-
-
 def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
     check = (
         "import gazerig.robot.dashboard.feed.page_process, sys;"
@@ -96,15 +83,6 @@ def test_unopened_page_drops() -> None:
     page.show_frame(b"jpeg")
     assert (page.dropped, page.frames_dropped, page.url(), page.notice()) == (1, 1, None, None)
     page.close()
-
-
-def test_more_than_the_page_can_show_is_passed_over() -> None:
-    page = PageProcess("127.0.0.1", 8080)
-    for tick in range(200):
-        page.show(replace(SNAPSHOT, t_s=5.0 + 0.005 * tick))
-    assert page.dropped == 100  # every second one was offered, and dropped as nothing is open
-    page.show(replace(SNAPSHOT, t_s=0.0))  # the clock was started again
-    assert page.dropped == 101
 
 
 # A page for the four that follow.
@@ -133,32 +111,6 @@ def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
     assert Visitor(url).get()
     assert page.notice() is None
     assert page_here() == process
-
-
-def test_a_view_chosen_before_the_scene_has_loaded_is_taken(
-    shared: tuple[PageProcess, str, int],
-) -> None:
-    visitor = Visitor(shared[1])
-    position_m, look_at_m, *_ = named_view(BOTH)
-    with visitor.open("/rig/panels") as panels:
-        panels.send(json.dumps({"seen": list(PANELS)}))
-        told: list[tuple[int, dict[str, object]]] = []
-        while not (found := [n for n, props in told if props.get("options") == list(NAMES)]):
-            message = panels.recv(timeout=PATIENCE_S)
-            told = json.loads(message).get("put", []) if isinstance(message, str) else []
-        panels.send(json.dumps({"set": [found[0], BOTH]}))
-        # Messages of one browser are taken in their order: this one has an answer.
-        panels.send(json.dumps({"set": [found[0], "from the moon"]}))
-        while "from above" not in str(panels.recv(timeout=PATIENCE_S)):
-            pass
-    with visitor.open("/view") as scene:
-        scene.send(LOOKING)
-        sent: dict[str, object] = {}
-        while len(sent) < 2:
-            for one in unpacked(scene.recv(timeout=PATIENCE_S, decode=False))["messages"]:
-                if one["type"].startswith("SetCamera") and not one.get("initial"):
-                    sent |= {w: one[w] for w in ("position", "look_at") if w in one}
-    assert sent == {"position": pytest.approx(position_m), "look_at": pytest.approx(look_at_m)}
 
 
 def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> None:
@@ -199,27 +151,6 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         assert page.notice() is None
 
 
-def test_a_suspended_page_holds_up_nobody_and_is_replaced() -> None:
-    def show_many() -> None:
-        for tick in range(3000):
-            page.show(replace(SNAPSHOT, t_s=0.01 * tick))
-
-    with running_page() as (page, url):
-        process = page_here()
-        assert process is not None
-        os.kill(process, signal.SIGSTOP)
-        assert in_time(show_many)
-        assert 2000 < page.dropped <= 3000
-        in_time(lambda: page.show_frame(bytes(100_000)))
-
-        def replaced() -> bool:
-            page.show(SNAPSHOT)
-            return page.started == 2
-
-        wait_for(replaced, "another page")
-        assert page.url() == url and page_here() not in (None, process)
-
-
 @pytest.mark.parametrize("beats", [True, False])
 def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -256,51 +187,6 @@ def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> No
         theirs.close()
 
 
-@pytest.mark.parametrize("stuck", ["drawing", "door", ""])
-def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    drawn, let_go, draws = threading.Event(), threading.Event(), [0]
-
-    def show(_news: object) -> None:
-        draws[0] += 1
-        drawn.set()
-        if stuck == "drawing":
-            let_go.wait()
-
-    view = SimpleNamespace(
-        choices={}, emulated=None, watched=lambda: False, silent=lambda: None, show=show
-    )
-    # A door whose thread is stuck accepts tasks and never does them.
-    door = SimpleNamespace(
-        is_open=lambda: True, call_soon=lambda do: None if stuck == "door" else do()
-    )
-    served = SimpleNamespace(door=door, pointer=SimpleNamespace(), outbox=Outbox(cast(Any, theirs)))
-    run = threading.Thread(
-        target=show_until_closed, args=(theirs, view, os.getppid(), served), daemon=True
-    )
-    ours.send(encode_snapshot(SNAPSHOT))
-    run.start()
-    try:
-        assert drawn.wait(PATIENCE_S)
-        ours.setblocking(False)
-        heard = 0
-        # The first beat is of the round before; a page that is stuck has no second one.
-        while heard < 2 and draws[0] < 20:
-            try:
-                heard += ours.recv(10) == BEAT
-            except BlockingIOError:
-                if stuck == "drawing":
-                    break
-                ours.send(encode_snapshot(SNAPSHOT))
-                let_go.wait(0.02)
-        assert heard == {"drawing": 1, "door": 0, "": 2}[stuck]
-    finally:
-        ours.close()
-        let_go.set()
-        run.join(PATIENCE_S)
-        theirs.close()
-
-
 def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     heard: list[object] = []
     slow = threading.Event()
@@ -322,12 +208,6 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     finally:
         slow.set()
         page.close()
-
-
-def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
-    with running_page() as (page, _):
-        page.show(replace(SNAPSHOT, level="mad"))  # type: ignore[arg-type]
-        assert "KeyError: 'mad'" in wait_for(page.notice, "the notice")
 
 
 PARENT = """
@@ -358,20 +238,3 @@ def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
         finally:
             if sibling > 0:
                 os.kill(sibling, signal.SIGKILL)
-
-
-def test_address_of_another_machine_is_refused_in_words() -> None:
-    page = PageProcess("192.0.2.1", 8080)
-    page.open()
-    words = wait_for(page.notice, "the notice")
-    assert "cannot open 192.0.2.1 port 8080" in words and page.gone
-    page.close()
-
-
-def test_free_port_takes_the_first_free_one() -> None:
-    with socket.socket() as other:
-        other.bind(("127.0.0.1", 0))
-        free = other.getsockname()[1]
-        other.listen()
-        assert first_free_port("127.0.0.1", free) > free
-    assert first_free_port("127.0.0.1", free) == free

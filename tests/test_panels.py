@@ -76,17 +76,6 @@ def test_a_slow_browser_gets_only_the_newest_of_each(widgets: Widgets) -> None:
     assert tab.seen[1]["content"] == "words 999" and tab.images == {2: b"image 999"}
 
 
-def test_nothing_is_seen_by_halves(widgets: Widgets) -> None:
-    first, second = (widgets.panel("watch").html() for _ in range(2))
-    tab = Tab(widgets)
-    tab.read()
-    with widgets.hold_changes():
-        first.content = "new"
-        assert tab.read() == []
-        second.content = "new"
-    assert tab.read() == [1, 2]
-
-
 def test_a_drawer_that_is_shut_is_not_sent_until_it_is_opened(widgets: Widgets) -> None:
     camera = widgets.panel("camera").image("camera")
     words = widgets.panel("health").html("guard: ok")
@@ -155,14 +144,6 @@ def test_what_a_field_cannot_hold_is_refused_in_words(
     assert tab.seen[1].get("value") == before  # the browser gets the present value
 
 
-def test_whole_numbers_stay_whole(widgets: Widgets) -> None:
-    slider = widgets.panel("tune").slider("id", (0, 252), 1, 7, whole=True)
-    slider.receive_input(9, "panels-1")
-    assert slider.value == 9 and isinstance(slider.value, int)
-    with pytest.raises(ValueError, match="whole"):
-        slider.receive_input(9.5, "panels-1")
-
-
 @pytest.mark.parametrize(
     "text",
     ["no JSON", "[]", "{}", '{"set": 3}', '{"set": [true, 1]}', '{"set": ["1", 1]}', "NaN",
@@ -192,41 +173,3 @@ def test_what_is_of_one_browser_is_neither_seen_nor_set_by_another(widgets: Widg
     assert heard == ["mine"]
     widgets.leave(one.client)
     assert Tab(widgets).read() == []  # it is gone with its browser
-
-
-def test_a_button_that_was_removed_a_moment_ago_is_pressed_in_good_faith(widgets: Widgets) -> None:
-    section = widgets.panel("steer").section("face")
-    buttons = section.buttons("track", ("nod",))
-    tab = Tab(widgets)
-    assert tab.read() == [1, 2]
-    section.remove()
-    tab.send({"set": [2, "nod"]})
-    tab.read()
-    assert tab.seen == {} and tab.notices == []
-    buttons.options = ("shake",)  # has no effect
-    assert tab.read() == []
-
-
-def test_words_go_to_who_asked_else_to_its_browser_else_to_all(widgets: Widgets) -> None:
-    tabs = [Tab(widgets, f"browser {k}") for k in (1, 1, 2)]
-
-    def told() -> list[bool]:
-        out = []
-        for tab in tabs:
-            tab.read()
-            out.append(bool(tab.notices))
-            tab.notices.clear()
-        return out
-
-    widgets.notify("saved", tabs[0].client.name)
-    assert told() == [True, False, False]
-    widgets.notify("too far", "5", "browser 1", refused=True)
-    assert told() == [True, True, False]
-    widgets.notify("the disk is full", "door")
-    assert told() == [True, True, True]
-
-
-def test_a_menu_whose_choice_is_gone_falls_back_to_its_first(widgets: Widgets) -> None:
-    menu = widgets.panel("watch").choice("show", ("yaw", "pitch", "neck"), "neck")
-    menu.options = ("yaw", "pitch")
-    assert menu.value == "yaw"

@@ -2,12 +2,10 @@
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
 from shown_page import SNAPSHOT
 from ticked_rig import Outbox
 
-from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves, outline, timeline_html
+from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves, timeline_html
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.commands import ControlTrack, Play
 from gazerig.robot.model.control_source import FINISHED, TrackState
@@ -102,11 +100,3 @@ def test_the_list_describes_all_tracks_and_escapes_texts() -> None:
     listed = Drawer().panel.list.content
     assert "a &lt;b&gt;song&lt;/b&gt;" in listed and "1.20 times slower" in listed
     assert "hello.wav" in listed
-
-
-@pytest.mark.parametrize("length", [0, 1, 50, 16000])
-def test_the_outline_of_a_sound(length: int) -> None:
-    loud = outline(np.linspace(0.0, -0.5, length, dtype=np.float32), 160)
-    assert loud.shape == (160,) and np.isfinite(loud).all() and loud.min() >= 0.0
-    if length > 1:
-        assert loud[-1] == pytest.approx(1.0) and loud[0] < 0.1

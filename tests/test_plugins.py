@@ -28,8 +28,6 @@ from gazerig.drivers.plugins import (
     SHIPPED,
     SURROUNDINGS,
     TRACKS,
-    AttentionPlugin,
-    CameraPlugin,
     Plugin,
 )
 from gazerig.robot.app.camera_factory import real_camera
@@ -105,22 +103,6 @@ def test_ours_are_found_and_loaded_by_the_same_code(group, name):
 # --- those of others
 
 
-def test_a_package_is_imported_when_its_part_is_used_and_no_sooner(folder):
-    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
-    (found,) = [one for one in plugins.registrations(ATTENTION) if not one.is_ours]
-    assert (found.name, found.maker) == ("tallest", "tall-rule 1.2")
-    assert found.label == "attention 'tallest' of tall-rule 1.2"
-    assert "tall_rule" not in sys.modules
-    assert isinstance(plugins.load(ATTENTION, "tallest", AttentionPlugin), AttentionPlugin)
-    assert "tall_rule" in sys.modules
-
-
-def test_a_plain_class_is_a_part_without_parameters(folder):
-    install(folder, "p", {CAMERA: {"fish": "fish_eye:Fish"}}, {"fish_eye": "class Fish: pass"})
-    part = plugins.load(CAMERA, "fish", CameraPlugin)
-    assert type(plugins.create(CAMERA, "fish", part, part.params())).__name__ == "Fish"
-
-
 def test_a_name_nobody_brings_is_refused_with_those_there_are(folder):
     install(folder, "p", {CAMERA: {"fish": "fish_eye:Fish"}}, {"fish_eye": "class Fish: pass"})
     with pytest.raises(
@@ -160,13 +142,6 @@ def test_a_package_that_cannot_be_imported_is_one_line_at_its_key(
     line = fault(with_chooser(tmp_path, "bad"))
     assert "mine.yaml:" in line and "gaze.chooser" in line
     assert f"attention 'bad' of bad-rule 1.2 cannot be loaded: {reported}" in line
-
-
-def test_something_else_than_a_part_is_refused(folder, tmp_path):
-    install(folder, "odd", {ATTENTION: {"odd": "odd_one:PLUGIN"}}, {"odd_one": "PLUGIN = 7"})
-    assert "attention 'odd' of odd 1.2 is a int, wanted a AttentionPlugin" in fault(
-        with_chooser(tmp_path, "odd")
-    )
 
 
 # --- their sections of the rig file
@@ -228,12 +203,6 @@ def test_rigs_and_tracks_of_a_package_are_found_by_their_names(folder, tmp_path)
         load_rig("othr")
     with pytest.raises(ConfigError, match="did you mean 'bow'"):
         tracks_of(("bov",))
-
-
-def test_a_package_that_names_no_folder_is_refused(folder):
-    install(folder, "odd", {RIGS: {"odd": "odd_one:x"}}, {"odd_one": "x = 7"})
-    with pytest.raises(ConfigError, match="rigs 'odd' of odd 1.2 is not a folder"):
-        load_rig("nowhere")
 
 
 # --- the list

@@ -1,11 +1,11 @@
 """The eyes look at a pointer over the view: the point is under the viewer's pointer."""
 
-from math import atan2, inf, nan, radians, tan
+from math import inf, nan, radians, tan
 
 import pytest
 from present import present
 
-from gazerig.gaze.angles import add, dot, rotate_back, scale, sub, unit
+from gazerig.gaze.angles import dot, rotate_back, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.dashboard.requests.pointer_to_look import (
     BURST,
@@ -14,7 +14,6 @@ from gazerig.robot.dashboard.requests.pointer_to_look import (
     PointerToLook,
     ViewCamera,
     gaze_target,
-    opponent_target,
     parse_pointer,
 )
 from gazerig.robot.model.clock import SimulatedClock
@@ -61,20 +60,6 @@ def test_the_point_is_drawn_under_the_pointer(
     assert share == pytest.approx(TOWARDS_HEAD)
 
 
-def test_a_pointer_on_the_eyes_makes_them_look_at_the_viewer() -> None:
-    x, y = seen_at(EYES, turned_camera(), 1.4)
-    point = present(gaze_target(Pointer(x, y, 1.4), turned_camera(), EYES))
-    to_viewer = sub(turned_camera().p_world_m, EYES)
-    assert point == pytest.approx(add(EYES, scale(to_viewer, 1.0 - TOWARDS_HEAD)))
-
-
-def test_a_pointer_to_the_viewers_left_is_to_the_heads_right() -> None:
-    left = present(gaze_target(Pointer(0.2, 0.5, 1.6), AHEAD_OF_IT, EYES))
-    up = present(gaze_target(Pointer(0.5, 0.2, 1.6), AHEAD_OF_IT, EYES))
-    assert atan2(left[1] - EYES[1], left[0] - EYES[0]) < -0.2  # y is the head's left
-    assert up[2] > EYES[2] + 0.05 and abs(up[1]) < 1e-9
-
-
 def test_who_is_inside_the_head_or_looks_away_from_it_leads_nowhere() -> None:
     inside = AHEAD_OF_IT._replace(p_world_m=(0.04, 0.0, 0.14))
     away = AHEAD_OF_IT._replace(p_world_m=(-0.8, 0.0, 0.14))
@@ -114,40 +99,3 @@ def test_a_pointer_is_handed_on_with_who_points_and_no_faster_than_a_burst() -> 
     assert taken == len(looks) == BURST - 1
     assert {who for _, who in looks} == {"ana"}
     assert looks[0][0][0] > EYES[0]
-
-
-LOOKS_AT_THE_OPPONENT = ViewCamera(
-    (-0.5, 0.0, 0.1), ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)), radians(50.0)
-)
-
-
-def test_the_fist_of_the_opponent_is_under_the_pointer_and_within_its_box() -> None:
-    point = present(opponent_target(Pointer(0.6, 0.4, 1.5), LOOKS_AT_THE_OPPONENT))
-    assert seen_at(point, LOOKS_AT_THE_OPPONENT, 1.5) == pytest.approx((0.6, 0.4))
-    assert point[0] == pytest.approx(0.7)
-    # A pointer outside of the box moves the fist to its edge; nothing behind the viewer is moved.
-    assert opponent_target(Pointer(1.0, 1.0, 1.5), LOOKS_AT_THE_OPPONENT) == pytest.approx(
-        (0.7, -0.6, -0.4)
-    )
-    near = AHEAD_OF_IT._replace(p_world_m=(0.6, 0.0, 0.14))
-    assert opponent_target(Pointer(0.5, 0.5, 1.5), near) is None
-
-
-def test_a_pointer_moves_either_gaze_or_opponent() -> None:
-    looks: list[Vec3] = []
-    moves: list[Vec3] = []
-    pointer = PointerToLook(
-        lambda who: LOOKS_AT_THE_OPPONENT,
-        lambda p, who: looks.append(p),
-        SimulatedClock(),
-        moves.append,
-    )
-    pointer.p_world_eyes_m = EYES
-    at = {"x": 0.5, "y": 0.5, "aspect": 1.0}
-    assert (
-        pointer.look_at_pointer({**at, "opponent": True}, "a browser")
-        and not looks
-        and len(moves) == 1
-    )
-    assert pointer.look_at_pointer(at, "a browser") and len(looks) == len(moves) == 1
-    assert not pointer.look_at_pointer({**at, "x": nan, "opponent": True}, "a browser")

@@ -34,11 +34,6 @@ def test_a_process_is_lowered_within_its_session_and_with_it(tmp_path: Path, lea
     assert group.read_text() == "2"
 
 
-def test_a_system_without_groups_of_sessions_is_no_fault(tmp_path: Path) -> None:
-    nice = str(os.getpriority(os.PRIO_PROCESS, 0) + 4)
-    assert _lowered(tmp_path / "missing" / "autogroup", True) == [nice, "True"]
-
-
 def test_real_time_priority_stays() -> None:
     code = (
         "import os; from gazerig.drivers.process.priority import request_slice; "
@@ -48,23 +43,6 @@ def test_real_time_priority_stays() -> None:
     assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "False\n"
 
 
-RAISE = (
-    "from pathlib import Path; from gazerig.drivers.process.priority import raise_priority; "
-    "raise_priority(Path({group!r}))"
-)
-
-
-@pytest.mark.parametrize(("leads", "text"), [(True, "-10"), (False, "")])
-def test_only_the_leader_of_a_session_raises_its_priority(
-    tmp_path: Path, leads: bool, text: str
-) -> None:
-    group = tmp_path / "autogroup"
-    group.touch()
-    words = [sys.executable, "-c", RAISE.format(group=str(group))]
-    subprocess.run(words, check=True, start_new_session=leads)
-    assert group.read_text() == text
-
-
 @pytest.mark.parametrize(("nice", "shared"), [(-10, "-10"), (0, ""), (3, "")])
 def test_a_raised_priority_is_shared_with_a_process(tmp_path: Path, nice: int, shared: str) -> None:
     for name, text in (("self", f"/autogroup-7 nice {nice}\n"), ("12", "")):
@@ -72,7 +50,3 @@ def test_a_raised_priority_is_shared_with_a_process(tmp_path: Path, nice: int, s
         (tmp_path / name / "autogroup").write_text(text)
     share_priority(12, tmp_path)
     assert (tmp_path / "12/autogroup").read_text() == shared
-
-
-def test_a_system_without_groups_shares_nothing(tmp_path: Path) -> None:
-    share_priority(12, tmp_path)

@@ -10,7 +10,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
@@ -32,14 +31,9 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
-from gazerig import open as open_head
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
-from gazerig.robot.control.gaze_events import EVENT_KINDS
 from gazerig.robot.dashboard.door import programs
-from gazerig.robot.model.command_json import from_json
-from gazerig.robot.model.outcome import Progress
-from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.client import RobotClient
 from gazerig.robot.remote.openapi import api_description
 
@@ -166,17 +160,6 @@ LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
 # Purpose
 
 
-def test_state_is_that_of_the_socket(rig: Rig) -> None:
-    status, answer = rig.get("/state")
-    assert status == 200 and answer["ok"]["events"] == []
-    state = answer["ok"]["state"]
-    mine, _ = rig.client.state()
-    assert mine is not None and state["joints"].keys() == mine.joints.keys()
-    assert set(state["client_control"]) == set(mine.client_control._fields)
-    _, answer = rig.get("/state?after=0")
-    assert {event["kind"] for event in answer["ok"]["events"]} <= set(EVENT_KINDS)
-
-
 def test_orders_have_outcomes(rig: Rig) -> None:
     status, answer = rig.post({"do": "look_at", "p_world_m": LEFT, "tag": "a"}, "?wait_s=15")
     assert status == 200 and answer["tag"] == "a" and answer["outcome"] == "arrived"
@@ -255,48 +238,6 @@ def test_who_hangs_while_leading_gives_control_back(rig: Rig) -> None:
         end.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
         rig.until(lambda now: now["controlled_by"])
         rig.until(lambda now: not now["controlled_by"])
-
-
-def test_a_posted_order_ends_by_its_time_or_after_its_request(rig: Rig) -> None:
-    began_s = time.monotonic()
-    rig.post({"do": "look_at", "p_world_m": LEFT, "for_s": 2.5}, "?wait_s=0")
-    rig.until(lambda now: not now["controlled_by"])
-    assert time.monotonic() - began_s > 2.0
-    rig.post({"do": "look_at", "p_world_m": RIGHT}, "?wait_s=0")
-    rig.until(lambda now: not now["controlled_by"])
-
-
-def test_posted_speech_lasts_for_its_seconds_and_other_states_for_one(rig: Rig) -> None:
-    """A request has no connection that could be lost; times are those of the head's clock."""
-
-    def talk(**message: object) -> dict[str, Any]:
-        assert "ok" in rig.post({"do": "talk", **message}, "?wait_s=0")[1]
-        return conversation()
-
-    def conversation() -> dict[str, Any]:
-        now = rig.get("/state")[1]["ok"]["state"]
-        return {"t_s": now["t_s"], **now["conversation"]}
-
-    spoken = talk(state="speaking", seconds=2.0)
-    while (now := conversation())["t_s"] < spoken["since_s"] + 1.5:
-        assert now["state"] == "speaking" and now["ends_s"] == spoken["since_s"] + 2.0
-    for message in ({"state": "listening"}, {"state": "speaking", "text": "x" * 90}):
-        begun = talk(**message)
-        while (now := conversation())["state"] != "idle":
-            pass
-        assert now["end_reason"] == "not renewed"
-        assert now["since_s"] - begun["since_s"] == pytest.approx(1.0, abs=0.1)
-
-
-def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
-    """A leaving program of the network does not disturb the client in control on this computer."""
-    with rig.dial() as end:
-        ask(end, do="look_at", p_world_m=LEFT, tag=1)
-        heard(end, "tag", 1)
-        x, y, z = RIGHT
-        rig.client.look_at(x, y, z)
-    time.sleep(1.5)
-    assert rig.client.status()["controlled_by"].startswith("the test")
 
 
 def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
@@ -379,25 +320,6 @@ def test_a_bad_message_gets_one_clear_error(rig: Rig, body: bytes, status: int, 
 def test_a_wrong_query_gets_one_clear_error(rig: Rig, path: str, text: str) -> None:
     status, answer = rig.get(path, Upgrade="websocket", Connection="Upgrade")
     assert status == 400 and text in answer["refused"]
-
-
-def test_other_methods_paths_and_versions_are_named(rig: Rig) -> None:
-    for path in ("/../v2/state", "/nothing", "/do"):
-        status, answer = rig.get(path)
-        assert status == 404 and "version 1 is at /api/v1/" in answer["refused"]
-    assert rig.get("/socket")[0] == 426
-
-
-def test_binary_and_huge_frames(rig: Rig) -> None:
-    with rig.dial() as end:
-        heard(end, "tag", "hello")
-        end.send(b"\x00\x01")
-        assert "not text" in heard(end, "refused")["refused"]
-        end.send(" " * 1_000_000)
-        with pytest.raises(ConnectionClosed) as closed:
-            end.recv(timeout=PATIENCE_S)
-        assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
-    assert rig.get("/state")[0] == 200
 
 
 # Allowed visitors
@@ -584,25 +506,6 @@ def test_commands_that_wait_are_refused_by_a_stop_and_questions_are_not() -> Non
     assert asyncio.run(stop()) == [{**refused, "tag": 1}, refused, {"do": "status"}, True]
 
 
-def test_a_slow_reader_loses_states_and_delays_nobody(rig: Rig) -> None:
-    parts = urlsplit(rig.url)
-    with socket.socket() as lazy:
-        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        lazy.connect((parts.hostname, parts.port))
-        lazy.sendall(
-            f"GET /api/v1/socket?rate_hz=60&events=true&token={rig.token} HTTP/1.1\r\n"
-            f"Host: {parts.netloc}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            "Sec-WebSocket-Version: 13\r\n"
-            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode()
-        )
-        with rig.dial("&rate_hz=20") as quick:
-            times = [heard(quick, "state")["state"]["t_s"] for _ in range(60)]
-        assert times[-1] - times[0] < 6.0
-        now_s = rig.client.state()[0].t_s  # type: ignore[union-attr]
-        assert now_s - times[-1] < 1.0
-    assert rig.get("/state")[0] == 200
-
-
 def test_a_program_too_many_takes_the_place_of_the_oldest(rig: Rig) -> None:
     with contextlib.ExitStack() as stack:
         first = stack.enter_context(rig.dial())
@@ -612,51 +515,6 @@ def test_a_program_too_many_takes_the_place_of_the_oldest(rig: Rig) -> None:
             while True:
                 first.recv(timeout=PATIENCE_S)
         assert rig.get("/state")[0] == 200
-
-
-def test_what_waits_for_a_program_is_bounded_and_states_come_at_its_rate() -> None:
-    async def fill() -> None:
-        program = programs.ProgramSocket(60.0, True)
-        for number in range(1000):
-            program.queue_message({"number": number})
-        sent = []
-        while text := program.outgoing():
-            sent.append(json.loads(text)["number"])
-        assert sent == list(range(1000 - 256, 1000))
-        for rate_hz in (0.0, 10.0, 30.0, 60.0):
-            reader, count = programs.ProgramSocket(rate_hz, False), 0
-            for k in range(600):  # ten seconds of news at 60 Hz, not quite regular
-                reader.add_news(
-                    programs.HeadNews(f"{k}", (), Progress()), 5.0 + k / 60.0 + k % 2 * 3e-3
-                )
-                count += bool(reader.outgoing())
-            assert count == pytest.approx(10.0 * rate_hz, abs=2)
-
-    asyncio.run(fill())
-
-
-def test_states_after_an_answer_are_not_older() -> None:
-    async def follow() -> list[Any]:
-        program = programs.ProgramSocket(60.0, False)
-        program.add_news(programs.HeadNews('"before"', (), Progress()), 5.0)
-        program.queue_answer({"do": "look_at"}, {"ok": 1}, 5.02)
-        program.add_news(programs.HeadNews('"read before the answer"', (), Progress()), 5.019)
-        program.add_news(programs.HeadNews('"after"', (), Progress()), 5.03)
-        return [json.loads(text) for text in iter(program.outgoing, "")]
-
-    assert asyncio.run(follow()) == ["before", {"ok": 1}, "after"]
-
-
-@pytest.mark.parametrize("number", range(3))
-def test_a_state_after_the_answer_to_a_stop_shows_it(rig: Rig, number: int) -> None:
-    with rig.dial("&rate_hz=60") as end:
-        heard(end, "state")
-        why = f"stop {number}"
-        ask(end, do="stop", why=why, tag="s")
-        heard(end, "tag", "s")
-        assert heard(end, "state")["state"]["stopped"] == why
-    assert rig.post({"do": "stop", "why": "by post"})[0] == 200
-    assert rig.get("/state")[1]["ok"]["state"]["stopped"] == "by post"
 
 
 # The description
@@ -686,89 +544,11 @@ def test_the_description_describes_what_is_sent(rig: Rig) -> None:
             check(wrong, "look_at")
 
 
-def test_the_page_lists_every_message(rig: Rig) -> None:
-    status, headers, text = fetch(f"{rig.base}/?token={rig.token}")
-    assert status == 200 and headers["Content-Type"].startswith("text/html")
-    assert all(f"<td>{verb}<td>" in text for verb in (*QUESTIONS, *CHANGES, *ORDERS))
-
-
 DOCS = ROOT / "docs" / "connect-your-program.md"
-
-
-def test_the_page_of_the_docs_lists_every_message_and_its_fields() -> None:
-    text = DOCS.read_text(encoding="utf-8")
-    rows = re.findall(
-        r"^\| ([a-z_, ]+) \| ?(.*?) ?\| .*\|$", text.split("## Messages")[1], re.MULTILINE
-    )
-    listed = {verb: fields for verbs, fields in rows for verb in verbs.split(", ")}
-    assert listed.pop("do") == "fields"
-    schemas = api_description("/api/v1")["components"]["schemas"]
-    assert set(listed) == {*QUESTIONS, *CHANGES, *ORDERS}
-    for verb, fields in listed.items():
-        known = set(schemas[verb]["properties"]) - {"do", "tag", "who", "stay", "for_s", "pointer"}
-        known -= {"look_at_pixel": {"p_world_m"}, "play": {"lead_s", "sound_s"}}.get(verb, set())
-        assert known == {name for name in known if name in fields}, verb
-
-
-def test_every_message_of_the_docs_is_one() -> None:
-    found = re.findall(r'\{"do": "(?:[^{}]|\{\})*?\}', DOCS.read_text(encoding="utf-8"))
-    components = api_description("/api/v1")["components"]
-    assert len(found) >= 10
-    for text in found:
-        message = json.loads(text.replace('"who": ...', '"who": "me"'))
-        whole = {"$ref": f"#/components/schemas/{message['do']}", "components": components}
-        jsonschema.Draft202012Validator(whole).validate(message)
-
-
-def test_the_messages_to_a_voice_agent_s_head_name_what_the_shipped_rig_has() -> None:
-    found = re.findall(
-        r'\{"do": "(?:set_level|express|play)".*?\}', DOCS.read_text(encoding="utf-8")
-    )
-    with open_head("expressive", mock=True, fast=True) as head:
-        for text in found:
-            order = head._send(from_json(json.loads(text)))
-            head.sleep(0.1)
-            assert order.reply is not None and not order.reply.refused, text
-    assert {json.loads(text)["do"] for text in found} == {"set_level", "express", "play"}
 
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
-
-
-@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
-def test_the_lines_for_curl_work(rig: Rig) -> None:
-    lines = blocks("sh")[0].splitlines()[1:]
-    given = {**os.environ, "RIG": rig.base, "TOKEN": rig.token}
-    for line in lines:
-        done = subprocess.run(line, shell=True, env=given, capture_output=True, check=True)
-        assert "ok" in json.loads(done.stdout), line
-    assert rig.client.status()["stopped"] == "a hand"
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-def test_the_lines_for_node_work(rig: Rig, tmp_path: Path) -> None:
-    node = shutil.which("node")
-    assert node is not None
-    network, local = (tmp_path / "network.mjs", tmp_path / "local.mjs")
-    for file, text in zip((network, local), blocks("js"), strict=True):
-        file.write_text(text, encoding="utf-8")
-        assert len(text.splitlines()) <= 5
-    words = [node, str(network), f"{rig.url}/?token={rig.token}"]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "arrived"
-    path = remote_socket.socket_folder(os.environ, os.getuid()) / f"{rig.client.pid}.sock"
-    process = subprocess.Popen([node, str(local), str(path)], stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        said = ""
-        while '"name":"nod"' not in said:
-            assert (line := process.stdout.readline())
-            said += line
-        assert '"version":1' in said
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def test_the_bridge_for_arduino_turns_the_gaze(rig: Rig, tmp_path: Path) -> None:
@@ -793,23 +573,6 @@ def test_the_bridge_for_arduino_turns_the_gaze(rig: Rig, tmp_path: Path) -> None
 
 
 # Examples
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-def test_the_node_example_follows_a_person(rig: Rig) -> None:
-    node = shutil.which("node")
-    assert node is not None
-    file = ROOT / "examples" / "follow.mjs"
-    process = subprocess.Popen(
-        [node, str(file), f"{rig.url}/?token={rig.token}"], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        rig.until(lambda now: "look at person" in now["controlled_by"])
-        assert process.stdout is not None and "person" in process.stdout.readline()
-    finally:
-        process.kill()
-        process.communicate()
-    rig.until(lambda now: not now["controlled_by"])
 
 
 @pytest.mark.browser

@@ -2,12 +2,10 @@
 
 import json
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
-from branch import ran
-from command_line import figures, gazerig, typed
+from command_line import figures, gazerig
 from ideal_bus import ideal_buses
 from slow_rigs import at_rate
 
@@ -93,19 +91,3 @@ def test_boxing_shows_the_papers_five_behaviours_with_their_latencies(half: str)
         assert seen[name]["seen"] == seen[name]["of"] > 0, name
     assert seen["punch"]["latency_s"] <= 0.4 and seen["wave"]["latency_s"] <= 0.4
     assert run["seconds"] == pytest.approx(45.0, abs=0.1)
-
-
-def test_a_recorded_run_is_run_again_to_the_same_bytes(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "run.mcap"
-    run = figures("--seconds", "2", "--record", str(file))
-    assert run["ticks"] == pytest.approx(2 * 200, abs=2)
-    assert run["stopped_by"] == "seconds" and file.stat().st_size > 10_000
-    again = ran("rerun", str(file))
-    assert again.returncode == 0, again.stderr
-    words = re.sub(r"\s+", " ", again.stdout + again.stderr)
-    assert "ticks are bit-identical; the bytes on the bus are the same" in words
-    capfd.readouterr()
-    assert typed("run", "--mock", "--fast", "--seconds", "1", "--record", str(file)) == 2
-    assert "already exists" in capfd.readouterr().err

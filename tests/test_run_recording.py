@@ -2,9 +2,7 @@
 
 import base64
 import json
-import os
 from collections import Counter
-from collections.abc import Iterable
 from datetime import datetime
 from math import inf, nan
 from pathlib import Path
@@ -19,33 +17,27 @@ from mcap.reader import make_reader
 from recorded_run import (
     STARTED,
     Recorded,
-    assembly,
     exact,
     handed_over,
     info_for,
     ordered,
     record,
-    with_picture,
 )
 from scipy.spatial.transform import Rotation
 
 from gazerig.config.load import load
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import Rig, load_rig, load_walk
-from gazerig.drivers.types import Detections
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.tick_stream import TickBatch, TickStream
-from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import commands
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.recorder import FramePicker, Recorder
 from gazerig.robot.recording.run_info import (
     RunEnd,
     RunInfo,
@@ -53,9 +45,7 @@ from gazerig.robot.recording.run_info import (
     read_run_end,
     read_run_info,
 )
-from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.viewer_messages import orientation
-from gazerig.robot.recording.writer_process import PIECE_BYTES, RecordRouter
 
 
 @pytest.fixture(scope="module")
@@ -83,27 +73,6 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
         Ask, LookAt, Jog, Stop, Resume, Tune
     }  # fmt: skip
     assert any(tick.stopped for tick in back)
-
-
-def test_percepts_come_back_and_stay_the_same_object_between_pictures(recorded: Recorded) -> None:
-    back = list(RunRecording(recorded.path).ticks())
-    assert any(tick.percept is not None and tick.percept.faces for tick in back)
-    pairs = list(zip(recorded.ticks, back, strict=True))
-    for (was, now), (was_next, now_next) in zip(pairs, pairs[1:], strict=False):
-        assert (was.percept is was_next.percept) == (now.percept is now_next.percept)
-        assert (was.percept is None) == (now.percept is None)
-        if was.percept is not None and now.percept is not None:
-            assert repr(now.percept.faces) == repr(was.percept.faces)
-            for name in Bodies.__slots__:
-                same(getattr(now.percept.bodies, name), getattr(was.percept.bodies, name))
-
-
-def same(now: object, was: object) -> None:
-    if isinstance(was, np.ndarray):
-        assert isinstance(now, np.ndarray) and now.dtype == was.dtype and now.shape == was.shape
-        assert now.tobytes() == was.tobytes()
-    else:
-        assert now == was
 
 
 def test_what_entered_the_run_beside_the_ticks_is_kept(recorded: Recorded) -> None:
@@ -151,80 +120,6 @@ def test_pictures_come_at_their_rate_with_their_exposure(recorded: Recorded) -> 
     assert np.diff(times) == pytest.approx([0.25] * 5, abs=0.051)
     pixels = cv2.imdecode(np.frombuffer(found[1][1], np.uint8), cv2.IMREAD_COLOR)
     assert pixels is not None and pixels.shape[:2] == (40, 60)
-
-
-def test_no_pictures_where_none_are_asked_for(recorded: Recorded) -> None:
-    found = with_picture(recorded.ticks[0], 0).detections
-    assert not FramePicker(0.0).is_due(found)
-    assert FramePicker(2.0).is_due(found)
-
-
-def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
-    """Return the times of the frames that are picked of these."""
-    picker, picture = FramePicker(rate_hz), np.zeros((2, 2, 3), np.uint8)
-    return [
-        at_s
-        for number, at_s in enumerate(times_s, 1)
-        if picker.is_due(Detections(at_s, number, 2, 2, image=picture))
-    ]
-
-
-def test_a_late_frame_does_not_delay_those_that_follow() -> None:
-    camera = (k / 100.0 for k in range(200) if not 40 <= k < 45 and not 100 <= k < 170)
-    wanted = [0.0, 0.2, 0.45, 0.6, 0.8, 1.7, 1.9]  # after a long gap the count starts again
-    assert picked_s(5.0, camera) == pytest.approx(wanted)
-
-
-@pytest.mark.parametrize(("rate_hz", "every"), [(30.0, 1), (10.0, 3), (15.0, 2)])
-def test_frames_whose_times_are_rounded_are_picked_at_the_rate(rate_hz: float, every: int) -> None:
-    dice = np.random.default_rng(1)
-    times = [round(k / 30.0 + dice.uniform(-4e-4, 4e-4), 4) for k in range(3000)]
-    assert picked_s(rate_hz, times) == times[::every]
-
-
-def test_a_tick_without_an_image_is_no_frame() -> None:
-    picker, picture = FramePicker(5.0), np.zeros((2, 2, 3), np.uint8)
-    assert not picker.is_due(None)
-    assert not picker.is_due(Detections(0.0, 1, 2, 2))
-    assert picker.is_due(Detections(0.01, 2, 2, 2, image=picture))
-    assert not picker.is_due(Detections(0.01, 2, 2, 2, image=picture))
-
-
-def test_pictures_are_not_more_than_were_asked_for() -> None:
-    assert len(picked_s(10.0, (k / 200.0 for k in range(20_000)))) == 1000
-
-
-def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
-    made = assembly()
-    path = tmp_path / "large.mcap"
-    recorder = Recorder(path, info_for(), patient=True)
-    recorder.open()
-    made.robot.start(made.clock)
-    noise = np.random.default_rng(0).integers(0, 255, (900, 1200, 3), np.uint8)
-    found = Detections(0.001, 1, 1200, 900, image=noise)
-    recorder.record(made.robot.tick(0.005, 0.005)._replace(detections=found))
-    recorder.close("seconds")
-    ((at_s, jpeg),) = RunRecording(path).frames()
-    assert at_s == 0.001 and len(jpeg) > 2 * PIECE_BYTES
-    assert jpeg == encode(noise)
-
-
-def test_a_picture_and_a_health_message_follow_the_tick_that_brought_them(
-    recorded: Recorded,
-) -> None:
-    with recorded.path.open("rb") as file:
-        found = list(make_reader(file).iter_messages(log_time_order=False))
-    times: dict[str, list[float]] = {fmt.FRAME: [], fmt.HEALTH: []}
-    t_s = 0.0
-    for _, channel, message in found:
-        if channel.topic == fmt.TICK:
-            t_s = json.loads(message.data)["t_s"]
-        elif channel.topic in times:
-            times[channel.topic].append(t_s)
-    exposed = [at_s for at_s, _ in RunRecording(recorded.path).frames()]
-    assert times[fmt.FRAME] == pytest.approx([at_s + 0.03 for at_s in exposed])
-    first_s = recorded.ticks[0].t_s
-    assert times[fmt.HEALTH] == pytest.approx([first_s, first_s + 1.0])
 
 
 def test_health_comes_once_a_second(recorded: Recorded) -> None:
@@ -287,13 +182,6 @@ def test_viewers_are_sent_25_messages_a_second(recorded: Recorded, topic: str) -
     assert len(sent_to_viewers(recorded, topic)) == pytest.approx(25 * 1.49, abs=2)
 
 
-def test_a_viewer_sees_joints_as_they_are_measured(recorded: Recorded) -> None:
-    for tick, data in sent_to_viewers(recorded, fmt.JOINT_STATES):
-        joints = data["joints"]
-        assert [one["position"] for one in joints] == list(tick.joints.position_rad)
-        assert [one["velocity"] for one in joints] == list(tick.joints.velocity_rad_s)
-
-
 def vector(of: dict[str, float]) -> list[float]:
     return [of[axis] for axis in "xyz"]
 
@@ -319,39 +207,6 @@ def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) 
     assert turned > 0.05  # the frames differ
 
 
-def test_faces_and_lines_of_sight_as_far_as_the_point_are_drawn(recorded: Recorded) -> None:
-    shown = 0
-    for tick, data in sent_to_viewers(recorded, fmt.SCENE):
-        (entity,), pose = data["entities"], tick.pose
-        # The lists of a SceneEntity in Foxglove's documentation; viewers want to find them all.
-        assert entity.keys() == {
-            "timestamp", "frame_id", "id", "lifetime", "frame_locked", "metadata", "arrows",
-            "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models",
-        }  # fmt: skip
-        points = np.array([vector(point) for point in entity["lines"][0]["points"]])
-        aim = np.array(tick.gaze.gaze_point_world_m)
-        faces = tick.percept.faces if tick.percept is not None else ()
-        balls = [vector(ball["pose"]["position"]) for ball in entity["spheres"]]
-        assert np.array(balls) == pytest.approx(np.array([*(f.p_world_m for f in faces), aim]))
-        shown += len(faces)
-        for (begin, end), left in ((points[:2], True), (points[2:], False)):
-            eye = np.array(pose.p_world_eye_left_m if left else pose.p_world_eye_right_m)
-            assert begin == pytest.approx(eye)
-            assert np.linalg.norm(end - begin) == pytest.approx(np.linalg.norm(aim - eye))
-            sight = (end - begin) / np.linalg.norm(end - begin)
-            assert sight == pytest.approx(line_of_sight(pose, left))
-    assert shown > 10
-
-
-def test_a_viewer_shows_a_frame_at_its_exposure(recorded: Recorded) -> None:
-    start_s = datetime.fromisoformat(STARTED).timestamp() - recorded.ticks[0].t_s
-    found = sent_to_viewers(recorded, fmt.FRAME)
-    for tick, data in found:
-        shown_s = data["timestamp"]["sec"] + data["timestamp"]["nsec"] / 1e9
-        assert shown_s == pytest.approx(start_s + tick.t_s - 0.03, abs=1e-6)
-    assert len(found) == 6
-
-
 def unexplained(data: Any, schema: dict[str, Any], at: str = "") -> list[str]:
     """List what a schema does not explain, or explains as something else."""
     kinds = {"object": dict, "array": list, "string": str, "number": (int, float),
@@ -370,21 +225,6 @@ def unexplained(data: Any, schema: dict[str, Any], at: str = "") -> list[str]:
     missing = [f"{at}.{key}: not explained" for key in data if key not in known and not free]
     inner = [(f"{at}.{key}", data[key], known[key]) for key in data if key in known]
     return missing + [fault for name, value, s in inner for fault in unexplained(value, s, name)]
-
-
-@pytest.mark.parametrize("odd", [nan, inf, -inf, -0.0, 5e-324, 1.7976931348623157e308])
-def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
-    tick = recorded.ticks[-1]
-    tick = tick._replace(
-        joints=tick.joints._replace(measured_s=(odd,) * 9, temperature_c=(None, odd, *(30.0,) * 7)),
-        desired_rad=(odd, *tick.desired_rad[1:]),
-        target=tick.target._replace(salience=odd),
-        percept=None,
-    )
-    values = msgspec.json.decode(msgspec.json.encode(moments.as_json(handed_over(tick, odd)[1])))
-    back = moments.from_json(values, {})
-    assert exact(back.tick) == exact(tick)
-    assert repr(back.dt_s) == repr(odd)
 
 
 def test_leads_and_tracks_come_back(recorded: Recorded) -> None:
@@ -432,35 +272,6 @@ def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: str) -> Non
     assert read_run_info(text).seed == 7
     with pytest.raises(ValueError, match="."):
         read_run_info({**text, name: nonsense})
-
-
-@pytest.mark.parametrize(
-    ("name", "nonsense"),
-    [("stopped_by", "3"), ("tx_sha256", "null"), ("lost", '"3"'), ("lost", "1.0"), ("ran_s", "-1"),
-     ("ran_s", '"1"'), ("ran_s", "NaN")],
-)  # fmt: skip
-def test_an_end_that_no_run_has_is_refused(name: str, nonsense: str) -> None:
-    text = as_text(RunEnd("seconds", 3, 1.5, "ab"))
-    assert read_run_end(text) == RunEnd("seconds", 3, 1.5, "ab")
-    with pytest.raises(ValueError, match="."):
-        read_run_end({**text, name: nonsense})
-
-
-def test_percepts_that_are_over_take_no_memory(recorded: Recorded, tmp_path: Path) -> None:
-    writer = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), {}, 0)
-    router, stream = RecordRouter(writer), TickStream(print)
-
-    def take(batch: TickBatch) -> bool:
-        router.write_ticks(batch.data)
-        return True
-
-    stream.add_sink("test", take)
-    for tick in recorded.ticks:
-        stream.append(tick, 0.005, ())
-    stream.flush()
-    writer.close(RunEnd())
-    assert len({id(tick.percept) for tick in recorded.ticks}) > 20
-    assert len(router._percepts) <= 1
 
 
 def test_a_rotation_as_a_quaternion() -> None:

@@ -12,12 +12,9 @@ from fakes.runs import ticks
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from recorded_run import Recorded, assembly, exact, info_for, ordered, record
-from typer.testing import CliRunner
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.cli.main import app
-from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
 from gazerig.robot.model import commands
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import BadRecording, RunRecording
@@ -125,14 +122,6 @@ def test_a_file_is_not_written_over_unasked(tmp_path: Path) -> None:
 # --- what goes wrong while it runs
 
 
-def test_a_run_that_never_began_leaves_no_file(tmp_path: Path) -> None:
-    path = tmp_path / "never.mcap"
-    recorder = Recorder(path, info_for())
-    recorder.open()
-    assert recorder.close("fault") == f"nothing was recorded: {path} was not created"
-    assert not path.exists()
-
-
 @pytest.fixture
 def small_disk() -> Iterator[None]:
     """Let no file grow beyond 60 kB, as on a disk that is nearly full."""
@@ -166,54 +155,6 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     assert not recording.whole
     assert path.stat().st_size <= 60_000
     list(recording.ticks())  # what is there is not damaged
-
-
-def test_a_run_whose_recording_stopped_is_a_fault(small_disk: None, tmp_path: Path) -> None:
-    path = tmp_path / "full.mcap"
-    words = ["run", "--mock", "--fast", "--seconds", "5", "--record", str(path)]
-    made = CliRunner().invoke(app, words)
-    _writer.flush(20.0)
-    assert made.exit_code == FAULT, made.output
-    assert made.exception is None or isinstance(made.exception, SystemExit)
-
-
-def test_an_older_recording_stays_until_a_run_has_begun(tmp_path: Path) -> None:
-    path = tmp_path / "older.mcap"
-    path.write_bytes(b"older")
-    path.chmod(0o600)
-    recorder = Recorder(path, info_for(), over=True)
-    recorder.open()
-    assert path.read_bytes() == b"older"
-    assert recorder.close("it could not start") == f"nothing was recorded: {path} is unchanged"
-    assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
-
-    recorder = Recorder(path, info_for(), over=True)
-    recorder.open()
-    recorder.begin()
-    assert path.read_bytes() != b"older" and path.stat().st_mode & 0o777 == 0o600
-    assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
-    recorder.close("seconds")
-
-
-def test_a_link_to_an_older_recording_stays_a_link(tmp_path: Path) -> None:
-    older, link = tmp_path / "older.mcap", tmp_path / "newest.mcap"
-    older.write_bytes(b"older")
-    link.symlink_to(older.name)
-    recorder = Recorder(link, info_for(), over=True)
-    recorder.open()
-    recorder.begin()
-    assert link.is_symlink() and older.read_bytes() != b"older"
-    assert recorder.close("fault") == f"nothing was recorded: {link} was not created"
-    assert [path.name for path in tmp_path.iterdir()] == ["newest.mcap"] and link.is_symlink()
-
-
-def test_a_robot_that_cannot_start_leaves_an_older_recording(tmp_path: Path) -> None:
-    path = tmp_path / "older.mcap"
-    path.write_bytes(b"older")
-    words = ["run", "--port", "/dev/absent", "--scene", "visitor", "--no-page", "--force"]
-    made = CliRunner().invoke(app, [*words, "--record", str(path)])
-    assert made.exit_code == BAD_INPUT, made.output
-    assert path.read_bytes() == b"older"
 
 
 def writing(path: Path) -> tuple[Recorder, Assembly, Any]:

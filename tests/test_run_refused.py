@@ -1,18 +1,14 @@
 """Errors of users, in one line before a run begins; check and schema."""
 
-import dataclasses
-import inspect
 import os
 import re
 from pathlib import Path
 
 import pytest
-from command_line import gazerig, options, typed
+from command_line import gazerig, typed
 
 import gazerig as gazerig_package
 from gazerig.config.faults import ConfigError
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli.run import run
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -21,18 +17,13 @@ DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
     ("words", "message"),
     [
         (("--mock", "--video", "nowhere.avi"), "nowhere.avi"),
-        (("--mock", "--video", "."), "."),
         (("--mock", "--camera", "97"), "97"),
         (("--scene", "visitor"), "/dev/ttyUSB0"),
-        (("--mock", "--scene", "circus"), "circus"),
         (("--mock", "--oak"), "no OAK camera found"),
         (("--mock", "--scene", "visitor", "--video", "x.avi"), "exclude each other"),
         (("--mock", "--fast", "--video", "x.avi"), "--seconds"),
-        (("--fast", "--scene", "visitor", "--seconds", "1"), "--mock"),
         (("--fast",), "--fast needs --mock"),
         (("--port", "/dev/ttyNOPE"), "no serial port /dev/ttyNOPE"),
-        (("--port", "/dev/ttyNOPE", "--camera", "97"), "no serial port /dev/ttyNOPE"),
-        (("--camera", "97"), "no serial port /dev/ttyUSB0"),
         ((), "nothing to look at"),
         (("--mock", "--page", "8080"), "HOST:PORT"),
         (("nosuchrig", "--mock"), "nosuchrig"),
@@ -51,16 +42,6 @@ def test_a_name_that_is_not_shipped_is_refused_at_once() -> None:
         gazerig_package.open("dessk")
     with pytest.raises(ConfigError, match="did you mean 'shy'"):
         gazerig_package.open("desk", character="shyy")
-
-
-@pytest.mark.parametrize("rig", [(), ("my.yaml",)])
-def test_a_missing_argument_is_named(
-    rig: tuple[str, ...], capfd: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("gazerig.features.bringup")
-    assert typed("jog", *rig, "neck_yaw") == 2
-    said = " ".join(re.sub(r"[│\n]", " ", capfd.readouterr().err).split())
-    assert "DEG (Joint angle in degrees): DEG is missing" in said
 
 
 def test_an_unknown_key_of_a_joint_is_the_only_error(
@@ -91,23 +72,6 @@ def test_ranges_in_radians_get_a_hint(tmp_path: Path, capfd: pytest.CaptureFixtu
     path.write_text(text.replace("-0.52, max_deg: 0.52", "-30, max_deg: 30"), encoding="utf-8")
     assert typed("check", str(path)) == 0
     assert hint not in capfd.readouterr().err
-
-
-def test_a_track_in_radians_gets_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    path, track = tmp_path / "my.yaml", tmp_path / "turn.yaml"
-    path.write_text(
-        DESK.read_text(encoding="utf-8") + "\ntrack_files: [turn.yaml]\n", encoding="utf-8"
-    )
-    for yaw, hinted in ((0.35, True), (20.0, False)):
-        frames = f"[{{time_s: 1, head_yaw_deg: {yaw}, head_pitch_deg: -0.1}}]"
-        track.write_text(f"description: a turn\nframes: {frames}\n", encoding="utf-8")
-        assert typed("check", str(path)) == 0
-        said = capfd.readouterr().err
-        assert ("turn.yaml: no angle is above 0.35: degrees?" in said) == hinted, said
-
-
-def test_no_option_is_a_double_negation() -> None:
-    assert not [option for option in options() if option.startswith("--no-no-")]
 
 
 def test_a_shell_sees_that_line_and_that_exit_code() -> None:
@@ -149,9 +113,3 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
     assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
-
-
-def test_every_option_of_run_is_a_field_of_the_options_of_a_run() -> None:
-    fields = {field.name for field in dataclasses.fields(RunOptions)}
-    assert set(inspect.signature(run).parameters) <= fields
-    assert fields - set(inspect.signature(run).parameters) == {"film_delay_s", "placed_by"}

@@ -14,11 +14,8 @@ import pytest
 from recorded_run import info_for
 
 from gazerig.drivers.files.file_input import MAGIC
-from gazerig.drivers.process.passed_image import copy_image, receive
-from gazerig.robot.control.tick_stream import encode
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording import writer_client
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.run_info import RunEnd, as_text
 from gazerig.robot.recording.run_writer import RunWriter
@@ -133,50 +130,6 @@ def client_of(ours: socket.socket) -> WriterClient:
     made = WriterClient(patient=False)
     made._socket = ours
     return made
-
-
-def open_files() -> int:
-    return len(os.listdir("/proc/self/fd"))
-
-
-@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts files in /proc")
-def test_images_that_wait_are_bounded_and_none_stays_open(
-    line: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writer_client, "IMAGE_BYTES", 3_000_000)
-    (ours, theirs), picture = line, np.zeros((1000, 1000), np.uint8)
-    client, before = client_of(ours), open_files()
-    while not client._queue:  # until the socket takes no more
-        client.post(writer.TICKS, bytes(50_000))
-
-    def post() -> bool:
-        image = copy_image(picture)
-        about = encode((0.0, image.shape, image.dtype))
-        return client.post_image(about, image.fd, picture.nbytes)
-
-    taken = [post() for _ in range(10)]
-    assert taken == [True] * 4 + [False] * 6  # the fourth begins below the bound
-    images = 0
-    while images < 4:
-        _, fd = receive(theirs, writer.PIECE_BYTES + 1)
-        client._send_waiting()
-        if fd >= 0:
-            os.close(fd)
-            images += 1
-    assert open_files() == before
-    assert post()  # there is room again
-    client._lose("over")
-
-
-def test_what_has_been_sent_takes_no_room(
-    line: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writer_client, "QUEUE_BYTES", 100_000)
-    ours, theirs = line
-    client = client_of(ours)
-    for _ in range(50):
-        assert client.post(writer.TICKS, bytes(10_000))
-        assert len(theirs.recv(writer.PIECE_BYTES + 1)) == 10_002
 
 
 @pytest.mark.parametrize("taking", [True, False], ids=["reads", "does not read"])

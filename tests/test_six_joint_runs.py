@@ -10,23 +10,16 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from recorded_rigs import Run, recorded
-from recorded_run import handed_over
 from six_joints import SIX
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.run_summary import Summary
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
-from gazerig.robot.recording.run_format import HEALTH
-from gazerig.robot.recording.tick_record import as_json, from_json
-from gazerig.robot.remote.request_handler import LoopMonitor
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-
-STARTED = "2026-01-31T12:00:00+00:00"
 
 
 @pytest.fixture(scope="module")
@@ -60,21 +53,6 @@ def test_six_joints_come_back_bit_for_bit_with_their_names(maker: Run) -> None:
     assert shut < 0.9  # lower lids move, and are kept
 
 
-def test_viewers_are_given_the_joints_that_are_there(maker: Run) -> None:
-    path = maker.recording.path
-    shown = [data for _, data in messages(path, "/joint_states")]
-    assert len(shown) > 100
-    assert {tuple(j["name"] for j in data["joints"]) for data in shown} == {SIX}
-    health = [data for _, data in messages(path, HEALTH)]
-    assert {tuple(data["temperature_c"]) for data in health} == {(None,) * 6}
-
-
-def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> None:
-    odd = maker.ticks[9]._replace(desired_rad=(float("nan"),) * 6)
-    data = json.loads(json.dumps(as_json(handed_over(odd._replace(percept=None))[1])))
-    assert exact(from_json(data, {}).tick) == exact(odd)
-
-
 def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
     seen: list[Tick] = []
     found = rerun(maker.recording, on_tick=seen.append)
@@ -92,35 +70,6 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
 
 
 # --- messages of the run
-
-
-def test_figures_and_status_say_what_is_estimated(maker: Run, desk: Run) -> None:
-    for ticks, estimated in ((maker.ticks, list(SIX)), (desk.ticks, [])):
-        summary, pulse = Summary(), LoopMonitor(_Still())
-        summary.update(ticks[0])
-        pulse.update(ticks[0])
-        figures = summary.figures()
-        assert figures["estimated"] == figures["reckoned"] == estimated
-        status = pulse.as_json()
-        assert status["estimated"] == status["reckoned"] == estimated
-        joints_deg = status["joints_deg"]
-        assert isinstance(joints_deg, dict) and tuple(joints_deg) == ticks[0].guard_result.joints
-
-
-class _Still:
-    def now_s(self) -> float:
-        return 0.0
-
-    def sleep_until(self, t_s: float) -> None:
-        raise AssertionError("nobody waits here")
-
-
-def test_absent_lids_count_for_nothing() -> None:
-    blinks = pytest.importorskip("gazerig.features.lab.analysis.blink_finder")
-    lid_openings, UPPER = blinks.lid_openings, blinks.UPPER  # noqa: N806
-    assert lid_openings(0.2, 0.4, SIX, UPPER) == (0.2, 0.4)
-    assert lid_openings(0.2, 1.0, ("left_upper_lid",), UPPER) == (0.2, 0.2)
-    assert lid_openings(1.0, 1.0, ("eyes_pan",), UPPER) is None
 
 
 # --- exports

@@ -1,21 +1,13 @@
 """Commands that messages suggest: typed unchanged, they reach the same rig and port."""
 
-from pathlib import Path
 from threading import Thread
-from typing import Any, cast
 
 import pytest
-from typer.testing import CliRunner
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.cli.main import app
-from gazerig.robot.cli.terminal import _writer, complete_suggestions, suggest_for_rig
-from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.robot.cli.terminal import complete_suggestions, suggest_for_rig
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 
-DESK = Path(__file__).parents[1] / "config/rigs/desk.yaml"
 GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
 
 
@@ -37,32 +29,6 @@ def test_a_suggestion_names_rig_and_port(said: str, wanted: str) -> None:
         "--port"
     ) == wanted.count("--port")
     assert complete_suggestions(said, {}) == said
-
-
-@pytest.mark.parametrize(
-    "asked",
-    [
-        ["jog", "RIG", "neck_yaw", "5"],
-        ["run", "RIG", "--scene", "visitor", "--no-page", "--seconds", "1"],
-    ],
-)
-def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path, capfd) -> None:
-    if asked[0] != "run":
-        pytest.importorskip("gazerig.features.bringup")
-    rig = tmp_path / "mine.yaml"
-    rig.write_text(DESK.read_text())
-    words = [str(rig) if word == "RIG" else word for word in asked]
-    with PtyBus() as bus:
-        path = bus.start(
-            cast(Any, next(iter(emulated_lines(load_rig("desk")).values())).servos),
-            baud=1_000_000,
-        )
-        bus.command("overload 7")
-        made = CliRunner().invoke(app, [*words, "--port", path])
-        _writer.flush(20.0)
-    said = made.output + capfd.readouterr().err
-    assert made.exit_code in (1, 2), said
-    assert f"; gazerig doctor {rig} --port {path} finds the cause" in said
 
 
 def test_other_threads_suggest_the_same_and_inner_blocks_too() -> None:

@@ -92,14 +92,6 @@ def test_who_fails_is_left_out_and_the_others_go_on(recorded: Recorded) -> None:
     assert len(sink.batches) == 5
 
 
-def test_a_text_that_cannot_be_written_is_written_as_far_as_it_can(recorded: Recorded) -> None:
-    stream, sink = TickStream(unwanted), Sink()
-    stream.add_sink("test", sink.take)
-    stream.update(recorded.ticks[0]._replace(events=("port \udcff gone",)))
-    (row,) = decode_rows(sink.batches[0].data)[1]
-    assert row.events == ("port ? gone",)
-
-
 def test_numbers_keep_their_bits_and_their_type() -> None:
     values = [0, 0.0, -0.0, 1, 1.0, True, None, "1", 5e-324, 2**63, -(2**63)]
     assert repr(decode_plain(encode(values))) == repr(values)

@@ -121,14 +121,3 @@ def test_an_address_is_told_without_a_token_that_is_kept_or_would_be_logged(
     with gazerig.open("desk", mock=True, page=page, token_file=file, say=said.append):
         wait_for(lambda: any("the page is at" in one for one in said), "the page's address")
     assert any("token=" in one for one in said) != kept
-
-
-def test_a_program_gives_the_page_a_token_file(tmp_path: Path) -> None:
-    path = tmp_path / "head.token"
-    gazerig.open("desk", mock=True, page="127.0.0.1:8080", token_file=path)
-    token = path.read_text(encoding="utf-8").strip()
-    gazerig.open("desk", mock=True, page="127.0.0.1:8080", token_file=str(path))
-    assert len(token) >= 22 and path.read_text(encoding="utf-8").strip() == token
-    path.chmod(0o644)
-    with pytest.raises(gazerig.Error, match="other users may read it"):
-        gazerig.open("desk", mock=True, page="127.0.0.1:8080", token_file=path)

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import figures, invoked, parse
-from features_there import needs_all_features, skip_without
-from tutorial import blocks, commands, steps, write_files
+from command_line import figures, invoked
+from features_there import skip_without
+from tutorial import commands, steps, write_files
 
 import gazerig
 from gazerig.config.schema import load_rig
@@ -21,12 +21,6 @@ STEPS = range(1, len(steps()) + 1)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def test_there_are_ten_steps_and_each_is_tried() -> None:
-    assert len(STEPS) == 10
-    assert all(commands(step) for step in STEPS)
-    assert {block.language for block in blocks()} <= {"sh", "yaml", "python", "text"}
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -112,11 +106,3 @@ def test_a_mouth_too_slow_for_its_jaw_is_refused_with_the_time_that_would_do(fol
     done = invoked("check", "myhead.yaml")
     assert done.code != 0 and "levels.mouth.smoothing_ms" in done.err
     assert "smoothing_ms must be at least 76 ms" in done.err
-
-
-@needs_all_features
-def test_what_the_tutorial_types_is_a_command() -> None:
-    for step in STEPS:
-        for line in commands(step):
-            if line.startswith("gazerig "):
-                parse(shlex.split(line)[1:])

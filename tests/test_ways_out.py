@@ -1,16 +1,12 @@
 """Whatever ends a command that switched torque on: the head parks and the torque goes off."""
 
-import fcntl
 import json
-import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from attack.ways_out import START, attack, bench
+from attack.ways_out import attack, bench
 from branch import Branch, gazerig
 from features_there import skip_without
 
@@ -104,17 +100,6 @@ def test_servos_that_do_not_confirm_are_said_even_where_success_is_not() -> None
     with PowerDown(head.park, off, said.append, Interrupts(), quiet=True) as leaving:
         leaving.switch_on(lambda: None)
     assert said == ["parked, torque off; servos 1-3: torque-off not confirmed: cut it"]
-
-
-def test_nobody_to_tell_changes_nothing() -> None:
-    head = Head()
-
-    def deaf(line: str) -> None:
-        raise BrokenPipeError
-
-    with PowerDown(head.park, head.off, deaf, Interrupts()) as leaving:
-        leaving.switch_on(lambda: None)
-    assert head.did == ["park", "off"]
 
 
 def test_a_start_that_is_refused_needs_no_end_and_one_that_breaks_off_does() -> None:
@@ -241,18 +226,6 @@ def ran(
     return session.run(composed, lambda: None, said.append)
 
 
-def test_who_asks_while_another_reason_is_looked_for_is_heard() -> None:
-    def thread() -> None:
-        asked.request("the program")  # as another thread does, in the middle of the look
-
-    def signalled() -> None:
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    for comes, expected in ((thread, "the program"), (signalled, "SIGTERM")):
-        with Interrupts(also=comes) as asked:
-            assert asked() == expected and asked.requests == 1
-
-
 @pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
 def test_no_memory_in_the_loop_leaves_by_the_door(
     rig: str, devices: list[Device], monkeypatch: pytest.MonkeyPatch
@@ -286,15 +259,6 @@ def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     assert [line for line in said if "plug-in" in line] == [
         "the summary failed (RuntimeError: plug-in); the rig continues without it"
     ]
-
-
-def test_nobody_to_say_anything_to_ends_nothing(devices: list[Device]) -> None:
-    def deaf(line: str) -> None:
-        raise BrokenPipeError
-
-    composed = session.compose(RunOptions(True, True, seconds=0.5).check_and_complete())
-    figures = session.run(composed, lambda: None, deaf, deaf)
-    assert figures["stopped_by"] == "seconds" and on(devices[0]) == 0
 
 
 @pytest.mark.parametrize("rig", ["desk", "feetech"])
@@ -339,12 +303,6 @@ def test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code(
     assert "neck_yaw not moving" in last[0]
 
 
-def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
-    said: list[str] = []
-    figures = ran("desk", said, 3.0)
-    assert figures["joint_faults"] == {} and not report_faults(figures, said.append)
-
-
 # --- programs of their own
 
 
@@ -372,32 +330,3 @@ def test_no_servo_stays_on(rig: str, command: str, way: str) -> None:
         row = attack(at, command, way, begun)
     assert not row.void and row.code is not None and row.on == 0, row
     assert row.off_park_deg < 6.0, row
-
-
-def test_ctrl_c_in_the_first_second_is_one_line() -> None:
-    reads, writes = os.pipe()
-    # It cannot run ahead: what it tells of its imports fits only as far as it is read.
-    fcntl.fcntl(writes, fcntl.F_SETPIPE_SZ, 4096)
-    with open(reads, encoding="utf-8") as stderr:
-        process = subprocess.Popen(
-            [sys.executable, "-X", "importtime", "-c", START, "check"],
-            stdout=subprocess.DEVNULL, stderr=writes,
-        )  # fmt: skip
-        os.close(writes)
-        # In the middle of the imports.
-        assert any("gazerig.config.load" in line or "typer" in line for line in stderr)
-        process.send_signal(signal.SIGINT)
-        err = stderr.read()
-        assert process.wait(60) == 130 and "Traceback" not in err
-    assert [line for line in err.splitlines() if "import time" not in line] == ["interrupted"]
-
-
-def test_a_reader_that_is_gone_is_one_line_for_a_quick_command() -> None:
-    reads, writes = os.pipe()
-    os.close(reads)
-    done = subprocess.run(
-        [sys.executable, "-c", START, "ctl", "get", "--help"],
-        stdout=writes, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
-    )  # fmt: skip
-    os.close(writes)
-    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
