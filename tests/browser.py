@@ -96,11 +96,6 @@ class Browser:
         """A PNG of the page."""
         return self._captured()
 
-    def photograph_part(self, x: float, y: float, width: float, height: float) -> bytes:
-        """A PNG of a part of the page as it is; places and sizes in pixels."""
-        part = {"x": x, "y": y, "width": width, "height": height, "scale": 1.0}
-        return self._captured(clip=part)
-
     def _captured(self, **what: object) -> bytes:
         answer = self.ask("Page.captureScreenshot", format="png", optimizeForSpeed=True, **what)
         return base64.b64decode(answer["data"])

@@ -11,21 +11,17 @@ from contextlib import contextmanager
 from math import degrees
 from typing import Any
 
-import cv2
-import numpy as np
 from browser import Browser
 from desk import GAZE_JOINTS
 from present import present
 from shown_page import free_port, wait_for
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick
-from gazerig.robot.dashboard.view.viewpoints import BOTH, HALF_WIDTH, named_view
 from gazerig.robot.model.commands import Renew
 
 YAW = GAZE_JOINTS.index("neck_yaw")
@@ -150,25 +146,6 @@ class Person:
     def _mouse(self, kind: str, x: float, y: float, button: str) -> None:
         self.tab.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
 
-    def lights_up(self, x: float, y: float) -> bool:
-        """Point at a place: does an arrow there light up, so that it can be taken hold of?"""
-        self._mouse("mouseMoved", x - 3.0, y, "none")
-        self._mouse("mouseMoved", x, y, "none")
-        self.wait_for_frames(3)
-        png = self.tab.photograph_part(x - 8.0, y - 8.0, 16.0, 16.0)
-        seen = present(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)).astype(int)
-        blue, green, red = seen[..., 0], seen[..., 1], seen[..., 2]
-        return bool(np.count_nonzero((red > 190) & (green > 170) & (blue < 180)) > 10)
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Move what the mouse is on as a hand does: button down, then step by step."""
-        (x, y), (to_x, to_y) = start, end
-        self._mouse("mousePressed", x, y, "left")
-        for step in range(1, 6):
-            share = step / 5.0
-            self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), "left")
-        self._mouse("mouseReleased", to_x, to_y, "left")
-
     def wait_for_frames(self, count: int) -> None:
         """Wait until the browser has drawn n times, so that messages to it are visible."""
         self.run(
@@ -225,20 +202,6 @@ def saying(words: str, kind: str = "button, [role=tab], label") -> str:
 def beside(words: str, kind: str) -> str:
     """The control of a kind that a label names."""
     return f"({saying(words, 'label')})?.parentElement.querySelector('{kind}')"
-
-
-def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple[float, float]:
-    """Where in the window a point of the view "both" is; canvas: left, top, width, height in px."""
-    seen = named_view(BOTH)
-    eye, look_at = np.array(seen.position_m), np.array(seen.look_at_m)
-    ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    away = np.array(p_world_m) - eye
-    left, top, width, height = canvas
-    scale_px = 0.5 * width / HALF_WIDTH / (away @ ahead)
-    x, y = away @ right * scale_px, away @ np.cross(right, ahead) * scale_px
-    return left + 0.5 * width + x, top + 0.5 * height - y
 
 
 STOP = "document.querySelector('#rig-stop')"

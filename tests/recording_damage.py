@@ -71,14 +71,6 @@ def flipped(data: bytes, rng: random.Random) -> bytes:
     return bytes(out)
 
 
-def flipped_head(data: bytes, rng: random.Random) -> bytes:
-    """Flip a bit where records begin: kinds, lengths, sizes, times."""
-    _, at, _ = rng.choice(list(records(data)))
-    out = bytearray(data)
-    out[min(at + rng.randrange(HEAD + 40), len(out) - 1)] ^= 1 << rng.randrange(8)
-    return bytes(out)
-
-
 def cut(data: bytes, rng: random.Random) -> bytes:
     """End the file early."""
     return data[: rng.randrange(len(data))]
@@ -89,13 +81,6 @@ def overwritten(data: bytes, rng: random.Random) -> bytes:
     at, size = rng.randrange(len(data)), rng.choice((1, 16, 512, 4096))
     fill = rng.choice((b"\0" * size, b"\xff" * size, rng.randbytes(size)))
     return data[:at] + fill[: len(data) - at] + data[at + size :]
-
-
-def shuffled(data: bytes, rng: random.Random) -> bytes:
-    """Return the data with a stretch of it removed, doubled or moved."""
-    a, b = sorted(rng.randrange(len(data)) for _ in range(2))
-    b = min(b, a + 5000)
-    return rng.choice((data[:a] + data[b:], data[:b] + data[a:b] + data[b:], data[b:] + data[:b]))
 
 
 def hostile_chunk(data: bytes, rng: random.Random) -> bytes:
@@ -147,7 +132,7 @@ def _unsummed(data: bytes) -> bytes:
 
 
 DAMAGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (
-    flipped, flipped, flipped, flipped_head, cut, overwritten, shuffled, hostile_chunk,
+    flipped, flipped, cut, overwritten, hostile_chunk,
 )  # fmt: skip
 
 

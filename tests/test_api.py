@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import gazerig
-from gazerig.drivers.types import DetectedFace, Detections, ImageArray
 from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.recording.read import RunRecording
@@ -286,69 +285,11 @@ def test_what_does_not_fit_is_one_line_of_one_family(
         pass
 
 
-class OwnCamera:
-    """Detects one stationary face."""
-
-    def __init__(self) -> None:
-        self.number = 0
-
-    def open(self) -> None: ...
-
-    def close(self) -> None: ...
-
-    def events(self) -> tuple[str, ...]:
-        return ()
-
-    def latest(self, now_s: float) -> Detections | None:
-        self.number = int(now_s * 20) + 1
-        marks = np.array([[300, 200], [340, 200], [320, 220], [305, 240], [335, 240]], float)
-        face = DetectedFace((280.0, 170.0, 80.0, 100.0), marks, 0.9)
-        return Detections(self.number / 20 - 0.05, self.number, 640, 480, (face,))
-
-
-class OwnRule:
-    """Always chooses the same point."""
-
-    def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Vec3:
-        return (1.0, -0.4, 0.2)
-
-
 class BadRule:
     """Fails."""
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Vec3:
         raise RuntimeError("out of ideas")
-
-
-class OwnDetector:
-    """Finds no one, and counts the frames."""
-
-    frames = 0
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        self.frames += 1
-        return ()
-
-
-def test_an_own_camera() -> None:
-    with gazerig.open("desk", fast=True, camera=OwnCamera(), say=quiet) as head:
-        assert head.run_until(lambda state: len(state.people) == 1, 2.0)
-        head.step(2.0)
-        assert head.gaze.target.startswith("face ")
-
-
-def test_an_own_detector() -> None:
-    detector = OwnDetector()
-    with gazerig.open("desk", fast=True, detector=detector, say=quiet) as head:
-        head.step(0.3)
-        assert detector.frames > 0 and head.people == ()
-
-
-def test_an_own_rule_of_attention() -> None:
-    with gazerig.open("desk", fast=True, attention=OwnRule(), say=quiet) as head:
-        head.step(2.0)
-        # Re-fixations leave its middle by up to 1.7 deg.
-        assert degrees(gaze_error(head, (1.0, -0.4, 0.2))) < 2.0
 
 
 def test_an_own_rule_that_fails_ends_the_head_with_its_error() -> None:

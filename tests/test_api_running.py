@@ -7,7 +7,6 @@ import subprocess
 import sys
 import textwrap
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from branch import Branch, script
 from slow_rigs import at_rate
 
 import gazerig
-from gazerig.robot.control.interrupts import SAME_REQUEST_S
 from gazerig.robot.control.loop import Robot, Tick
 
 LET_GO = "(not )?parked, torque off"
@@ -140,45 +138,6 @@ def test_an_interrupt_in_the_block(said: list[str], opened: Open) -> None:
     assert_let_go(said)
 
 
-@pytest.mark.parametrize("more", [1, 3])
-@pytest.mark.parametrize(
-    ("number", "raised"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)]
-)
-def test_more_signals_skip_what_is_left_of_parking(
-    said: list[str],
-    opened: Open,
-    number: signal.Signals,
-    raised: type[BaseException],
-    more: int,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    park, parking, sent = Robot.park, threading.Event(), threading.Event()
-
-    def parked(self: Robot, *given: Any) -> bool:
-        parking.set()
-        sent.wait()
-        while not given[3]():  # as far from the parking pose as can be
-            time.sleep(0.01)
-        return park(self, *given)
-
-    def send() -> None:
-        parking.wait()
-        for _ in range(more):
-            time.sleep(SAME_REQUEST_S + 0.05)
-            os.kill(os.getpid(), number)
-        sent.set()
-
-    monkeypatch.setattr(Robot, "park", parked)
-    sender = threading.Thread(target=send)
-    with pytest.raises(raised), opened():
-        sender.start()
-        signal.raise_signal(number)
-        pytest.fail("the signal raises")
-    sender.join()
-    why = "the program" if number == signal.SIGINT else "SIGTERM"
-    assert said[-1] == f"stopped by {why}: not parked (interrupted), torque off"
-
-
 def test_the_death_of_the_thread_that_opened_it(said: list[str], opened: Open) -> None:
     kept: list[gazerig.Head] = []
 
@@ -214,18 +173,6 @@ def test_an_error_of_the_loop_reaches_the_program(
     assert re.fullmatch(f"stopped by fault: unexpected RuntimeError: a bug: {LET_GO}", said[-1])
 
 
-def test_a_fault_that_nobody_asked_about_is_raised_at_the_end(
-    said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def failing(self: Robot, *values: Any) -> Tick:
-        raise RuntimeError("a bug")
-
-    with pytest.raises(gazerig.HeadEnded, match="a bug"), opened():
-        monkeypatch.setattr(Robot, "tick", failing)
-        for running in [t for t in threading.enumerate() if t.name.startswith("head ")]:
-            running.join(30.0)
-
-
 def test_a_start_that_fails_raises_what_failed(said: list[str], opened: Open) -> None:
     with pytest.raises(gazerig.ConfigError, match="did you mean"), opened("dusk"):
         pass
@@ -235,26 +182,6 @@ def test_a_start_that_fails_raises_what_failed(said: list[str], opened: Open) ->
     ):
         pass
     assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
-
-
-def test_two_heads_in_one_program_are_found_by_their_rigs(
-    said: list[str], opened: Open, rigs: Path
-) -> None:
-    feetech = str(rigs / "feetech.yaml")
-    with opened() as desk, opened("feetech") as other:
-        assert desk.look_at(1.0, 0.3, 0.3).wait(100.0) == "arrived"
-        assert other.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
-        assert desk.state.controlled_by != other.state.controlled_by
-        with pytest.raises(gazerig.NotFound, match="2 rigs are running"):
-            gazerig.connect()
-        with gazerig.connect(rig=feetech) as far:
-            assert far.rig == feetech and far.state.controlled_by == other.state.controlled_by
-        with pytest.raises(gazerig.NotFound, match="no heads with the rig maker"):
-            gazerig.connect(rig="maker")
-    ends = [line for line in said if line.startswith("stopped by")]
-    assert len(ends) == 2 and all(
-        re.fullmatch(f"stopped by the program: {LET_GO}", e) for e in ends
-    )
 
 
 def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
@@ -291,15 +218,6 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
     for state in head.states(rate_hz=50.0):
         if not state.controlled_by:
             break
-
-
-def test_states_are_the_newest_and_cost_the_loop_nothing(head: gazerig.Head) -> None:
-    times = []
-    for state in head.states(rate_hz=100.0):
-        times.append(state.t_s)
-        if len(times) == 20:
-            break
-    assert times == sorted(set(times))
 
 
 def run_script(

@@ -14,12 +14,10 @@ from typing import Any
 import pytest
 import typer
 from command_line import gazerig, typed
-from features_there import needs_all_features, skip_without
 from typer.core import TyperGroup
 
 from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.cli.main import CommandsByName, app, next_steps
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, exit_on_signals
 
@@ -41,11 +39,6 @@ def test_without_anything_the_first_step_needs_no_hardware() -> None:
     words = next_steps([ON_BOARD], [], running=False)
     assert "gazerig run --mock" in words and "No USB serial adapter" in words
     assert "gazerig --help" in words
-
-
-def test_a_running_rig_comes_first() -> None:
-    words = next_steps([], [], running=True)
-    assert words.index("gazerig stop") < words.index("gazerig run --mock")
 
 
 def test_gazerig_alone_shows_it_and_is_no_error() -> None:
@@ -108,29 +101,6 @@ def helps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return {words: (folder / str(i)).read_text("utf-8") for i, words in enumerate(LIGHT_HELP)}
-
-
-@pytest.mark.parametrize("words", LIGHT_HELP)
-def test_help_imports_nothing_heavy(words: str, helps: dict[str, str]) -> None:
-    skip_without(words.partition(" ")[0])
-    *shown, end, imported = helps[words].splitlines()
-    assert any("Usage: gazerig" in line for line in shown) and end == "END 0"
-    # Typer reads types with pydantic.
-    assert imported.split() in (["HEAVY"], *([["HEAVY", "pydantic"]] if words else []))
-
-
-@needs_all_features
-def test_every_command_has_examples_and_no_example_is_without_command() -> None:
-    ctl, study = commands()["ctl"], commands()["study"]
-    assert isinstance(ctl, TyperGroup) and isinstance(study, TyperGroup)
-    of_studies = {f"study {name}" for name in study.commands}
-    assert {*commands(), *ctl.commands, *of_studies} == set(all_examples())
-    for name, command in study.commands.items():
-        assert f"gazerig study {name}" in str(command.epilog), name
-    for name, command in commands().items():
-        assert f"gazerig {name}" in str(command.epilog), name
-    for name, order in ctl.commands.items():
-        assert f"gazerig {'stop' if name == 'stop' else f'ctl {name}'}" in str(order.epilog), name
 
 
 def test_the_version_is_that_of_the_package(capfd: Terminal) -> None:

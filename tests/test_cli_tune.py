@@ -13,11 +13,8 @@ from tuned_rig import Running, a_rig, a_rig_beside
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.cli.steer import END, run_steering
 from gazerig.robot.cli.tune import app
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote.client import RobotClient, connect_to_all
-from gazerig.robot.remote.steering import STOP, Steering, Stick
 
 GAZERIG = (
     "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
@@ -199,21 +196,6 @@ def test_ask_lists_the_menus_and_chooses_from_them() -> None:
         gazerig("ctl", "ask", "conversation", present)
 
 
-@pytest.mark.parametrize(
-    ("words", "rule"),
-    [
-        (("moods",), "moods: not a menu of this rig; available: behaviour"),
-        (("moods", "glad"), "no menu 'moods'"),
-        (("conversation", "shout"), "shout"),
-    ],
-)
-def test_what_cannot_be_asked_for_is_refused_with_what_can(
-    words: tuple[str, ...], rule: str
-) -> None:
-    done = gazerig("ctl", "ask", *words)
-    assert done.returncode == 2 and rule in done.stderr and "Traceback" not in done.stderr
-
-
 def test_status_says_what_the_rig_does() -> None:
     said = gazerig("ctl", "status").stdout
     with RobotClient.connect() as rig:
@@ -245,28 +227,6 @@ def there_is_none() -> None:
     assert whole_gazerig("stop") == none
     done = gazerig("stop", "--pid", "1")
     assert done.stderr == "no rig of process 1 is running: start one with gazerig run ...\n"
-
-
-class _Turns:
-    """Controls that hold a stick for some turns, let go, play and stop."""
-
-    def __init__(self, rig: RobotClient, seen: list[str]) -> None:
-        self._rig, self._seen, self._turn = rig, seen, 0
-
-    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        self._turn += 1
-        self._seen.append(str(self._rig.status()["control_text"]))
-        steering.stick(Stick(1.0, 0.0) if self._turn < 5 else Stick())
-        return {6: ("nod",), 8: (STOP,), 9: (END,)}.get(self._turn, ())
-
-
-def test_steer_leads_a_running_rig_and_lets_go() -> None:
-    seen: list[str] = []
-    with RobotClient.connect(who="gazerig ctl steer") as rig:
-        run_steering(rig, _Turns(rig, seen), Steering(), RealClock(), lambda line: None)
-        assert rig.status()["stopped"]
-    assert "steer" in seen[2] and "steer" in seen[4]
-    assert "steer" not in seen[0] and "steer" not in seen[6]
 
 
 def test_steer_needs_a_terminal_or_a_gamepad() -> None:

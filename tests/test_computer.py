@@ -1,7 +1,5 @@
 """The load level of a computer is a function of measured figures; options override it."""
 
-from dataclasses import replace
-
 import pytest
 
 from gazerig.config.schema import load_rig
@@ -74,13 +72,6 @@ def test_a_computer_that_becomes_busy_halves_the_rate(
     figures = LoopFigures(rate_hz, 0.0, 1.0, 30.0, 9, 9, over_s, late_share, 30.0)
     assert slower_rate(figures, rate_hz, LOWEST_HZ) == slower_hz
     assert slower_rate(None, rate_hz, LOWEST_HZ) is None
-
-
-def test_a_slow_rig_stays_slow() -> None:
-    rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=60.0))
-    asked = RunOptions(mock=True, computer="small").check_and_complete()
-    assert with_options(rig, asked).loop.rate_hz == 60.0
 
 
 def test_a_busy_computer_renders_no_pictures_of_a_world() -> None:

@@ -2,11 +2,8 @@
 
 import pytest
 
-from gazerig.robot.app import session
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.browser import has_desktop
 from gazerig.robot.cli.run import report_faults
-from gazerig.robot.control.interrupts import Interrupts
 
 DESK = {"DISPLAY": ":0"}
 
@@ -26,20 +23,6 @@ def test_a_browser_is_opened_only_where_somebody_sees_it(
     environ: dict[str, str], terminal: bool, opens: bool
 ) -> None:
     assert has_desktop(environ, terminal) is opens
-
-
-@pytest.mark.parametrize("verbose", [False, True])
-def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
-    said: list[str] = []
-    options = RunOptions(
-        mock=True, fast=True, profile="nakamoto", seconds=0.1, verbose=verbose
-    ).check_and_complete()
-    session.run(session.compose(options), Interrupts(signals=False), said.append)
-    register = [line for line in said if "->" in line or "Indirect Addresses" in line]
-    table = [line for line in said if "do not all sum to 1" in line]
-    assert (len(register) > 10, len(table)) == ((True, 1) if verbose else (False, 0))
-    if not verbose:
-        assert said == ["stopped by seconds: parked, torque off"]
 
 
 def test_a_fault_of_many_joints_is_told_once() -> None:

@@ -10,7 +10,7 @@ from gazerig.robot.control.tick_text import head_activity, tick_control_source
 from gazerig.robot.dashboard.feed.snapshot import snapshot
 from gazerig.robot.dashboard.panels.attention_panel import salience_bars, target_text
 from gazerig.robot.dashboard.panels.servo_health import health_table
-from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
+from gazerig.robot.model.commands import Jog, LookAt, Resume, Stop
 from gazerig.robot.model.control_source import ControlSource, control_sentence
 from gazerig.robot.model.types import Snapshot
 
@@ -74,21 +74,6 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
     assert head_activity(tick).headline == said
 
 
-def test_a_person_who_was_chosen_and_a_track(running: Running) -> None:
-    running.order(LookAtPerson(1, "ann"))
-    tick = running.go(0.3)[-1]
-    assert (
-        tick_control_source(tick).kind == "person"
-        and "look at person 1" in head_activity(tick).headline
-    )
-    running.order(LookAt(None, "ann"))
-    running.order(Play("nod", who="ben"))
-    tick = running.go(0.2)[-1]
-    assert tick_control_source(tick)[:3] == ("track", "ben", "nod")
-    assert head_activity(tick).headline.startswith("it plays nod for ben, and looks at person 1")
-    assert tick_control_source(running.go(4.0)[-1]) == ControlSource()
-
-
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), "ann"))
     running.go(0.2)
@@ -99,16 +84,6 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     running.go(2.0)
     running.order(Resume("ann"))
     assert tick_control_source(running.go(0.1)[-1]) == ControlSource()
-
-
-def test_a_head_without_torque_looks_at_nobody(running: Running) -> None:
-    tick = running.go(0.1)[-1]
-    hot = ("neck_yaw: hot", "neck_roll: hot")
-    found = tick.guard_result._replace(level="torque_off", critical_reasons=hot)
-    shot = shown(tick._replace(guard_result=found))
-    assert shot.headline == shot.why == "the torque is off: neck_yaw: hot"
-    stopped = tick._replace(guard_result=found, stopped="a test")
-    assert shown(stopped).headline.startswith("stopped: a test")
 
 
 def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:

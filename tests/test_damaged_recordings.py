@@ -2,14 +2,11 @@
 
 import resource
 import struct
-import zlib
 from io import BytesIO
 from pathlib import Path
 
 import pytest
 import zstandard
-from command_line import typed
-from features_there import skip_without
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
@@ -40,10 +37,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(run: bytes, tmp_path: Path, hon
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 150_000  # kB
 
 
-@pytest.mark.parametrize("right", [True, False])
-def test_in_a_file_that_was_not_closed_every_chunk_is_checked(
-    run: bytes, tmp_path: Path, right: bool
-) -> None:
+def test_in_a_file_that_was_not_closed_every_chunk_is_checked(run: bytes, tmp_path: Path) -> None:
     """It has no check sum of the whole: one figure of a tick is another one."""
     at, length = next((at, n) for kind, at, n in records(run) if kind == Opcode.CHUNK)
     content = run[at + HEAD : at + HEAD + length]
@@ -53,13 +47,10 @@ def test_in_a_file_that_was_not_closed_every_chunk_is_checked(
     assert inside[figure : figure + 1].isdigit()
     other = inside[:figure] + (b"1" if inside[figure] != ord("1") else b"2") + inside[figure + 1 :]
     packed, fixed = zstandard.compress(other), 8 + 8 + 8  # two times and the size come first
-    crc = struct.pack("<I", zlib.crc32(other)) if right else content[fixed : fixed + 4]
+    crc = content[fixed : fixed + 4]
     body = content[:fixed] + crc + struct.pack("<I4sQ", 4, b"zstd", len(packed)) + packed
     file = tmp_path / "cut.mcap"
     file.write_bytes(run[: at + 1] + struct.pack("<Q", len(body)) + body)
-    if right:
-        assert len(list(RunRecording(file).ticks())) > 10
-        return
     with pytest.raises(BadRecording, match="wrong checksum"):
         list(RunRecording(file).ticks())
 
@@ -73,29 +64,3 @@ def test_one_wrong_bit_anywhere_before_the_end_is_known(run: bytes, tmp_path: Pa
         file.write_bytes(damaged)
         with pytest.raises(BadRecording):
             list(RunRecording(file).ticks())
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("rerun", "{}"),
-        ("export", "{}"),
-        ("report", "{}"),
-        ("report", "{}", "{}"),
-    ],
-    ids=" ".join,
-)
-def test_commands_say_one_line_and_fail(
-    words: tuple[str, ...], run: bytes, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    skip_without(words.split()[0] if isinstance(words, str) else words[0])
-    file = tmp_path / "run.mcap"
-    damaged = bytearray(run)
-    damaged[len(run) // 2] ^= 1
-    for content in (bytes(damaged), run[: len(run) // 50], b"", b"\x89MCAP0\r\n" * 2):
-        file.write_bytes(content)
-        assert typed(*(word.replace("{}", str(file)) for word in words)) == 2
-        said = capfd.readouterr()
-        assert len(said.err.splitlines()) == 1 and str(file) in said.err and not said.out
-        assert "unexpected" not in said.err
-    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]

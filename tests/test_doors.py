@@ -90,17 +90,6 @@ CONVERSATIONS: dict[str, tuple[Callable[[], Any], Sequence[tuple[Mapping[str, An
         (lva("muted", muted=False), []),
         (lva("timer_ringing", id="1", name="eggs", total_seconds=300, seconds_left=0), []),
     ]),
-    "out of order": (LVA, [
-        (lva("tts_finished"), []),
-        (lva("tts_speaking"), ["speaking"]),  # no text: no plan
-        (lva("tts_speaking"), []),
-        (lva("thinking"), []),  # of the next sentence
-        (lva("tts_text", text=SAID), [("speaking", "67 characters")]),
-        (lva("pipeline_error", reason="stt"), ["idle"]),
-        ({"event": "tts_text", "data": ["no object"]}, []),
-        ({"event": "tts_text", "data": {"text": 7}}, []),
-        (lva("disconnected"), []),
-    ]),
     "pipecat": (RTVI, [
         (rtvi("bot-ready"), []),
         (rtvi("user-started-speaking"), ["listening"]),

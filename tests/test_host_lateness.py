@@ -2,7 +2,6 @@
 
 import os
 import re
-from typing import Any
 
 import pytest
 from line_noise import Noisy
@@ -19,7 +18,6 @@ from gazerig.drivers.process.host_lateness import (
 from gazerig.drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech")
-SYNC_READ = 0x82
 BLAME = r"check|cable\b|with its id|program|supply too weak"
 """Words that name something else than this computer."""
 
@@ -92,49 +90,6 @@ def test_a_host_that_slept_is_told_as_that_and_servos_go_on():
     assert outcome.outside == 0
 
 
-def standing_still(noisy: Noisy, seconds: float):
-    """Delay all packets to the servos for a time; then all of them arrive."""
-    held: list[Any] = []
-    until_s, write = noisy.now + seconds, noisy.port.write
-    available, read_until = noisy.port.getBytesAvailable, noisy.port.read_until
-
-    def arrive():
-        if noisy.now >= until_s:
-            for data in held:
-                write(data)
-            held.clear()
-
-    def queued(data):
-        held.append(data)
-        arrive()
-
-    def seen():
-        arrive()
-        return available()
-
-    def read(length, deadline_s):
-        if noisy.now < until_s <= deadline_s:
-            noisy.now = until_s
-        arrive()
-        return read_until(length, deadline_s)
-
-    noisy.port.write, noisy.port.getBytesAvailable, noisy.port.read_until = queued, seen, read  # type: ignore[method-assign]
-
-
-@pytest.mark.parametrize("kind", (*KINDS, "maestro", "pca9685"))
-@pytest.mark.parametrize("seconds", (0.4, 1.0))
-def test_servos_that_stood_still_for_a_while_are_no_bad_plug(kind, seconds):
-    noisy = Noisy(kind)
-    noisy.start()
-    noisy.bus.events()
-    standing_still(noisy, seconds)
-    outcome = noisy.run("clear", 0.0, 500)
-    about = [text for text in outcome.said if "answer" in text or "check" in text]
-    assert len(about) == 1, about
-    assert "emulator was suspended" in about[0]
-    assert outcome.wrong == 0
-
-
 @pytest.mark.parametrize("since_s", [5.0, None])
 def test_one_rule_decides_whether_a_cable_is_blamed(since_s):
     lateness = HostLateness()
@@ -148,25 +103,6 @@ def test_one_rule_decides_whether_a_cable_is_blamed(since_s):
     text = lateness.blame("no answer", "check its cable", 9.0, **begin)
     assert ("this computer was busy" in text) == (since_s is not None)
     assert ("check" in text) == (since_s is None)
-
-
-def test_an_answer_that_may_be_to_an_older_question_is_confirmed_by_another():
-    noisy = Noisy("feetech")
-    noisy.start()
-    asked = []
-    write = noisy.port.write
-
-    def counted(data):
-        asked.append(data[4])
-        write(data)
-
-    noisy.port.write = counted  # type: ignore[method-assign]
-    noisy.run("clear", 0.0, 20)
-    in_peace = asked.count(SYNC_READ)
-    asked.clear()
-    outcome = noisy.run("stall all 5 count 12", 0.0, 20)
-    assert asked.count(SYNC_READ) > in_peace + 20
-    assert outcome.wrong == 0
 
 
 # --- which port it is

@@ -16,10 +16,7 @@ from gazerig.robot.model.clock import Clock
 Missed = Callable[[int, random.Random], int]
 HOSTS: dict[str, Missed] = {
     "one to three slots": lambda _, rng: rng.choice((1, 2, 3)),
-    "up to three slots": lambda _, rng: rng.choice((0, 1, 2, 3)),
     "three slots": lambda _n, _rng: 3,
-    "every other tick": lambda n, _: n % 2,
-    "every third tick by two": lambda n, _: 2 * (n % 3 == 0),
     "never four times": lambda n, rng: rng.choice((1, 2, 3)) if n % 4 else 0,
 }
 

@@ -83,25 +83,3 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
         "print('ok')"
     )
     assert python.run(code, tmp_path)[0].splitlines()[-1] == "ok"
-
-
-@with_mujoco
-def test_sending_shapes_of_a_world_loads_no_mujoco(python: LightPython, tmp_path: Path) -> None:
-    pytest.importorskip("gazerig.features.world")
-    code = (
-        "import sys, pickle; from gazerig.features.world.run.run_world import world_scene;"
-        "from gazerig.features.world.shapes import shapes_of;"
-        "from gazerig.features.world.world_spec import WorldSpec;"
-        "found = shapes_of(WorldSpec(world_scene('living-room', 0).figures, ()));"
-        "pickle.dumps(found); found.poses(1.0); print('mujoco' in sys.modules)"
-    )
-    assert python.run(code, tmp_path)[0] == "False\n"
-
-
-def test_a_rig_of_ours_looks_at_no_package(python: LightPython, tmp_path: Path) -> None:
-    code = (
-        "import sys; from gazerig.config.schema import load_rig; load_rig('desk');"
-        "from gazerig.robot.app.bus_wiring import rig_bus;"
-        "from gazerig.drivers import plugins; print(plugins._package_parts.cache_info().misses)"
-    )
-    assert python.run(code, tmp_path)[0] == "0\n"

@@ -20,7 +20,6 @@ from gazerig.drivers.vision.model_files import (
     FOLDER_VARIABLE,
     YUNET,
     ModelFile,
-    models_folder,
 )
 from gazerig.robot.cli import models
 
@@ -158,17 +157,6 @@ def test_the_command_fetches_lists_and_says_what_fails(
     monkeypatch.setattr(models, "MODEL_FILES", (plain(server),))
     assert "plain.bin already exists" in invoked("models", "fetch").out
     assert "MIT" in invoked("models", "list").out
-
-
-def test_the_folder_is_that_of_the_user_unless_another_is_named(
-    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert models_folder() == folder
-    monkeypatch.delenv(FOLDER_VARIABLE)
-    assert models_folder() == tmp_path / "gazerig" / "models"
-    monkeypatch.delenv("XDG_DATA_HOME")
-    monkeypatch.setenv("HOME", "/home/somebody")
-    assert models_folder() == Path("/home/somebody/.local/share/gazerig/models")
 
 
 def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder: Path) -> None:

@@ -40,21 +40,6 @@ def test_every_file_that_is_not_python_is_named_as_data() -> None:
     assert len(data) > 10 and named.issuperset(data)
 
 
-def test_the_changelog_keeps_its_form() -> None:
-    """https://keepachangelog.com/en/1.1.0/: releases, newest first, each with known headings."""
-    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    releases = re.findall(r"^## (.+)$", text, re.MULTILINE)
-    assert releases and releases[-1].startswith("[0.1.0] - ")
-    for release in releases:
-        assert re.fullmatch(r"\[\d+\.\d+\.\d+\] - (\d{4}-\d\d-\d\d|Unreleased)", release), release
-    kinds = re.findall(r"^### (.+)$", text, re.MULTILINE)
-    order = ["Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"]
-    assert {"Added"} <= set(kinds) <= set(order)
-    for release in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
-        ranks = [order.index(kind) for kind in re.findall(r"^### (.+)$", release, re.MULTILINE)]
-        assert ranks == sorted(set(ranks)), release.splitlines()[0]
-
-
 def yaml(name: str) -> Any:
     return YAML(typ="safe").load((ROOT / name).read_text(encoding="utf-8"))
 

@@ -1,17 +1,11 @@
-"""The page takes snapshots without ever holding up its caller, and shows a head that looks.
-
-As a script it photographs a page: ``python tests/test_page.py OUT.png [URL]``; without a
-URL it feeds a page of its own with the snapshots made here.
-"""
+"""The page takes snapshots without ever holding up its caller, and shows a head that looks."""
 
 import itertools
 import math
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import TypeVar
 
 import cv2
@@ -193,7 +187,3 @@ def test_page_shows_a_head_that_turns() -> None:
         own = (here, here.replace("http", "ws", 1), "data:", f"blob:{here}")
         assert [asked for asked in browser.asked_for if not asked.startswith(own)] == []
         assert any(asked.startswith(here) for asked in browser.asked_for)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else None)

@@ -180,19 +180,3 @@ def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> 
     finally:
         present(rig.audience._page)._on_request = hear
     resumed(rig, person)
-
-
-# The last: the browser leaves the rig of the others.
-@pytest.mark.slow
-def test_without_the_token_there_is_one_line_and_with_it_the_page(tab: Browser) -> None:
-    with running("127.0.0.2") as (rig, url):
-        person = Person(tab)
-        with_token, url = url, url.partition("?")[0]
-        tab.go(url)
-        wait_for(lambda: person.reads("refused: open the address with the token"), "the refusal")
-        assert not person.reads("STOP")
-        tab.go(with_token)
-        wait_for(lambda: person.reads("STOP", "Steer"), "the page")
-        assert "token" not in str(person.run("location.href + document.cookie"))
-        person.click(STOP)
-        wait_for(lambda: rig.robot.stopped, "the stop")

@@ -110,9 +110,6 @@ def test_what_one_does_the_others_see_and_handlers_hear_once(widgets: Widgets) -
         ("checkbox", [1, "yes", None]),
         ("text", [1, None, "x" * 5000]),
         ("choice", ["c", 1, None]),
-        ("buttons", ["c", None]),
-        ("html", ["<b>"]),
-        ("section", [True]),
     ],
 )
 def test_what_a_field_cannot_hold_is_refused_in_words(
@@ -125,9 +122,6 @@ def test_what_a_field_cannot_hold_is_refused_in_words(
         "checkbox": lambda: place.checkbox("drag", value=False),
         "text": lambda: place.text("find", "neck"),
         "choice": lambda: place.choice("group", ("a", "b")),
-        "buttons": lambda: place.buttons("menu", ("a", "b")),
-        "html": place.html,
-        "section": lambda: place.section("joints").widget,
     }
     field = made[kind]()
     for name in ("on_change", "on_press"):

@@ -78,13 +78,4 @@ def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:
     slider.remove()
 
 
-def test_who_leaves_is_forgotten(near: Rig) -> None:
-    widgets = near.door.widgets
-    gone: list[str] = []
-    widgets.on_leave(gone.append)
-    with near.knock(PANELS):
-        wait_for(lambda: widgets.is_watched, "the browser")
-    wait_for(lambda: len(gone) > 0 and not widgets.is_watched, "the end")
-
-
 # --- a person at a browser ----------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Parts of other packages are found by name, loaded when used, and refused in one line."""
 
 import pickle
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -163,13 +162,6 @@ def test_a_section_is_checked_like_ours(folder, tmp_path):
         assert "mine.yaml:" in line
 
 
-def test_a_rule_nobody_brings_is_refused_at_its_key_with_all_there_are(folder, tmp_path):
-    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
-    line = fault(with_chooser(tmp_path, "talest"))
-    assert "gaze.chooser" in line and "did you mean 'tallest'?" in line
-    assert "tall_rule" not in sys.modules
-
-
 def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(folder, tmp_path):
     install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
     rig: Any = load_rig(with_chooser(tmp_path, "tallest"))
@@ -272,13 +264,3 @@ def test_a_camera_of_a_package_is_looked_through_by_its_name(fish, tmp_path, nam
     finally:
         camera.close()
     assert not any("lost" in line for line in camera.events())
-
-
-def test_the_section_of_a_camera_is_checked_and_waits_for_the_next_start(fish, tmp_path):
-    with pytest.raises(ConfigError, match=r"frames\.grey: 999 is above 255"):
-        fish_rig(tmp_path, "frames:\n  grey: 999\n")
-    with pytest.raises(ConfigError, match="unknown key 'framse'; did you mean"):
-        fish_rig(tmp_path, "framse:\n  grey: 9\n")
-    rig = fish_rig(tmp_path)
-    (grey,) = [one for one in parameters(rig, rig) if one.key == "frames.grey"]
-    assert grey.live.startswith("next start")

@@ -60,14 +60,6 @@ def test_the_point_is_drawn_under_the_pointer(
     assert share == pytest.approx(TOWARDS_HEAD)
 
 
-def test_who_is_inside_the_head_or_looks_away_from_it_leads_nowhere() -> None:
-    inside = AHEAD_OF_IT._replace(p_world_m=(0.04, 0.0, 0.14))
-    away = AHEAD_OF_IT._replace(p_world_m=(-0.8, 0.0, 0.14))
-    assert gaze_target(Pointer(0.5, 0.5, 1.0), inside, EYES) is None
-    assert gaze_target(Pointer(0.5, 0.5, 1.0), away, EYES) is None
-    assert gaze_target(Pointer(0.5, 0.5, 1.0), AHEAD_OF_IT._replace(fov_rad=nan), EYES) is None
-
-
 @pytest.mark.parametrize(
     "asked",
     [

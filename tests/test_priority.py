@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.drivers.process.priority import share_priority
-
 LOWER = (
     "import os; from pathlib import Path; "
     "from gazerig.drivers.process.priority import lower_priority; "
@@ -41,12 +39,3 @@ def test_real_time_priority_stays() -> None:
     )
     words = [sys.executable, "-c", code]
     assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "False\n"
-
-
-@pytest.mark.parametrize(("nice", "shared"), [(-10, "-10"), (0, ""), (3, "")])
-def test_a_raised_priority_is_shared_with_a_process(tmp_path: Path, nice: int, shared: str) -> None:
-    for name, text in (("self", f"/autogroup-7 nice {nice}\n"), ("12", "")):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "autogroup").write_text(text)
-    share_priority(12, tmp_path)
-    assert (tmp_path / "12/autogroup").read_text() == shared

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from math import radians
 from pathlib import Path
@@ -144,14 +145,6 @@ def test_another_user_is_kept_out(folder: Path) -> None:
     path.chmod(0o666)
     assert said() == ""  # so the two were what kept it out
     server.close()
-
-
-def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -> None:
-    assert remote_socket.socket_folder({"XDG_RUNTIME_DIR": str(tmp_path)}, os.getuid()) == (
-        tmp_path / "gazerig"
-    )
-    for environ in ({}, {"XDG_RUNTIME_DIR": "/nonexistent"}, {"XDG_RUNTIME_DIR": str(tmp_path)}):
-        assert remote_socket.socket_folder(environ, 4_000_000) == Path("/tmp/gazerig-4000000")
 
 
 def listens() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import jsonschema
 import msgspec
 import numpy as np
 import pytest
@@ -153,7 +154,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
             count[channel.topic] += 1
             assert message.sequence == count[channel.topic]  # a missing one is detectable
             data = seen[channel.topic] = json.loads(message.data)
-            assert unexplained(data, schemas[channel.topic]) == []
+            jsonschema.validate(data, {**schemas[channel.topic], "additionalProperties": False})
             if channel.topic == fmt.TICK:
                 since_s = data["t_s"] - recorded.ticks[0].t_s
                 wall_s = datetime.fromisoformat(STARTED).timestamp() + since_s
@@ -175,11 +176,6 @@ def sent_to_viewers(recorded: Recorded, topic: str) -> list[tuple[Tick, dict[str
             (of[round((message.log_time - start_ns) / 1e6)], json.loads(message.data))
             for _, _, message in make_reader(file).iter_messages([topic])
         ]
-
-
-@pytest.mark.parametrize("topic", [fmt.JOINT_STATES, fmt.TRANSFORMS, fmt.SCENE])
-def test_viewers_are_sent_25_messages_a_second(recorded: Recorded, topic: str) -> None:
-    assert len(sent_to_viewers(recorded, topic)) == pytest.approx(25 * 1.49, abs=2)
 
 
 def vector(of: dict[str, float]) -> list[float]:
@@ -205,26 +201,6 @@ def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) 
             assert vector(frames[name]["translation"]) == pytest.approx(place)
         turned = max(turned, abs(ahead["left_eye"] @ ahead["head"] - 1.0), abs(pose.head_rad[0]))
     assert turned > 0.05  # the frames differ
-
-
-def unexplained(data: Any, schema: dict[str, Any], at: str = "") -> list[str]:
-    """List what a schema does not explain, or explains as something else."""
-    kinds = {"object": dict, "array": list, "string": str, "number": (int, float),
-             "integer": int, "boolean": bool, "null": type(None)}  # fmt: skip
-    named = schema.get("type", list(kinds))
-    allowed = [named] if isinstance(named, str) else named
-    if not any(isinstance(data, kinds[kind]) for kind in allowed):  # type: ignore[arg-type]
-        return [f"{at}: {type(data).__name__} is no {allowed}"]
-    if isinstance(data, list):
-        items = schema.get("items", {})
-        return [fault for item in data for fault in unexplained(item, items, f"{at}[]")]
-    if not isinstance(data, dict):
-        return []
-    known = schema.get("properties", {})
-    free = at.endswith("before[]") or "additionalProperties" in schema or "order" in known
-    missing = [f"{at}.{key}: not explained" for key in data if key not in known and not free]
-    inner = [(f"{at}.{key}", data[key], known[key]) for key in data if key in known]
-    return missing + [fault for name, value, s in inner for fault in unexplained(value, s, name)]
 
 
 def test_leads_and_tracks_come_back(recorded: Recorded) -> None:

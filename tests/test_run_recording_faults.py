@@ -51,16 +51,6 @@ def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(
     assert counts == sorted(counts, reverse=True) and counts[-1] < 299
 
 
-def test_damage_is_told_in_one_line(recorded: Recorded, tmp_path: Path) -> None:
-    data = bytearray(recorded.path.read_bytes())
-    data[len(data) // 3] ^= 0xFF
-    broken = tmp_path / "broken.mcap"
-    broken.write_bytes(data)
-    with pytest.raises(BadRecording, match="damaged") as found:
-        list(RunRecording(broken).ticks())
-    assert "\n" not in str(found.value)
-
-
 def test_time_that_runs_back_or_leaps_is_no_run(recorded: Recorded, tmp_path: Path) -> None:
     with recorded.path.open("rb") as file:
         found = [json.loads(m.data) for *_, m in make_reader(file).iter_messages([fmt.TICK])][:3]

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import select
 import socket
 from collections.abc import Iterator
 from itertools import islice
@@ -19,7 +18,6 @@ from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.run_info import RunEnd, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.writer_client import WriterClient
 
 MESSAGES, A_CHUNK = 40, 10
 
@@ -124,30 +122,3 @@ def test_a_writer_whose_program_has_died_ends_although_a_fork_holds_its_socket(
     found = list(islice(writer._messages(theirs, os.getpid()), 3))  # our parent is another one
     assert [(one.kind, one.body) for one in found if one] == [(writer.END, b"first")]
     assert len(found) == 1
-
-
-def client_of(ours: socket.socket) -> WriterClient:
-    made = WriterClient(patient=False)
-    made._socket = ours
-    return made
-
-
-@pytest.mark.parametrize("taking", [True, False], ids=["reads", "does not read"])
-def test_a_writer_that_does_not_go_on_is_waited_for_once(
-    line: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch, taking: bool
-) -> None:
-    waited_s = []
-
-    def never(*given: object) -> tuple[list[int], ...]:
-        waited_s.append(given[-1])
-        assert len(waited_s) < 4
-        return [], [], []
-
-    monkeypatch.setattr(select, "select", never)
-    (ours, _), client = line, client_of(line[0])
-    while not taking and not client._queue:
-        client.post(writer.TICKS, bytes(50_000))
-    client.close()
-    words = "its writer does not end" if taking else "its writer does not respond"
-    assert client.failed == words and not client.alive and ours.fileno() == -1
-    assert waited_s == [15.0] and not client._queue

@@ -13,7 +13,6 @@ from recorded_rigs import Run, recorded
 from six_joints import SIX
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.export_csv import columns, write_csv
@@ -59,14 +58,6 @@ def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
     assert found.is_same and found.sent_bytes_same and found.notes == ()
     assert list(map(exact, seen)) == list(map(exact, maker.ticks))
     assert rerun(maker.recording, joints="emulated").is_same
-
-
-def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, desk: Run) -> None:
-    found = rerun(desk.recording, rig="maker")
-    assert not found.is_same and found.joints == "emulated"
-    assert any("the rig has the joints eyes_pan" in note for note in found.notes)
-    with pytest.raises(SetupError, match=r"the rig has the joints .*: use emulated servos"):
-        rerun(maker.recording, rig="desk", joints="recorded")
 
 
 # --- messages of the run

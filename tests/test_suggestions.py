@@ -1,10 +1,8 @@
 """Commands that messages suggest: typed unchanged, they reach the same rig and port."""
 
-from threading import Thread
-
 import pytest
 
-from gazerig.robot.cli.terminal import complete_suggestions, suggest_for_rig
+from gazerig.robot.cli.terminal import complete_suggestions
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 
@@ -29,13 +27,3 @@ def test_a_suggestion_names_rig_and_port(said: str, wanted: str) -> None:
         "--port"
     ) == wanted.count("--port")
     assert complete_suggestions(said, {}) == said
-
-
-def test_other_threads_suggest_the_same_and_inner_blocks_too() -> None:
-    heard = []
-    with suggest_for_rig("my.yaml", "/dev/ttyACM3", False), suggest_for_rig(None, None, False):
-        thread = Thread(target=lambda: heard.append(complete_suggestions("gazerig doctor")))
-        thread.start()
-        thread.join()
-    assert heard == ["gazerig doctor my.yaml --port /dev/ttyACM3"]
-    assert complete_suggestions("gazerig doctor") == "gazerig doctor"

@@ -1,14 +1,9 @@
 """The page's token in a file: the same after a restart, and refused where others could know it."""
 
 import os
-import signal
-import urllib.error
-import urllib.request
 from pathlib import Path
 
 import pytest
-from branch import Branch
-from branch import gazerig as gazerig_branch
 from command_line import invoked
 from shown_page import free_port, wait_for
 
@@ -73,34 +68,6 @@ def test_a_run_is_refused_in_one_line_before_anything_is_done(tmp_path: Path) ->
     assert done.err.startswith(f"--token-file {path}: a token is 22 to 200 random letters")
     # Without a page it is not requested.
     assert RunOptions(mock=True, fast=True, page="127.0.0.1:1", token_file=path).page_token == ""
-
-
-@pytest.mark.pty
-def test_a_program_keeps_its_token_when_the_head_is_started_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    path, port = written(tmp_path / "token", GOOD), free_port()
-    url = f"http://127.0.0.1:{port}"
-
-    def state(token: str) -> int:
-        with urllib.request.urlopen(f"{url}/api/v1/state?token={token}", timeout=20.0) as answer:
-            return int(answer.status)
-
-    words = ["run", "--mock", "--rate=40", "--no-browser", f"--page=127.0.0.1:{port}"]
-    words.append(f"--token-file={path}")
-    for _ in range(2):
-        with (tmp_path / "log").open("w+", encoding="utf-8") as log:
-            process = Branch(gazerig_branch(*words), stdout=log, stderr=log)
-            try:
-                wait_for(lambda: f"the page is at {url}/; " in (tmp_path / "log").read_text(), "it")
-                assert GOOD not in (tmp_path / "log").read_text()
-                assert state(GOOD) == 200
-                with pytest.raises(urllib.error.HTTPError, match="403"):
-                    state(GOOD[:-1] + "z")
-            finally:
-                process.send_signal(signal.SIGINT)
-                assert process.wait(60.0) == 0
 
 
 @pytest.mark.usefixtures("ideal_servos")
