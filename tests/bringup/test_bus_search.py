@@ -2,10 +2,8 @@
 
 import pytest
 
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.features.bringup.bus_search import (
     BOARD_RATES,
-    SearchRound,
     found_servos,
     parse_kinds,
     plan_search,
@@ -94,16 +92,6 @@ def test_pulses_go_on_while_it_is_asked():
     assert only.board.pulses[0] == 6000 == board.faults.reports()[0]["position"]
 
 
-def test_kinds_that_are_named_are_asked_and_no_other():
-    assert {kind for kind, _ in plan_search("", ("feetech",), None)} == {"feetech"}
-    assert {kind for kind, _ in plan_search("", ("dynamixel",), None)} == {"dynamixel"}
-    # A board is searched at any rate, before servo packets are sent.
-    assert plan_search("", ALL, (4_500_000,)) == (
-        ("maestro", BOARD_RATES[0]),
-        ("dynamixel", 4_500_000),
-    )
-
-
 # --- servos of each kind hear the other's packets and are left as they are
 
 
@@ -145,28 +133,6 @@ def test_no_packet_changes_sts_servos():
     assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
     assert chain.positions_steps() == places
     assert not any(one.found for one in rounds if one.kind == "dynamixel")
-
-
-def test_nobody():
-    chain = build_dynamixel([ServoSpec(1, "xl330-m077")], lambda: 0.0, baud=2_000_000)
-    rounds = Line(chain).search(rates=(57_600,))
-    assert [(one.kind, one.baud) for one in rounds] == [
-        ("maestro", 57_600), ("dynamixel", 57_600), ("feetech", 57_600),
-    ]  # fmt: skip
-    assert not any(one.has_answer for one in rounds)
-
-
-def test_all_rates_of_a_kind_are_in_the_plan():
-    rows = plan_search("", ALL, None)
-    assert [rate for kind, rate in rows if kind == "dynamixel"] == list(DYNAMIXEL.scan_rates)
-    assert rows[0] == ("maestro", 115_200)
-
-
-def test_words_for_kinds():
-    assert parse_kinds("feetech") == ("feetech",)
-    with pytest.raises(ValueError, match="pca: not all or one of dynamixel, feetech, maestro"):
-        parse_kinds("pca")
-    assert not SearchRound("feetech", 9600).has_answer
 
 
 def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():

@@ -1,18 +1,15 @@
 """Bad conditions of a camera are reported once at their start and end; good ones never."""
 
 from functools import cache
-from math import nan, radians
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from present import present
-from seeing.material import background, carphone, noisy, paste, portrait
+from seeing.material import background, noisy, paste, portrait
 
-from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.health import (
-    FIELD_TEXT,
     CameraHealth,
     CameraObservation,
     HealthModel,
@@ -20,13 +17,11 @@ from gazerig.drivers.camera.health import (
 )
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import DetectedFace
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.features.bringup.doctor.camera import examine_camera
 from gazerig.features.bringup.doctor.diagnostics import Diagnostic
-from gazerig.robot.model.frames import CameraParams, LensParams
-from gazerig.robot.perception.frame_locator import FrameLocator
+from gazerig.robot.model.frames import CameraParams
 
 WIDTH, HEIGHT = 640, 480
 FAST = {"faces": 0.01}
@@ -119,13 +114,6 @@ def test_good_pictures_are_left_alone(image):
     assert looked([image] * 18, detector) == ([], ())
 
 
-def test_a_film_is_left_alone():
-    film, images = cv2.VideoCapture(str(carphone())), list[np.ndarray]()
-    while (read := film.read())[0] and len(images) < 60:
-        images.append(read[1])
-    assert looked(images[::3], MtcnnDetector(FaceDetectorParams())) == ([], ())
-
-
 @pytest.mark.parametrize(
     ("deg", "says", "rotation", "set_to"),
     [
@@ -153,12 +141,6 @@ def test_a_turned_camera_is_told_with_its_rotation(deg, says, rotation, set_to):
     assert stepped(model, 20) == ["camera: the picture is upright again"]
 
 
-@pytest.mark.parametrize("deg", [-70, -40, 40, 70])
-def test_a_rolled_camera_is_told_by_about_how_much(deg):
-    roll = present(TurnedFaceSearch().find(turned(room(), deg), True))
-    assert abs(roll - deg) < 20.0
-
-
 def test_an_upside_down_camera_is_found_and_its_end_too():
     down = np.ascontiguousarray(room()[::-1, ::-1])
     told, _ = looked([down] * 22 + [np.asarray(room())] * 20, MtcnnDetector(FaceDetectorParams()))
@@ -166,12 +148,6 @@ def test_an_upside_down_camera_is_found_and_its_end_too():
         " the camera is turned by 180 deg, according to the faces",
         " the picture is upright again",
     ]
-
-
-def test_searches_that_do_not_agree_are_not_told():
-    model = HealthModel()
-    for turned_deg in (180.0, 180.0, 90.0, 180.0, 0.0, 180.0) * 4:
-        assert not model.step(CameraObservation(GOOD, False, turned_deg))
 
 
 def test_frames_that_come_too_fast_are_told_with_the_stage():
@@ -188,56 +164,6 @@ def test_frames_that_come_too_fast_are_told_with_the_stage():
         health.assess(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
         told += health.events()
     assert told[1:] == ["camera: frames are analysed in time again"]
-
-
-def test_twenty_of_sixty_frames_are_enough():
-    assert not stepped(HealthModel(), 20, delivered_frames=60, analysed_frames=20, duration_s=1.0)
-    assert stepped(HealthModel(), 20, delivered_frames=120, analysed_frames=16, duration_s=2.0)
-
-
-class Nobody:
-    def find(self, image: Any) -> tuple[DetectedFace, ...]:
-        return ()
-
-
-def test_an_assumed_field_of_view_is_told_until_it_is_known():
-    unknown = FrameLocator(None, radians(69.0))
-    frames = FrameAnalyzer(Nobody(), None, unknown, has_unknown_lens=True)
-    shots = [Shot(float(k), k, np.asarray(room(0))) for k in range(1, 9)]
-    assert frames.analyze(shots[0]).conditions == (FIELD_TEXT,)
-    assert frames.events() == (f"camera: {FIELD_TEXT}",)
-    assert frames.analyze(shots[1]).conditions == (FIELD_TEXT,) and frames.events() == ()
-    frames.retune(None, None, FrameLocator(None, radians(84.0)))
-    assert frames.analyze(shots[2]).conditions == ()
-    assert frames.events() == ("camera: the field of view is known now",)
-    lens = LensParams(WIDTH, HEIGHT, 500.0, 500.0, 320.0, 240.0)
-    for locate, unknown_lens in ((FrameLocator(lens, radians(69.0)), True), (unknown, False)):
-        known = FrameAnalyzer(Nobody(), None, locate, has_unknown_lens=unknown_lens)
-        assert known.analyze(shots[3]).conditions == ()
-
-
-@pytest.mark.parametrize(
-    "image",
-    [
-        np.full((HEIGHT, WIDTH, 3), nan),
-        np.zeros((HEIGHT, WIDTH), np.uint8),
-        np.zeros((0, 0, 3), np.uint8),
-        np.zeros((1, 1, 3), np.uint8),
-        np.zeros((4, 5000, 3), np.uint8),
-    ],
-    ids=["nan", "grey", "empty", "one pixel", "strip"],
-)
-def test_pictures_that_are_none_are_borne(image):
-    told, _ = looked([image] * 30)
-    assert len(told) <= 1
-    assert TurnedFaceSearch().find(image) in (None, 0.0)
-
-
-def test_times_that_stand_still_or_run_back_are_borne():
-    health = CameraHealth()
-    for t_s in (5.0, 5.0, nan, 1.0, -3.0, float("inf"), 2.0, 1e9, 3.0):
-        assert health.assess(Shot(t_s, 1, np.asarray(room())), (), FAST) == ()
-    assert health.events() == ()
 
 
 class Frames:

@@ -7,7 +7,6 @@ import pytest
 from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one, setups_of
 from present import present
 
-from gazerig.drivers.errors import PortError
 from gazerig.drivers.feetech.memory_table import TABLE_END
 from gazerig.drivers.i2c import bridge
 from gazerig.drivers.maestro.params import MaestroParams
@@ -31,9 +30,6 @@ from gazerig.features.bringup.doctor.boards import examine_maestro, examine_pca9
 from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
     Fix,
-    group_findings,
-    join_places,
-    summarize,
     worst_level,
 )
 from gazerig.features.bringup.doctor.examination import (
@@ -42,18 +38,10 @@ from gazerig.features.bringup.doctor.examination import (
     apply_fixes,
     examine_latency,
     examine_port,
-    find_servos,
     fix_latency,
 )
 from gazerig.features.bringup.doctor.servo_checks import CHECKS
 from gazerig.features.bringup.doctor.servo_rules import apply_rules, read_state
-from gazerig.features.bringup.maestro_settings import (
-    clipping_text,
-    instructions,
-    range_us,
-    start_limits,
-    wide_range,
-)
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
@@ -206,41 +194,12 @@ def test_at_the_edge(kind, values, edge):
     assert worst_level(apply_rules(servo_state(kind, **values))) == edge
 
 
-def test_two_latches_are_two_findings():
-    findings = apply_rules(servo_state(DYNAMIXEL, hardware_error_status=0x24))
-    assert [f.what for f in findings if f.level == "error"] == [
-        "has latched: overheating",
-        "has latched: overload",
-    ]
-
-
-def test_a_twelve_volt_servo_that_is_still_set_for_less():
-    strong = setups_of(FEETECH)[0]._replace(model="sts3215-12v")
-    findings = apply_rules(servo_state(FEETECH, strong, present_input_voltage=120))
-    found = one(findings, "error", PAN, "limits are 4.0..8.0 V")
-    assert "must come off this supply" in found.remedy
-    assert "Max Voltage (14) to 140" in found.remedy
-    assert not found.fixes  # only a person can see which servo it is
-
-
-def test_a_joint_that_asks_for_more_speed_than_there_is():
-    fast = setups_of(FEETECH)[0]._replace(max_speed_steps_s=4000.0)
-    assert one(apply_rules(servo_state(FEETECH, fast)), "note", PAN, "asks its shaft for 352 deg/s")
-
-
 @each
 def test_firmware_that_is_too_old(kind):
     now = FIRMWARE[kind.name]
     wanted = setups_of(kind)[0]._replace(firmware_min=now + 1)
     findings = apply_rules(servo_state(kind, wanted))
     assert one(findings, "error", PAN, f"firmware {now}, the YAML wants {now + 1}")
-
-
-def test_what_old_firmware_of_a_dynamixel_lacks():
-    old = apply_rules(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=45)))
-    assert one(old, "warn", PAN, "no fast sync read").remedy
-    known = apply_rules(servo_state(DYNAMIXEL, found=found_as(DYNAMIXEL, firmware=52)))
-    assert one(known, "note", PAN, "firmware 52")
 
 
 @each
@@ -253,12 +212,6 @@ def test_a_wrong_model_or_two_servos_are_not_judged_further(kind):
     assert "two servos share id 1" in only.what
 
 
-def test_what_was_not_read_is_said():
-    findings = apply_rules(servo_state(DYNAMIXEL, shutdown=None, velocity_limit=None))
-    found = one(findings, "error", PAN, "gave no good answer about")
-    assert "shutdown" in found.what and "velocity limit" in found.what
-
-
 @each
 def test_every_rule_stands_registers_that_were_not_read(kind):
     state = servo_state(kind)
@@ -266,21 +219,6 @@ def test_every_rule_stands_registers_that_were_not_read(kind):
         assert one(
             apply_rules(servo_state(kind, **{name: None})), "error", PAN, "no good answer about"
         )
-
-
-@each
-def test_a_servo_that_does_not_tell(kind):
-    rig = Rig(kind)
-    if kind is DYNAMIXEL:
-        rig.set(1, shutdown=52)  # as from the factory it is worth a note
-    found = ping(rig.port, kind.family, 1, BAUD, 1)
-    rig.command("lose 1")
-    checks = CHECKS[kind.name]
-    (only,) = apply_rules(
-        read_state(Registers(rig.port, kind.family), checks, rig.setups[0], present(found), 0)
-    )
-    says = "no good answer about its registers" if kind is FEETECH else "answers pings and nothing"
-    assert only.level == "error" and says in only.what
 
 
 # --- a whole bus
@@ -294,18 +232,6 @@ def test_a_good_rig_is_well(kind):
     version = "53" if kind is DYNAMIXEL else "3.53"
     well = one(findings, "ok", YAW, f"{NECK[kind.name]}, firmware {version}, ")
     assert "degC, at step 2048" in well.what and not well.remedy and not well.fixes
-
-
-def test_that_nobody_guards_servos_without_a_watchdog_is_said():
-    (note,) = [f for f in Rig(FEETECH).check() if f.level != "ok"]
-    assert note.level == "note" and "no bus watchdog" in note.what and "switch" in note.what
-
-
-def test_the_voltage_latch_is_explained_where_it_is_armed():
-    findings = Rig(DYNAMIXEL).check()
-    note = one(findings, "note", PAN, "switches its torque off until it is restarted")
-    assert "power off and on" in note.remedy and "3.5..7.0 V" in note.what
-    assert not any(f.level == "note" and f.where == YAW for f in findings)
 
 
 @each
@@ -324,15 +250,6 @@ def test_a_missing_servo_a_stranger_and_one_at_another_rate(kind):
 
 
 @each
-def test_a_new_servo_among_the_others(kind):
-    eye, neck = EYE[kind.name], NECK[kind.name]
-    rig = Rig(kind, [ServoSpec(1, eye), ServoSpec(2, eye), ServoSpec(11, neck)])
-    rig.set(11, baud_rate=kind.family.baud_rates.index(57_600))
-    found = one(rig.check(), "warn", "the bus", f"servo 11 ({neck}) answers at 57600")
-    assert "gazerig setup" in found.remedy
-
-
-@each
 def test_nobody(kind):
     rig = Rig(kind)
     rig.command("lose all")
@@ -348,18 +265,6 @@ def test_two_servos_with_one_id_and_one_of_which_only_pieces_come(kind, fault, s
     rig = Rig(kind)
     rig.command(fault)
     assert "alone" in one(rig.check(), "error", TILT, says).remedy
-
-
-def test_what_servos_suffer():
-    rig = Rig(FEETECH)
-    rig.hold(7)
-    for fault in ("voltage 1 12.0", "temperature 2 64", "overload 7"):
-        rig.command(fault)
-    findings = rig.check()
-    assert "sts3215-12v" in one(findings, "error", PAN, "12.0 V").remedy
-    assert one(findings, "warn", TILT, "64 degC")
-    assert one(findings, "error", YAW, "reports: overload")
-    assert one(findings, "warn", YAW, "torque is on")
 
 
 @each
@@ -412,16 +317,6 @@ def test_fix_mends_an_sts_servo_for_good():
     assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1) == b"\1"
 
 
-def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
-    rig = Rig(DYNAMIXEL)
-    servo = rig.chain[2]
-    servo.memory.set("status_return_level", 0)
-    servo.status_level = 0
-    found = one(rig.check(), "error", TILT, "answers pings and nothing else")
-    (done,) = rig.fix([found])
-    assert done.done and worst_level(rig.check()) == "note"
-
-
 @each
 def test_fix_leaves_a_servo_alone_whose_torque_is_on(kind):
     rig = Rig(kind)
@@ -455,12 +350,6 @@ USB = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-FTD
 
 def facts(access, holders=()):
     return PortFacts("/dev/ttyUSB0", access, holders, (USB,))
-
-
-def test_a_good_port_and_its_lasting_name():
-    first, second = examine_port(facts(Access(True, True, True, "dialout", True)))
-    assert (first.level, second.level) == ("ok", "note")
-    assert "/dev/serial/by-id/usb-FTDI-if00" in second.remedy
 
 
 @pytest.mark.parametrize(
@@ -502,44 +391,7 @@ def test_latency_timer(tmp_path):
     assert unread.level == "note"
 
 
-def test_a_port_that_is_not_there_ends_the_examination(tmp_path):
-    rig = Rig(DYNAMIXEL)
-    rig.port.port_name = str(tmp_path / "ttyUSB9")
-    (only,) = rig.check_all(Host())
-    assert only.level == "error" and only.where.endswith("ttyUSB9")
-
-
-def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
-    rig, host = Rig(DYNAMIXEL), Host(processes=tmp_path)
-    rig.port.port_name = "/dev/null"  # a character device that may be opened
-    rig.port.faults.command("deny on")
-    findings = rig.check_all(host)
-    assert worst_level(findings) == "error" and findings[-1].where == "/dev/null"
-    rig.port.faults.command("clear")
-    assert len(rig.check_all(host)) > 3
-    assert not rig.port.is_open
-    rig.port.setBaudRate = lambda baud: False  # type: ignore[assignment, method-assign]
-    with pytest.raises(PortError, match="cannot run at 1000000"):
-        find_servos(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
-
-
 # --- words
-
-
-def test_findings_in_words():
-    finding = Diagnostic("warn", "hot", "neck_yaw (servo 7)", "let it cool")
-    assert str(finding) == "warn: neck_yaw (servo 7): hot: let it cool"
-    assert worst_level([]) == "ok"
-    same = [Diagnostic("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
-    worst_first = group_findings([*same, finding])
-    assert [row[0] for row in worst_first] == ["warn", "note"]
-    assert worst_first[1] == ("note", "j1, j2, j4 (servos 1-2, 4)", "n", "")
-    assert join_places(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
-    fixable = Diagnostic("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
-    assert summarize([finding, fixable], "desk", False) == (
-        "desk: 2 warn; gazerig doctor --fix mends 1 of them"
-    )
-    assert "--fix" not in summarize([fixable], "desk", True)
 
 
 def test_remarks_of_a_scan():
@@ -624,23 +476,6 @@ def test_nobody_answers():
     assert "USB Dual Port" in only.remedy and "serial pins" not in only.remedy
 
 
-@pytest.mark.parametrize(("real", "wanted"), [(True, False), (False, True)])
-def test_check_bytes(real, wanted):
-    rig = BoardRig(params=MaestroParams(crc=wanted), crc=real)
-    found = one(rig.check(), "error", "the board", "the YAML says crc")
-    assert f"bus.maestro.crc: {str(real).lower()}" in found.remedy
-
-
-def test_another_device_number():
-    rig = BoardRig(params=MaestroParams(protocol="pololu"), device=3)
-    found = one(rig.check(), "error", "the board", "answers the compact form only")
-    assert "its device number is not 12" in found.remedy
-    assert (
-        worst_level(BoardRig(params=MaestroParams(protocol="pololu", device=3), device=3).check())
-        == "note"
-    )
-
-
 def test_a_board_with_fewer_channels_than_the_rig():
     far = CHANNEL_PAN._replace(id=8, name="eyes_tilt")
     rig = BoardRig(6, setups=(CHANNEL_PAN, far), usb=MICRO)
@@ -648,13 +483,6 @@ def test_a_board_with_fewer_channels_than_the_rig():
     assert one(findings, "error", "the board", "has 6 channels, the YAML says 12")
     assert one(findings, "error", "eyes_tilt (channel 8)", "channels 0..5 only")
     assert bytes.fromhex("9008") not in rig.sent  # an error to a board sends all channels home
-
-
-def test_where_the_size_is_not_known_a_missing_channel_is_found_by_its_silence():
-    far = CHANNEL_PAN._replace(id=8, name="eyes_tilt")
-    rig = BoardRig(6, setups=(CHANNEL_PAN, far))
-    assert one(rig.check(), "error", "eyes_tilt (channel 8)", "does not answer about this channel")
-    assert rig.errors() == []  # the doctor has cleaned up after itself
 
 
 def test_a_channel_that_may_not_be_there_is_not_asked_for_while_servos_have_pulses():
@@ -698,47 +526,7 @@ def test_a_script_is_stopped_by_fix():
     assert not rig.board.faults.board_status()["script"] and worst_level(rig.check()) != "warn"
 
 
-def test_pulses_without_a_program():
-    rig = BoardRig()
-    rig.do("84 00 70 2E")
-    found = one(rig.check(), "warn", "eyes_pan (channel 0)", "1500 us though no program runs it")
-    assert "gazerig jog" in found.remedy
-    rig.do("84 00 00 1F")
-    found = one(rig.check(), "error", "eyes_pan (channel 0)", "outside its range 1100..1900 us")
-    assert "switch the servo supply off" in found.remedy
-
-
 # --- what to set in Pololu's program
-
-
-def test_ranges_are_rounded_outwards_to_what_a_board_can_keep():
-    assert range_us(CHANNEL_PAN) == (1088, 1904)
-    assert range_us(LID) == (896, 1808)
-    assert (wide_range(CHANNEL_PAN), wide_range(LID)) == (None, (896, 1808))
-    edge = CHANNEL_PAN._replace(min_steps=3968, max_steps=8000)
-    assert (range_us(edge), wide_range(edge)) == ((992, 2000), None)
-    assert wide_range(edge._replace(max_steps=8001)) == (992, 2016)
-
-
-def test_what_to_set_is_said_for_every_channel():
-    said = "\n".join(instructions(MaestroParams(device=5, crc=True), SETUPS, True))
-    assert "USB Dual Port" in said and "Device Number: 5" in said and "Enable CRC: on" in said
-    assert "channel  2: Min  896, Max 1808, Speed" in said and "Timeout: 0.50 s" in said
-    pins = "\n".join(instructions(MaestroParams(baud=57_600), SETUPS, False))
-    assert "UART, fixed baud rate 57600" in pins and "USB Dual Port" not in pins
-
-
-@pytest.mark.parametrize(("steps_s", "units"), [(3100.0, 31), (3300.0, 32), (12_345.0, 124)])
-def test_a_speed_is_given_as_the_board_keeps_it(steps_s, units):
-    assert start_limits(LID._replace(max_speed_steps_s=steps_s))[0] == units
-
-
-def test_a_place_that_is_cut():
-    assert clipping_text(LID, 3600, 3968) == (
-        "left_upper_lid (channel 2) is sent to 900 us and the board stays at 992 us: set its Min "
-        "to 896 and its Max to 1808 in Pololu's program"
-    )
-    assert "gives no pulses" in clipping_text(LID, 3600, 0)
 
 
 # --- PCA9685
@@ -782,13 +570,6 @@ def test_a_board_that_is_not_there_is_one_finding_with_its_remedy() -> None:
     (only,) = examine_pca9685(Pca9685Rig().port, Pca9685Params(address=0x41), CHANNELS)
     assert only.level == "error" and only.what == "no PCA9685 answers at 0x41"
     assert "VCC" in only.remedy and "jumpers" in only.remedy
-
-
-def test_a_channel_that_no_board_has() -> None:
-    wrong = CHANNELS[1]._replace(id=16)
-    findings = examine_pca9685(Pca9685Rig().port, PCA9685, (CHANNELS[0], wrong))
-    assert findings[0].level == "error" and "channels 0 to 15" in findings[0].what
-    assert "eyes_tilt" in findings[0].where
 
 
 @pytest.mark.parametrize(

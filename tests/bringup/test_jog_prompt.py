@@ -9,9 +9,7 @@ from commands_started import OnTerminal
 from served_rigs import rig_files
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.linkage_calibration import HobbyMarker
-from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.prompts import Lines
 
@@ -44,25 +42,6 @@ def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFi
     person(tmp_path, "+40", "-12.5", "1480", "left", "nan", "").steer("move it", servo)
     assert servo.reported == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
     assert capsys.readouterr().err.count("moves it by so many us") == 2
-
-
-def test_a_number_is_said_or_agreed_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answers = person(tmp_path, "", "-7.5", "much", "inf", "3")
-    assert answers.ask_number("how far?", 12.5, str) == 12.5
-    assert answers.ask_number("how far?", 12.5, str) == -7.5
-    assert answers.ask_number("how far?", 12.5, str) == 3.0
-    said = capsys.readouterr().err
-    assert "how far? [12.5]" in said and "'much' is no number" in said
-
-
-@pytest.mark.parametrize("word", ["q", "quit"])
-def test_q_and_the_end_of_the_answers_end_it(word: str, tmp_path: Path) -> None:
-    with pytest.raises(CalibrationStopped, match="q"):
-        person(tmp_path, word).steer("move it", Servo())
-    with pytest.raises(CalibrationStopped):
-        person(tmp_path, word).ask_number("how far?", 1.0, str)
-    with pytest.raises(SetupError, match=r"no answer left to: how far\? \[1\]"):
-        person(tmp_path).ask_number("how far?", 1.0, str)
 
 
 def test_keys_steer_a_hobby_servo_at_the_terminal(tmp_path: Path) -> None:

@@ -9,18 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.config.rig import LidJoints
 from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
-    EndStop,
-    StopSearch,
     StopSearchParams,
     find_end_stop,
-    move_to_goal,
 )
 from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
@@ -28,11 +24,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     CalibrationRefused,
     Marks,
     PositionUnwrapper,
-    centre_zero,
-    end_names,
-    is_lid,
     joint_calibration,
-    lid_keys,
     rig_changes,
     with_calibration,
 )
@@ -41,14 +33,9 @@ from gazerig.features.bringup.calibration.joint_procedure import (
     calibrate_by_motion,
 )
 from gazerig.features.bringup.calibration.linkage_calibration import (
-    LEAD_US,
-    HandMarker,
     HobbyMarker,
-    angle_now,
     calibrate_by_marks,
     fit_linkage,
-    likely_angle,
-    spread_between,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
@@ -58,7 +45,6 @@ from gazerig.features.bringup.servo_kinds import servo_kind
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.types import GAZE_JOINTS as EVERY
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -161,11 +147,6 @@ def test_a_position_is_followed_over_the_seam_however_it_is_reported(
     assert track.steps == true
 
 
-def test_a_servo_that_went_on_counting_before_is_taken_into_its_turn() -> None:
-    assert PositionUnwrapper().see(TURN + 100, 0.0) == 100
-    assert PositionUnwrapper().see(-100, 0.0) == TURN - 100
-
-
 def test_turning_unseen_is_refused_when_its_way_is_unknown() -> None:
     track = PositionUnwrapper()
     track.see(1000, 0.0)
@@ -232,7 +213,6 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
     [
         (Marks(2070, 2030, 2050), "only 3.5 deg are between the two ends"),
         (Marks(2300, 1800, 2400), "is not between the ends"),
-        (Marks(2300, 1800, 2290), "is within 2 deg of an end"),
         (Marks(2085, 2011, 2048), "with 2 deg of margin at each end only"),
         (Marks(2000 + 5000, 2000, 4000), "counts only one turn"),
     ],
@@ -242,39 +222,7 @@ def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says:
         joint_calibration("left_eye_pan", marks, JOINT, 2.0)
 
 
-def test_a_geared_joint_beyond_half_a_turn_is_refused() -> None:
-    geared = replace(JOINT, ratio=0.1, min_deg=-1.0, max_deg=1.0)
-    with pytest.raises(CalibrationRefused, match="more than a joint may turn"):
-        joint_calibration("neck_yaw", Marks(2600, 1500, 2048), geared, 2.0)
-
-
-def test_every_joint_has_names_for_its_ends() -> None:
-    for name in EVERY:
-        positive, negative = end_names(name)
-        assert positive != negative
-    assert end_names("right_eye_tilt") == end_names("eyes_tilt") == ("UPPER", "LOWER")
-    assert end_names("left_lower_lid") == ("OPEN", "SHUT")
-
-
-def test_the_keys_of_lids_are_those_of_the_rig_file() -> None:
-    lids = [name for name in EVERY if is_lid(name)]
-    assert len(lids) == 4 and all(lid_keys(name) == LidJoints.keys(name) for name in lids)
-
-
-def test_the_cure_for_the_seam_is_what_the_servo_can_do() -> None:
-    sts = replace(JOINT, model="sts3215")
-    with pytest.raises(CalibrationRefused, match="--set-middle"):
-        joint_calibration("neck_yaw", Marks(4200, 3900, 4050), sts, 0.0)
-    with pytest.raises(CalibrationRefused, match="take the horn off"):
-        joint_calibration("neck_yaw", Marks(4200, 3900, 4050), JOINT, 0.0)
-
-
 # --- what goes into the rig file
-
-
-def test_only_what_differs_is_changed() -> None:
-    found = Calibration(cast(int, JOINT.zero_step), 1, -35.0, 30.0)
-    assert rig_changes("left_eye_pan", JOINT, found, {}) == {"joints.left_eye_pan.max_deg": 30.0}
 
 
 @pytest.mark.parametrize(("lid", "key"), [("upper", "left"), ("lower", "left_lower")])
@@ -284,10 +232,6 @@ def test_a_lid_s_own_ends_and_its_parking_follow_the_new_range(lid: str, key: st
     ends = {f"lid_joints.{key}_shut_deg": -20.0, f"lid_joints.{key}_open_deg": 22.0}
     assert {one: wanted[one] for one in wanted if one.startswith("lid_joints")} == ends
     assert wanted[f"park_deg.{name}"] == -20.0 and "park_deg.neck_pitch" not in wanted
-
-
-def test_the_middle_is_half_way() -> None:
-    assert centre_zero(Marks(3000, 1000, 0)).zero == 2000
 
 
 # --- finding a stop
@@ -341,49 +285,6 @@ def test_a_stop_is_found_where_it_is_and_never_pushed_for_half_a_second(
     assert 1.5 <= back <= PARAMS.back_off_deg + 0.1
 
 
-def test_the_goal_never_runs_far_ahead_nor_fast() -> None:
-    look = StopSearch(PARAMS, 1, 0, TURN - 1)
-    goals = [look.step(2048, 0.0, 0.02 * i) for i in range(20)]
-    assert max(goals) - 2048 <= PARAMS.lead_deg * STEPS_PER_DEG
-    steps = [after - before for before, after in zip(goals, goals[1:], strict=False)]
-    assert max(steps) <= PARAMS.speed_deg_s * 0.02 * STEPS_PER_DEG + 1
-
-
-def test_current_without_motion_ends_a_push_early() -> None:
-    gentle = Toy(1000, 0, 1000, 0.0)
-    strong = find_end_stop(PARAMS, 1, (0, TURN - 1), gentle.exchange)
-    assert strong.pushed_s < PARAMS.longest_push_ms / 1e3
-    blind = Toy(1000, 0, 1000, 0.0)
-    late = find_end_stop(
-        PARAMS, 1, (0, TURN - 1), lambda goal: (*blind.exchange(goal)[:1], 0.0, blind.t_s)
-    )
-    assert late.kind == "stop" and strong.pushed_s < late.pushed_s <= 0.5
-
-
-def test_the_end_of_the_turn_is_no_stop() -> None:
-    free = Toy(3900, -5000, 9000)
-    assert find_end_stop(PARAMS, 1, (0, TURN - 1), free.exchange).kind == "limit"
-    assert isinstance(find_end_stop(PARAMS, -1, (3000, TURN - 1), free.exchange), EndStop)
-
-
-def test_going_somewhere_tells_whether_something_was_in_the_way() -> None:
-    toy = Toy(1000, 500, 2000)
-    assert move_to_goal(1800, PARAMS, toy.exchange)
-    assert abs(toy.x - 1800) < 1.5 * STEPS_PER_DEG
-    assert not move_to_goal(2500, PARAMS, toy.exchange)
-    assert toy.longest_push_s <= 0.5
-
-
-def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
-    joint = load_rig("expressive").joints["jaw"]
-    assert end_names("jaw") == end_names("car_lid") == ("POSITIVE", "NEGATIVE")
-    made = joint_calibration("jaw", Marks(2400, 2047, 2045), joint, 2.0)
-    assert (made.zero_step, made.min_deg, made.sign) == (2047, 0.0, 1)
-    assert made.max_deg == pytest.approx(29.0, abs=0.05)
-    with pytest.raises(CalibrationRefused, match=r"straight ahead .* is not between"):
-        joint_calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)
-
-
 # --- Calibrating one emulated joint by hand or by motion; refused joints; and a push rod
 
 
@@ -414,16 +315,6 @@ def test_by_hand_torque_that_was_left_on_goes_off_first(joint: JointParams) -> N
     assert bench.get("torque_enable") == 0
 
 
-@pytest.mark.parametrize("start", [3900, 200])
-def test_by_hand_over_the_seam_is_refused_with_the_turn_that_helps(start: int) -> None:
-    bench = Bench(EYE, start)
-    bench.script = [600, -1200, 600]
-    with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* take the horn off"):
-        calibrate_by_hand(bench.joint, bench, 2.0)
-    with pytest.raises(SetupError, match="cannot set its middle"):
-        bench.joint.set_middle()
-
-
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
     bench = Bench(STS, 3900)
     bench.script = [600, -1200, 600]
@@ -433,40 +324,6 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     bench.script = [600, -1200, 600]
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
-
-
-def test_a_joint_next_to_the_seam_is_calibrated_on_its_side() -> None:
-    bench = Bench(EYE, 3700)
-    bench.script = [300, -800, 400]
-    found = calibrate_by_hand(bench.joint, bench, 2.0)
-    assert found.zero_step == 3600 and found.max_deg < 36.0
-
-
-def test_a_servo_turned_by_whole_turns_before_gives_the_same() -> None:
-    bench = Bench(EYE)
-    bench.chain.find_servo(1).turn(4096)
-    bench.script = [400, -800, 400]
-    assert calibrate_by_hand(bench.joint, bench, 2.0).zero_step == 2100
-
-
-def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
-    bench = Bench(STS, 3000)
-    bench.joint.set_middle()
-    offset = bench.get("position_offset")
-    bench.joint.check()
-    assert offset
-    assert bench.joint.clear_offset() == offset
-    bench.restart()
-    assert bench.get("position_offset") == 0
-    assert bench.get("present_position") == pytest.approx(3000, abs=4)
-
-
-def test_a_homing_offset_can_be_cleared() -> None:
-    bench = Bench(EYE)
-    bench.put("homing_offset", 300)
-    assert bench.joint.clear_offset() == 300
-    bench.joint.check()
-    assert bench.get("homing_offset") == 0
 
 
 # --- driven
@@ -493,32 +350,10 @@ def test_by_motion_finds_the_stops_and_puts_everything_back(joint: JointParams) 
     assert len(pushed) == 2 and max(pushed) <= 500.0
 
 
-def test_drive_that_a_killed_program_left_weak_is_full_again() -> None:
-    bench = Bench(EYE, 2100, STOPS)
-    bench.put("goal_pwm", 200)
-    calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert bench.get("goal_pwm") == bench.get("pwm_limit")
-
-
 def test_by_motion_the_person_says_which_way_it_went() -> None:
     bench = Bench(EYE, 2100, STOPS)
     bench.agreed = False
     assert calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle").sign == -1
-
-
-def test_by_motion_zero_by_a_person() -> None:
-    bench = Bench(EYE, 2100, STOPS)
-    bench.script = [100]
-    found = calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "person")
-    assert found.zero_step == pytest.approx(2200, abs=15)
-
-
-def test_by_motion_narrow_limits_of_a_neck_servo_are_opened_and_put_back() -> None:
-    bench = Bench(NECK, 2100, STOPS)
-    bench.put("min_position_limit", 2000)
-    bench.put("max_position_limit", 2200)
-    found = calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert found.max_deg > 30.0 and bench.limits() == (2000, 2200)
 
 
 def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
@@ -562,27 +397,6 @@ def test_by_motion_is_slow_and_weak() -> None:
     bench.joint.restore()
 
 
-def test_by_motion_a_servo_without_a_watchdog_is_said_to_be_one() -> None:
-    bench = Bench(STS, 2100, STOPS)
-    bench.joint.enable_torque(GENTLY)
-    assert bench.get("torque_limit") == 300
-    assert 0 < bench.get("goal_speed") <= 2.0 * 15.0 * STEPS_PER_DEG
-    assert "no watchdog" in bench.joint.alone and not Bench(EYE).joint.alone
-    bench.joint.restore()
-    calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
-    assert any("no watchdog" in line for line in bench.said)
-
-
-def test_limits_that_a_killed_program_left_open_are_narrow_again_after_a_restart() -> None:
-    bench = Bench(STS, 2100, STOPS)
-    bench.put("min_position_limit", 2000)
-    bench.put("max_position_limit", 2200)
-    bench.joint.enable_torque(GENTLY)
-    assert bench.get("min_position_limit") == 0
-    bench.restart()
-    assert bench.limits() == (2000, 2200)
-
-
 def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
     bench = Bench(STS, 2100, (1000.0, 3000.0))
     bench.joint.enable_torque(GENTLY)
@@ -599,7 +413,6 @@ def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
     [
         (EYE, "homing_offset", 300, r"Homing Offset is 300 steps.*--clear-offset"),
         (EYE, "operating_mode", 4, r"operating_mode is 4, not 3: gazerig doctor --fix"),
-        (EYE, "drive_mode", 1, r"drive_mode is 1, not 0"),
         (STS, "operating_mode", 1, r"operating_mode is 1, not 0: gazerig doctor --fix"),
         (STS, "phase", 0x1C, r"phase is 28, not 12: gazerig doctor --fix"),
     ],
@@ -611,14 +424,6 @@ def test_a_servo_set_up_in_another_way_is_refused(
     bench.put(register, value)
     with pytest.raises(ServoMissing, match=says):
         bench.joint.check()
-
-
-def test_a_wrong_model_is_named() -> None:
-    bench = Bench(EYE)
-    other = replace(EYE, model="xc330-m288")
-    wrong = SmartServoAccess("left_eye_pan", other, bench.port, bench.clock, lambda: None)
-    with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
-        wrong.check()
 
 
 @pytest.mark.parametrize(
@@ -642,13 +447,6 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
         bench.joint.position()
 
 
-def test_a_servo_that_answers_pings_alone_is_brought_to_speak() -> None:
-    bench = Bench(EYE)
-    bench.put("status_return_level", 0)
-    bench.joint.check()
-    assert bench.limits() == (0, 4095)
-
-
 def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
     bench = Bench(EYE, 4000)
     bench.chain.find_servo(1).turn(200)
@@ -667,36 +465,6 @@ def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
     bench.clock.sleep_until(bench.clock.now_s() + 1.0)
     assert bench.get("present_position") == pytest.approx(stopped_at, abs=3)
     assert stopped_at < 2100 + 0.5 * 2.0 * 15.0 * STEPS_PER_DEG
-
-
-class Reader(Bench):
-    """A person who turns a joint by hand and types the angles; None: the proposed ones."""
-
-    angles: list[float | None]
-
-    def ask_number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        self.said.append(question)
-        live()
-        said = self.angles.pop(0)
-        return proposed if said is None else said
-
-    def steer(self, question: str, servo: HobbyMarker) -> None:
-        raise AssertionError("a servo that tells its place is turned by hand")
-
-
-def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
-    rod = replace(
-        STS, min_deg=-20.0, max_deg=20.0, transmission_points=((-25.0, 1800.0), (25.0, 2400.0))
-    )
-    bench = Reader(STS)
-    single = SmartServoAccess("left_eye_pan", rod, bench.port, bench.clock, lambda: None)
-    bench.script = [0, 250, -490, 120, 240]
-    bench.angles = [22.0, -21.0, None, 10.0]
-    made = calibrate_by_marks(HandMarker(single, bench), bench, 1.0, 1)
-    assert [round(at) for _, at in made.transmission_points] == [1860, 1980, 2100, 2220, 2350]
-    assert [angle for angle, _ in made.transmission_points] == [-21.0, -10.5, 0.0, 10.0, 22.0]
-    assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
-    assert any("turn left_eye_pan until it reads about step 1980" in line for line in bench.said)
 
 
 # --- A joint behind a push rod: places marked by eye over an emulated board, and their linkage
@@ -730,32 +498,16 @@ def test_the_range_lies_inside_what_was_marked(
     assert joint.make_linkage().rising == rising
 
 
-def test_a_lid_ends_where_it_was_marked_and_its_keys_are_its_own() -> None:
-    made = fit_linkage("left_lower_lid", [(20.0, 1250.0), (-9.0, 1600.0), (5.0, 1450.0)], LID, 2.0)
-    assert (made.min_deg, made.max_deg) == (-9.0, 20.0)
-    wanted = rig_changes("left_lower_lid", LID, made, {"left_lower_lid": -12.0})
-    assert wanted == {
-        "joints.left_lower_lid.transmission_points": ((-9, 1600), (5, 1450), (20, 1250)),
-        "joints.left_lower_lid.min_deg": -9.0,
-        "joints.left_lower_lid.max_deg": 20.0,
-        "lid_joints.left_lower_shut_deg": -9.0,
-        "lid_joints.left_lower_open_deg": 20.0,
-        "park_deg.left_lower_lid": -9.0,
-    }
-
-
 @pytest.mark.parametrize(
     ("name", "marked", "says"),
     [
         ("eyes_pan", [(0.0, 1500.0), (1.5, 1600.0), (-20.0, 1300.0)], "0 deg must be within"),
         ("left_lower_lid", [(20.0, 1250.0), (3.0, 1600.0)], "call half open 0"),
-        ("eyes_pan", [(0.0, 1500.0), (4.0, 1600.0), (-4.0, 1300.0)], "only 4.0 deg"),
         (
             "eyes_pan",
             [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)],
             "all increase or all decrease",
         ),
-        ("eyes_pan", [(0.0, 1500.0), (0.0, 1700.0), (-20.0, 1300.0)], "must be within|must rise"),
         ("eyes_pan", [(0.0, 1500.0), (20.0, 2900.0), (-20.0, 1300.0)], "outside the servo's"),
     ],
 )
@@ -764,31 +516,6 @@ def test_what_makes_no_linkage_is_refused_with_the_rule(
 ) -> None:
     with pytest.raises(CalibrationRefused, match=says):
         fit_linkage(name, marked, MAKER.joints[name], 2.0)
-
-
-def test_proposals_keep_the_shape_of_the_curve_and_meet_the_marks() -> None:
-    assert angle_now(PAN, 1500.0) == 0.0 and angle_now(PAN, 1776.0) == 20.0
-    one, other = (0.0, 1500.0), (40.0, 1776.0)
-    assert likely_angle(PAN, 1500.0, one, other) == 0.0
-    assert likely_angle(PAN, 1776.0, one, other) == 40.0
-    # 10 deg of 20 are now 20 of 40.
-    assert likely_angle(PAN, 1634.0, one, other) == pytest.approx(20.0, abs=0.1)
-    assert likely_angle(PAN, 1634.0, (0.0, 1776.0), (-40.0, 1500.0)) == pytest.approx(-20, abs=0.1)
-
-
-def test_places_between_are_evenly_spread() -> None:
-    assert spread_between(1500.0, 1800.0, 2) == [1600.0, 1700.0]
-    assert spread_between(1800.0, 1500.0, 0) == []
-
-
-def test_a_smart_servo_behind_a_push_rod_is_measured_in_steps() -> None:
-    smart = JointParams(
-        1, "sts3215", -20.0, 20.0, 300.0, 20000.0, transmission_points=((-25, 1800), (25, 2300))
-    )
-    made = fit_linkage("eyes_pan", [(0.0, 2050.0), (22.0, 2300.0), (-21.0, 1790.0)], smart, 1.0)
-    joint = replace(smart, **made._asdict())
-    assert joint.steps(radians(-21.0)) == pytest.approx(1790.0)
-    assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
 
 
 # --- measured by eye
@@ -874,23 +601,6 @@ def test_eyes_are_measured_and_their_pulses_end() -> None:
     assert any("cut the servo power" in line for line in bench.said)
 
 
-def test_places_between_are_gone_to_and_asked_for() -> None:
-    bench = LinkageBench("eyes_tilt", "", "", "1210", "", "", "1790", "", "", "-13.5", "", "")
-    made = bench.measure(more=1)
-    assert [at for _, at in made.transmission_points] == [1790.0, 1650.0, 1510.0, 1360.0, 1210.0]
-    assert made.transmission_points[1][0] == -13.5 and made.transmission_points[2] == (0.0, 1510.0)
-    # The proposed angle is that of the file at this pulse.
-    assert made.transmission_points[-1][0] == pytest.approx(22.4, abs=0.2)
-
-
-def test_a_lid_is_left_shut_so_that_the_other_can_meet_it() -> None:
-    bench = LinkageBench("left_lower_lid", "", "1300", "", "20", "1600", "", "-9.5")
-    made = bench.measure()
-    assert (made.min_deg, made.max_deg) == (-9.5, 20.0)
-    assert bench.place_us() == pytest.approx(1600.0, abs=6.0) and bench.pulse() == 0
-    assert any("SHUT: where it meets the upper lid" in line for line in bench.said)
-
-
 def test_a_channel_that_gives_pulses_does_not_jump() -> None:
     bench = LinkageBench("eyes_pan", "", "1550", "", "", "1450", "", "")
     bench.port.setBaudRate(115_200)
@@ -917,40 +627,6 @@ def test_it_moves_slowly_and_never_outside_what_was_asked() -> None:
     assert bench.place_us() == pytest.approx(1700.0, abs=6.0)
 
 
-def test_a_key_that_is_held_down_runs_never_far_ahead() -> None:
-    bench = LinkageBench("eyes_pan")
-    bench.hobby.open()
-    bench.hobby.begin(1500.0)
-    for _ in range(40):
-        bench.placer.nudge(50.0)
-        bench.placer.live()
-        assert bench.hobby.place_us - bench.hobby.pulse_us <= LEAD_US + SPEED_US_S * 0.05
-    let_go_us = bench.hobby.pulse_us
-    assert bench.hobby.arrive() - let_go_us <= LEAD_US + 1.0
-
-
-def test_the_board_s_own_range_is_where_it_ends_and_is_named() -> None:
-    bench = LinkageBench("eyes_pan")
-    narrow = emulated_lines(MAKER)[""]
-    servos = tuple(
-        one._replace(max_steps=1700 * 4) if one.channel == 0 else one
-        for one in cast(tuple[Any, ...], narrow.servos)
-    )
-    bench.board = build(replace(narrow, servos=servos), bench.clock.now_s)  # type: ignore[arg-type]
-    bench.port = InProcessPort(bench.board, sleep_until=bench.clock.sleep_until)
-    bench.hobby = HobbyServoAccess(
-        "eyes_pan", MAKER.joints["eyes_pan"], bench.port, BOARD, bench.clock,
-        lambda: None, (500.0, 2500.0),
-    )  # fmt: skip
-    bench.hobby.open()
-    bench.hobby.begin(1600.0)
-    bench.hobby.aim(1900.0)
-    assert bench.hobby.arrive() == pytest.approx(1700.0, abs=1.0)
-    assert any("widen the range of its channel" in line for line in bench.hobby.events())
-    bench.hobby.aim(1650.0)
-    assert bench.hobby.arrive() == 1650.0
-
-
 @pytest.mark.parametrize("why", ["SIGINT", "q"])
 def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
     bench = LinkageBench("eyes_pan", "", "1700")
@@ -958,13 +634,6 @@ def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
     if why == "SIGINT":
         bench.tell = lambda line: setattr(bench, "why", why)  # type: ignore[method-assign]
     with pytest.raises(CalibrationStopped):
-        bench.measure()
-    assert bench.pulse() == 0
-
-
-def test_marks_that_go_back_are_refused_and_it_is_let_go() -> None:
-    bench = LinkageBench("eyes_pan", "", "", "1700", "", "20", "1600", "", "-20")
-    with pytest.raises(CalibrationRefused, match="all increase or all decrease"):
         bench.measure()
     assert bench.pulse() == 0
 

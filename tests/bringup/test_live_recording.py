@@ -158,17 +158,3 @@ def test_the_command_records_a_puppeteered_jaw_while_a_track_turns_the_neck(
     assert track.owns == ("jaw",) and max(angles) > 8.0 > 2.0 > min(angles)
     again = CliRunner().invoke(command.app, [*words, "--folder", str(tmp_path)])
     assert again.exit_code != 0 and "--force" in again.stderr
-
-
-def test_the_command_names_a_joint_that_the_head_lacks(turning: Path, tmp_path: Path) -> None:
-    words = [str(turning), "tail", "--live", "--joints", "jaw,tail", "--folder", str(tmp_path)]
-    done = CliRunner().invoke(command.app, words)
-    assert done.exit_code != 0 and "no joint 'tail'; joints of the head: " in done.stderr
-    assert not (tmp_path / "tail.yaml").exists()
-
-
-def test_the_command_keeps_what_it_has_when_the_time_is_over(turning: Path, tmp_path: Path) -> None:
-    words = [str(turning), "short", "--live", "--joints", "jaw", "--seconds", "1.5"]
-    done = CliRunner().invoke(command.app, [*words, "--folder", str(tmp_path)])
-    assert done.exit_code == 0 and "ended: the time is over" in done.stderr
-    assert load_track(tmp_path / "short.yaml").owns == ("jaw",)

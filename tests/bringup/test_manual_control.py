@@ -84,13 +84,6 @@ def on(kind: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("other", [kind], indirect=True)
 
 
-def test_nothing_moves_at_the_start(bench: Bench) -> None:
-    before = bench.where()
-    assert all(bench.torque())
-    assert bench.control.hold(1.0).arrived
-    assert bench.where() == pytest.approx(before, abs=0.3)
-
-
 def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
     before = bench.where()
     moved = bench.control.jog("neck_yaw", 20.0)
@@ -213,22 +206,6 @@ def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench)
     assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
 
 
-@on("maker")
-def test_a_jammed_hobby_servo_cannot_be_known_so_nothing_is_called_measured(other: Bench) -> None:
-    other.command("stick 0")
-    moved = other.control.jog("eyes_pan", 20.0)
-    assert moved.arrived and moved.joint_move("eyes_pan").estimated
-    assert other.where()["eyes_pan"] == pytest.approx(0.0, abs=1.0)
-
-
-@on("feetech")
-def test_sts_servos_are_measured(other: Bench) -> None:
-    moved = other.control.jog("neck_yaw", 20.0)
-    assert moved.arrived and not moved.joint_move("neck_yaw").estimated
-    assert str(moved.joint_move("neck_yaw")).startswith("neck_yaw: desired 20.0, measured ")
-    assert other.where()["neck_yaw"] == pytest.approx(20.0, abs=2.0)
-
-
 @on("mixed")
 def test_joints_of_three_kinds_move_together(other: Bench) -> None:
     asked = {"eyes_pan": 10.0, "neck_yaw": 15.0, "neck_pitch": -5.0}
@@ -241,6 +218,3 @@ def test_joints_of_three_kinds_move_together(other: Bench) -> None:
     }
     where = other.where()
     assert {name: where[name] for name in asked} == pytest.approx(asked, abs=2.0)
-
-
-# --- looking at a point

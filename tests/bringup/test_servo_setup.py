@@ -7,7 +7,7 @@ from doctor_rig import BAUD, each
 from doctor_rig import NECK as MODELS
 
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
-from gazerig.drivers.servo_bus.discovery import FoundServo, has_any_reply, ping
+from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
@@ -99,15 +99,6 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
 
 
 @each
-def test_doing_it_again_changes_nothing(kind):
-    bench = Bench(kind=kind)
-    bench.assign()
-    before = bench.kept(7)
-    assert bench.assign().changes == ()
-    assert bench.kept(7) == before
-
-
-@each
 def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     bench = Bench(kind=kind)
     bench.hold()
@@ -184,36 +175,7 @@ def test_a_servo_that_falls_silent_is_said_to_be_where_it_was(kind):
         assign_servo(bench.port, kind, found, bench.yaw._replace(id=5), bench.baud, print)
 
 
-def test_kinds_write_firmware_as_their_makers_do():
-    assert [FEETECH.family.format_firmware(number) for number in (353, 310)] == ["3.53", "3.10"]
-    assert DYNAMIXEL.family.format_firmware(53) == "53"
-
-
-def test_any_reply_is_a_matter_of_answers_not_of_echoes():
-    bench = Bench(kind=FEETECH)
-    bench.port.setBaudRate(BAUD)
-    assert has_any_reply(bench.port, FEETECH.family)
-    bench.port.faults.command("lose all")
-    assert not has_any_reply(bench.port, FEETECH.family)
-    bench.port.faults.command("echo on")
-    assert not has_any_reply(bench.port, FEETECH.family)
-    assert has_any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)), DYNAMIXEL.family)
-
-
 # --- Dynamixel servos, packet by packet
-
-
-def test_the_likely_rates_are_asked_first():
-    assert search_order(DYNAMIXEL, 2_000_000)[:2] == (57_600, 2_000_000)
-    assert sorted(search_order(DYNAMIXEL, 57_600)) == sorted(RATES)
-
-
-def test_a_servo_that_answers_pings_alone():
-    bench = Bench()
-    servo = bench.chain[1]
-    servo.memory.set("status_return_level", 0)
-    servo.status_level = 0
-    assert bench.assign().after.id == 7
 
 
 class StubbornPort(InProcessPort):

@@ -3,38 +3,32 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from math import degrees, pi, radians, sin
+from math import degrees, pi, sin
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 from emulated_rig import EmulatedRig, mixed_rig
-from present import present
 from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
-from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.drivers.errors import ServoFault
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
 from gazerig.features.bringup.cli.record_track import app
 from gazerig.features.bringup.hand_recording import record_hand_motion, switch_off
-from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH, KINDS
+from gazerig.features.bringup.servo_kinds import KINDS
 from gazerig.features.bringup.telemetry import (
     Monitor,
     Telemetry,
     TelemetrySample,
     as_json,
-    joint_telemetry,
-    pulse_telemetry,
-    telemetry_of,
 )
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
-from gazerig.robot.model.coupling import Differential
-from gazerig.robot.model.coupling_params import CoupledPair
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 from gazerig.robot.model.track_fit import track_motions
@@ -142,15 +136,6 @@ def test_a_moving_joint_and_its_goal_are_seen(kind: str) -> None:
 
 
 @each
-def test_an_error_is_named(kind: str) -> None:
-    bench = Bench(kind)
-    bench.command("overload 7")
-    bench.command("encoder 7")
-    assert set(bench.see("neck_yaw").errors) == {"overload", "encoder"}
-    assert bench.see("left_eye_pan").errors == ()
-
-
-@each
 def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
     bench = Bench(kind)
     bench.command("lose 7")
@@ -163,30 +148,6 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
     assert reported["joints"]["left_eye_pan"]["position_steps"] == 2100
     bench.command("clear")
     assert bench.monitor.sample().servos["neck_yaw"] is not None
-
-
-def test_load_is_a_share_of_the_stall() -> None:
-    assert present(DYNAMIXEL.calibration).load("xl330-m077", -147) == pytest.approx(-0.1)
-    assert present(DYNAMIXEL.calibration).load("xl430-w250", 250) == pytest.approx(0.25)
-    assert -100 * FEETECH.family.models["sts3215"].load_unit == pytest.approx(-0.1)
-
-
-def test_registers_are_shown_in_units_of_the_joint() -> None:
-    values = {
-        "torque_enable": 1,
-        "goal_position": 3000,
-        "present_current": -147,
-        "present_velocity": -3,
-        "present_position": -5,
-        "present_input_voltage": 52,
-        "present_temperature": 41,
-        "hardware_error_status": 0x20,
-    }
-    seen = telemetry_of(DYNAMIXEL, replace(EYE, zero_step=0, min_deg=0.0), values)
-    assert (seen.goal_steps, seen.position_steps) == (3000, -5)
-    assert seen.load == pytest.approx(-0.1) and seen.temperature_c == 41
-    assert seen.voltage_v == pytest.approx(5.2) and seen.errors == ("overload",)
-    assert radians(seen.velocity_deg_s or 0.0) < 0.0
 
 
 # --- boards
@@ -215,21 +176,6 @@ def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors() -> None:
     assert json.loads(bench.command("status"))["errors"] == ["protocol"]
 
 
-def test_a_board_that_waits_for_the_first_byte_of_the_pololu_form_is_woken_by_a_question() -> None:
-    bench = Bench(MAKER)
-    bench.command("lose all count 1")
-    assert bench.monitor.sample().servos["eyes_pan"] is None
-    bench.sent[""].clear()
-    assert bench.see("eyes_tilt").pulse_us == 0.0
-    pololu = [packet for packet in bench.sent[""] if packet[0] == 0xAA]
-    assert pololu and all(packet[2] == GET_POSITION & 0x7F for packet in pololu)
-
-
-def test_an_input_is_no_servo() -> None:
-    seen = pulse_telemetry(MAKER.joints["eyes_pan"], 700)
-    assert seen.errors == ("its channel is an input",) and seen.pulse_us is None
-
-
 def test_a_rig_of_three_kinds_is_one_sample(tmp_path: Path) -> None:
     rig = mixed_rig(tmp_path)
     bench = Bench(rig)
@@ -244,22 +190,6 @@ def test_a_rig_of_three_kinds_is_one_sample(tmp_path: Path) -> None:
     assert yaw["position_deg"] == pytest.approx(
         degrees(rig.joints["neck_yaw"].angle_rad(start)), abs=0.2
     )
-
-
-def telemetry(deg: float | None) -> Telemetry:
-    return Telemetry(deg, 0, deg, 0, deg, 0.1, 30, 5.0, True, ())
-
-
-def test_the_monitor_shows_the_joints_of_coupled_servos() -> None:
-    pair = CoupledPair("neck_pitch", "neck_roll", Differential())
-    one, other = joint_telemetry(pair, telemetry(25.0), telemetry(5.0))
-    assert one is not None and other is not None
-    assert (one.goal_deg, other.goal_deg) == pytest.approx((15.0, 10.0))
-    assert (one.position_deg, other.position_deg) == pytest.approx((15.0, 10.0))
-    assert (one.velocity_deg_s, other.velocity_deg_s) == pytest.approx((15.0, 10.0))
-    one, other = joint_telemetry(pair, telemetry(25.0), None)
-    assert one is not None and other is None and one.position_deg is None
-    assert joint_telemetry(pair, None, telemetry(1.0))[0] is None
 
 
 # --- A track that is recorded by hand: torque off, and the head's motion becomes its keys
@@ -324,20 +254,6 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(tmp_path: Path) -
     wanted = np.array([how(t)["neck_pitch"] for t in at])
     assert np.abs(played[:, 1] - wanted).max() < TOLERANCE_DEG + 0.8
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved
-
-
-def test_torque_that_comes_on_ends_the_recording() -> None:
-    bench = HandBench()
-    switch_off(DESK.joints, bench.port)
-    left = iter(range(5))
-
-    def sample() -> TelemetrySample:
-        if next(left, None) is None:  # as another program does
-            Registers(bench.port, KINDS["dynamixel"].family).write(7, "torque_enable", 1)
-        return bench.monitor.sample()
-
-    with pytest.raises(SetupError, match="the torque of neck_yaw came on: another program"):
-        record_hand_motion(sample, bench.rig.clock, lambda: None, 2.0)
 
 
 def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off() -> None:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.config.load import ConfigError, load, shipped_path
+from gazerig.config.load import load, shipped_path
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
+from gazerig.features.lab.analysis.eye_tracker_csv import Samples
 from gazerig.features.lab.analysis.fit_scanpath import fit_to_recording
-from gazerig.features.lab.analysis.fixations import FixationParams, PartBoxes, fixations_of
+from gazerig.features.lab.analysis.fixations import PartBoxes
 from gazerig.gaze.scanpath.scanpath import (
     Scanpath,
     ScanpathParams,
@@ -134,27 +134,6 @@ def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) 
     assert "#   gaze.csv" in text and "95 %" in text and "# from RE" in text
 
 
-def test_fixations_are_found_where_and_when_they_are(boxes: PartBoxes) -> None:
-    looks = list(walked(400, 5, 0.2))
-    found = fixations_of(samples(boxes, iter(looks), 6), boxes, FixationParams())
-    assert [f.part for f in found] == [part for part, _ in looks]
-    # Each look lasts 7 samples of flight and 50 at rest.
-    starts = 0.004 * (7 + 57 * np.arange(400))
-    # Within the flight: to a near place it is slow enough to belong to the look.
-    assert np.abs([f.start_s for f in found] - starts).max() < 0.028
-    assert np.mean([f.duration_s for f in found]) == pytest.approx(0.2, abs=0.012)
-
-
-def test_a_short_loss_is_bridged_and_a_long_one_ends_a_fixation(boxes: PartBoxes) -> None:
-    x, y = np.full(500, 400.0), np.full(500, 400.0)
-    x[100:110] = NAN  # 40 ms
-    x[300:400] = NAN  # 400 ms: a blink
-    found = fixations_of(Samples(np.arange(500) * 0.004, x, y, ""), boxes, FixationParams())  # type: ignore[arg-type]
-    assert [f.part for f in found] == ["N", "N"]
-    assert found[0].duration_s == pytest.approx(1.2, abs=0.01)
-    assert found[1].start_s == pytest.approx(1.6)
-
-
 def test_fixations_with_places_are_labelled_by_the_boxes(tmp_path: Path, boxes: PartBoxes) -> None:
     rows = (f"{300 * k},250,{(400, 300)[k % 2]},{(400, 300)[k % 2]}" for k in range(80))
     recording = written(tmp_path / "looks.csv", "onset,duration,X,Y", rows)
@@ -163,24 +142,6 @@ def test_fixations_with_places_are_labelled_by_the_boxes(tmp_path: Path, boxes: 
     assert load(tmp_path / "mine.yaml", Walk).dwell_mean_s == (0.25,) * 8
     with pytest.raises(SetupError, match="without a part column need the rectangles"):
         fit_to_recording(recording, None, tmp_path / "none.yaml")
-
-
-@pytest.mark.parametrize("header", ["time_ms;X;Y;pupil", "Timestamp\tgaze_x\tgaze_y\tpupil"])
-def test_headers_separators_and_units_are_understood(tmp_path: Path, header: str) -> None:
-    cut = ";" if ";" in header else "\t"
-    rows = (cut.join((str(4 * k), "1.5", "nan" if k == 3 else "2", "7")) for k in range(10))
-    read = read_recording(written(tmp_path / "gaze.csv", header, rows))
-    assert isinstance(read, Samples)
-    assert read.time_s == pytest.approx(0.004 * np.arange(10))
-    assert np.isnan(read.y).tolist() == np.isnan(read.x).tolist() == [k == 3 for k in range(10)]
-    assert "is in ms" in read.note
-
-
-def test_same_seed_same_bytes(tmp_path: Path) -> None:
-    recording = labelled_csv(tmp_path / "looks.csv", 300)
-    for name in ("a", "b"):
-        fit_to_recording(recording, None, tmp_path / name, "bootstrap", seed=7)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 SAMPLE_ROWS = [f"{0.004 * k:.3f},400,400" for k in range(200)]
@@ -219,40 +180,6 @@ def test_files_that_cannot_be_trusted_are_refused(
         fit_to_recording(recording, boxes, out)
     assert "\n" not in str(caught.value) and "bad.csv" in str(caught.value)
     assert not out.exists()
-
-
-def test_what_else_can_be_wrong_is_said(tmp_path: Path, boxes: PartBoxes) -> None:
-    looks = labelled_csv(tmp_path / "looks.csv", 300)
-    with pytest.raises(SetupError, match="no smoothing 'some'; there are none, laplace"):
-        fit_to_recording(looks, None, tmp_path / "out.yaml", "some")
-    with pytest.raises(SetupError, match="is the recording itself"):
-        fit_to_recording(looks, None, looks)
-    with pytest.raises(SetupError, match="No such file"):
-        fit_to_recording(tmp_path / "absent.csv", None, tmp_path / "out.yaml")
-    with pytest.raises(SetupError, match="No such file or directory\\): name another file"):
-        fit_to_recording(looks, None, tmp_path / "nowhere" / "out.yaml")
-    (tmp_path / "gaze.csv").write_text("time,x,y\n0,1,2\n0.1,1,2\n", encoding="utf-8")
-    with pytest.raises(SetupError, match=r"need the rectangles of the face's parts \(--parts\)"):
-        fit_to_recording(tmp_path / "gaze.csv", None, tmp_path / "out.yaml")
-    (tmp_path / "latin.csv").write_bytes(b"time,x,y\n\xff")
-    with pytest.raises(SetupError, match="not UTF-8 text"):
-        fit_to_recording(tmp_path / "latin.csv", boxes, tmp_path / "out.yaml")
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("N: [0, 0, 10, 10]\n", "at least two parts"),
-        ("N: [0, 0, 10, 10]\nM: [10, 0, 0, 10]\n", "M: .*needs x0 < x1"),
-        ("N: [0, 0, 10]\nM: [0, 0, 9, 9]\n", "N: has length 3, wanted 4"),
-        ("nose: [0, 0, 10, 10]\n", "none of the keys DN, FL"),
-    ],
-)
-def test_part_rectangles_are_checked(tmp_path: Path, text: str, why: str) -> None:
-    path = tmp_path / "parts.yaml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=why):
-        load(path, PartBoxes)
 
 
 def test_the_smaller_of_two_overlapping_parts_is_meant() -> None:

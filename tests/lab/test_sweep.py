@@ -2,36 +2,30 @@
 
 import csv
 import json
-import os
 import signal
 import subprocess
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from math import dist
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from branch import Branch, gazerig
-from child_processes import running
 from command_line import Invoked, invoked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.load import ConfigError, shipped_path
-from gazerig.config.parameters import apply_changes
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.human_norms import BY_KEY
-from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import (
     Axis,
     Point,
-    check_points,
     grid,
     latin_hypercube,
     make_axes,
@@ -39,22 +33,17 @@ from gazerig.features.lab.sweep.axes import (
 from gazerig.features.lab.sweep.fit import (
     counted_measures,
     fit_settings,
-    make_trial,
-    search_best,
-    yaml_snippet,
 )
-from gazerig.features.lab.sweep.response_figure import most_responsive, response_png
+from gazerig.features.lab.sweep.response_figure import most_responsive
 from gazerig.features.lab.sweep.run_outcome import (
     OUTSIDE,
     Outcome,
     grade,
-    run_figures,
     table_rows,
-    write_tables,
 )
 from gazerig.features.lab.sweep.sweep import RUNS, run_store
 from gazerig.features.lab.sweep.worker import figures_at
-from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool
+from gazerig.features.lab.sweep.worker_pool import Job, WorkerPool
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 
@@ -115,13 +104,6 @@ def test_the_picture_and_parquet_hold_the_same(finished: Path) -> None:
     assert columns[OUTSIDE][0] == int(rows[0][OUTSIDE])
 
 
-def test_a_sweep_is_done_once(finished: Path, tmp_path: Path) -> None:
-    before = {path.name: path.read_bytes() for path in finished.iterdir()}
-    again = swept(finished, "--set", f"{LOW}=0.2,1.5", "--set", f"{HIGH}=1.0,1.8", "--seeds", "1")
-    assert again.code == 0, again.err
-    assert {path.name: path.read_bytes() for path in finished.iterdir()} == before
-
-
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -135,27 +117,6 @@ def test_other_arguments_are_refused_with_what_differs(
 ) -> None:
     done = swept(finished, "--set", f"{LOW}=0.2,1.5", "--set", f"{HIGH}=1.0,1.8", *words)
     assert done.code == 2 and text in done.err and "another folder with --out" in done.err
-
-
-def test_an_edited_rig_is_another_one(tmp_path: Path) -> None:
-    file, out = tmp_path / "mine.yaml", tmp_path / "out"
-    file.write_text(Path(DESK).read_text(encoding="utf-8"), encoding="utf-8")
-    words = ("sweep", str(file), "--out", str(out), *QUICK, "--set", f"{COMFORT}=95,96")
-    assert invoked(*words).code == 2 and not out.exists()
-    with run_store(out, {"rig": {"gaze": {"a": 1, "b": 2}}}):
-        pass
-    with pytest.raises(SetupError, match="rig.gaze.b was 2, is now 3; repeat those"):  # noqa: SIM117
-        with run_store(out, {"rig": {"gaze": {"a": 1, "b": 3}}}):
-            pass
-
-
-def test_a_folder_of_something_else_or_in_use_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    done = swept(tmp_path, "--set", f"{COMFORT}=4,8")
-    assert done.code == 2 and "holds other files" in done.err
-    with run_store(tmp_path / "busy", {}), pytest.raises(SetupError, match="another gazerig sweep"):  # noqa: SIM117
-        with run_store(tmp_path / "busy", {}):
-            pass
 
 
 def test_a_line_that_was_being_written_when_the_power_went_is_done_again(tmp_path: Path) -> None:
@@ -204,32 +165,12 @@ def _zombie(pid: int) -> bool:
         return True
 
 
-def test_a_process_that_dies_costs_its_run_alone_and_the_end_comes_when_asked() -> None:
-    ends: list[str] = []
-    job = Job(RunOptions(mock=True, fast=True, scene="visitor", seconds=600.0, bus="ideal"), "")
-    pool = WorkerPool(job, 1, lambda: ends[0] if ends else None)
-    with pool:
-        outcomes = pool.outcomes([({}, 0), ({}, 1), ({}, 2)])
-        apply_changes = next(outcomes)[1]  # "" is no rig's configuration
-        assert apply_changes.failure == "the files of desk changed while the sweep ran"
-        os.kill(pool.pids[0], signal.SIGSTOP)
-        killed = pool.pids[0]
-        os.kill(killed, signal.SIGKILL)
-        dead = next(outcomes)[1]
-        assert dead.has_died and dead.failure.startswith("its process ended (killed by signal 9)")
-        ends.append("SIGINT")
-        with pytest.raises(SweepInterrupted):
-            list(outcomes)
-        pids = [killed, *pool.pids]
-    assert not alive(pids)
-
-
 # ---- the end from outside
 
 
 @contextmanager
-def begun(out: Path, fresh: bool = False) -> Iterator[Branch]:
-    """Start a sweep and wait for its first run; fresh: its workers are other Pythons."""
+def begun(out: Path) -> Iterator[Branch]:
+    """Start a sweep and wait for its first run."""
     words = ("sweep", "--out", str(out), *QUICK, "--set", f"{COMFORT}=1:80:80", "--seeds", "50")
     pipe = subprocess.PIPE
     process = Branch(gazerig(*words), stderr=pipe, text=True)
@@ -260,7 +201,7 @@ def children(pid: int) -> list[int]:
 @pytest.mark.slow
 def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with begun(out, fresh=True) as process:
+    with begun(out) as process:
         workers = children(process.pid)
         assert len(workers) == 1
         process.send_signal(signal.SIGINT)
@@ -271,16 +212,6 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
     lines = (out / RUNS).read_text(encoding="utf-8").splitlines()
     assert lines and all(len(json.loads(line)) == 4 for line in lines)
     assert not (out / "table.csv").exists()
-
-
-@pytest.mark.slow
-def test_a_killed_sweep_leaves_no_process(tmp_path: Path) -> None:
-    with begun(tmp_path / "out") as process:
-        workers = children(process.pid)
-        assert len(workers) == 1
-        process.kill()
-        process.wait()
-        wait_for(lambda: not alive(workers))
 
 
 # ---- figures
@@ -318,54 +249,10 @@ def test_the_picture_shows_what_responds() -> None:
     assert most_responsive([RANGE, PROFILE], sample, 2) == [OUTSIDE, "report.blink_rate"]
 
 
-@pytest.mark.parametrize(
-    ("axes", "panels"),
-    [((BLINKS,), 1), ((PROFILE,), 1), ((BLINKS, PROFILE), 1), ((BLINKS, CLOSE, PROFILE), 3),
-     ((RANGE, PROFILE), 2)],
-)  # fmt: skip
-def test_a_picture_of_every_number_of_parameters(axes: tuple[Axis, ...], panels: int) -> None:
-    points = grid(axes) if RANGE not in axes else latin_hypercube(axes, 12, 0)
-    drawn = response_png(axes, outcomes_of(points), ["report.blink_rate"])
-    image = cv2.imdecode(np.frombuffer(drawn, np.uint8), cv2.IMREAD_COLOR)
-    assert image is not None and image.std() > 5.0
-    assert image.shape[1] == pytest.approx(3.3 * 110 * max(panels, 2), abs=2)
-    assert drawn == response_png(axes, outcomes_of(points), ["report.blink_rate"])
-
-
 def test_a_measure_outside_its_band_counts_by_its_distance() -> None:
     assert grade(5.0, 4.0, 6.0) == grade(4.0, 4.0, 6.0) == 0.0
     assert grade(6.5, 4.0, 6.0) == grade(3.5, 4.0, 6.0) == pytest.approx(0.5)
     assert 0.5 < grade(8.0, 4.0, 6.0) < grade(100.0, 4.0, 6.0) < 1.0
-
-
-def test_a_column_of_numbers_and_words_is_text_in_parquet(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    runs = [
-        Outcome({"a": 1, "b": (1, 2)}, 0, {"x": 1}),
-        Outcome({"a": "two", "b": True}, 0, {"x": 0.5}),
-    ]
-    write_tables(tmp_path, runs)
-    held = parquet.read_table(tmp_path / "table.parquet").to_pydict()
-    assert held["a"] == ["1", "two"] and held["b"] == ["[1, 2]", "True"] and held["x"] == [1.0, 0.5]
-
-
-def test_a_run_gives_what_the_report_and_the_summary_give() -> None:
-    run = simulate(RIG, OPTIONS)
-    figures = run_figures(*run)
-    assert figures["seconds"] == run.figures["seconds"] and figures["events"] == 0
-    assert figures["gaze_error_deg.median"] == run.figures["gaze_error_deg"]["median"]  # type: ignore[index]
-    verdicts = [held for name, held in figures.items() if name.startswith("verdict.")]
-    assert figures[OUTSIDE] == verdicts.count("outside")
-    assert figures["report.too_few_events"] == verdicts.count("too few events") > 5
-
-
-def test_an_error_while_ticks_are_gathered_is_no_short_run() -> None:
-    def fail(tick: object) -> None:
-        raise RuntimeError("full")
-
-    with pytest.raises(RuntimeError, match="full"):
-        simulate(RIG, OPTIONS, watch=fail)
-    assert not running()
 
 
 # ---- what is refused
@@ -413,20 +300,6 @@ def test_steps_lists_and_ranges_are_read() -> None:
     assert reach.label == f"{BLINKING}, 1/min" and words.label == "gaze.saccade.profile"
 
 
-def test_lists_can_be_levels() -> None:
-    (axis,) = read("joints.neck_yaw.gains=[400, 0, 0],[800, 0, 0]")
-    assert axis.values == ((400, 0, 0), (800, 0, 0))
-
-
-def test_whole_numbers_stay_whole() -> None:
-    (axis,) = read("webcam.width_px=640:1280:3")
-    assert axis.values == (640, 960, 1280) and all(isinstance(v, int) for v in axis.values)
-    with pytest.raises(SetupError, match="640.5 is no whole number"):
-        read("webcam.width_px=640:641:3")
-    with pytest.raises(ConfigError, match="640.5 has a fraction|wanted a whole number"):
-        read("webcam.width_px=640.5:700")
-
-
 @pytest.mark.parametrize(
     ("setting", "error", "text"),
     [
@@ -455,14 +328,6 @@ def test_what_cannot_be_a_setting_is_refused(
     assert text in str(refused.value)
 
 
-def test_a_key_stands_once_and_all_faults_are_told() -> None:
-    with pytest.raises(SetupError, match="is given twice"):
-        read(f"{COMFORT}=4,5", f"{COMFORT}=6,7")
-    with pytest.raises(ConfigError) as refused:
-        read("gaze.hed.comfort_deg=4,5", f"{BLINKING}=1:99")
-    assert "did you mean 'head'" in str(refused.value) and "above 60" in str(refused.value)
-
-
 def test_a_grid_has_every_combination_the_last_axis_fastest() -> None:
     points = grid(read(f"{COMFORT}=4,6", f"{BLINKING}=10:30:3"))
     assert [tuple(point.values()) for point in points] == [
@@ -472,26 +337,6 @@ def test_a_grid_has_every_combination_the_last_axis_fastest() -> None:
         grid(read(f"{COMFORT}=4:16"))
     with pytest.raises(SetupError, match="at most 100000"):
         grid(read(f"{COMFORT}=4:16:1000", f"{BLINKING}=1:60:1000"))
-
-
-def test_values_that_the_rig_allows_nowhere_are_refused_before_anything_runs() -> None:
-    axes = read(f"{COMFORT}=4,x,-3,95", f"{BLINKING}=10,20")
-    with pytest.raises(ConfigError) as refused:
-        check_points(RIG, axes, grid(axes))
-    assert str(refused.value).splitlines() == [
-        f"{COMFORT}: 'x' is text, wanted a number, 0 to 90 deg",
-        f"{COMFORT}: -3 is below 0 (unit deg)",
-        f"{COMFORT}: 95 is above 90 (unit deg)",
-    ]
-
-
-def test_a_rule_between_two_parameters_refuses_only_what_no_point_allows() -> None:
-    axes = read(f"{LOW}=0.2,1.5", f"{HIGH}=1.0,2.0")
-    points = grid(axes)
-    check_points(RIG, axes, points)  # 1.5 and 1.0 exclude each other: their runs report it
-    axes = read(f"{LOW}=2.5,3.0", f"{HIGH}=1.0,2.0")
-    with pytest.raises(ConfigError, match="max_salience must be above min_salience"):
-        check_points(RIG, axes, grid(axes))
 
 
 OTHER_AXES = (
@@ -513,19 +358,6 @@ def test_a_latin_hypercube_falls_once_into_each_part_of_every_axis(n: int, seed:
     assert all(abs(whole[b] - n / 6) < 2 for b in range(1, 7))
     levels = Counter(point["c"] for point in points)
     assert all(abs(levels[c] - n / 3) < 2 for c in "xyz")
-
-
-@settings(deadline=None, max_examples=60)
-@given(st.floats(0.0, 1.0), st.sampled_from(OTHER_AXES))
-def test_a_share_of_an_axis_is_a_value_of_it_and_back(share: float, axis: Axis) -> None:
-    value = axis.value_at(share)
-    assert axis.value_at(axis.share(value)) == value
-    assert 0.0 <= axis.share(value) <= 1.0
-
-
-def test_points_are_changes_of_a_rig() -> None:
-    (point,) = latin_hypercube(read(f"{COMFORT}=4:16"), 2, 0)[:1]
-    assert apply_changes(RIG, point).gaze.head.comfort_deg == point[COMFORT]
 
 
 FITTED = (
@@ -571,49 +403,6 @@ def test_a_search_puts_the_measures_inside_their_bands() -> None:
     assert 60 <= len(found.trials) <= 98
 
 
-def test_the_same_search_asks_for_the_same_points() -> None:
-    assert fit_settings(blinking, FITTED, START, 24, 1) == fit_settings(
-        blinking, FITTED, START, 24, 1
-    )
-    other = fit_settings(blinking, FITTED, START, 24, 2)
-    assert [one.point for one in other.trials] != [
-        one.point for one in fit_settings(blinking, FITTED, START, 24, 1).trials
-    ]
-
-
-def test_no_point_is_run_twice() -> None:
-    asked: list[str] = []
-
-    def run(points: Sequence[Point]) -> list[list[Outcome]]:
-        asked.extend(json.dumps(point) for point in points)
-        return [
-            [outcome(p, 0, (50.0, 80.0, {"min_jerk": 1.0}.get(str(p[FITTED[2].key]), 0.0)))]
-            for p in points
-        ]
-
-    fit_settings(run, FITTED[2:], {FITTED[2].key: "min_jerk"}, 30, 0)
-    assert len(asked) == len(set(asked)) == 3
-
-
-def test_the_search_beats_chance_and_takes_the_start_along() -> None:
-    """A bowl in three dimensions: of 96 points by chance the nearest is about 0.13 off."""
-    bowl, begun = (0.2, 0.7, 0.4), {"a": 0.5, "b": 0.5, "c": 0.5}
-    axes = [Axis(key, (), 0.0, 1.0) for key in "abc"]
-    nearest = []
-    for seed in range(6):
-        found: list[float] = []
-
-        def scores(points: Sequence[Point], found: list[float] = found) -> list[float]:
-            assert found or points[0] == begun
-            found += [dist(bowl, [float(str(x)) for x in p.values()]) for p in points]
-            return found[-len(points) :]
-
-        search_best(scores, axes, begun, 96, seed)
-        assert len(found) == 96
-        nearest.append(min(found))
-    assert sum(nearest) / len(nearest) < 0.05
-
-
 def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
     runs = [outcome(START, 0, (17.0, None, 0.3)), outcome(START, 1, (40.0, None, None))]
     assert set(counted_measures(runs)) == {"blink_rate", "skew"}
@@ -621,30 +410,6 @@ def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
         counted_measures([outcome(START, 0, (None, None, None))])
     with pytest.raises(SetupError, match="own values cannot be run: it failed"):
         counted_measures([Outcome(START, 0, {}, "it failed")])
-
-
-def test_what_can_no_longer_be_judged_is_outside_and_a_failure_worst_of_all() -> None:
-    band = BY_KEY["blink_rate"]
-    just = band.high + 0.25 * (band.high - band.low)
-    trial = make_trial(START, [outcome(START, 0, (just, 80.0, None))], KEYS)
-    assert trial.score == pytest.approx(1.5) and trial.outside == 2.0
-    failed = make_trial(
-        START, [outcome(START, 0, (17.0, 80.0, 0.3)), Outcome(START, 1, {}, "x")], KEYS
-    )
-    assert failed.score > len(KEYS) and failed.failed == "x"
-
-
-def test_the_best_point_is_yaml_that_a_run_takes(tmp_path: Path) -> None:
-    file = tmp_path / "best.yaml"
-    point: Point = {"gaze.lids.close_ms": 90.5, "gaze.saccade.profile": "main_sequence"}
-    file.write_text(yaml_snippet(RunOptions(character="shy"), point), encoding="utf-8")
-    made, shy = load_rig("desk", str(file)), load_rig("desk", "shy")
-    assert made.gaze.lids.close_ms == 90.5 and made.gaze.saccade.profile == "main_sequence"
-    assert made.gaze.attention == shy.gaze.attention and shy != load_rig("desk")
-    file.write_text(yaml_snippet(RunOptions(), point), encoding="utf-8")
-    assert file.read_text(encoding="utf-8") == (
-        "gaze:\n  lids:\n    close_ms: 90.5\n  saccade:\n    profile: main_sequence\n"
-    )
 
 
 def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path: Path) -> None:
@@ -672,12 +437,3 @@ def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path:
     again = invoked(*words)
     assert again.code == 0 and again.err.splitlines() == done.err.splitlines()
     assert (out / "table.csv").read_text(encoding="utf-8").splitlines() == rows
-
-
-def test_levels_and_ends_of_a_fit_are_checked_before_anything_runs(tmp_path: Path) -> None:
-    words = ("sweep", "--fit", "--out", str(tmp_path / "fit"), "--bus", "ideal")
-    done = invoked(*words, "--set", "gaze.lids.close_ms=50,5000")
-    assert done.code == 2 and "gaze.lids.close_ms: 5000 is above 500 (unit ms)" in done.err
-    done = invoked(*words, "--set", "gaze.lids.close_ms=5:90")
-    assert done.code == 2 and "gaze.lids.close_ms: 5.0 is below 30 (unit ms)" in done.err
-    assert not (tmp_path / "fit").exists()

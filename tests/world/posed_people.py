@@ -9,17 +9,13 @@ import numpy as np
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
-from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.features.world.gl_context import import_mujoco
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
-from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
-from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 from gazerig.sim_mock.scenes.script import Act, LightParams, PersonScript, SceneScript
 
 OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
@@ -75,8 +71,7 @@ class PosedPeople:
         self.lens = intrinsics_of_view(radians(69.0), *size_px)
         self._rng = np.random.default_rng(2)
         self._pose: Pose | None = None
-        self._gathered: int | None = None
-        self._placed: tuple[Pose | None, int | None, float] | None = None
+        self._placed: tuple[Pose | None, float] | None = None
         self.picture = WorldPicture(self.model, self._place, params)
 
     def show(self, pose: Pose) -> ImageArray:
@@ -107,30 +102,16 @@ class PosedPeople:
         """Return how far the pupils would be apart in the picture if the face were frontal."""
         return PUPIL_DISTANCE_M * self.lens.fx_px / pose.away_m
 
-    def gather(self, count: int) -> None:
-        """Put the first ``count`` people before the camera, side by side; the others away."""
-        self._gathered = count
-
-    def draw(self) -> ImageArray:
-        """Return what the camera sees of the people who are gathered."""
-        return self.picture.draw(PinholeView(1.0, self.lens, self.size_px, OPTICAL, CAMERA_M)).image
-
     def close(self) -> None:
         """Free the renderer."""
         self.picture.close()
 
     def _place(self, data: Any, t_s: float) -> None:
-        if (now := (self._pose, self._gathered, t_s)) == self._placed:
+        if (now := (self._pose, t_s)) == self._placed:
             return
         self._placed = now
         self._people.place(data, t_s)
         shown = [] if self._pose is None else [self._pose]
-        if self._gathered is not None:
-            middle = 0.5 * (self._gathered - 1)
-            shown = [
-                Pose(look, 1.2, 0.3 * (look - middle), 0.0, 0.0, 0.0, 0.0, t_s)
-                for look in range(self._gathered)
-            ]
         poses = {f"p{pose.look}": self._moved(pose, t_s) for pose in shown}
         for segment, at in self.figures.row.items():
             name, part = segment.split("/")
@@ -236,82 +217,3 @@ def mean_abs_deg(values: Sequence[float | None]) -> float:
     """Return the mean size of angles, those that are not there left out."""
     there = [abs(degrees(one)) for one in values if one is not None]
     return float(np.mean(there)) if there else float("nan")
-
-
-def _within(box_px: tuple[float, float, float, float] | None, place_px: Floats) -> bool:
-    """Return whether a place is in the box of a blob, or just outside it."""
-    if box_px is None:
-        return False
-    x, y, width, height = box_px
-    off = np.abs(place_px - (x + 0.5 * width, y + 0.5 * height))
-    return bool((off < (0.5 * width + 8.0, 0.5 * height + 8.0)).all())
-
-
-class _NoFaces:
-    """A detector that finds none."""
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return none."""
-        return ()
-
-
-def watch_motion(
-    script: SceneScript,
-    seconds: float,
-    turn: float,
-    params: Any = None,
-    size_px: tuple[int, int] = (320, 240),
-) -> tuple[float, float, int]:
-    """Return what the motion detector finds while a script is played.
-
-    Args:
-        script: of one person, called p, who may wave.
-        seconds: how long.
-        turn: 0 for a head at rest, 1 for a head that swings 20 deg to either side in 2 s.
-        params: of the renderer.
-        size_px: of the pictures.
-
-    Returns:
-        The share of pictures with a waving hand in which a blob is at it, how many blobs a picture
-        are elsewhere, and the number of pictures with a waving hand.
-    """
-    from gazerig.features.world.figure import Figures
-    from gazerig.features.world.figure_model import PeoplePlacer
-    from gazerig.features.world.model import world_model
-    from gazerig.features.world.renderer import WorldPicture
-    from gazerig.features.world.world_scene import WorldScene
-
-    scene = WorldScene("posed", Figures(script, 1))
-    model = world_model(scene.figures, ()).mj
-    view = WorldPicture(model, PeoplePlacer(model, scene.figures).place, params)
-
-    def head(t_s: float) -> tuple[Mat3, Vec3]:
-        return rotation((turn * radians(20.0) * sin(pi * t_s), 0.0, 0.0)), (0.0, 0.0, 0.0)
-
-    mount = CameraMount(CameraParams(position_mm=tuple(1e3 * one for one in CAMERA_M)))  # type: ignore[arg-type]
-    camera = PixelCamera(
-        PixelCameraParams(width_px=size_px[0], height_px=size_px[1], latency_ms=0.0), scene, mount, head, _NoFaces(),
-        np.random.default_rng(0), SyntheticMotionDetector(MotionParams()), view=view,
-    )  # fmt: skip
-    hits = waving = beside = count = 0
-    before: Floats | None = None
-    for tick in range(round(200 * seconds)):
-        t_s = tick / 200 + 1e-6
-        seen = camera.latest(t_s)
-        if seen is None or seen.image is None or seen.number == count:
-            continue
-        count = seen.number
-        hand = scene.people(t_s)[0].hand
-        R, p = mount.pose(*head(t_s))
-        place = np.full(2, np.nan)
-        if hand is not None:
-            place = project((np.array(hand) - p) @ np.array(R), camera.lens)[0]
-        near = [_within(blob.box_px, place) for blob in seen.blobs]
-        moved = before is not None and np.linalg.norm(place - before) > 2.0
-        if moved and count > 3 and (place > 0).all() and (place < seen.image.shape[1::-1]).all():
-            waving += 1
-            hits += any(near)
-        beside += sum(not one for one in near)
-        before = place
-    view.close()
-    return hits / max(waving, 1), beside / max(count, 1), waving

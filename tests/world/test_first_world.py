@@ -32,15 +32,6 @@ def test_the_room_where_it_can_be_rendered(
     assert capsys.readouterr() == (f"--computer {level} {ROOM}\n", "")
 
 
-def test_no_room_on_a_computer_that_is_too_busy_for_it(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(first_world, "measure", lambda _: ComputerFigures(2, 0.0, 0.3, True))
-    monkeypatch.setattr(first_world, "renderer_name", lambda: ("llvmpipe", ""))
-    main()
-    assert capsys.readouterr() == ("--computer least\n", "")
-
-
 def test_one_line_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,14 +14,12 @@ from present import present
 pytest.importorskip("mujoco")
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.figure import Figures  # noqa: E402
 from gazerig.features.world.opponent_motion import (  # noqa: E402
     HOLD_S,
     MAX_M_S,
     MAX_M_S2,
     TAKE_S,
     OpponentMotion,
-    OpponentTrack,
 )
 from gazerig.features.world.run.run_world import world_scene  # noqa: E402
 from gazerig.features.world.world_scene import WorldScene  # noqa: E402
@@ -109,15 +107,6 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
     assert alone[210:230, 0, 0].min() < 0.36 and at[190:200, 0, 0].min() > 0.6
 
 
-def test_another_process_sees_the_same_motion(scene: WorldScene, tmp_path: Path) -> None:
-    shared = scene.figures.with_shared_file(tmp_path / "people.npy")
-    other = Figures(shared.script, shared.seed, shared.shared)
-    at = hands(WorldScene("boxing", shared))
-    seen = WorldScene("boxing", other).hand("rival", "left", 6.3)
-    assert seen == pytest.approx(at[630, 0], abs=1e-9)
-    assert OpponentTrack(tmp_path / "people.moved").rows(1.0) is None  # before it was moved
-
-
 def test_events_follow_from_the_motion(scene: WorldScene) -> None:
     hands(scene)
     punch, opened = present(scene.figures.opponent).events
@@ -161,17 +150,6 @@ def test_a_bad_point_gets_one_clear_error(p_m: object) -> None:
     ):
         from_json({"do": "opponent", "p_world_m": p_m})
     assert from_json(as_json(MoveOpponent(READY))) == MoveOpponent(READY)
-
-
-def test_only_a_world_with_a_boxer_has_an_opponent() -> None:
-    for options in (
-        replace(BOXING, world=None, scene="visitor"),
-        replace(BOXING, world="conversation"),
-    ):
-        made = assemble(load_rig("desk"), options)
-        with pytest.raises(ValueError, match="^no opponent to move: "):
-            made.robot.command(MoveOpponent(READY))
-        made.close()
 
 
 def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """The world of the emulator's process, and the camera that looks into it from another one."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +9,11 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.process import CameraProcess
-from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.errors import SetupError
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.run.poses import RigInState, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld, world_of
-from gazerig.features.world.run.sight import RenderedWorld, WorldCamera, served_pixels
+from gazerig.features.world.run.sight import WorldCamera
 from gazerig.features.world.served_world import PUBLISH_MS, ServedWorld
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
@@ -22,7 +21,6 @@ from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 RIG = load_rig("minimal")
 
@@ -113,29 +111,3 @@ def test_without_pictures_detections_are_those_of_the_same_people(
     assert seen.start_s == host.poses.begin_s
     assert found is None or found.image is None
     seen.close()
-
-
-def test_another_fault_of_the_camera_ends_the_start(host: Host) -> None:
-    with pytest.raises(CameraError):
-        camera(host, CameraError("it does not start")).open()
-
-
-@pytest.mark.parametrize("wish", [None, "2"])
-def test_the_camera_s_process_renders_without_threads_unless_somebody_wants_them(
-    host: Host, monkeypatch: pytest.MonkeyPatch, wish: str | None
-) -> None:
-    threads = []
-
-    def look(world: RenderedWorld, *others: object) -> None:
-        threads.append(os.environ.get("LP_NUM_THREADS"))
-
-    monkeypatch.setenv("LP_NUM_THREADS", wish or "")  # is put back afterwards
-    if wish is None:
-        monkeypatch.delenv("LP_NUM_THREADS")
-    monkeypatch.setattr(RenderedWorld, "pixels", look)
-    rendered = RenderedWorld(
-        host.world.spec, host.world.scene, CameraMount(RIG.camera), RIG.camera,
-        np.random.default_rng(1), WorldCameraParams(),
-    )  # fmt: skip
-    served_pixels(rendered, host.poses, host.poses.head)
-    assert threads == [wish or "0"]

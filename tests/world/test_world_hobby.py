@@ -53,29 +53,6 @@ def test_a_hobby_servo_without_pulses_is_limp() -> None:
     assert abs(servo.place_steps - before) <= 30.0
 
 
-def test_a_hobby_servo_strains_against_its_joints_stop() -> None:
-    """Its torque is no more than its data sheet has."""
-    bench = WorldBench("maker")
-    joint = bench.rig.names[0]
-    servo = bench.servos[joint]
-    bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(servo.spec.max_steps)
-    bench.pass_ms(800)
-    assert servo.is_straining and servo.place_steps < servo.spec.max_steps - 100
-    assert abs(servo.shaft.effort) <= 1.0
-
-
-def test_a_jammed_hobby_servo_does_not_move() -> None:
-    """As the fault command stick has it."""
-    bench = WorldBench("maker")
-    joint = bench.rig.names[0]
-    servo = bench.servos[joint]
-    before = servo.place_steps
-    servo.stuck = True
-    bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(round(before) + MOVE)
-    bench.pass_ms(300)
-    assert servo.place_steps == pytest.approx(before, abs=2.0)
-
-
 def test_ideal_servos_lead_the_joints_of_a_world() -> None:
     """With their lag, within a step; without torque the joints are limp."""
     now_s = [0.0]

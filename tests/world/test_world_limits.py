@@ -1,6 +1,5 @@
 """Worlds of a user that are too large or hold no numbers: refused before MuJoCo reads them."""
 
-import os
 import struct
 from pathlib import Path
 
@@ -8,7 +7,6 @@ import mujoco
 import pytest
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.mjcf_limits import refuse_excessive
 from gazerig.features.world.model import world_model
 
 
@@ -80,32 +78,3 @@ def test_a_picture_is_refused_by_its_header(tmp_path: Path) -> None:
     (tmp_path / "wall.png").write_bytes(png)
     own = world(tmp_path, "<asset><texture type='2d' name='wall' file='wall.png'/></asset>")
     assert "wall.png has 60,000 x 60,000 pixels: at most 32,000,000" in refused(own)
-
-
-def test_files_that_are_included_count_too(tmp_path: Path) -> None:
-    (tmp_path / "more.xml").write_text("<mujoco><size memory='9T'/></mujoco>", encoding="utf-8")
-    with pytest.raises(SetupError, match=r"more\.xml: size: memory='9T'"):
-        world_model(None, [], world(tmp_path, "<include file='more.xml'/>"))
-    ring = world(tmp_path, "<include file='own.xml'/>")
-    refuse_excessive(ring)  # MuJoCo reports the fault itself
-
-
-def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
-    pipe = tmp_path / "pipe.xml"
-    os.mkfifo(pipe)
-    assert "is a named pipe" in refused(pipe)
-    with (tmp_path / "large.xml").open("wb") as file:
-        file.truncate(5_000_000_000)
-    assert "larger than the 20 MB" in refused(tmp_path / "large.xml")
-    assert "cannot be read" in refused(tmp_path / "absent.xml")
-
-
-def test_common_numbers_are_taken(tmp_path: Path) -> None:
-    refuse_excessive(
-        world(
-            tmp_path,
-            "<option gravity='0 0 -24.8'><flag gravity='disable'/></option>"
-            "<size memory='64M' nconmax='5000'/><custom><text name='nan' data='x'/></custom>"
-            "<asset><hfield name='hill' nrow='1000' ncol='1000' size='9 9 1 .1'/></asset>",
-        )
-    )

@@ -66,16 +66,6 @@ def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path)
     assert model.mj.nbody == 1 + len(names) and model.mj.nu == len(names)
 
 
-def test_a_described_rig_is_a_world_itself(tmp_path: Path) -> None:
-    """The file of gazerig describe has the joints, and motors at them that are not wanted here."""
-    desk = load_rig("desk")
-    placed = rig_in_world(desk, looks=False)
-    (tmp_path / "desk.xml").write_text(placed.body()[0])
-    model = world_model(None, [placed], tmp_path / "desk.xml")
-    assert model.mj.nu == len(desk.names) == model.mj.nv
-    assert model.rigs[0].p_world_base_m == (0.0, 0.0, 0.0)
-
-
 def test_a_users_world_with_a_part_of_the_joints_names_those_missing(tmp_path: Path) -> None:
     """Half a rig is a mistake, not another head."""
     first, *others = load_rig("minimal").names
@@ -109,9 +99,3 @@ def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str
     with pytest.raises(SetupError, match=rf"own\.xml: MuJoCo cannot {why}") as found:
         world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
     assert len(str(found.value).splitlines()) == 1
-
-
-def test_a_users_world_that_is_not_there_is_named(tmp_path: Path) -> None:
-    """One line, not MuJoCo's stack."""
-    with pytest.raises(SetupError, match=r"gone\.xml: "):
-        world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], tmp_path / "gone.xml")

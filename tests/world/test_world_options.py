@@ -2,23 +2,17 @@
 
 import importlib.util
 import re
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.load import load, shipped_path
 from gazerig.config.schema import load_rig
-from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError, install_command
-from gazerig.features.world.room import HOME
-from gazerig.features.world.run.run_world import world_of, world_script
+from gazerig.features.world.run.run_world import world_of
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.session import compose
 from gazerig.robot.cli.run import start_text
-from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 ASKED = RunOptions(mock=True, world="living-room")
 
@@ -71,45 +65,3 @@ def test_a_script_at_fault_is_said_with_file_line_and_key(tmp_path: Path) -> Non
     with pytest.raises(ConfigError) as found:
         world_of(load_rig("desk"), replace(ASKED, world=str(file)))
     assert "mine.yaml:4" in str(found.value) and "people.anna.start" in str(found.value)
-
-
-def test_a_script_is_read_once_until_it_is_changed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, reads = tmp_path / "mine.yaml", list[Path]()
-
-    def counted(path: Path, *more: Any, **named: Any) -> Any:
-        reads.append(path)
-        return load(path, *more, **named)
-
-    monkeypatch.setattr("gazerig.features.world.run.run_world.load", counted)
-    file.write_text("room: living-room\npeople: {}\n")
-    asked = replace(ASKED, world=str(file), no_pictures=True, fast=True, bus="ideal")
-    compose(asked).assembly.close()
-    assert reads == [file]
-    file.write_text("room: hall\npeople: {}\n")
-    assert world_script(str(file)).room == "hall"
-
-
-def test_a_mesh_that_is_lost_is_said_with_file_line_and_key(tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    text = shipped_path("rigs", "minimal").read_text(encoding="utf-8")
-    file.write_text(text + "meshes:\n  head:\n    file: lost.stl\n")
-    with pytest.raises(ConfigError) as found:
-        compose(replace(ASKED, rig=str(file), world=None, scene="visitor", fast=True))
-    line = 3 + text.count("\n")
-    assert f"mine.yaml:{line}" in str(found.value) and "meshes.head.file" in str(found.value)
-
-
-def test_every_shipped_world_can_be_read() -> None:
-    rig = load_rig("desk")
-    for name in shipped_names("worlds", HOME):
-        world = world_of(rig, replace(ASKED, world=name, no_pictures=True))
-        assert world is not None and world.scene.name == name
-        assert world.scene.people(0.0)
-
-
-def test_the_paper_has_every_parameter_of_the_camera() -> None:
-    paper = (Path(__file__).parents[2] / "docs/world/worlds.md").read_text(encoding="utf-8")
-    for field in fields(WorldCameraParams):
-        assert f"| `{field.name}` |" in paper

@@ -2,8 +2,6 @@
 
 import pickle
 from functools import cache
-from math import cos, radians, sin
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,15 +10,11 @@ from scipy.spatial.transform import Rotation
 from world_scripts import WORLDS, shipped_world
 
 from gazerig.features.world.body_shape import body_segments
-from gazerig.features.world.faces import look_angles
 from gazerig.features.world.figure import SEGMENTS, Figures
-from gazerig.features.world.rotations import rotation_matrix
 from gazerig.features.world.timeline import HEAD_M
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.person_shape import WORLD_LOOKS
-from gazerig.sim_mock.scenes.script import Act, PersonScript, PlaceScript, SceneScript
-from gazerig.sim_mock.scenes.timeline import TimedAct
 
 STEP_S = 0.02
 
@@ -74,14 +68,6 @@ def axes(name: str, segment: str, t_s: float) -> Floats:
 
 def angles_deg(a: Floats, b: Floats) -> Floats:
     return np.degrees(np.arccos(np.clip((a * b).sum(axis=-1), -1.0, 1.0)))
-
-
-@pytest.mark.parametrize("name", WORLDS)
-def test_all_numbers_are_finite_and_faces_are_above_the_floor(name: str) -> None:
-    assert np.isfinite(film(name).p_m).all() and np.isfinite(film(name).R).all()
-    for who in people(name):
-        above = places(name, f"{who}/head")[:, 2] + figures(name).script.neck_height_m
-        assert above.min() > 0.7 and above.max() < 2.0, who
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -187,40 +173,6 @@ def test_the_same_seed_gives_the_same_motion_in_another_process_and_another_seed
     )
 
 
-def test_a_scene_says_where_faces_truly_are() -> None:
-    scene = WorldScene("living-room", Figures(shipped_world("living-room")))
-    t_s = 20.0
-    (anna,) = scene.people(t_s)
-    all_of_them = scene.figures
-    head = all_of_them.row["anna/head"]
-    found = all_of_them.segments(t_s)
-    R = _rotation(found.quat[head])
-    away = np.array(anna.p_world_face_m) - found.p_m[head]
-    assert R.T @ away == pytest.approx(-np.array(all_of_them.measures["anna"].skull_m), abs=1e-6)
-    assert anna.hand is not None or scene.things(t_s) == ()
-
-
-def test_who_speaks_moves_the_lips_four_to_five_times_a_second() -> None:
-    all_of_them = figures("living-room")
-    (spoken,) = [one for one in all_of_them.timelines["anna"] if one.start_s == 28.0]
-    moments_s = np.arange(spoken.start_s, spoken.end_s, 0.01)
-
-    def open_m(t_s: float) -> float:
-        R = axes("living-room", "anna/head", t_s)
-        return float(
-            (
-                R.T
-                @ (place("living-room", "anna/lips", t_s) - place("living-room", "anna/head", t_s))
-            )[2]
-        )
-
-    heights = np.array([open_m(t_s) for t_s in moments_s.tolist()])
-    moves = heights - heights.mean()
-    rate_hz = np.fft.rfftfreq(len(moves), 0.01)[np.abs(np.fft.rfft(moves)).argmax()]
-    assert 3.5 < rate_hz < 5.5 and np.ptp(heights) > 0.005
-    assert np.ptp([open_m(t_s) for t_s in (18.1, 18.5, 18.9)]) < 1e-6
-
-
 def test_eyes_are_on_who_is_looked_at_and_lids_blink() -> None:
     off = []
     for t_s in np.arange(40.8, 42.8, 0.02).tolist():
@@ -246,15 +198,6 @@ def test_a_cup_goes_from_hand_to_hand_and_stays_upright() -> None:
     assert np.linalg.norm(hands[0] - hands[1]) < 0.25
 
 
-def test_a_child_pushes_the_head() -> None:
-    (push,) = [one for one in figures("crowd").timelines["tim"] if one.act.do == "push"]
-    nearest = min(
-        float(np.linalg.norm(place("crowd", "tim/right_hand", t_s) - np.array(HEAD_M)))
-        for t_s in np.arange(push.start_s, push.end_s, 0.02).tolist()
-    )
-    assert 0.02 < nearest < 0.08
-
-
 def test_a_boxer_s_fist_goes_to_the_head_and_spins_only_then() -> None:
     scene = WorldScene("boxing", Figures(shipped_world("boxing"), 3))
     assert scene.behaviours
@@ -268,76 +211,3 @@ def test_a_boxer_s_fist_goes_to_the_head_and_spins_only_then() -> None:
     assert max(abs(one.spin_rad_s) for one in fists) > 3.0
     quiet = [one.spin_rad_s for one in scene.things(1.0)]
     assert max(map(abs, quiet)) < 0.5
-
-
-def test_seeds_vary_when_a_boxer_punches_and_only_by_what_the_script_allows() -> None:
-    script = shipped_world("boxing")
-    starts = {
-        seed: [one.start_s for one in Figures(script, seed).timelines["rival"]] for seed in range(6)
-    }
-    assert len({tuple(one) for one in starts.values()}) == 6
-    for found in starts.values():
-        for act, start_s in zip(script.people["rival"].acts, found, strict=True):
-            assert abs(start_s - act.at_s) <= act.vary_s + 1e-9
-
-
-def test_processes_share_a_motion_and_without_its_file_compute_the_same(tmp_path: Path) -> None:
-    script = shipped_world("living-room")
-    one = Figures(script, 3, tmp_path / "people.npy")
-    assert pickle.loads(pickle.dumps(one)).shared == one.shared
-    alone = pickle.loads(pickle.dumps(one)).segments(7.123)  # there is no file yet
-    one.share()
-    reads = pickle.loads(pickle.dumps(one))
-    assert isinstance(reads._table.base, np.memmap)
-    for found in (alone, reads.segments(7.123)):
-        np.testing.assert_array_equal(found.p_m, one.segments(7.123).p_m)
-        np.testing.assert_array_equal(found.quat, one.segments(7.123).quat)
-
-
-def test_a_world_sent_to_another_process_computes_its_people_once() -> None:
-    scene = WorldScene("living-room", Figures(shipped_world("living-room")))
-    again, figures = pickle.loads(pickle.dumps((scene, scene.figures)))
-    assert again.figures is figures
-    assert (again.name, again.round_s) == (scene.name, scene.round_s)
-
-
-def test_a_rotation_matrix_is_that_of_its_quaternion() -> None:
-    for turn in Rotation.random(20, rng=np.random.default_rng(3)):
-        found = rotation_matrix(turn.as_quat(scalar_first=True))
-        np.testing.assert_allclose(found, turn.as_matrix(), atol=1e-12)
-
-
-def test_a_head_does_not_turn_to_what_is_behind_it() -> None:
-    """Somebody who looks at a place behind stays ahead with the head; the eyes do what they can."""
-    t_s = np.arange(0.0, 4.0, 0.01)
-    eyes, ahead = np.tile((0.0, 0.0, 1.6), (len(t_s), 1)), np.zeros(len(t_s))
-    places = {
-        name: np.tile((cos(angle), sin(angle), 1.6), (len(t_s), 1))
-        for name, angle in (("aside", radians(60.0)), ("behind", radians(170.0)))
-    }
-    turned = {}
-    for name in places:
-        act = TimedAct(Act(at_s=1.0, do="look_at", to=name), 1.0, 1.0)
-        first = np.tile((1.0, 0.0, 1.6), (len(t_s), 1))
-        rng = np.random.default_rng(0)
-        found = look_angles(t_s, (act,), first, places, eyes, ahead, "head", rng)
-        turned[name] = float(np.degrees(found.yaw[len(t_s) // 2 :]).mean())
-    assert turned["aside"] > 40.0
-    assert abs(turned["behind"]) < 5.0
-
-
-def test_only_a_hand_before_the_camera_is_to_be_looked_at() -> None:
-    """A hand that reaches for a thing on the floor is below the picture all the time."""
-    found = {}
-    for name, height_m in (("level", 1.0), ("floor", 0.2)):
-        script = SceneScript(
-            {"p": PersonScript("near", acts=(Act(at_s=1.0, do="reach", to="it", for_s=2.8),))},
-            round_s=5.0,
-            places={
-                "near": PlaceScript(0.75, 0.0, facing_deg=180.0),
-                "it": PlaceScript(0.5, 0.1, height_m=height_m),
-            },
-        )
-        events = WorldScene(name, Figures(script)).events()
-        found[name] = [event.name for event in events]
-    assert found == {"level": ["reach"], "floor": []}

@@ -4,7 +4,7 @@ from math import degrees, radians
 from pathlib import Path
 
 import pytest
-from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run, write
+from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run
 
 mujoco_or_skip()
 
@@ -58,18 +58,6 @@ def test_servos_yield_within_their_torque_limits() -> None:
     assert 0.8 < abs(roll.shaft.effort) <= 1.01
 
 
-def test_a_limp_head_falls_away_from_a_push_and_stays_where_it_was_left() -> None:
-    """Without torque only the gears' friction is there."""
-    bench = WorldBench("desk")
-    before = bench.world.joints_rad()["neck_yaw"]
-    bench.world.push("head", (0.0, 3.0, 0.0), 0.3)
-    bench.pass_ms(1500)
-    left = bench.world.joints_rad()["neck_yaw"]
-    assert left > before + 0.1
-    bench.pass_ms(300)
-    assert bench.world.joints_rad()["neck_yaw"] == pytest.approx(left, abs=1e-3)
-
-
 HAND = """<mujoco><worldbody>
   <site name="gazerig"/>
   <body name="hand" mocap="true" pos="0.05 -0.4 0.12">
@@ -93,14 +81,6 @@ def test_a_hand_that_moves_into_the_head_pushes_it(tmp_path: Path) -> None:
     assert abs(read(roll, "present_position") - goal) <= 8
 
 
-def test_only_a_body_that_is_led_can_be_moved(tmp_path: Path) -> None:
-    """The message names the requirement."""
-    (tmp_path / "hand.xml").write_text(HAND)
-    bench = _held(tmp_path / "hand.xml")
-    with pytest.raises(ValueError, match="no body 'arm' with mocap=\"true\""):
-        bench.world.move("arm", (0.0, 0.0, 0.0))
-
-
 def test_upper_and_lower_lids_hold_each_other_off() -> None:
     """Both are sent beyond where they meet: they touch, strain and stay apart."""
     bench = WorldBench("maker")
@@ -115,28 +95,6 @@ def test_upper_and_lower_lids_hold_each_other_off() -> None:
     assert (
         sum(degrees(bench.world.joints_rad()[name]) for name in wanted) > -29.5
     )  # they meet at -28
-
-
-SHELF = """<mujoco><worldbody>
-  <site name="gazerig"/>
-  <geom type="box" size=".03 .2 .05" pos=".12 0 .1"/>
-</worldbody></mujoco>"""
-
-
-def test_what_stands_before_the_forehead_stops_it(tmp_path: Path) -> None:
-    """Sent down to its limit, the neck stops on the shelf, with its torque in the registers."""
-    (tmp_path / "shelf.xml").write_text(SHELF)
-    lowest, efforts = [], []
-    for path in (None, tmp_path / "shelf.xml"):
-        bench = _held(path)
-        pitch = bench.servos["neck_pitch"]
-        joint = bench.rig.joints["neck_pitch"]
-        write(pitch, "goal_position", round(joint.steps(radians(joint.min_deg))))
-        bench.pass_ms(600)
-        lowest.append(degrees(bench.world.joints_rad()["neck_pitch"]))
-        efforts.append(abs(read(pitch, "present_current")))
-    assert lowest[0] == pytest.approx(-35.0, abs=1.5) and lowest[1] > -32.0
-    assert efforts[1] > efforts[0] + 100
 
 
 def test_the_guard_finds_a_head_that_is_held_away_and_brings_it_back_softly(
@@ -168,17 +126,6 @@ def test_the_guard_finds_a_head_that_is_held_away_and_brings_it_back_softly(
 
 
 # --- as a command
-
-
-def test_a_push_can_be_typed() -> None:
-    """The direction is in the rig's frame; the default duration is half a second."""
-    bench = _held()
-    before = bench.world.joints_rad()["neck_yaw"]
-    assert (
-        COMMANDS.obey(bench.world, "push head 10 left") == "head is pushed left with 10 N for 0.5 s"
-    )
-    bench.pass_ms(300)
-    assert bench.world.joints_rad()["neck_yaw"] > before + 0.02
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 from rendering import renders as renders
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.features.world.gl_context import NoRenderer, import_mujoco, open_context
+from gazerig.features.world.gl_context import import_mujoco
 from gazerig.gaze.angles import compose, rotate, rotation, sub
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.description.links import IDENTITY, ORIGIN
@@ -21,7 +20,6 @@ from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
-    blur_along,
     expose,
     through_lens,
 )
@@ -119,15 +117,6 @@ def test_a_point_lands_where_the_programs_own_lens_says(
     assert np.isinf(seen.depth_m[0, 0])
 
 
-def test_rows_alone_are_those_of_the_whole_picture(balls: Balls) -> None:
-    for lens in (LENS, BENT):
-        whole = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *POSES[1]))
-        part = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *POSES[1]), rows=(90, 150))
-        assert part.image.shape == (60, 320, 3)
-        assert np.abs(part.image.astype(int) - whole.image[90:150]).max() <= 40  # samples at edges
-        assert np.abs(part.image.astype(int) - whole.image[90:150]).mean() < 0.05
-
-
 def turning(rate_rad_s: float) -> CameraMotion:
     """Return the motion of a camera that turns to its left."""
     span = 0.005
@@ -152,18 +141,6 @@ def test_what_moves_itself_is_blurred_only_where_the_exposure_is_made_of_several
     )
     passing.picture.close()
     assert width_px(blurred) - width_px(sharp) == pytest.approx(8, abs=2)
-
-
-def test_the_mean_of_several_pictures_is_as_wide_as_the_smear_of_a_turn() -> None:
-    one = Balls(ONE)
-    motion = turning(3.0)
-    wide, smear, sharp = (
-        width_px(expose(one.picture, OpticsParams(20.0, count), 0.0, LENS, SIZE, move).image)
-        for count, move in ((12, motion), (1, motion), (1, motion._replace(span_s=0.0)))
-    )
-    one.picture.close()
-    assert wide == pytest.approx(smear, abs=2)
-    assert smear > sharp + 9
 
 
 def test_rows_that_are_read_later_are_seen_from_where_the_camera_is_then() -> None:
@@ -226,27 +203,6 @@ def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
         Renderer(model, *SIZE, params, ["skull"])
 
 
-def test_several_threads_may_use_one_renderer_and_it_can_be_closed_twice(balls: Balls) -> None:
-    expected = balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image
-    found: list[np.ndarray] = []
-
-    def draw() -> None:
-        found.append(balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image)
-
-    threads = [threading.Thread(target=draw) for _ in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(found) == 3
-    assert all((image == expected).all() for image in found)
-    other = Balls(ONE)
-    other.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0]))
-    other.picture.close()
-    other.picture.close()
-    assert (balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image == expected).all()
-
-
 def refused(**environment: str) -> str:
     """Return the output of a process that tries to render with other settings."""
     code = (
@@ -269,24 +225,6 @@ def test_where_nothing_renders_all_that_was_tried_is_told_in_one_line() -> None:
     assert said.count("\n") == 1
     for part in ("egl: ", "osmesa: ", "glfw: there is no display", "libegl1", "libosmesa6"):
         assert part in said
-
-
-def test_the_users_own_choice_is_the_only_one_tried() -> None:
-    said = refused(MUJOCO_GL="glfw")
-    assert "glfw: there is no display" in said
-    assert "egl" not in said
-
-
-def test_a_wish_that_is_no_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for wish in ("off", "vulkan"):
-        monkeypatch.setenv("MUJOCO_GL", wish)
-        with pytest.raises(NoRenderer, match=wish):
-            open_context(lambda: None)
-
-
-def test_a_smear_of_nothing_changes_nothing() -> None:
-    image = np.zeros((4, 4, 3), np.uint8)
-    assert blur_along(image, (0.3, 0.3)) is image
 
 
 def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> None:

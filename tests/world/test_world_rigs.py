@@ -3,23 +3,15 @@
 from dataclasses import replace
 from math import degrees, radians
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 from emulated_rig import mixed_rig
 from test_coupling import KINDS
 from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
-from world_scripts import read as read_script
 
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.figure import Figures  # noqa: E402
-from gazerig.features.world.model import world_model  # noqa: E402
-from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
-from gazerig.robot.app.run_bus import emulated_lines  # noqa: E402
 
 
 def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:
@@ -64,55 +56,3 @@ def test_two_servos_move_two_joints_together(kind: str) -> None:
             assert abs(servo.position_steps - servo.drive.joint_steps) < 4.0  # play of both joints
     assert angles["neck_pitch"] == pytest.approx(0.2, abs=radians(1.0))
     assert angles["neck_roll"] == pytest.approx(-0.15, abs=radians(1.0))
-
-
-def test_both_servos_of_a_pair_feel_a_push_against_one_joint() -> None:
-    """A roll of the head is a torque on both, of opposite sign."""
-    bench = WorldBench(replace(load_rig("desk"), couplings={"neck": KINDS["differential"]}))
-    a, b = bench.servos["neck_pitch"], bench.servos["neck_roll"]
-    for servo in (a, b, bench.servos["neck_yaw"]):
-        arm(servo)
-    bench.pass_ms(150)
-    bench.world.push("head", (0.0, 12.0, 0.0), 0.3)
-    bench.pass_ms(250)
-    assert a.shaft.effort > 0.1 and b.shaft.effort < -0.1
-
-
-PUSH = """description: a child pushes the head
-room: hall
-round_s: 10.0
-neck_height_m: 1.05
-people:
-  tim:
-    look: 3
-    stature_m: 1.22
-    start: close
-    acts:
-      - {at_s: 3.0, do: push, to: head}
-"""
-
-
-def test_a_child_that_pushes_the_head_turns_it_and_its_servos_feel_it(tmp_path: Path) -> None:
-    """By contact alone: registers show the torque, and the head comes back to its goal."""
-    (tmp_path / "push.yaml").write_text(PUSH)
-    rig, now_s = load_rig("desk"), [0.0]
-    figures = Figures(read_script(tmp_path / "push.yaml"))
-    (push,) = figures.timelines["tim"]
-    world = World(world_model(figures, [rig_in_world(rig, looks=False)]), lambda: now_s[0])
-    (line,) = emulated_lines(rig).values()
-    chain: Any = world.device(line)
-    pitch = chain[8]
-    for servo in chain.servos[6:]:
-        arm(servo)
-    world.begin(-round(push.start_s * 1000.0) + 200)
-    world.advance(200)
-    before = read(pitch, "present_position")
-    rows = []
-    for ms in range(220, 3200, 20):
-        world.advance(ms)
-        rows.append((read(pitch, "present_position") - before, read(pitch, "present_current")))
-    moved, current = np.array(rows).T
-    assert np.abs(moved).max() > 23  # 2 deg
-    at = int(np.abs(moved).argmax())
-    assert abs(current[at]) > 150 and current[at] * moved[at] < 0
-    assert abs(moved[-1]) <= 6 and not pitch.errors

@@ -10,9 +10,7 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 from fakes.runs import ticks
 from rendering import why_not
 
-import gazerig
 from gazerig.config.schema import load_rig
-from gazerig.features.world import gl_context
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
@@ -96,25 +94,8 @@ def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> N
     assert again.ticks == figures["ticks"]
 
 
-def test_nothing_but_the_world_imports_its_graphics() -> None:
-    assert "mujoco" not in vars(gl_context)
-
-
-def test_ideal_servos_move_the_world_too() -> None:
-    """For tests above the bus; the head has its pose in the world."""
-    made = simulate(load_rig("desk"), replace(FAST, bus="ideal", seconds=4.0))
-    error = made.figures["gaze_error_deg"]
-    assert isinstance(error, dict) and error["median"] < 1.0
-
-
 def test_pictures_of_the_same_seed_give_the_same_bytes_on_one_machine() -> None:
     if reason := why_not():
         pytest.skip(reason)
     seen = replace(FAST, no_pictures=False, seconds=0.2)
     assert digest(seen) == digest(seen)
-
-
-def test_a_program_can_be_in_a_world() -> None:
-    with gazerig.open("desk", fast=True, world="living-room", seed=3) as head:
-        head.step(0.2)
-        assert head.time_s >= 0.2

@@ -1,7 +1,6 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
 from dataclasses import replace
-from functools import partial
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,7 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.drivers.errors import SetupError  # noqa: E402
 from gazerig.features.world.physics import WorldUnstable  # noqa: E402
-from gazerig.robot.app import run_bus  # noqa: E402
-from gazerig.sim_mock.devices import PluginLine  # noqa: E402
-from gazerig.sim_mock.smart_servo.physics import Physics  # noqa: E402
 
 STEP = 200
 """Steps of 4096 that a joint is sent."""
@@ -93,36 +88,6 @@ def test_a_joint_with_play_stays_behind_as_that_of_an_emulated_servo(name: str, 
     assert max(gaps) == pytest.approx(half) and min(gaps) == pytest.approx(-half)
 
 
-def test_play_is_that_of_both_eyes_if_one_servo_turns_them() -> None:
-    bench = _armed("minimal", "eyes_pan")
-    model, data = bench.world.model.mj, bench.world._data
-    write(bench.servos["eyes_pan"], "goal_position", 2200)
-    bench.pass_ms(700)
-    write(bench.servos["eyes_pan"], "goal_position", 2000)
-    for _ in range(100):
-        bench.pass_ms(5)
-        left, right = (
-            data.qpos[model.joint(f"rig_{name}").qposadr[0]]
-            for name in ("eyes_pan", "right_eyes_pan")
-        )
-        assert left == pytest.approx(right, abs=radians(0.1))
-
-
-def test_a_step_reaches_its_goal_in_registers() -> None:
-    """Present Position, Velocity and Current are read as from any servo."""
-    bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
-    servo = bench.servos["left_eye_pan"]
-    start = read(servo, "present_position")
-    write(servo, "goal_position", start + STEP)
-    bench.pass_ms(20)
-    assert read(servo, "present_velocity") > 20 and read(servo, "present_position") > start
-    bench.pass_ms(500)
-    assert (
-        abs(read(servo, "present_position") - start - STEP) <= 5
-        and abs(read(servo, "present_velocity")) <= 3
-    )
-
-
 def test_without_torque_a_hand_turns_the_joint_and_it_stays_there() -> None:
     """Dry friction of the gear holds what is balanced."""
     bench = WorldBench("desk")
@@ -159,20 +124,6 @@ def test_the_neck_goes_limp_and_falls_when_its_load_is_heavier_than_friction() -
     write(servo, "torque_enable", 0)
     bench.pass_ms(300)
     assert servo.position_steps < held - 100 and servo.shaft.effort == 0.0
-
-
-def test_a_jammed_joint_does_not_move_and_a_freed_one_does() -> None:
-    """As the fault commands stick and free have it."""
-    bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
-    servo = bench.servos["left_eye_pan"]
-    before = servo.position_steps
-    servo.jam()
-    write(servo, "goal_position", round(before) + STEP)
-    bench.pass_ms(300)
-    assert servo.position_steps == pytest.approx(before, abs=1.0) and servo.shaft.effort > 0.1
-    servo.jam(False)
-    bench.pass_ms(400)
-    assert servo.position_steps == pytest.approx(before + STEP, abs=6.0)
 
 
 def test_the_bus_watchdog_halts_a_servo_at_its_time_although_nobody_asks() -> None:
@@ -221,13 +172,6 @@ def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path) -> None:
         bench.pass_ms(20)
 
 
-def test_a_bus_of_a_package_has_no_servos_in_a_world() -> None:
-    """Its device has mechanics of its own, which would leave the joints limp."""
-    bench = WorldBench("desk")
-    with pytest.raises(SetupError, match="kind theirs has no servos that a world could move"):
-        bench.world.device(PluginLine("theirs", "", ()))
-
-
 def test_a_head_at_rest_does_not_tremble() -> None:
     """After a push all nine joints come to rest, stiff gains and all: speeds are none."""
     bench = WorldBench("desk")
@@ -257,36 +201,6 @@ def test_supply_and_motor_feel_a_stall() -> None:
     assert servo.temperature_c > warm + 0.5
 
 
-def test_a_shaft_without_torque_turns_as_fast_as_its_viscous_friction_lets_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Dry friction takes .03 of the stall torque, the other half of it at no-load speed."""
-    monkeypatch.setattr(run_bus, "Physics", partial(Physics, viscous_share=0.5))
-    bench = WorldBench("desk")
-    for servo in bench.both("left_eye_pan"):
-        servo.set_load(-0.05 * servo.model.stall_torque_nm)
-    bench.pass_ms(500)
-    for servo in bench.both("left_eye_pan"):
-        no_load = servo.model.no_load_rpm * 4096 / 60_000  # steps/ms
-        assert servo.shaft.v == pytest.approx(-(0.05 - 0.03) / 0.5 * no_load, rel=0.03)
-
-
-def test_a_restart_lets_go_of_the_joint_until_torque_comes_on_again() -> None:
-    """As after a reboot instruction: deaf for a while, then limp."""
-    bench = _armed("desk", "neck_yaw")
-    servo = bench.servos["neck_yaw"]
-    servo.restart()
-    assert not servo.torque and not servo.advance(round(bench.now_s * 1000.0))
-    bench.world.push("head", (0.0, 3.0, 0.0), 0.2)
-    before = servo.position_steps
-    bench.pass_ms(600)
-    moved = servo.position_steps
-    assert moved > before + 20 and servo.advance(round(bench.now_s * 1000.0))
-    arm(servo)
-    bench.pass_ms(200)
-    assert servo.position_steps == pytest.approx(moved, abs=3.0)
-
-
 def test_acceleration_is_fed_forward_as_by_servos_with_mechanics_of_their_own() -> None:
     """With a profile and a soft controller the second gain sets the shaft in motion."""
     first = {}
@@ -300,22 +214,3 @@ def test_acceleration_is_fed_forward_as_by_servos_with_mechanics_of_their_own() 
         assert max(abs(a[0] - b[0]) for a, b in zip(world, own, strict=True)) < 0.03 * STEP
         first[gain] = world[1][2]
     assert first[16000] > first[0] + 0.1
-
-
-def test_a_stalled_motor_does_not_wind_up() -> None:
-    """Freed after a second, it overshoots its goal by no more than a servo that was never held."""
-    past = []
-    for held_ms in (0, 1000):
-        bench = _armed("desk", "neck_yaw", (1500, 300, 3000))
-        servo = bench.servos["neck_yaw"]
-        start = servo.position_steps
-        servo.jam(held_ms > 0)
-        write(servo, "goal_position", round(start) + 3 * STEP)
-        bench.pass_ms(held_ms)
-        servo.jam(False)
-        most = 0.0
-        for _ in range(120):
-            bench.pass_ms(5)
-            most = max(most, servo.position_steps - start)
-        past.append(most - 3 * STEP)
-    assert past[1] < past[0] + 5.0

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from present import present
 
 pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
 
@@ -98,26 +97,6 @@ def test_everybody_is_where_mujoco_has_them() -> None:
             assert np.allclose(p_world_m, data.xpos[body], atol=1e-9), name
 
 
-def test_limbs_collide_from_joint_to_joint() -> None:
-    spec = shapes("conversation").spec
-    figures, model = present(spec.figures), spec.compile().mj
-    data = mujoco.MjData(model)
-    PeoplePlacer(model, figures).place(data, 0.0)
-    mujoco.mj_kinematics(model, data)
-    for who in figures.script.people:
-        for upper, lower in (("upper_arm", "forearm"), ("forearm", "hand"), ("thigh", "shank"),
-                             ("shank", "foot")):  # fmt: skip
-            body, below = (model.body(f"{who}/left_{part}").id for part in (upper, lower))
-            (geom,) = np.flatnonzero(
-                (model.geom_bodyid == body) & (model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
-            )
-            half = model.geom_size[geom, 1] * data.geom_xmat[geom].reshape(3, 3)[:, 2]
-            ends = [data.geom_xpos[geom] - half, data.geom_xpos[geom] + half]
-            ends.sort(key=lambda end: float(np.linalg.norm(end - data.xpos[body])))
-            assert ends[0] == pytest.approx(data.xpos[body], abs=2e-3), (who, upper)
-            assert ends[1] == pytest.approx(data.xpos[below], abs=2e-3), (who, upper)
-
-
 def test_a_users_world_is_shown_without_the_rig_and_what_mujoco_hides(tmp_path: Path) -> None:
     (tmp_path / "mine.xml").write_text(MJCF)
     parts = shapes_of(WorldSpec(None, (desk(),), tmp_path / "mine.xml")).parts()
@@ -138,24 +117,3 @@ def test_a_users_world_is_shown_without_the_rig_and_what_mujoco_hides(tmp_path: 
         flat = np.cross(b - a, c - a)
         seen = np.linalg.norm(flat, axis=1) > 1e-9
         assert ((flat * normals[faces[:, 0]]).sum(axis=1)[seen] > 0.0).mean() > 0.95
-
-
-def test_a_picture_lies_on_a_wall_as_mujoco_lays_it() -> None:
-    """The first row of a picture is on top, its first column to the left of who looks at it."""
-    walls = [
-        part.shape
-        for part in parts_of("living-room")
-        if isinstance(part.shape, TexturedMesh) and np.ptp(part.shape.uv, axis=0).max() <= 1.001
-    ]
-    checked = 0
-    for wall in walls:
-        corners = wall.faces.reshape(-1)
-        upright = np.abs(wall.normals[corners, 2]).max() < 0.1 and np.ptp(wall.uv[corners, 1]) > 0.9
-        if not upright:
-            continue
-        top = wall.vertices[corners][wall.uv[corners, 1] % 1.0 < 0.01, 2]
-        checked += 1
-        v = wall.uv[corners, 1]
-        highest, lowest = wall.vertices[corners, 2].argmax(), wall.vertices[corners, 2].argmin()
-        assert v[highest] < v[lowest] and len(top)
-    assert checked >= 2

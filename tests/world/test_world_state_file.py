@@ -4,7 +4,6 @@ import threading
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from gazerig.features.world.state_file import StateReader, StateWriter
 
@@ -20,15 +19,6 @@ def test_the_newest_state_is_read_and_none_before_the_first(tmp_path: Path) -> N
     assert (found.host_s, found.t_s, found.qpos.tolist()) == (100.5, 0.5, [4.0, 5.0, 6.0])
     assert reader.begin_s == 100.0 and reader.count == 2
     assert StateReader(tmp_path / "state").newest() is not None  # who comes later sees it as well
-
-
-def test_a_state_is_kept_when_others_follow(tmp_path: Path) -> None:
-    writer, path = StateWriter(tmp_path / "state", 1), tmp_path / "state"
-    writer.write(1.0, 0.0, (7.0,))
-    first = StateReader(path).newest()
-    for k in range(5):
-        writer.write(2.0, 1.0, (float(k),))
-    assert first is not None and first.qpos.tolist() == [7.0]
 
 
 def test_states_are_never_mixed(tmp_path: Path) -> None:
@@ -82,9 +72,3 @@ def test_a_reader_that_was_overtaken_reads_again(tmp_path: Path) -> None:
     found = reader.newest()
     assert found is not None
     assert (found.host_s, found.t_s, *found.qpos.tolist()) == (3.0, 3.0, 3.0, 3.0)
-
-
-def test_a_second_writer_is_refused(tmp_path: Path) -> None:
-    StateWriter(tmp_path / "state", 1)
-    with pytest.raises(FileExistsError):
-        StateWriter(tmp_path / "state", 1)
