@@ -17,10 +17,15 @@ from typer.testing import CliRunner
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
+import contextlib
+import sys
+
+from fakes.waiting import PATIENCE_S
+
 import gazerig
-from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
+from gazerig.doors import admission, livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
-from gazerig.doors.turn_taking import Orders, UnknownMessage
+from gazerig.doors.turn_taking import Orders, TurnOrder, TurnTaking, UnknownMessage
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.app.door_processes import load_door
 from gazerig.robot.cli import door as cli_door
@@ -629,3 +634,82 @@ def test_the_command_lists_doors_and_names_a_missing_one() -> None:
     missed = CliRunner().invoke(cli_door.app, ["wyomin"])
     assert missed.exit_code == 2
     assert "no door is called 'wyomin': did you mean 'wyoming'?" in missed.output
+
+
+def test_a_satellite_takes_the_place_of_an_idle_one() -> None:
+    pytest.importorskip("wyoming", reason="it is in the extra doors")
+    port = free_port()
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        idle = [await asyncio.open_connection("127.0.0.1", port) for _ in range(8)]
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(b'{"type": "describe"}\n')
+        await asyncio.wait_for(reader.readuntil(b"gazerig"), PATIENCE_S)
+        with contextlib.suppress(ConnectionError):
+            assert await idle[0][0].read() == b""
+        for _, one in (*idle, (reader, writer)):
+            one.close()
+
+    run(wyoming.DOOR, scenario, bind=f"127.0.0.1:{port}")
+
+
+def test_a_text_of_spaces_is_no_speech() -> None:
+    talk = TurnTaking()
+    talk.add_text(" " * 60, 0.0)
+    assert talk.speak(0.0) == (TurnOrder("speaking"),)
+    assert talk.speak(1.0, 4.0) == (TurnOrder("speaking", 3.0),)
+    talk = TurnTaking()
+    talk.add_text("Yes." + " " * 60, 0.0)
+    assert talk.speak(0.0)[0].text.strip() == "Yes."
+    assert talk.add_text(" " * 90, 3.0) == (TurnOrder("speaking"),)  # what is left of it
+
+
+def test_the_newest_neighbour_takes_the_place_of_an_idle_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bind = f"127.0.0.1:{free_port()}"
+
+    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+        await until(lambda: head.said)
+        async with ClientSession() as session:
+            sockets = [await session.ws_connect(f"ws://{bind}/x?y=1") for _ in range(8)]
+            for one in sockets[1:]:
+                await one.send_json(rtvi("user-started-speaking"))
+            await until(lambda: head.states == ["listening"])
+            sockets.append(await session.ws_connect(f"ws://{bind}"))
+            assert (await sockets[0].receive()).type.name in ("CLOSED", "CLOSE", "ERROR")
+            await sockets[-1].send_json(rtvi("bot-started-speaking"))
+            await until(lambda: head.last == "speaking")
+            with pytest.raises(WSServerHandshakeError, match="503"):  # all have spoken
+                await session.ws_connect(f"ws://{bind}")
+            monkeypatch.setattr(admission, "IDLE_S", 0.0)  # a long time later
+            await session.ws_connect(f"ws://{bind}")
+            assert not sockets[-1].closed  # the idlest one was closed
+            await sockets[-1].send_json({"type": "x"})
+            await sockets[-1].close()
+            await until(lambda: head.last == "idle")
+
+    head = run(pipecat.DOOR, scenario, bind=bind)
+    assert [line.split(" at once")[0] for line in head.said[1:3]] == ["more than 8 connections"] * 2
+    assert "the idlest is closed" in head.said[1] and "the newest is refused" in head.said[2]
+
+
+def test_the_user_of_a_connection_is_read_from_the_system_s_table() -> None:
+    mapped = "0000000000000000FFFF0000"
+    rows = [
+        # A server's end, the ends of two programs, one of them on IPv6, and one that has closed.
+        "0: 0100007F:17A8 0100007F:C635 01 0:0 00:0 0 7 0 11 1",
+        "1: 0100007F:C635 0100007F:17A8 01 0:0 00:0 0 1000 0 12 1",
+        f"2: {mapped}0100007F:C636 {mapped}0100007F:17A8 01 0:0 00:0 0 1001 0 13 1",
+        "3: 0100007F:C637 0100007F:17A8 05 0:0 03:1 0 0 0 0 3",
+        f"4: {'0' * 24}01000000:C638 {'0' * 24}01000000:17A8 01 0:0 00:0 0 1002 0 14 1",
+    ]
+    if sys.byteorder == "big":
+        pytest.skip("the rows are those of a little-endian computer")
+    own, users = ("127.0.0.1", 0x17A8), {0xC635: 1000, 0xC636: 1001, 0xC637: None, 0xC639: None}
+    for port, user in users.items():
+        assert admission.socket_user(rows, ("127.0.0.1", port), own) == user
+    own6 = ("::ffff:127.0.0.1", 0x17A8, 0, 0)
+    assert admission.socket_user(rows, ("::ffff:127.0.0.1", 0xC635, 0, 0), own6) == 1000
+    assert admission.socket_user(rows, ("::1", 0xC638, 0, 0), ("::1", 0x17A8, 0, 0)) == 1002

@@ -4,7 +4,7 @@ import os
 import re
 
 import pytest
-from line_noise import Noisy
+from line_noise import IDS, Noisy
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.process.host_lateness import (
@@ -16,6 +16,9 @@ from gazerig.drivers.process.host_lateness import (
     HostLateness,
 )
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.servo_bus.faults import NOT_SET_UP
+
+SYNC_READ = 0x82
 
 KINDS = ("dynamixel", "feetech")
 BLAME = r"check|cable\b|with its id|program|supply too weak"
@@ -136,3 +139,23 @@ def test_an_adaptor_is_found_again_under_another_name_and_no_other_is_taken_for_
     with pytest.raises(PortError, match="is another adaptor now"):
         port.setBaudRate(1_000_000)
     port.closePort()
+
+
+def test_servos_that_cannot_be_set_up_in_time_have_no_second_id():
+    """After a brown-out each servo is set up by many questions, whose answers come late here."""
+    noisy = Noisy("dynamixel")
+    noisy.start()
+    for servo_id in IDS:
+        noisy.device.faults.command(f"brown-out {servo_id}")
+    write = noisy.port.write
+
+    def delayed(data):
+        if data[7] == SYNC_READ:  # the loop's own request is another one
+            noisy.device.faults.command("delay all 18 count 6")
+        write(data)
+
+    noisy.port.write = delayed  # type: ignore[method-assign]
+    outcome = noisy.run("clear", 0.0, 900)
+    failed = [text for text in outcome.said if NOT_SET_UP in text]
+    assert failed and all("this computer was busy" in text for text in failed), outcome.said
+    assert not [text for text in outcome.said if re.search(BLAME, text)], outcome.said

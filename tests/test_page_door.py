@@ -452,3 +452,20 @@ def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() 
                 break
         else:
             raise AssertionError("no stop was taken")
+
+
+def test_neither_websockets_nor_silent_connections_shut_out_a_stop(near: Rig) -> None:
+    """Websockets have limits of their own, and a request that has just begun is not closed."""
+    host, port = near.address.split(":")
+    with ExitStack() as stack:
+        for path in ("/rig/line", "/rig/panels", f"/api/v1/socket?token={TOKEN}"):
+            for _ in range(32):
+                stack.enter_context(near.knock(path))
+        near.stops.clear()
+        for number in range(20):
+            assert near.post(b'{"do": "stop", "why": "many websockets"}')[0] == 204, number
+        for _ in range(300):
+            stack.enter_context(socket.create_connection((host, int(port))))
+        for number in range(20):
+            assert near.post(b'{"do": "stop", "why": "and silent ones"}')[0] == 204, number
+        assert len(near.stops) == 40

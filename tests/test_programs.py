@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -29,11 +30,17 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
+from gazerig import open as open_head
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.dashboard.door import programs
+from gazerig.robot.model.command_json import from_json
+from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import RobotClient
 from gazerig.robot.remote.openapi import api_description
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs" / "connect-your-program.md"
 
 PATIENCE_S = 60.0
 ROOT = Path(__file__).parents[1]
@@ -559,3 +566,39 @@ def test_the_browser_example_shows_the_head_and_commands_it(
         rig.until(lambda now: now["stopped"])
         wait_for(lambda: "stopped: browser.html" in browser.words(), "the stop")
     rig.until(lambda now: not now["controlled_by"])
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_a_state_after_the_answer_to_a_stop_shows_it(rig: Rig, number: int) -> None:
+    with rig.dial("&rate_hz=60") as end:
+        heard(end, "state")
+        why = f"stop {number}"
+        ask(end, do="stop", why=why, tag="s")
+        heard(end, "tag", "s")
+        assert heard(end, "state")["state"]["stopped"] == why
+    assert rig.post({"do": "stop", "why": "by post"})[0] == 200
+    assert rig.get("/state")[1]["ok"]["state"]["stopped"] == "by post"
+
+
+def test_states_after_an_answer_are_not_older() -> None:
+    async def follow() -> list[Any]:
+        program = programs.ProgramSocket(60.0, False)
+        program.add_news(programs.HeadNews('"before"', (), Progress()), 5.0)
+        program.queue_answer({"do": "look_at"}, {"ok": 1}, 5.02)
+        program.add_news(programs.HeadNews('"read before the answer"', (), Progress()), 5.019)
+        program.add_news(programs.HeadNews('"after"', (), Progress()), 5.03)
+        return [json.loads(text) for text in iter(program.outgoing, "")]
+
+    assert asyncio.run(follow()) == ["before", {"ok": 1}, "after"]
+
+
+def test_the_messages_to_a_voice_agent_s_head_name_what_the_shipped_rig_has() -> None:
+    found = re.findall(
+        r'\{"do": "(?:set_level|express|play)".*?\}', DOCS.read_text(encoding="utf-8")
+    )
+    with open_head("expressive", mock=True, fast=True) as head:
+        for text in found:
+            order = head._send(from_json(json.loads(text)))
+            head.sleep(0.1)
+            assert order.reply is not None and not order.reply.refused, text
+    assert {json.loads(text)["do"] for text in found} == {"set_level", "express", "play"}

@@ -626,3 +626,27 @@ def test_answers_that_nobody_reads_count_as_waiting() -> None:
         assert not ahead.is_full
         ahead.add_answer({"refused": "not a line of JSON"})
     assert ahead.is_full
+
+
+def test_a_stop_does_not_wait_for_another_thread_of_its_program(
+    rig: RobotClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Like that of a head that is speaking: the answer to say comes when it begins."""
+    answer, asked, over = RequestHandler.answer, threading.Event(), threading.Event()
+
+    def slow(self: RequestHandler, request: Any, peer: str = "") -> dict[str, object]:
+        if request["do"] == "characters":
+            asked.set()
+            over.wait(20.0)
+        return answer(self, request, peer)
+
+    monkeypatch.setattr(RequestHandler, "answer", slow)
+    other = threading.Thread(target=rig.characters)
+    other.start()
+    assert asked.wait(20.0)
+    rig.stop("meanwhile")
+    assert other.is_alive()
+    over.set()
+    other.join()
+    assert rig.status()["stopped"] == "meanwhile"
+    rig.resume()  # it is the same client

@@ -133,14 +133,3 @@ def test_no_packet_changes_sts_servos():
     assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
     assert chain.positions_steps() == places
     assert not any(one.found for one in rounds if one.kind == "dynamixel")
-
-
-def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():
-    chain = build_feetech([ServoSpec(5, "sts3215")], lambda: 0.0)
-    chain.choose_behaviour("broadcast-ping", "silence")
-    line = Line(chain)
-    asked = plan_search("", ("feetech",), (1_000_000,))
-    assert not any(one.found for one in search_bus(line.port, "", asked))
-    assert len(line.sent) < 100
-    (one,) = search_bus(line.port, "", asked, thorough=True)
-    assert [servo.id for servo in one.found] == [5]

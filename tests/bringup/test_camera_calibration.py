@@ -14,7 +14,6 @@ from desk import GAZE_JOINTS, LIDS
 from PIL import Image
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
-from gazerig.drivers.camera.source import Shot
 from gazerig.features.bringup.calibration.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
@@ -29,7 +28,6 @@ from gazerig.features.bringup.calibration.camera_procedure import (
 )
 from gazerig.features.bringup.calibration.charuco_views import (
     PAPERS_MM,
-    RULER_MM,
     BoardView,
     ViewParams,
     board_page,
@@ -174,11 +172,6 @@ def test_corners_that_jump_about_are_refused_with_the_number() -> None:
         calibrated(some_views(1.6))
 
 
-def test_a_focal_length_that_is_not_sure_is_refused() -> None:
-    with pytest.raises(CameraCalibrationRefused, match="sure to .* % only.*tilted"):
-        calibrated(some_views(0.3), most_focal_error_percent=0.05)
-
-
 def test_coverage_says_what_to_do_next() -> None:
     middle = BoardView(0.4, 0.6, 0.4, 0.6, 0.0, 0.0)
     params = ViewParams(least_views=2)
@@ -225,21 +218,12 @@ def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("paper", sorted(PAPERS_MM))
-def test_squares_and_ruler_on_the_page_are_as_long_as_they_say(paper: str) -> None:
+def test_squares_on_the_page_are_as_long_as_they_say(paper: str) -> None:
     sheet = board_page(PRINTED, paper)
     seen = PRINTED.find(cv2.GaussianBlur(sheet, (0, 0), 2.0).astype(np.uint8))
     assert seen is not None and len(seen.ids) == 24
     sides = np.diff(seen.corners_px.reshape(4, 6, 2)[:, :, 0], axis=1) / PX_PER_MM
     assert sides == pytest.approx(np.full((4, 5), 36.0), abs=0.02)
-    below = sheet[int(seen.corners_px[:, 1].max()) + round(37.0 * PX_PER_MM) :]
-    longest = max(_runs(row == 0) for row in below)
-    assert longest == RULER_MM * PX_PER_MM
-
-
-def _runs(dark: np.ndarray) -> int:
-    """Return the longest run of dark pixels."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([0], dark.astype(int), [0]))))
-    return int(np.max(ends[1::2] - ends[::2], initial=0))
 
 
 @pytest.mark.parametrize(
@@ -302,18 +286,6 @@ def test_somebody_who_shows_the_board_from_all_sides_gets_the_lens(scene: BoardS
     lens = steps.result()
     assert lens.intrinsics.fx_px == pytest.approx(scene.lens.fx_px, rel=0.01)
     assert lens.params().width_px == 640
-
-
-def test_pictures_without_a_new_view_say_why(scene: BoardScene) -> None:
-    steps = LensSteps(BOARD, radians(69.0))
-    shot = scene.look(0.0)
-    assert steps.take(shot).kept
-    again = steps.take(shot)
-    assert not again.kept and again.why == "too much like a view before"
-    empty = steps.take(Shot(0.1, 2, np.zeros((400, 640, 3), np.uint8)))
-    assert (empty.kept, empty.corners, empty.why) == (False, 0, "no board seen")
-    with pytest.raises(CameraCalibrationRefused, match="show 11 more views"):
-        steps.result()
 
 
 def test_a_head_that_looks_around_finds_its_camera(scene: BoardScene, neck: MovedNeck) -> None:
@@ -400,17 +372,6 @@ def test_it_is_written_down_rounded_and_on_the_head() -> None:
     )
     assert at.mount == "head" and at.horizontal_field_deg == 70.0
     assert at.position_mm == tuple(round(mm, 1) for mm in at.position_mm)
-
-
-def test_a_view_during_which_the_board_was_knocked_is_dropped() -> None:
-    scene = scene_of(0)
-    views = neck_views(scene)
-    seen = views[3].seen
-    views[3] = views[3]._replace(seen=seen._replace(corners_px=seen.corners_px + (25.0, 8.0)))
-    found = found_in(scene, views)
-    assert found.dropped == (3,)
-    mm, deg = off(found, scene.mount)
-    assert mm < 3.0 and deg < 0.3
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -86,17 +86,6 @@ def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
     assert conditions == ()
 
 
-def test_what_comes_and_goes_is_not_told():
-    bad, good = room() // 16, np.asarray(room())
-    assert looked(([bad] * 3 + [good] * 2) * 6) == ([], ())
-    model = HealthModel()
-    stepped(model, 5, brightness=20.0)
-    # Between the two limits it stays as it is.
-    assert not stepped(model, 20, brightness=40.0) and model.conditions
-    assert stepped(model, 20, brightness=50.0) == ["camera: the picture is bright enough again"]
-    assert not stepped(model, 20, brightness=40.0)
-
-
 @pytest.mark.parametrize(
     "image",
     [

@@ -13,18 +13,15 @@ from pathlib import Path
 import pytest
 from command_line import invoked
 from commands_started import hear, start, status
-from desk import GAZE_JOINTS
 from served_rigs import Served, hide_real_ports, rig_files, served
 
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.features.bringup.cli import ports
 from gazerig.features.bringup.manual_control import ManualControl
-from gazerig.sim_mock.devices import FeetechLine, MaestroLine
+from gazerig.sim_mock.devices import MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")
-SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "
 
 
@@ -55,17 +52,6 @@ def test_scan_lists_every_servo():
     found = json.loads(out)
     assert code == 0 and [servo["id"] for servo in found["servos"]] == list(range(1, 10))
     assert found["servos"][6]["model"] == "xc330-m288"
-
-
-def test_scan_of_feetech_servos():
-    with PtyBus() as bus:
-        path = bus.start_device(FeetechLine((ServoSpec(1, "sts3215"), ServoSpec(9, "sts3215"))))
-        words = ("scan", "--port", path, "--bauds", "1000000")
-        code, out, _ = invoked(*words)
-        rows = [("1", "sts3215", "3.53", "1000000"), ("9", "sts3215", "3.53", "1000000")]
-        assert code == 0 and re.findall(ROW + "Feetech", out) == rows
-        code, out, _ = invoked(*words, "--kind", "dynamixel")
-        assert code == 1 and "gazerig scan --kind feetech" in out
 
 
 @pytest.mark.parametrize(
@@ -109,22 +95,6 @@ def test_doctor_finds_and_fixes():
     after = out.partition("after that:")[2]
     assert "waits" not in after and "xc330-m288, firmware" in after
     assert "nothing that --fix" in invoked("doctor", "--port", "/dev/ttyNONE", "--fix").out
-
-
-def test_doctor_on_a_port_served_elsewhere_names_what_is_wrong():
-    with PtyBus() as bus:
-        path = bus.start(SMALL, baud=1_000_000)
-        bus.command("overload 7")
-        code, out, _ = invoked("doctor", "--port", path)
-        assert code == 1
-        assert "neck_yaw (servo 7): has latched: overload" in out
-        assert "then switch its power off and on" in out
-        assert "does not answer" in out and "neck_pitch" in out
-        code, out, _ = invoked("doctor", "--port", path, "--json")
-        found = json.loads(out)
-        assert {f["where"] for f in found if f["what"] == "does not answer"} == {
-            f"{name} (servo {i})" for i, name in enumerate(GAZE_JOINTS, 1) if i not in (1, 7)
-        }
 
 
 def test_doctor_examines_every_bus_and_says_which(mixed):
@@ -209,30 +179,6 @@ def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
     assert "torque off on all servos; neck_roll (servo 9): torque-off not confirmed" in done.err
 
 
-def test_monitor_changes_nothing(desk: Served) -> None:
-    path = desk.ports
-    before = desk.command("status")
-    done = invoked("monitor", "--once", "--port", path)
-    assert done.code == 0, done.err
-    assert [line.split()[0] for line in done.out.splitlines()[1:10]] == list(GAZE_JOINTS)
-    after = json.loads(desk.command("status"))
-    for servo, was in zip(after["servos"], json.loads(before)["servos"], strict=True):
-        assert (servo["torque"], servo["goal"]) == (was["torque"], was["goal"])
-    desk.command("lose 3")
-    lost = invoked("monitor", "--once", "--port", path)
-    assert lost.code == 0 and "no answer" in lost.out
-
-
-def test_jog_says_what_was_applied() -> None:
-    done = invoked(
-        "jog", "left_eye_pan", "-20", "--mock", "--speed", "60", "--seconds", "0", "--no-park"
-    )
-    assert done.code == 0, done.err
-    assert re.search(r"left_eye_pan: desired -20\.0, measured -\d+\.\d deg", done.err)
-    assert "torque on: 9 servos" in done.err
-    assert "torque off on all servos" in done.err
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -287,12 +233,6 @@ def test_on_real_wires_hobby_servos_are_asked_for_first(rigs: dict[str, str]) ->
 # --- scan and setup of boards that move hobby servos
 
 
-@pytest.fixture
-def on_pca9685(tmp_path):
-    """Return the path of the maker's rig with a PCA9685 in place of its Maestro."""
-    return rig_files(tmp_path)["pca9685"]
-
-
 def test_scan_of_a_maestro():
     with PtyBus() as bus:
         path = bus.start_device(MaestroLine())
@@ -341,23 +281,3 @@ def test_setup_of_a_maestro_finds_a_range_that_cuts_and_a_servo_on_another_chann
         assert "plug its servo into channel 0" in err and "done: 1 of 1" in err
         first = json.loads(command("status"))["servos"][0]
         assert first["position"] == 0
-
-
-def test_setup_of_a_pca9685_moves_one_channel_after_another(on_pca9685):
-    with served(on_pca9685) as (port, _, command):
-        code, _, err = invoked(
-            "setup", on_pca9685, "--port", port, "--joint", "eyes_pan", "--joint", "left_upper_lid",
-            # move; another moved; move; that is it; skip
-            answers="y\nn\ny\ny\nn\n",
-        )  # fmt: skip
-        assert code == 0 and "eyes_pan: channel 0 of board 0x40" in err
-        assert "plug its servo into channel 0" in err and "skipped: left_upper_lid" in err
-        status = json.loads(command("status"))["servos"]
-        assert not any(one["target"] for one in status)
-        assert abs(status[0]["place"] - 6000) < 80 and status[2]["place"] == 5920
-
-
-def test_the_command_port_is_the_first_of_the_two_of_a_maestro(monkeypatch):
-    both = [SerialPort(f"/dev/ttyNONE{n}", "Maestro", "1ffb:0089", None) for n in range(2)]
-    monkeypatch.setattr(ports, "serial_ports", lambda host: both)
-    assert "no serial port /dev/ttyNONE0" in invoked("scan").err

@@ -1,6 +1,5 @@
 """gazerig calibrate joints, camera, board and face as they are typed, against emulated buses."""
 
-import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -115,14 +114,6 @@ def test_a_hobby_joint_is_steered_and_its_places_are_written(
     assert "[-6, 1430]" in Path(path).read_text("utf-8")
     assert "-6 deg: 1430" in done.out and "Keep your fingers out" in done.err
     assert list(tmp_path.glob("maker.yaml.bak-*"))
-
-
-def test_the_middle_of_an_sts_servo_can_be_set(rigs: dict[str, str], tmp_path: Path) -> None:
-    words = ("turn 60", "", "turn 150", "", "turn -320", "", "turn 170", "", "n")
-    answers = answers_in(tmp_path, *words)
-    done = calibrated(rigs["feetech"], "--mock", "--joint", "neck_roll", "--set-middle",
-               "--answers", answers)  # fmt: skip
-    assert re.search(r"its place is 2048 now \(offset -?\d+\)", done.err)
 
 
 @pytest.mark.parametrize(

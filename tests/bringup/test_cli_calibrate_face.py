@@ -2,22 +2,15 @@
 
 import socket
 from pathlib import Path
-from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
-from hypothesis import given
-from hypothesis import strategies as st
 from page_visitor import Visitor
 from served_rigs import rig_files
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.calibrate import face as cli_face
 from gazerig.features.bringup.cli.calibration_keys import (
-    Keys,
     split_words,
 )
 from gazerig.robot.app.run_observers import stop_only_handler
@@ -102,19 +95,6 @@ def test_nothing_chosen_a_no_or_what_is_wrong_writes_nothing(
     assert rig.read_bytes() == before and not list(tmp_path.glob("*.bak-*"))
 
 
-def test_without_a_face_it_says_so_and_a_script_ends(
-    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cli_face, "_SCRIPT_WAITS_S", 2.0)
-    wall = tmp_path / "wall.png"
-    cv2.imwrite(str(wall), np.full((120, 160, 3), 128, np.uint8))
-    words = ("--mock", "--video", str(wall))
-    done = run(str(rig), *words, *script(tmp_path, "left", "", "q"))
-    assert done.code == 2, done.err
-    assert "no face is seen: sit before the camera" in done.err
-    assert "no face is seen for 2 s" in done.err and "torque off" in done.err
-
-
 # --- keys
 
 
@@ -125,15 +105,6 @@ def test_what_a_terminal_sends_for_keys() -> None:
         "larger", "enter", "skip", "back", "end",
     ]  # fmt: skip
     assert rest == "\x1b["
-
-
-@given(st.lists(st.sampled_from(["\x1b[A", "\x1bOB", "w", "\n", "\x1b[1;2C", "x"])), st.data())
-def test_keys_are_the_same_however_the_bytes_are_cut(sent: list[str], data: st.DataObject) -> None:
-    text = "".join(sent)
-    cut = data.draw(st.integers(0, len(text)))
-    first, rest = split_words(text[:cut])
-    second, left = split_words(rest + text[cut:])
-    assert first + second == split_words(text)[0] and left == ""
 
 
 # --- on a terminal
@@ -190,24 +161,6 @@ def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
     assert found["N"] == pytest.approx((usual["N"][0], 5.0, 5.0), abs=0.06)
     x, y, z = usual["LE"]
     assert found["LE"] == pytest.approx((x, y, z - 5.0), abs=0.06)
-
-
-class NoKeys(Keys):
-    """Another source, of which nothing comes unless it is given."""
-
-    def __init__(self) -> None:
-        self.inside = False
-        self.given: list[str] = []
-
-    def __enter__(self) -> "NoKeys":
-        self.inside = True
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.inside = False
-
-    def next(self, ready: bool) -> Any:
-        return self.given.pop(0) if self.given else None
 
 
 def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:

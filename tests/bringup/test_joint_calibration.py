@@ -20,12 +20,10 @@ from gazerig.features.bringup.calibration.endstop_search import (
 )
 from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoAccess
 from gazerig.features.bringup.calibration.joint_calibration import (
-    Calibration,
     CalibrationRefused,
     Marks,
     PositionUnwrapper,
     joint_calibration,
-    rig_changes,
     with_calibration,
 )
 from gazerig.features.bringup.calibration.joint_procedure import (
@@ -91,10 +89,6 @@ class Bench:
 
     def limits(self) -> tuple[int, int]:
         return self.get("min_position_limit"), self.get("max_position_limit")
-
-    def restart(self) -> None:
-        self.chain.faults.command(f"brown-out {self.id}")
-        self.clock.sleep_until(self.clock.now_s() + 1.0)
 
     def command(self, text: str) -> None:
         self.port.faults.command(text.format(id=self.id))
@@ -223,15 +217,6 @@ def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says:
 
 
 # --- what goes into the rig file
-
-
-@pytest.mark.parametrize(("lid", "key"), [("upper", "left"), ("lower", "left_lower")])
-def test_a_lid_s_own_ends_and_its_parking_follow_the_new_range(lid: str, key: str) -> None:
-    name, found = f"left_{lid}_lid", Calibration(2000, -1, -20.0, 22.0)
-    wanted = rig_changes(name, JOINT, found, {name: -25.0, "neck_pitch": -12.0})
-    ends = {f"lid_joints.{key}_shut_deg": -20.0, f"lid_joints.{key}_open_deg": 22.0}
-    assert {one: wanted[one] for one in wanted if one.startswith("lid_joints")} == ends
-    assert wanted[f"park_deg.{name}"] == -20.0 and "park_deg.neck_pitch" not in wanted
 
 
 # --- finding a stop

@@ -1,27 +1,19 @@
 """Puppeteering: a track of some joints of a running head, while a track plays on others."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from expressive_rig import started
-from ticked_rig import TickedRig
-from typer.testing import CliRunner
 
 import gazerig
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import DriverError
-from gazerig.features.bringup.cli import record_track as command
 from gazerig.features.bringup.hand_recording import record_live
 from gazerig.robot.app.track_file import TOLERANCE_DEG, track_text, write_track
 from gazerig.robot.control.head_state import HeadState
-from gazerig.robot.model.commands import SetLevel
 from gazerig.robot.model.track_fit import track_motions
-from gazerig.robot.remote.client import RobotClient
-from gazerig.robot.remote.request_handler import LoopMonitor
 
 TURN = """description: the neck turns
 owns: [neck]
@@ -110,51 +102,3 @@ def test_a_stop_or_a_lost_head_ends_the_recording_and_keeps_it() -> None:
         assert found.ended_by == "the rig (process 7) ended" and len(found.series["jaw"][0]) == 1
         with pytest.raises(DriverError, match="process 7"):
             record_live(read, ["jaw"], clock, lambda: None, 60.0)
-
-
-class TickedClock:
-    """A clock whose waiting ticks the head, while a puppeteer moves the jaw."""
-
-    def __init__(self, rig: TickedRig) -> None:
-        self._rig = rig
-
-    def now_s(self) -> float:
-        return self._rig.made.clock.now_s()
-
-    def sleep_until(self, t_s: float) -> None:
-        self._rig.command(SetLevel("mouth", 0.5 + 0.5 * float(np.sin(3.0 * self.now_s()))))
-        while self.now_s() < t_s:
-            self._rig.tick()
-
-
-@pytest.fixture
-def turning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Yield the file of a rig that every client connects to, with a track of its neck."""
-    (tmp_path / "turn.yaml").write_text(TURN)
-    file = tmp_path / "rig.yaml"
-    file.write_text(shipped_path("rigs", "expressive").read_text() + "\ntrack_files: [turn.yaml]\n")
-    made = started(load_rig(str(file)))
-    rig = TickedRig(made)
-    rig.tick(400)
-    client = RobotClient(rig, 1)  # type: ignore[arg-type]
-    monkeypatch.setattr(LoopMonitor, "wait_for_commands", lambda *_, **__: True)
-    monkeypatch.setattr(RobotClient, "connect", lambda pid=None, who="": client)
-    monkeypatch.setattr(command, "RealClock", lambda: TickedClock(rig))
-    yield file
-    made.robot.stop()
-    made.close()
-
-
-def test_the_command_records_a_puppeteered_jaw_while_a_track_turns_the_neck(
-    turning: Path, tmp_path: Path
-) -> None:
-    words = [str(turning), "mouth", "--live", "--joints", "jaw", "--play", "turn"]
-    done = CliRunner().invoke(command.app, [*words, "--folder", str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    assert "recording jaw; Enter ends it" in done.stderr
-    assert "recorded 1 joints; ended: turn: finished" in done.stderr
-    track = load_track(tmp_path / "mouth.yaml")
-    angles = [frame.joints_deg["jaw"] for frame in track.frames]
-    assert track.owns == ("jaw",) and max(angles) > 8.0 > 2.0 > min(angles)
-    again = CliRunner().invoke(command.app, [*words, "--folder", str(tmp_path)])
-    assert again.exit_code != 0 and "--force" in again.stderr

@@ -204,17 +204,3 @@ def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench)
     where = other.where()
     assert where["eyes_pan"] == pytest.approx(-15.0, abs=1.0)
     assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
-
-
-@on("mixed")
-def test_joints_of_three_kinds_move_together(other: Bench) -> None:
-    asked = {"eyes_pan": 10.0, "neck_yaw": 15.0, "neck_pitch": -5.0}
-    moved = other.control.pose(asked)
-    assert moved.arrived
-    estimated = {part.joint for part in moved.joints if part.estimated}
-    joints = other.rig.joints
-    assert estimated == {
-        name for name in other.rig.names if not joints[name].model_facts.measures_position
-    }
-    where = other.where()
-    assert {name: where[name] for name in asked} == pytest.approx(asked, abs=2.0)

@@ -6,7 +6,7 @@ import pytest
 from doctor_rig import BAUD, each
 from doctor_rig import NECK as MODELS
 
-from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
@@ -133,19 +133,6 @@ def test_two_servos_are_refused(kind, ids, says):
 
 
 @each
-def test_two_servos_at_two_rates_are_refused(kind):
-    model = MODELS[kind.name]
-    bench = Bench(ServoSpec(1, model), ServoSpec(2, model), kind=kind)
-    bench.port.setBaudRate(bench.baud)
-    index = kind.family.baud_rates.index(115_200)
-    bench.registers().write_persistent(2, "baud_rate", index)
-    bench.chain.refresh()
-    both = rf"id 1 \({model}\) at {bench.baud} .*id 2 \({model}\) at 115200"
-    with pytest.raises(ServoMissing, match=both):
-        bench.find()
-
-
-@each
 def test_another_model_is_refused_and_left_alone(kind):
     bench = Bench(kind=kind)
     before = bench.kept(1)
@@ -205,29 +192,6 @@ def test_a_refusal_says_where_the_servo_answers_now(address, says):
     bench.port.address = address
     with pytest.raises(ServoFault, match=says):
         bench.assign()
-
-
-def test_an_adaptor_that_cannot_run_at_the_rate():
-    bench = Bench()
-    found = bench.find()
-    bench.port.setBaudRate = lambda baud: (  # type: ignore[assignment, method-assign]
-        baud == 57_600 and InProcessPort.setBaudRate(bench.port, baud)
-    )
-    with pytest.raises(PortError, match="cannot run at 1000000"):
-        assign_servo(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
-
-
-def test_a_servo_that_is_gone_after_is_missed():
-    bench = Bench()
-    bench.port = StubbornPort(bench.chain)
-    bench.port.silent = 7  # type: ignore[assignment]
-    with pytest.raises(ServoMissing, match=f"does not answer as id 7 at {BAUD}"):
-        bench.assign()
-    bench = Bench(ServoSpec(7, "xc330-m288"))
-    found = bench.find()
-    bench.port.faults.command("lose 7")
-    with pytest.raises(ServoMissing):
-        assign_servo(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
 
 
 @pytest.mark.parametrize("address", [7, 8])

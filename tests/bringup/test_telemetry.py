@@ -3,13 +3,13 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from math import degrees, pi, sin
+from math import pi, sin
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from emulated_rig import EmulatedRig, mixed_rig
+from emulated_rig import EmulatedRig
 from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig
@@ -174,22 +174,6 @@ def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors() -> None:
         assert bench.monitor.sample().unanswered == 0
     assert {packet[0] for packet in bench.sent[""]} == {GET_POSITION}
     assert json.loads(bench.command("status"))["errors"] == ["protocol"]
-
-
-def test_a_rig_of_three_kinds_is_one_sample(tmp_path: Path) -> None:
-    rig = mixed_rig(tmp_path)
-    bench = Bench(rig)
-    bench.command("lose 1", "tilt")
-    reported = json.loads(json.dumps(as_json(bench.monitor.sample(), 0.0)))
-    assert set(reported["joints"]) == set(rig.names)
-    assert reported["joints"]["neck_pitch"] is None and reported["unanswered"] == 1
-    pan, yaw = reported["joints"]["eyes_pan"], reported["joints"]["neck_yaw"]
-    assert pan["measured"] is False and pan["pulse_us"] == 0.0 and pan["load"] is None
-    assert yaw["measured"] is True and "pulse_us" not in yaw
-    start = bench.lines["neck"].servos[0].start_steps
-    assert yaw["position_deg"] == pytest.approx(
-        degrees(rig.joints["neck_yaw"].angle_rad(start)), abs=0.2
-    )
 
 
 # --- A track that is recorded by hand: torque off, and the head's motion becomes its keys

@@ -134,16 +134,6 @@ def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) 
     assert "#   gaze.csv" in text and "95 %" in text and "# from RE" in text
 
 
-def test_fixations_with_places_are_labelled_by_the_boxes(tmp_path: Path, boxes: PartBoxes) -> None:
-    rows = (f"{300 * k},250,{(400, 300)[k % 2]},{(400, 300)[k % 2]}" for k in range(80))
-    recording = written(tmp_path / "looks.csv", "onset,duration,X,Y", rows)
-    report = fit_to_recording(recording, boxes, tmp_path / "mine.yaml")
-    assert "80 fixations on the face" in report and "times are in ms" in report
-    assert load(tmp_path / "mine.yaml", Walk).dwell_mean_s == (0.25,) * 8
-    with pytest.raises(SetupError, match="without a part column need the rectangles"):
-        fit_to_recording(recording, None, tmp_path / "none.yaml")
-
-
 SAMPLE_ROWS = [f"{0.004 * k:.3f},400,400" for k in range(200)]
 
 

@@ -44,7 +44,6 @@ from gazerig.features.lab.report.page import (
     RunHeader,
     band_text,
 )
-from gazerig.features.lab.report.plotting import COLOURS, ShownRun, drawing_png
 from gazerig.features.lab.report.report import DRAWINGS, judge_run, make_report
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
@@ -210,12 +209,6 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
         assert finding.band.title in page and band_text(finding.band) in page
     assert reported[-1] == (build.DRAWING, 1.0)
     assert [share for _, share in reported] == sorted(share for _, share in reported)
-
-
-@pytest.mark.usefixtures("unlaid_figures")
-@pytest.mark.parametrize("drawing", DRAWINGS, ids=[d.key for d in DRAWINGS])
-def test_a_figure_of_nothing_says_so(drawing: object) -> None:
-    assert drawing_png(drawing, [ShownRun("none", EMPTY, COLOURS[0])])[:4] == b"\x89PNG"  # type: ignore[arg-type]
 
 
 def test_the_command_takes_a_file_or_a_scene() -> None:
@@ -474,26 +467,6 @@ def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
     found = [rests.largest_slot_excess(each) for each in smooth]
     assert abs(np.mean(found)) < 0.005 and max(found) < 0.04  # chance makes none
     assert all(rests.largest_slot_excess(np.maximum(each, 0.2)) > 0.2 for each in smooth)
-
-
-@pytest.mark.parametrize(("gain", "verdict"), [(0.97, "pass"), (1.2, "outside")])
-def test_the_highest_gain_knows_how_uncertain_it_is(gain: float, verdict: str) -> None:
-    """A face sways at all frequencies below 1 Hz; what the gaze adds is noise."""
-    dice = np.random.default_rng(5)
-    t = np.arange(0.0, 300.0, 0.02)
-    f = dice.uniform(0.05, 1.0, 40)
-    phases = dice.uniform(0.0, 2.0 * np.pi, 40)
-    target = np.sin(2.0 * np.pi * np.outer(t, f) + phases).sum(axis=1)
-    speed = (2.0 * np.pi * f * np.cos(2.0 * np.pi * np.outer(t, f) + phases)).sum(axis=1)
-    rows = np.zeros((len(t), len(TraceRow._fields)))
-    noise = np.convolve(dice.standard_normal(len(t)), np.ones(50) / 4.0, "same")
-    for name, values in (("t", t), ("target_yaw", target), ("target_yaw_rate", speed),
-                         ("gaze_yaw", gain * target + noise)):  # fmt: skip
-        rows[:, TraceRow._fields.index(name)] = values
-    most = verdicts(GazeTrace(rows, (), (), ()))["pursuit_most"]
-    assert most.value > gain + 0.01  # the largest of many is beyond the truth
-    assert most.low95 < gain + 0.02 and most.high95 - most.low95 > 0.03
-    assert most.verdict == verdict
 
 
 def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> None:

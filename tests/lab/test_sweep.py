@@ -34,7 +34,6 @@ from gazerig.features.lab.sweep.fit import (
     counted_measures,
     fit_settings,
 )
-from gazerig.features.lab.sweep.response_figure import most_responsive
 from gazerig.features.lab.sweep.run_outcome import (
     OUTSIDE,
     Outcome,
@@ -215,38 +214,6 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
 
 
 # ---- figures
-
-
-def outcomes_of(points: Sequence[Point], seeds: int = 4) -> list[Outcome]:
-    """Return runs in which the blinks follow the first parameter, and nothing else any."""
-    rng = np.random.default_rng(1)
-    found = []
-    for point in points:
-        first = next(iter(point.values()))
-        x = float(first) if isinstance(first, int | float) else float(len(str(first)))
-        for seed in range(seeds):
-            figures = {
-                OUTSIDE: int(rng.integers(2, 6)),
-                "report.blink_rate": x + rng.normal(),
-                "report.blink_close": 80.0 + 0.1 * rng.normal(),
-                "report.vor": 1.0 + 0.1 * rng.normal(),
-                "report.blink_open": 150.0 + 1e-3 * x,  # it follows, by next to nothing
-            }
-            found.append(Outcome(point, seed, figures))
-    return [*found, Outcome(points[0], 99, {}, "it failed")]
-
-
-BLINKS = Axis("gaze.lids.blinks_per_min", (8.0, 14.0, 20.0), unit="1/min")
-CLOSE = Axis("gaze.lids.close_ms", (50, 70), unit="ms")
-PROFILE = Axis("gaze.saccade.profile", ("min_jerk", "main_sequence"))
-RANGE = Axis("gaze.lids.blinks_per_min", (), 5.0, 30.0, unit="1/min")
-
-
-def test_the_picture_shows_what_responds() -> None:
-    runs = outcomes_of(grid([BLINKS, CLOSE]))[:-1]
-    assert most_responsive([BLINKS, CLOSE], runs, 2) == [OUTSIDE, "report.blink_rate"]
-    sample = outcomes_of(latin_hypercube([RANGE, PROFILE], 20, 0), 1)[:-1]
-    assert most_responsive([RANGE, PROFILE], sample, 2) == [OUTSIDE, "report.blink_rate"]
 
 
 def test_a_measure_outside_its_band_counts_by_its_distance() -> None:

@@ -107,14 +107,6 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene) -> None:
     assert alone[210:230, 0, 0].min() < 0.36 and at[190:200, 0, 0].min() > 0.6
 
 
-def test_events_follow_from_the_motion(scene: WorldScene) -> None:
-    hands(scene)
-    punch, opened = present(scene.figures.opponent).events
-    assert punch.name == "punch" and punch.due_s is not None
-    assert 2.0 < punch.start_s < 2.15 < punch.due_s < 2.5
-    assert opened.name == "attack" and 3.0 < opened.start_s < 3.4 and 4.0 < opened.end_s < 4.4
-
-
 @pytest.mark.parametrize("early_s", [0.0, 0.7])  # the scene may start before the first tick
 def test_a_moved_punch_is_scored_and_a_script_that_waits_is_not(early_s: float) -> None:
     rig, options = load_rig("desk", "strong_boxer"), replace(BOXING, character="strong_boxer")

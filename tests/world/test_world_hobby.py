@@ -5,10 +5,6 @@ from world_rigs import WorldBench, mujoco_or_skip
 
 mujoco_or_skip()
 
-from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.model import world_model  # noqa: E402
-from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.run_world import rig_in_world, world_ideal_bus  # noqa: E402
 
 MOVE = 800
 """Quarter microseconds that a servo is sent away, 18 deg."""
@@ -51,30 +47,3 @@ def test_a_hobby_servo_without_pulses_is_limp() -> None:
     bench.devices[""].body.channels[bench.rig.joints[joint].id].set_target(round(before))
     bench.pass_ms(400)
     assert abs(servo.place_steps - before) <= 30.0
-
-
-def test_ideal_servos_lead_the_joints_of_a_world() -> None:
-    """With their lag, within a step; without torque the joints are limp."""
-    now_s = [0.0]
-    rig = load_rig("desk")
-    world = World(world_model(None, [rig_in_world(rig, looks=False)]), lambda: now_s[0])
-    bus = world_ideal_bus(rig, world)
-    bus.open()
-    goals = [round(steps) for steps in bus.enable_torque()]
-    goals[0] += 300
-    goals[7] += 200
-    bus.write(goals)
-    now_s[0] = 0.008
-    moved = bus.read(now_s[0]).position_steps[0] - goals[0] + 300
-    assert 0.5 * 300 < moved < 0.75 * 300  # 1 - 1/e, and the lag of a joint with inertia
-    now_s[0] = 0.2
-    assert bus.read(now_s[0]).position_steps == pytest.approx(goals, abs=1.0)
-    angles = world.joints_rad()
-    assert angles["left_eye_pan"] == pytest.approx(
-        rig.joints["left_eye_pan"].angle_rad(goals[0]), abs=0.002
-    )
-    bus.disable_torque()
-    goals[0] -= 300
-    bus.write(goals)
-    now_s[0] = 0.4
-    assert bus.read(now_s[0]).position_steps[0] == pytest.approx(goals[0] + 300, abs=2.0)

@@ -66,14 +66,6 @@ def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path)
     assert model.mj.nbody == 1 + len(names) and model.mj.nu == len(names)
 
 
-def test_a_users_world_with_a_part_of_the_joints_names_those_missing(tmp_path: Path) -> None:
-    """Half a rig is a mistake, not another head."""
-    first, *others = load_rig("minimal").names
-    path = _world_file(tmp_path, f'<body><joint name="{first}"/><geom size=".01"/></body>')
-    with pytest.raises(SetupError, match=f"own.xml: .*not {', '.join(others)}: add"):
-        world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
-
-
 UNUSABLE = (
     ("", "read"),
     ("<mujoco><worldbody>", "read"),

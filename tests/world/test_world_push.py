@@ -4,7 +4,7 @@ from math import degrees, radians
 from pathlib import Path
 
 import pytest
-from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run
+from world_rigs import WorldBench, arm, mujoco_or_skip, read
 
 mujoco_or_skip()
 
@@ -13,7 +13,6 @@ from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 from gazerig.features.world.served_world import COMMANDS  # noqa: E402
 from gazerig.features.world.world_spec import WorldSpec  # noqa: E402
 from gazerig.robot.app.run_bus import emulated_lines  # noqa: E402
-from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.sim_mock.pty.line import BusSettings  # noqa: E402
 from gazerig.sim_mock.pty.server import Server, ServerSettings, SurroundingsSettings  # noqa: E402
 
@@ -95,34 +94,6 @@ def test_upper_and_lower_lids_hold_each_other_off() -> None:
     assert (
         sum(degrees(bench.world.joints_rad()[name]) for name in wanted) > -29.5
     )  # they meet at -28
-
-
-def test_the_guard_finds_a_head_that_is_held_away_and_brings_it_back_softly(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A push of a second: the neck yields, is detected as stalled, waits, and returns."""
-    run = world_run("desk", monkeypatch)
-    seen: list[tuple[float, float, tuple[str, ...]]] = []
-
-    def watch(tick: Tick) -> None:
-        if len(seen) == 400:
-            run.world.push("head", (0.0, 15.0, 0.0), 0.8)
-        roll = run.rig.names.index("neck_roll")
-        seen.append(
-            (
-                degrees(tick.joints.position_rad[roll]),
-                tick.joints.load[roll],
-                tick.guard_result.reasons,
-            )
-        )
-
-    run.play(5.0, watch)
-    before, pushed, after = seen[390], seen[400:560], seen[-1]
-    assert abs(before[0]) < 3.0
-    assert min(row[0] for row in pushed) < -10.0
-    assert max(abs(row[1]) for row in pushed) > 0.7
-    assert any("neck_roll: not moving" in row[2] for row in seen[400:700])
-    assert abs(after[0]) < 3.0 and not after[2]
 
 
 # --- as a command

@@ -1,8 +1,5 @@
 """Pictures of a world: where points land, how far things are, and what a real lens adds."""
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -117,13 +114,6 @@ def test_a_point_lands_where_the_programs_own_lens_says(
     assert np.isinf(seen.depth_m[0, 0])
 
 
-def turning(rate_rad_s: float) -> CameraMotion:
-    """Return the motion of a camera that turns to its left."""
-    span = 0.005
-    before = compose(rotation((-rate_rad_s * span, 0.0, 0.0)), OPTICAL)
-    return CameraMotion(OPTICAL, (0.0, 0.0, 0.0), before, (0.0, 0.0, 0.0), span)
-
-
 ONE = np.array([(1.5, 0.0, 0.0)])
 
 
@@ -141,23 +131,6 @@ def test_what_moves_itself_is_blurred_only_where_the_exposure_is_made_of_several
     )
     passing.picture.close()
     assert width_px(blurred) - width_px(sharp) == pytest.approx(8, abs=2)
-
-
-def test_rows_that_are_read_later_are_seen_from_where_the_camera_is_then() -> None:
-    column = np.array([(1.5, 0.0, z) for z in (-0.5, 0.0, 0.5)])
-    pole = Balls(column)
-    params = OpticsParams(0.0, read_out_ms=20.0, bands=24)
-    motion = turning(1.0)
-    slant = expose(pole.picture, params, 0.0, LENS, SIZE, motion).image
-    straight = expose(pole.picture, OpticsParams(0.0), 0.0, LENS, SIZE, motion).image
-    pole.picture.close()
-    expected = project(column @ np.array(OPTICAL), LENS)
-    for image, rate in ((slant, 1.0), (straight, 0.0)):
-        for x, y in expected:
-            late_s = 0.020 * ((y + 0.5) / SIZE[1] - 0.5)
-            # The camera turns to the left, so what is there goes to the right.
-            where = np.array([(x + rate * late_s * LENS.fx_px, y)])
-            assert landed(Rendered(image, None), where)[0][0] == pytest.approx(where[0][0], abs=0.5)
 
 
 def test_what_is_beside_the_picture_is_left_out_and_nothing_else() -> None:
@@ -201,30 +174,6 @@ def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
         renderer.close()
     with pytest.raises(ValueError, match="no body 'skull'"):
         Renderer(model, *SIZE, params, ["skull"])
-
-
-def refused(**environment: str) -> str:
-    """Return the output of a process that tries to render with other settings."""
-    code = (
-        "from gazerig.features.world.gl_context import import_mujoco, NoRenderer\n"
-        "mujoco = import_mujoco()\n"
-        "from gazerig.features.world.renderer import Renderer\n"
-        "try: Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 16, 16)\n"
-        "except NoRenderer as error: print(error)\n"
-    )
-    clean = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "DISPLAY")}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=clean | environment, capture_output=True, text=True
-    )
-    assert not done.stderr
-    return done.stdout
-
-
-def test_where_nothing_renders_all_that_was_tried_is_told_in_one_line() -> None:
-    said = refused(MUJOCO_EGL_DEVICE_ID="99", LD_LIBRARY_PATH="", PYOPENGL_PLATFORM="egl")
-    assert said.count("\n") == 1
-    for part in ("egl: ", "osmesa: ", "glfw: there is no display", "libegl1", "libosmesa6"):
-        assert part in said
 
 
 def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> None:

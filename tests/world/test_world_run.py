@@ -94,6 +94,13 @@ def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> N
     assert again.ticks == figures["ticks"]
 
 
+def test_ideal_servos_move_the_world_too() -> None:
+    """For tests above the bus; the head has its pose in the world."""
+    made = simulate(load_rig("desk"), replace(FAST, bus="ideal", seconds=4.0))
+    error = made.figures["gaze_error_deg"]
+    assert isinstance(error, dict) and error["median"] < 1.0
+
+
 def test_pictures_of_the_same_seed_give_the_same_bytes_on_one_machine() -> None:
     if reason := why_not():
         pytest.skip(reason)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
+from world_rigs import WorldBench, arm, mujoco_or_skip, write
 
 mujoco_or_skip()
 
@@ -186,31 +186,3 @@ def test_a_head_at_rest_does_not_tremble() -> None:
         for name, servo in bench.servos.items():
             assert servo.shaft.v == 0.0, name
             assert servo.position_steps == pytest.approx(before[name], abs=0.05)
-
-
-def test_supply_and_motor_feel_a_stall() -> None:
-    """Present Input Voltage falls by the supply's resistance, Present Temperature rises."""
-    bench = _armed("desk", "neck_yaw")
-    servo = bench.servos["neck_yaw"]
-    volts, warm = read(servo, "present_input_voltage"), servo.temperature_c
-    servo.jam()
-    write(servo, "goal_position", 3500)
-    bench.pass_ms(1500)
-    assert servo.shaft.effort > 0.85
-    assert read(servo, "present_input_voltage") <= volts - 2
-    assert servo.temperature_c > warm + 0.5
-
-
-def test_acceleration_is_fed_forward_as_by_servos_with_mechanics_of_their_own() -> None:
-    """With a profile and a soft controller the second gain sets the shaft in motion."""
-    first = {}
-    for gain in (0, 16000):
-        bench = _armed("desk", "neck_yaw", (100, 0, 0))
-        for servo in bench.both("neck_yaw"):
-            write(servo, "feedforward_2nd_gain", gain)
-            write(servo, "profile_acceleration", 300)
-            write(servo, "profile_velocity", 100)
-        world, own = _moves(bench, "neck_yaw", 100)
-        assert max(abs(a[0] - b[0]) for a, b in zip(world, own, strict=True)) < 0.03 * STEP
-        first[gain] = world[1][2]
-    assert first[16000] > first[0] + 0.1

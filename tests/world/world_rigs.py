@@ -1,20 +1,13 @@
 """Rigs in a world with physics, for tests; a test that needs mujoco is skipped without it."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fakes.runs import play
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.features.world.run.run_world import rig_in_world
-from gazerig.robot.app import run_bus
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
-from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
 
 MUJOCO_ABSENT = "mujoco is not installed: pip install 'gazerig[world]'"
@@ -86,35 +79,3 @@ def arm(servo: Any, gains: tuple[int, ...] = ()) -> None:
     if servo.memory.has("goal_speed"):
         write(servo, "goal_speed", 3400)
     write(servo, "torque_enable", 1)
-
-
-class WorldRun:
-    """A run of a shipped rig in a world without people, looking at a scene's."""
-
-    def __init__(self, name: str, monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
-        from gazerig.features.world.model import world_model
-        from gazerig.features.world.physics import World
-
-        self.rig = load_rig(name)
-        buses = iter(bus_names(self.rig))
-        worlds: list[World] = []
-
-        def in_world(line: Any, now_s: Callable[[], float]) -> Any:
-            if not worlds:
-                worlds.append(
-                    World(world_model(None, [rig_in_world(self.rig, looks=False)]), now_s)
-                )
-            return worlds[0].device(line, next(buses))
-
-        monkeypatch.setattr(run_bus, "build", in_world)
-        self.made = assemble(self.rig, RunOptions(True, True, 0, scene))
-        self.world = worlds[0]
-
-    def play(self, seconds: float, watch: Callable[[Tick], None]) -> None:
-        """Run for a time."""
-        play(self.made, seconds, watch)
-
-
-def world_run(name: str, monkeypatch: pytest.MonkeyPatch, scene: str = "visitor") -> WorldRun:
-    """Return a run in simulated time whose servos are in a world."""
-    return WorldRun(name, monkeypatch, scene)
