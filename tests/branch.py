@@ -23,9 +23,17 @@ class Branch(subprocess.Popen[Any]):
     """A program in a fork of this process."""
 
     def __init__(
-        self, work: Callable[[], object], env: dict[str, str] | None = None, **options: Any
+        self,
+        work: Callable[[], object],
+        env: dict[str, str] | None = None,
+        preexec_fn: Callable[[], object] = lambda: None,
+        **options: Any,
     ) -> None:
-        super().__init__(["fork"], preexec_fn=lambda: become(work, env), **options)
+        def begin() -> None:
+            preexec_fn()
+            become(work, env)
+
+        super().__init__(["fork"], preexec_fn=begin, **options)
 
 
 def become(work: Callable[[], object], env: dict[str, str] | None = None) -> NoReturn:
