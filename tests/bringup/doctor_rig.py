@@ -7,7 +7,7 @@ import pytest
 from gazerig.drivers.feetech.memory_table import REGISTERS
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.examination import apply_fixes, examine_bus, examine_ports
+from gazerig.features.bringup.doctor.examination import apply_fixes, examine_bus
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_kinds import DYNAMIXEL, FEETECH
 from gazerig.robot.model.joint import JointLimit
@@ -101,9 +101,6 @@ class Rig:
 
     def fix(self, findings):
         return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))
-
-    def check_all(self, host):
-        return examine_ports(self.port, host, self.check)
 
 
 def one(findings, level, where, words):

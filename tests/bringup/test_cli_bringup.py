@@ -1,7 +1,4 @@
-"""scan, doctor, setup, jog and monitor as people type them.
-
-Most in simulated time; of each command one is on a pseudo-terminal too, and marked so.
-"""
+"""scan, doctor, setup, jog and monitor as people type them."""
 
 import json
 import re

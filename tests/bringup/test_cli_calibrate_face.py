@@ -172,6 +172,3 @@ def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
         with pytest.raises(ValueError, match="steer the head now"):
             order(asked)
     assert given == [Stop("a test"), Resume()]
-
-
-# --- gazerig stop

@@ -511,9 +511,6 @@ def test_a_script_is_stopped_by_fix():
     assert not rig.board.faults.board_status()["script"] and worst_level(rig.check()) != "warn"
 
 
-# --- what to set in Pololu's program
-
-
 # --- PCA9685
 
 CHANNELS = (

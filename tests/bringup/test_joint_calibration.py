@@ -216,9 +216,6 @@ def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says:
         joint_calibration("left_eye_pan", marks, JOINT, 2.0)
 
 
-# --- what goes into the rig file
-
-
 # --- finding a stop
 
 PARAMS = StopSearchParams()
@@ -270,7 +267,7 @@ def test_a_stop_is_found_where_it_is_and_never_pushed_for_half_a_second(
     assert 1.5 <= back <= PARAMS.back_off_deg + 0.1
 
 
-# --- Calibrating one emulated joint by hand or by motion; refused joints; and a push rod
+# --- Calibrating one emulated joint by hand or by motion; refused joints
 
 
 STOPS = (1700.0, 2500.0)

@@ -1,4 +1,4 @@
-"""Setting servos up one at a time: on emulated servos, byte for byte."""
+"""Setting servos up one at a time, on emulated servos, byte for byte."""
 
 from dataclasses import replace
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
-from gazerig.drivers.errors import ServoFault
+from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
@@ -238,6 +238,20 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(tmp_path: Path) -
     wanted = np.array([how(t)["neck_pitch"] for t in at])
     assert np.abs(played[:, 1] - wanted).max() < TOLERANCE_DEG + 0.8
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved
+
+
+def test_torque_that_comes_on_ends_the_recording() -> None:
+    bench = HandBench()
+    switch_off(DESK.joints, bench.port)
+    left = iter(range(5))
+
+    def sample() -> TelemetrySample:
+        if next(left, None) is None:  # as another program does
+            Registers(bench.port, KINDS["dynamixel"].family).write(7, "torque_enable", 1)
+        return bench.monitor.sample()
+
+    with pytest.raises(SetupError, match="the torque of neck_yaw came on: another program"):
+        record_hand_motion(sample, bench.rig.clock, lambda: None, 2.0)
 
 
 def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off() -> None:

@@ -1,4 +1,4 @@
-"""Both detectors find the faces of a world's people; an idle room has no motion."""
+"""Both detectors find the faces of a world's people."""
 
 from collections.abc import Iterator
 from pathlib import Path

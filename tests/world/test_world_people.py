@@ -154,18 +154,6 @@ def test_eyes_are_on_who_is_looked_at_and_lids_blink() -> None:
     assert 8 <= blinks * 60.0 / figures("conversation").script.round_s <= 26
 
 
-def test_a_cup_goes_from_hand_to_hand_and_stays_upright() -> None:
-    all_of_them = figures("conversation")
-    for t_s, who, side in ((20.0, "anna", "left"), (40.0, "ben", "right"), (70.0, "anna", "left")):
-        hand = place("conversation", f"{who}/{side}_hand", t_s)
-        assert np.linalg.norm(place("conversation", "thing/cup", t_s) - hand) < 0.12
-    assert turns("conversation", "thing/cup")[:, 2, 2].min() > 1.0 - 1e-6
-    (given,) = [one for one in all_of_them.timelines["anna"] if one.act.do == "pass"]
-    middle_s = 0.5 * (given.start_s + given.end_s)
-    hands = [place("conversation", f"{who}_hand", middle_s) for who in ("anna/left", "ben/right")]
-    assert np.linalg.norm(hands[0] - hands[1]) < 0.25
-
-
 def test_a_boxer_s_fist_goes_to_the_head_and_spins_only_then() -> None:
     scene = WorldScene("boxing", Figures(shipped_world("boxing"), 3))
     assert scene.behaviours

@@ -1,4 +1,4 @@
-"""Several buses, coupled servos and several rigs in one world."""
+"""Several buses and coupled servos in one world."""
 
 from dataclasses import replace
 from math import degrees, radians

@@ -1,4 +1,4 @@
-"""Rooms and people in MuJoCo: what is there, how much it is, and that a hand can push the head."""
+"""People of a world keep out of its furniture and of each other."""
 
 from functools import cache
 from typing import Any
