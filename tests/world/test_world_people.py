@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from world_scripts import WORLDS, shipped_world
 
 from gazerig.features.world.figure import SEGMENTS, Figures
@@ -31,6 +30,8 @@ class Film(NamedTuple):
 
 @cache
 def film(name: str) -> Film:
+    from scipy.spatial.transform import Rotation
+
     round_s = figures(name).script.round_s
     found = [figures(name).segments(t_s) for t_s in np.arange(0.0, round_s, STEP_S).tolist()]
     quats = np.array([one.quat for one in found])
@@ -56,6 +57,8 @@ def place(name: str, segment: str, t_s: float) -> Floats:
 
 
 def _rotation(quat: Floats) -> Floats:
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.from_quat(quat, scalar_first=True).as_matrix())
 
 
