@@ -411,30 +411,6 @@ class MovingBlob:
     from_side: bool = False
 
 
-class CameraTurn(NamedTuple):
-    """Orientation of a camera when an image was exposed, from its own gyro.
-
-    epoch: only orientations of one epoch can be compared; a gap in the readings begins another
-    R_start_camera: takes directions from the camera's axes (x right, y down, z forward) to its axes
-    at the start of the epoch; drifts slowly
-    """
-
-    epoch: int
-    R_start_camera: tuple[_Row, _Row, _Row]
-
-    @property
-    def is_rotation(self) -> bool:
-        """Return whether its rows form a rotation; False for NaN."""
-        R = np.array(self.R_start_camera, dtype=np.float64)
-        return R.shape == (3, 3) and bool(np.abs(R @ R.T - np.eye(3)).max() < 1e-3)
-
-    def rotation_since(self, before: "CameraTurn | None") -> NDArray[np.float64] | None:
-        """Return R_now_before (3, 3), which turns directions in camera axes; None if unknown."""
-        if before is None or before.epoch != self.epoch:
-            return None
-        return np.asarray(np.array(self.R_start_camera).T @ np.array(before.R_start_camera))
-
-
 SCENES_OF_A_PROCESS: Final = 1_000_000
 """Scene numbers reserved for each process of a camera; the next process starts above them."""
 
@@ -449,7 +425,6 @@ class Detections:
         width_px), NaN where unknown
     lens: the lens if the camera reports it
     located: faces and things in the camera's axes; None: the consumer computes them
-    turn: orientation of the camera from its own gyro, None if it has none
     scene: number of the scene shown; it changes at a cut
     people: people with and without a visible face; only some frames are searched for them, each
         only in part
@@ -467,7 +442,6 @@ class Detections:
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
     located: LocatedFrame | None = None
-    turn: CameraTurn | None = None
     scene: int = 0
     people: tuple[DetectedPerson, ...] = ()
     palms: tuple[DetectedPalm, ...] | None = None
@@ -490,7 +464,6 @@ class Detections:
             self.depth_m,
             self.lens,
             locate(self),
-            self.turn,
             self.scene,
             self.people,
             self.palms,

@@ -1,4 +1,4 @@
-"""Packets, calibrations and archives of an OAK camera, made of depthai's classes without one."""
+"""Calibrations and archives of an OAK camera, made of depthai's classes without one."""
 
 import io
 import json
@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 COLOUR_FX = 3080.0  # px of a frame of 3840 x 2160
 DISTORTION = (8.1, -61.0, 0.0004, -0.0003, 152.0, 7.95, -60.2, 150.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Of the usual rational model: k1 k2 p1 p2 k3 k4 k5 k6, thin prism and tilt."""
-R_CAMERA_IMU = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 _NONE = np.eye(3).tolist()
 
 
-def calibrated(dai: Any, stereo: bool = True, imu: bool = True, colour: bool = True) -> Any:
+def calibrated(dai: Any, stereo: bool = True, colour: bool = True) -> Any:
     """Return the calibration of an OAK-D: what its memory would hold."""
     handler, socket = dai.CalibrationHandler(), dai.CameraBoardSocket
     handler.setDeviceName("OAK-D")
@@ -33,9 +31,6 @@ def calibrated(dai: Any, stereo: bool = True, imu: bool = True, colour: bool = T
             handler.setCameraIntrinsics(side, K, 1280, 800)
         handler.setCameraExtrinsics(socket.CAM_B, socket.CAM_C, _NONE, [-7.5, 0.0, 0.0])
         handler.setCameraExtrinsics(socket.CAM_C, socket.CAM_A, _NONE, [3.75, 0.0, 0.0])
-    if imu:
-        rows = [list(row) for row in R_CAMERA_IMU]
-        handler.setImuExtrinsics(socket.CAM_A, rows, [0.5, 0.1, 0.0], [0.5, 0.1, 0.0])
     return handler
 
 
@@ -67,44 +62,3 @@ def face_archive(
             entry.size = len(content)
             archive.addfile(entry, io.BytesIO(content))
     return path
-
-
-def packet(dai: Any, device_s: float, rates_rad_s: tuple[float, float, float]) -> Any:
-    """Return one reading of the gyro."""
-    found, stamp = dai.IMUPacket(), dai.Timestamp()
-    stamp.sec, stamp.nsec = divmod(round(device_s * 1e9), 1_000_000_000)
-    gyro = found.gyroscope
-    gyro.x, gyro.y, gyro.z = rates_rad_s
-    gyro.tsDevice = stamp
-    found.gyroscope = gyro
-    return found
-
-
-def imu_message(dai: Any, packets: list[Any]) -> Any:
-    """Return some readings as they come together."""
-    message = dai.IMUData()
-    message.packets = packets
-    return message
-
-
-def at_rest(
-    rng: np.random.Generator, seconds: float, bias_deg_s: tuple[float, float, float] = (0, 0, 0)
-) -> list[tuple[float, tuple[float, float, float]]]:
-    """Return readings of a BMI270 at rest: (time, rates about its own axes), 200 a second."""
-    return readings(rng, np.zeros((round(200 * seconds), 3)), bias_deg_s)
-
-
-def readings(
-    rng: np.random.Generator,
-    rates_rad_s: NDArray[np.float64],
-    bias_deg_s: tuple[float, float, float] = (0, 0, 0),
-    start_s: float = 0.0,
-) -> list[tuple[float, tuple[float, float, float]]]:
-    """Return readings of rates about the camera's axes, with noise, bias and steps of 1/16 deg/s.
-
-    rates_rad_s: (n, 3), 200 a second
-    """
-    rates = np.degrees(rates_rad_s @ np.array(R_CAMERA_IMU)) + bias_deg_s
-    rates = np.round((rates + rng.normal(0.0, 0.1, rates.shape)) * 16.0) / 16.0
-    found = np.radians(rates)
-    return [(start_s + k / 200.0, (x, y, z)) for k, (x, y, z) in enumerate(found.tolist())]

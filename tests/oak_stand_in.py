@@ -45,7 +45,6 @@ class Device:
         self.speed = speed
         sockets = real().CameraBoardSocket
         self.sockets = [sockets.CAM_A, sockets.CAM_B, sockets.CAM_C]
-        self.imu = "BMI270"
         self.platform = real().Platform.RVC2
         self.calibration = calibrated(real())
         self.closed = 0
@@ -60,9 +59,6 @@ class Device:
 
     def getDeviceName(self):  # noqa: N802
         return "OAK-D"
-
-    def getConnectedIMU(self):  # noqa: N802
-        return self.imu
 
     def getPlatform(self):  # noqa: N802
         return self.platform
@@ -126,13 +122,9 @@ class Queue:
 class Rig:
     """A complete substitute for depthai with one device."""
 
-    def __init__(self, speed="SUPER", start_fault=None, gyro=None) -> None:
+    def __init__(self, speed="SUPER", start_fault=None) -> None:
         self.device = Device(getattr(real().UsbSpeed, speed))
         self.queue = Queue()
-        self.imu = None
-        if gyro is not None:
-            readings = SimpleNamespace(tryGet=lambda: gyro.pop(0) if gyro else None)
-            self.imu = SimpleNamespace(createOutputQueue=lambda maxSize, blocking: readings)
         rig = self
 
         class Sync:
@@ -194,6 +186,6 @@ class Rig:
 
         def nodes(dai, pipeline, params) -> PipelineOutputs:
             self.asked = params
-            return PipelineOutputs(colour, imu=self.imu)
+            return PipelineOutputs(colour)
 
         return OakSource(OakParams(**wanted), nodes, True, lambda: self.dai)

@@ -21,7 +21,7 @@ from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.types import CameraTurn, DetectedFace
+from gazerig.drivers.types import DetectedFace
 from gazerig.robot.app.options import RunOptions
 
 GO_ON = threading.Event()
@@ -41,8 +41,7 @@ def shot(k: int, whole: bool = True) -> Shot:
     depth[:5] = np.nan
     landmarks = rng.uniform(0.0, 48.0, (5, 2))
     faces = (DetectedFace((1.25, 2.5, 30.0, 40.0), landmarks, 0.875),) if k % 2 else ()
-    turn = CameraTurn(1 + k // 2, ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0)))
-    return Shot(TIMES_S[k], k + 1, picture, depth, LENS, faces, turn)
+    return Shot(TIMES_S[k], k + 1, picture, depth, LENS, faces)
 
 
 def write(path: Path, shots, **how) -> Path:
@@ -63,7 +62,6 @@ def assert_same(found: Shot, wanted: Shot) -> None:
     assert np.array_equal(present(found.depth_m), present(wanted.depth_m), equal_nan=True)
     assert present(found.depth_m).dtype == np.float32
     assert found.lens == wanted.lens
-    assert found.turn == wanted.turn
     assert len(present(found.faces)) == len(present(wanted.faces))
     for face, other in zip(present(found.faces), present(wanted.faces), strict=True):
         assert (face.box_px, face.confidence) == (other.box_px, other.confidence)
@@ -84,7 +82,7 @@ def test_standard_tools_read_the_file(file):
     with file.open("rb") as stream:
         reader = make_reader(stream)
         summary = present(reader.get_summary())
-        assert present(summary.statistics).message_count == 5 * len(TIMES_S)
+        assert present(summary.statistics).message_count == 4 * len(TIMES_S)
         names = {schema.name for schema in summary.schemas.values()}
         assert {"foxglove.CompressedImage", "foxglove.CameraCalibration"} <= names
         _, _, message = next(iter(reader.iter_messages(topics=[fmt.LENS])))
@@ -97,7 +95,7 @@ def test_standard_tools_read_the_file(file):
 def test_what_the_camera_does_not_give_is_not_there(tmp_path):
     recording = Recording(write(tmp_path / "plain.mcap", [shot(0, whole=False)]))
     found = recording.shot(0)
-    assert (found.depth_m, found.lens, found.faces, found.turn) == (None, None, None, None)
+    assert (found.depth_m, found.lens, found.faces) == (None, None, None)
 
 
 def test_jpeg_is_smaller_and_nearly_the_same(tmp_path):

@@ -24,7 +24,6 @@ from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     PipelineOutputs,
     device_nodes,
-    imu_queue,
     set_controls,
 )
 from gazerig.drivers.camera.oak.source import OakSource
@@ -228,7 +227,6 @@ def test_exposure_limit_flicker_and_focus_are_sent(dai):
     [
         ("exposure_limit_ms: 20\n  rate_hz: 60", "longer than a frame lasts"),
         ("width_px: 650", "width_px must be a multiple of 16"),
-        ("imu_rotation_deg: [0, 0]", "imu_rotation_deg"),
     ],
 )
 def test_keys_are_checked(tmp_path, keys, told):
@@ -278,16 +276,6 @@ def test_exposure_and_focus_are_set_before_the_start(dai):
     control.setAutoExposureLimit.assert_called_once_with(5000)
     control.setManualFocus.assert_called_once_with(120)
     control.setAntiBandingMode.assert_not_called()
-
-
-def test_gyro_is_asked_for_in_small_batches(dai):
-    outputs, made = asked(dai, depth=False)
-    (imu,) = made["IMU"]
-    imu.enableIMUSensor.assert_called_once_with(dai.IMUSensor.GYROSCOPE_RAW, 200)
-    imu.setBatchReportThreshold.assert_called_once_with(2)
-    assert imu_queue(outputs) is not None
-    outputs, made = asked(dai, depth=False, gyro=False)
-    assert "IMU" not in made and imu_queue(outputs) is None
 
 
 def test_yunet_gets_the_frame_in_whole_and_is_decoded_on_the_host(dai, tmp_path):

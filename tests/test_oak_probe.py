@@ -98,32 +98,6 @@ def test_camera_without_colour_is_refused(rig):
 
 
 @pytest.mark.parametrize(
-    ("imu", "extrinsics", "told"),
-    [
-        ("BMI270", True, ""),
-        ("NONE", True, "no IMU; set oak.gyro: false"),
-        ("", True, "no IMU; set oak.gyro: false"),
-        ("BMI270", False, "lacks the IMU's orientation: set oak.imu_rotation_deg"),
-    ],
-)
-def test_camera_without_a_usable_gyro_goes_on_without(rig, imu, extrinsics, told):
-    rig.device.imu, rig.device.calibration = imu, calibrated(real(), imu=extrinsics)
-    source = rig.opened()
-    reported = source.events()
-    assert rig.asked.gyro == (not told)
-    assert len(reported) == bool(told) and told in " ".join(reported)
-    source.close()
-    without = rig.opened(gyro=False)
-    assert without.events() == () and not rig.asked.gyro
-
-
-def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own(rig):
-    rig.device.calibration = calibrated(real(), imu=False)
-    source = rig.opened(imu_rotation_deg=(0.0, 0.0, 90.0))
-    assert source.events() == () and rig.asked.gyro
-
-
-@pytest.mark.parametrize(
     ("archive", "told"),
     [
         ({}, ""),

@@ -147,7 +147,6 @@ class FrameAnalyzer:
             shot.image,
             shot.depth_m,
             shot.lens,
-            turn=shot.turn,
             scene=self._cuts.scene(shot.image),
             people=people,
             palms=palms,

@@ -1,7 +1,7 @@
 """Correction of frames of a camera that is mounted sideways or upside down, or is mirrored.
 
-Every frame is turned upright on arrival, with its data: depth, lens, faces found by the camera
-itself, and gyro. So no other code depends on the mount of the camera. Turning takes .03 to .1 ms at
+Every frame is turned upright on arrival, with its data: depth, lens, and faces found by the
+camera itself. So no other code depends on the mount of the camera. Turning takes .03 to .1 ms at
 640 x 480 and .2 to .9 ms at 1920 x 1080.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
-from gazerig.drivers.types import CameraTurn, DetectedFace
+from gazerig.drivers.types import DetectedFace
 
 Floats = NDArray[np.float64]
 Rotation = Literal[0, 90, 180, 270]
@@ -60,7 +60,6 @@ class FrameOrientation:
             faces=None
             if shot.faces is None
             else tuple(self.turn_face(face, width, height) for face in shot.faces),
-            turn=None if shot.turn is None else self._convert_turn(shot.turn),
         )
 
     def turn_image(self, image: NDArray[Any]) -> NDArray[Any]:
@@ -114,13 +113,6 @@ class FrameOrientation:
             landmarks_px=marks[_OTHER_SIDE] if self.mirrored else marks,
             gaze_camera=gaze,
         )
-
-    def _convert_turn(self, turn: CameraTurn) -> CameraTurn:
-        """Return the camera's turn in the axes of upright frames."""
-        axes = np.eye(3)
-        axes[:2, :2] = self._image_rotation()
-        x, y, z = (axes @ np.array(turn.R_start_camera) @ axes.T).tolist()
-        return turn._replace(R_start_camera=(tuple(x), tuple(y), tuple(z)))
 
     def _image_rotation(self) -> Floats:
         """Return the matrix (2, 2) that turns directions in the image."""

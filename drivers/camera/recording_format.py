@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.depth_roi import to_metres, to_millimetres
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot, to_bgr
-from gazerig.drivers.types import CameraTurn, Depth, DetectedFace, ImageArray
+from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 PICTURE, DEPTH, LENS, FACES = "/camera/picture", "/camera/depth", "/camera/lens", "/camera/faces"
-TURN = "/camera/turn"
 """Topics."""
 PROFILE = "gazerig-camera-1"
 _FRAME = "camera"
@@ -55,10 +54,6 @@ SCHEMAS: dict[str, tuple[str, dict[str, Any]]] = {
                 "P": _MATRIX,
             },
         },
-    ),
-    TURN: (
-        "gazerig.CameraTurn",
-        {"type": "object", "properties": {"epoch": {"type": "integer"}, "R": _MATRIX}},
     ),
     FACES: (
         "gazerig.Faces",
@@ -121,9 +116,6 @@ def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]
         found.append((DEPTH, _dump(_image_message("png", file, stamp))))
     if shot.faces is not None:
         found.append((FACES, _dump({"faces": [_face(face) for face in shot.faces]})))
-    if shot.turn is not None:
-        R = [value for row in shot.turn.R_start_camera for value in row]
-        found.append((TURN, _dump({"epoch": shot.turn.epoch, "R": R})))
     if jpeg_quality is None:
         file = _encode_file(".png", shot.image, _COLOUR_PNG)
         found.append((PICTURE, _dump(_image_message("png", file, stamp))))
@@ -171,22 +163,6 @@ def decode_lens(data: bytes) -> Intrinsics:
         raise BadMessage("no five numbers of distortion in it")
     k1, k2, p1, p2, k3 = D.tolist()
     return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]), (k1, k2, p1, p2, k3))
-
-
-def decode_turn(data: bytes) -> CameraTurn:
-    """Read a message of the camera's orientation.
-
-    Raises:
-        BadMessage: it contains no rotation.
-    """
-    epoch, R = _load(data, "epoch"), np.asarray(_load(data, "R"), dtype=np.float64)
-    if not isinstance(epoch, int) or R.shape != (9,):
-        raise BadMessage("no turn of the camera in it")
-    (a, b, c), (d, e, f), (g, h, i) = R.reshape(3, 3).tolist()
-    found = CameraTurn(epoch, ((a, b, c), (d, e, f), (g, h, i)))
-    if not found.is_rotation:
-        raise BadMessage("no rotation in it")
-    return found
 
 
 def decode_faces(data: bytes) -> tuple[DetectedFace, ...]:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import CameraTurn, Depth, DetectedFace, ImageArray
+from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 
 class Shot(NamedTuple):
@@ -21,7 +21,6 @@ class Shot(NamedTuple):
     depth_m: distances, aligned with the frame and of its size, NaN where unknown
     lens: the lens of this frame
     faces: faces that the camera itself has found; no detector runs in that case
-    turn: orientation of the camera from its own gyro
     """
 
     captured_s: float
@@ -30,7 +29,6 @@ class Shot(NamedTuple):
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
     faces: tuple[DetectedFace, ...] | None = None
-    turn: CameraTurn | None = None
 
 
 class FrameSource(Protocol):

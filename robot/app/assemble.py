@@ -56,7 +56,6 @@ from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.moved_opponent import BoxingScene, TickClockOpponent
 from gazerig.robot.model.track_fit import TrackRefused
 from gazerig.robot.model.types import JointAngles, further_joints
-from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.perception.tracker import Tracker
@@ -201,11 +200,7 @@ def assemble(
             None if options.bus == "ideal" else sag_compensation(rig),
             messages.append if options.recover else None,
         )
-        # A recorded camera was mounted on other joints: its gyro is not fused with these.
-        parts = _build_components(
-            rig, body, kinematics, seen, sight.mount, camera, walk, random,
-            GyroFusion(messages.append) if options.replay is None else None,
-        )  # fmt: skip
+        parts = _build_components(rig, body, kinematics, seen, sight.mount, camera, walk, random)
         placement = CameraPlacement(
             lambda rig: camera_placement(rig, options, kinematics, seen)[0], camera.mount
         )
@@ -255,7 +250,6 @@ def _build_components(
     placed: CameraParams,
     walk: Walk,
     random: _Generators,
-    gyro: GyroFusion | None,
 ) -> Components:
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
@@ -287,7 +281,6 @@ def _build_components(
             face_parts_m(rig),
             placed.lens,
             depth_at,
-            gyro,
             kinematics.body_volumes,
         ),
         tracker=tracker,

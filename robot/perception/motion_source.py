@@ -3,9 +3,8 @@
 from gazerig.drivers.camera.capture_loop import Motion
 from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import CameraTurn, MovingBlob
+from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.gaze.types import Floats
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
 
@@ -34,7 +33,6 @@ class MotionSource:
 
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._turns = turns
-        self._before_turn: CameraTurn | None = None
         self._detector = MotionDetector(params)
 
     def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
@@ -50,20 +48,10 @@ class MotionSource:
             return ()
         height, width = shot.image.shape[:2]
         lens = intrinsics_of_lens(self._lens, self._field_rad, width, height, shot.lens)
-        turned = self._rotation_since(shot)
+        before_s, turned = self._detector.before_s, None
+        if self._turns is not None and before_s is not None:
+            turned = self._turns.rotation_between(shot.captured_s, before_s)
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
-
-    def _rotation_since(self, shot: Shot) -> Floats | None:
-        """Return R_now_before from the camera's gyro, else from the joints; None if unknown."""
-        before, self._before_turn = self._before_turn, shot.turn
-        before_s = self._detector.before_s
-        if before_s is None:
-            return None
-        if shot.turn is not None and (by_gyro := shot.turn.rotation_since(before)) is not None:
-            return by_gyro
-        return (
-            None if self._turns is None else self._turns.rotation_between(shot.captured_s, before_s)
-        )
 
 
 def motion_finder(

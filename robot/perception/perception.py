@@ -26,7 +26,6 @@ from gazerig.robot.perception.egomotion_residual import (
     turn_bound,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
-from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import (
     OwnParts,
     known_faces,
@@ -63,7 +62,6 @@ class Perception:
             the average ones (Nakamoto & Tsuruno 3.7).
         lens: calibrated lens, used for frames with the aspect ratio of the calibration.
         depth_at: reads depth images; without it, distances come from the size of faces.
-        gyro: also places frames with the camera's own gyro; None: only with the joints.
         own_parts: positions of the robot's own head and neck; None: they count as other things.
     """
 
@@ -75,13 +73,11 @@ class Perception:
         parts_face_m: Mapping[str, Vec3] | None = None,
         lens: LensParams | None = None,
         depth_at: DepthAt | None = None,
-        gyro: GyroFusion | None = None,
         own_parts: OwnParts | None = None,
     ) -> None:
         self._mount = mount
         self._own_parts = own_parts
         self._depth_at = depth_at
-        self._gyro = gyro
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
         self._hands = Hands()
@@ -103,8 +99,6 @@ class Perception:
         lens: LensParams | None,
     ) -> None:
         """Change field of view, parts and lens from the next frame; the mount may change too."""
-        if self._gyro is not None:
-            self._gyro.reset()
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)
@@ -119,8 +113,6 @@ class Perception:
         t_s = detections.captured_s
         R_head, self._p_head = poses.head_pose(t_s)
         R, p = self._mount.pose(R_head, self._p_head)
-        if self._gyro is not None:
-            R = self._gyro.orientation(t_s, R, detections.turn)
         if self._is_cut(detections.scene, (R[0][2], R[1][2], R[2][2])):
             self._tracker.forget()
             self._tracks, self._hands = (), Hands()

@@ -7,7 +7,7 @@ bumped, which they do not feel.
 """
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import cv2
@@ -41,7 +41,7 @@ from seeing.moving_room import (
 
 from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import CameraTurn, MovingBlob
+from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.perception.motion_source import MotionSource
 
@@ -117,18 +117,14 @@ def judged(
     seen: Iterable[Seen],
     turns: PoseBuffer | None = None,
     field: float = FIELD_RAD,
-    turn_of: Callable[[float], CameraTurn | None] = lambda _: None,
 ) -> Score:
-    """Let the detector look, as the program uses it, and compare with the truth.
-
-    turn_of: returns the gyro's rotation at a time
-    """
+    """Let the detector look, as the program uses it, and compare with the truth."""
     source = MotionSource(MotionParams(), None, field, turns)
     pictures = false = right = moving = noticed = 0
     costs = []
     for k, one in enumerate(seen):
         began_s = time.thread_time()
-        blobs = source(Shot(one.t_s, k + 1, one.image, turn=turn_of(one.t_s)))
+        blobs = source(Shot(one.t_s, k + 1, one.image))
         costs.append(time.thread_time() - began_s)
         if k < _LEARN:
             continue

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from gazerig.drivers.camera.oak.calibration import imu_to_camera
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, output_names_fault
 from gazerig.drivers.errors import CameraError
@@ -119,9 +118,6 @@ def supported_settings(
         except UnusableModel as error:
             events.append(f"{error}; until then faces are found on the host")
             params = replace(params, face_model="")
-    if params.gyro and (why := _gyro_fault(dai, device, params)):
-        events.append(f"{label} has no usable gyro: {why}")
-        params = replace(params, gyro=False)
     return params, tuple(events)
 
 
@@ -158,17 +154,4 @@ def _stereo_fault(dai: Any, device: Any, sockets: set[Any]) -> str:
         device.readCalibration().getCameraExtrinsics(socket.CAM_B, socket.CAM_C)
     except RuntimeError:
         return "its stereo pair is not calibrated (Luxonis' documentation: calibration)"
-    return ""
-
-
-def _gyro_fault(dai: Any, device: Any, params: OakParams) -> str:
-    """Return why the gyro is not available, "" if it is."""
-    imu = device.getConnectedIMU()
-    if not imu or imu.upper() == "NONE":
-        return "it has no IMU; set oak.gyro: false in the rig"
-    if params.imu_rotation_deg is None and imu_to_camera(dai, device.readCalibration()) is None:
-        return (
-            "its calibration lacks the IMU's orientation: set oak.imu_rotation_deg, "
-            "or set oak.gyro: false"
-        )
     return ""

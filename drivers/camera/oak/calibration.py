@@ -1,4 +1,4 @@
-"""Factory calibration of an OAK camera: orientation of the gyro, distortion of the colour lens."""
+"""Factory calibration of an OAK camera: the distortion of its colour lens."""
 
 from typing import Any
 
@@ -15,27 +15,6 @@ Floats = NDArray[np.float64]
 _MOST_FIT_PX = 1.0
 _PRECISELY = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
 _AXES = np.eye(3)
-
-
-def rotation_matrix(vector_deg: tuple[float, float, float]) -> Floats:
-    """Return the rotation (3, 3) about a vector by its length in degrees (Rodrigues)."""
-    x, y, z = np.radians(vector_deg)
-    angle = float(np.linalg.norm((x, y, z)))
-    K = np.array([(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)])
-    # sin(a) / a and (1 - cos(a)) / a^2, both also accurate at 0.
-    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    return np.asarray(np.eye(3) + first * K + second * (K @ K))
-
-
-def imu_to_camera(dai: Any, calibration: Any) -> Floats | None:
-    """Return R_camera_imu (3, 3); None if the calibration does not contain it."""
-    try:
-        found = calibration.getImuToCameraExtrinsics(dai.CameraBoardSocket.CAM_A)
-    except RuntimeError:
-        return None
-    R = np.asarray(found, dtype=np.float64)[:3, :3]
-    # A memory that was never written contains zeros.
-    return R if np.abs(R @ R.T - np.eye(3)).max() < 1e-2 else None
 
 
 def raw_distortion(dai: Any, calibration: Any, params: OakParams) -> Distortion:

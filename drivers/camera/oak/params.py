@@ -27,10 +27,6 @@ class OakParams:
     anti_flicker: Annotated[Literal["default", "off", "50hz", "60hz", "auto"],
         "exposure times that are whole periods of the mains, to avoid stripes under lamps; default: chosen by the camera"] = "default"
     focus: Annotated[int | None, Bounds(0, 255), "fixed position of the lens, larger for nearer objects; null: autofocus"] = None
-    gyro: Annotated[bool, "measure the camera's rotation with its gyro"] = True
-    imu_rotation_deg: Annotated[tuple[float, float, float] | None, Bounds(-180, 180),
-        "rotation vector that takes directions from the gyro's axes to the camera's (x right, y down, z forward); "
-        "null: from the camera's own calibration"] = None
     dot_projector: Annotated[float, Bounds(0, 1),
         "brightness of the infrared dot projector of Pro models (helps on bare walls), as a share of its maximum"] = 0.0
     face_model: Annotated[str,

@@ -40,21 +40,18 @@ COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
 # Two groups may be queued: the current one and the newest.
 _QUEUE = 2
-_GYRO_HZ, _GYRO_BATCH = 200, 2
-_READINGS = 100  # messages in the queue: one second
 
 
 class PipelineOutputs(NamedTuple):
-    """Outputs of nodes: frames, depth in millimetres (RAW16), faces, and the gyro's readings.
+    """Outputs of nodes: frames, depth in millimetres (RAW16), and faces.
 
-    depth, faces, imu: None if they are not wanted
+    depth, faces: None if they are not wanted
     face_fault: returns why no faces can be found on the camera, "" if they can
     """
 
     colour: Any
     depth: Any | None = None
     faces: Any | None = None
-    imu: Any | None = None
     face_fault: Callable[[], str] = str
 
 
@@ -81,7 +78,6 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> PipelineOutputs:
     outputs = PipelineOutputs(
         colour,
         _stereo(dai, pipeline, params, colour) if params.depth else None,
-        imu=_imu(dai, pipeline) if params.gyro else None,
     )
     if not params.face_model:
         return outputs
@@ -103,15 +99,6 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> PipelineOutputs:
     return outputs._replace(faces=found.output, face_fault=found.fault)
 
 
-def _imu(dai: Any, pipeline: Any) -> Any:
-    """Create the node of the gyro's readings."""
-    imu = pipeline.create(dai.node.IMU)
-    imu.enableIMUSensor(dai.IMUSensor.GYROSCOPE_RAW, _GYRO_HZ)
-    imu.setBatchReportThreshold(_GYRO_BATCH)
-    imu.setMaxBatchReports(10 * _GYRO_BATCH)
-    return imu.out
-
-
 def join_outputs(dai: Any, pipeline: Any, outputs: PipelineOutputs, rate_hz: float) -> Any:
     """Return the queue of message groups, each with all outputs of one instant."""
     sync = pipeline.create(dai.node.Sync)
@@ -121,16 +108,6 @@ def join_outputs(dai: Any, pipeline: Any, outputs: PipelineOutputs, rate_hz: flo
         if output is not None:
             output.link(sync.inputs[name])
     return sync.out.createOutputQueue(maxSize=_QUEUE, blocking=False)
-
-
-def imu_queue(outputs: PipelineOutputs) -> Any | None:
-    """Return the queue of the gyro's readings, None without a gyro.
-
-    They are not joined to frames, as there are many per frame, in separate messages.
-    """
-    if outputs.imu is None:
-        return None
-    return outputs.imu.createOutputQueue(maxSize=_READINGS, blocking=False)
 
 
 def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:

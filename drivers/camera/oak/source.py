@@ -7,17 +7,10 @@ from datetime import timedelta
 from math import inf
 from typing import Any
 
-import numpy as np
-
 from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
 from gazerig.drivers.camera.oak.abilities import full_line_text, supported_settings, usb2_text
-from gazerig.drivers.camera.oak.calibration import (
-    imu_to_camera,
-    raw_distortion,
-    rotation_matrix,
-)
+from gazerig.drivers.camera.oak.calibration import raw_distortion
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
-from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     COLOUR,
@@ -26,7 +19,6 @@ from gazerig.drivers.camera.oak.pipeline import (
     device_nodes,
     faces_of,
     image_of,
-    imu_queue,
     join_outputs,
     lens_of,
 )
@@ -38,8 +30,6 @@ from gazerig.drivers.types import DetectedFace
 _SLICE = timedelta(milliseconds=100)  # longest delay of a stop request
 # The camera's stamp in host time is used if it is not older than this and not in the future.
 _OLDEST_STAMP_S = 1.0
-# The gyro needs 1.5 s at rest; the wait is a little longer.
-_SETTLING, _SETTLING_S = 100, 0.02
 
 
 class OakSource:
@@ -72,10 +62,8 @@ class OakSource:
         self._number = 0
         self._events: list[str] = []
         self._distortion: Distortion | None = None
-        self._gyro_queue: Any = None
         self._face_fault: Callable[[], str] = str
         self._face_fault_told = False
-        self._gyro: Gyro | None = None
         self._slow_line: FrameRateMonitor | None = None
         self._waited = False  # whether the newest frame arrived during a wait
 
@@ -102,24 +90,8 @@ class OakSource:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
             outputs = self._nodes(self._dai, self._pipeline, self._asked)
             self._queue = join_outputs(self._dai, self._pipeline, outputs, self._asked.rate_hz)
-            self._gyro_queue, self._face_fault = imu_queue(outputs), outputs.face_fault
+            self._face_fault = outputs.face_fault
             self._pipeline.start()
-            # The gyro must find its bias before the head moves.
-            if self._gyro_queue is not None:
-                if self._asked.imu_rotation_deg is not None:
-                    R = rotation_matrix(self._asked.imu_rotation_deg)
-                else:
-                    found = None
-                    if self._device is not None:
-                        found = imu_to_camera(self._dai, self._device.readCalibration())
-                    R = np.eye(3) if found is None else found
-                self._gyro = Gyro(R)
-                pause = threading.Event()
-                for _ in range(_SETTLING):
-                    self._read_gyro()
-                    if self._gyro.is_settled:
-                        break
-                    pause.wait(_SETTLING_S)
         except RuntimeError as error:
             self.close()
             text = _one_line(error)
@@ -130,17 +102,6 @@ class OakSource:
             self.close()
             raise
         self._bridge, self._in_step, self._number = ClockSync(), True, 0
-
-    def _read_gyro(self) -> None:
-        """Pass new readings to the gyro, and collect its events."""
-        if self._gyro_queue is None or self._gyro is None:
-            return
-        while (message := self._gyro_queue.tryGet()) is not None:
-            for packet in message.packets:
-                found = packet.gyroscope
-                stamp_s = found.getTimestampDevice().total_seconds()
-                self._gyro.add(stamp_s, (found.x, found.y, found.z))
-        self._events.extend(self._gyro.events())
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the middle of its exposure.
@@ -182,7 +143,7 @@ class OakSource:
     def close(self) -> None:
         """Stop and free the camera; safe to call twice."""
         pipeline, device = self._pipeline, self._device
-        self._pipeline = self._device = self._queue = self._gyro_queue = self._gyro = None
+        self._pipeline = self._device = self._queue = None
         # An unplugged camera raises an error from every call.
         for end in (_create_end(pipeline), device.close if device is not None else None):
             if end is not None:
@@ -234,15 +195,6 @@ class OakSource:
         lens = lens_of(group)
         if lens is not None and self._distortion is not None:
             lens = replace(lens, distortion=self._distortion)
-        # The camera's orientation at the middle of a frame's exposure.
-        turn = None
-        if self._gyro is not None:
-            self._read_gyro()
-            middle = self._dai.CameraExposureOffset.MIDDLE
-            turn = self._gyro.orientation_at(
-                group[COLOUR].getTimestampDevice(middle).total_seconds()
-            )
-            self._events.extend(self._gyro.events())
         return Shot(
             captured_s,
             self._number,
@@ -250,7 +202,6 @@ class OakSource:
             depth_of(group, width, height),
             lens,
             self._faces(group, width, height),
-            turn,
         )
 
     def _faces(self, group: Any, width_px: int, height_px: int) -> tuple[DetectedFace, ...] | None:
