@@ -1,6 +1,6 @@
 """Description of a rig from its YAML, with the user's own meshes."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 
 from gazerig.config.rig import Rig
@@ -8,12 +8,10 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.control.sag import SagCompensation
 from gazerig.robot.description.build import RigShape, describe
-from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
 from gazerig.robot.description.statics import NECK_JOINTS, Statics, moving_bodies
 from gazerig.robot.model.coupling_params import coupled_pairs
-from gazerig.robot.model.guard_params import CollisionParams
 from gazerig.robot.model.types import order_joints
 
 
@@ -86,26 +84,6 @@ def sag_compensation(rig: Rig) -> SagCompensation | None:
     return SagCompensation(
         statics_of(rig, of_neck=True), order_joints(rig.joints), rig.mass.sag_share
     )
-
-
-def collision_hints(rig: Rig) -> list[str]:
-    """Return the collisions of the rig's model within the joints' limits, one line each.
-
-    Collisions that its guard prevents are omitted. The shoulders are those of the model, so these
-    are only hints.
-    """
-    shape = shape_of(replace(rig, meshes={}))
-    return [
-        one.text()
-        for one in collisions(shape)
-        if not any(_forbids_pose(two, one.angles_deg) for two in rig.guard.collisions)
-    ]
-
-
-def _forbids_pose(pair: CollisionParams, angles_deg: Mapping[str, float]) -> bool:
-    first, second = angles_deg.get(pair.first, 0.0), angles_deg.get(pair.second, 0.0)
-    within = pair.first_min_deg <= first <= pair.first_max_deg
-    return within and pair.second_min_deg <= second <= pair.second_max_deg
 
 
 def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:

@@ -7,7 +7,6 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
-from gazerig.robot.cli.rig_check import collision_lines
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 
 app = typer.Typer()
@@ -53,7 +52,7 @@ def describe(
             make_folder(path)
         for path, data in paths.items():
             write_file(path, data, force)
-        for line in (*_file_lines(folder, files), *collision_lines(rig)):
+        for line in _file_lines(folder, files):
             say(line)
 
 

@@ -12,7 +12,7 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         say(check_line(rig))
-        hints = (*unit_lines(rig), *collision_lines(rig), *weight_lines(rig), *track_lines(rig))
+        hints = (*unit_lines(rig), *weight_lines(rig), *track_lines(rig))
         for line in hints:
             say(line)
 
@@ -50,18 +50,6 @@ def unit_lines(rig: str) -> list[str]:
     for file in loaded.track_files:
         hints[file] = radians_hint(track_angles_deg(load_track(track_path(file))))
     return [f"{where}: {hint}" for where, hint in hints.items() if hint]
-
-
-def collision_lines(rig: str) -> list[str]:
-    """Return collisions between parts of a valid rig's model within the joints' limits.
-
-    Raises:
-        ConfigError: the rig is invalid.
-    """
-    from gazerig.config.schema import load_rig
-    from gazerig.robot.app.rig_description import collision_hints
-
-    return [f"{rig}: in its model, at {hint}" for hint in collision_hints(load_rig(rig))]
 
 
 def weight_lines(rig: str) -> list[str]:
