@@ -11,7 +11,7 @@ COLUMNS = (12, 254, 496, 738)
 
 BOXES = {
     "page": (0, 40, "STOP button, space bar", "browser/stop.js"),
-    "program": (1, 40, "gazerig stop, Python, gamepad", "RobotClient.stop"),
+    "program": (1, 40, "gazerig stop, keys, Python", "RobotClient.stop"),
     "signal": (2, 40, "Ctrl-C, SIGTERM, SIGHUP", "Interrupts"),
     "death": (3, 40, "program killed, loop hangs", "guardian/heartbeat.py"),
     "door": (0, 116, "page process", "AuthProxy, StopSender"),

@@ -20,7 +20,6 @@ ROOMS = ("config", "doors", "drivers", "features", "gaze", "robot", "sim_mock")
 OWNERS = {
     "serial": ("drivers.serial.", "sim_mock.in_process_port"),
     "dynamixel_sdk": ("drivers.serial.port", "sim_mock.in_process_port"),
-    "evdev": ("robot.remote.gamepad",),
     "depthai": ("drivers.camera.oak.discovery",),
     "mcap": ("drivers.camera.playback", "drivers.camera.recorder", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),

@@ -229,8 +229,6 @@ def there_is_none() -> None:
     assert done.stderr == "no rig of process 1 is running: start one with gazerig run ...\n"
 
 
-def test_steer_needs_a_terminal_or_a_gamepad() -> None:
+def test_steer_needs_a_terminal() -> None:
     done = gazerig("ctl", "steer")
-    assert done.returncode == 2 and "run this in one, or use --gamepad" in done.stderr
-    done = gazerig("ctl", "steer", "--keyboard", "--gamepad")
-    assert done.returncode == 2 and "use only one of --keyboard and --gamepad" in done.stderr
+    assert done.returncode == 2 and "run this in one" in done.stderr

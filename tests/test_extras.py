@@ -93,12 +93,11 @@ def test_every_extra_that_is_named_brings_its_package_and_the_tests_have_them_al
         )
         if "docs" not in path.parts
     }
-    assert {("depthai", "oak"), ("matplotlib", "report"), ("evdev", "gamepad")} <= named
+    assert {("depthai", "oak"), ("matplotlib", "report")} <= named
     base = " ".join(PROJECT["dependencies"])
     tested = re.search(r"gazerig\[(.+)\]", " ".join(EXTRAS["dev"]))
     assert tested is not None
     for package, extra in named:
         assert any(wanted.startswith(package) for wanted in EXTRAS[extra]), extra
         assert package not in base
-        # Gamepads are tested by events without one, and evdev has to be built.
-        assert extra in tested[1].split(",") or extra == "gamepad"
+        assert extra in tested[1].split(",")

@@ -1,9 +1,9 @@
-"""Command steer: keys or a gamepad move a rig in another terminal."""
+"""Command steer: keys move a rig in another terminal."""
 
 import contextlib
 import sys
-from collections.abc import Callable, Generator
-from typing import Annotated, ClassVar, Protocol
+from collections.abc import Callable
+from typing import Annotated, ClassVar
 
 import typer
 
@@ -14,52 +14,34 @@ from gazerig.robot.cli.terminal import clear_errors, say, status
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import LookAtDirection
 from gazerig.robot.remote.client import RequestRejected, RobotClient
-from gazerig.robot.remote.gamepad import Gamepad, open_gamepad
 from gazerig.robot.remote.steering import STOP, TRACKS, Steering
 
 app = typer.Typer()
 _EVERY_S = 0.05
 _FAR_M = 1.5
 END = "end"
-HELP = {
-    "keyboard": "arrow keys: gaze; 1 nod, 2 shake, 3 wink, 4 surprised, 5 sleepy; "
-    "space: STOP; q: quit",
-    "gamepad": "stick: gaze; A nod, B shake, X wink, Y surprised, left shoulder sleepy; "
-    "Start: STOP; Ctrl-C: quit",
-}
-
-
-class SteeringInput(Protocol):
-    """An input device for steering."""
-
-    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Apply moved controls, and return the pressed ones: tracks, STOP, END."""
-        ...
+HELP = "arrow keys: gaze; 1 nod, 2 shake, 3 wink, 4 surprised, 5 sleepy; space: STOP; q: quit"
 
 
 @app.command()
 def steer(
-    keyboard: Annotated[bool, typer.Option("--keyboard", help="Arrow keys (the default).")] = False,
-    gamepad: Annotated[bool, typer.Option("--gamepad", help="The first gamepad.")] = False,
-    device: Annotated[
-        str | None, typer.Option(metavar="PATH", help="A certain gamepad: /dev/input/event7.")
-    ] = None,
     behind: Annotated[
         bool, typer.Option("--behind", help="You are behind the head: its right is your right.")
     ] = False,
     pid: PidOption = None,
 ) -> None:
-    """Steer the running head by arrow keys or a gamepad; when released, it looks freely again."""
+    """Steer the running head by arrow keys; when released, it looks freely again."""
+    from gazerig.robot.cli.key_input import TerminalInput
+
     with clear_errors():
-        with_pad = gamepad or device is not None
-        if keyboard and with_pad:
-            raise SetupError("use only one of --keyboard and --gamepad")
-        if not with_pad and not sys.stdin.isatty():
-            raise SetupError("keys are read from a terminal: run this in one, or use --gamepad")
-        with contextlib.ExitStack() as stack:
-            controls = stack.enter_context(_gamepad(device) if with_pad else _keyboard())
-            rig = stack.enter_context(RobotClient.connect(pid, "gazerig ctl steer"))
-            say(HELP["gamepad" if with_pad else "keyboard"])
+        if not sys.stdin.isatty():
+            raise SetupError("keys are read from a terminal: run this in one")
+        with (
+            TerminalInput() as terminal,
+            RobotClient.connect(pid, "gazerig ctl steer") as rig,
+        ):
+            say(HELP)
+            controls = KeyControls(terminal.text)
             with contextlib.suppress(KeyboardInterrupt):
                 run_steering(rig, controls, Steering(behind), RealClock(), status)
             if rig.in_control:
@@ -69,7 +51,7 @@ def steer(
 
 def run_steering(
     rig: RobotClient,
-    controls: SteeringInput,
+    controls: "KeyControls",
     steering: Steering,
     clock: Clock,
     show: Callable[[str], None],
@@ -78,7 +60,7 @@ def run_steering(
 
     Args:
         rig: The running rig.
-        controls: The input device.
+        controls: The keys.
         steering: Converts its input to commands.
         clock: Clock of this program.
         show: Writes the status line.
@@ -124,7 +106,7 @@ class KeyControls:
         self._rest = ""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Apply pressed keys; see SteeringInput."""
+        """Apply pressed arrows, and return the other pressed keys: tracks, STOP, END."""
         from gazerig.robot.cli.key_input import split_keys
 
         typed = self._text()
@@ -142,32 +124,3 @@ class KeyControls:
             elif key in "qQ":
                 pressed.append(END)
         return tuple(pressed)
-
-
-@contextlib.contextmanager
-def _keyboard() -> Generator[SteeringInput, None, None]:
-    from gazerig.robot.cli.key_input import TerminalInput
-
-    with TerminalInput() as terminal:
-        yield KeyControls(terminal.text)
-
-
-class GamepadControls:
-    """A gamepad."""
-
-    def __init__(self, pad: Gamepad) -> None:
-        self._pad = pad
-
-    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Apply stick and buttons; see SteeringInput."""
-        news = self._pad.news()
-        steering.stick(news.stick)
-        return news.pressed
-
-
-@contextlib.contextmanager
-def _gamepad(path: str | None) -> Generator[SteeringInput, None, None]:
-    pad = open_gamepad(path)
-    say(f"gamepad: {pad.name}")
-    with contextlib.closing(pad):
-        yield GamepadControls(pad)

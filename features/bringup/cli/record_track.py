@@ -56,7 +56,7 @@ def record_track(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the track.")],
     live: Annotated[
         bool,
-        typer.Option("--live", help="Record what moves a running head: page, gamepad or program."),
+        typer.Option("--live", help="Record what moves a running head: page, keys or program."),
     ] = False,
     joints: Annotated[
         str,
