@@ -30,18 +30,17 @@ class RecordingWriter:
     """
 
     def __init__(
-        self, path: Path, about: dict[str, str], jpeg_quality: int | None = None, over: bool = False
+        self, path: Path, about: dict[str, str], over: bool = False
     ) -> None:
         """Create the file.
 
-        about: metadata of the recording; jpeg_quality: 1..100, None keeps frames exactly; over:
+        about: metadata of the recording; over:
             whether to overwrite an existing file
 
         Raises:
             CameraError: the file already exists or cannot be created.
         """
         self._path = path
-        self._jpeg_quality = jpeg_quality
         refuse_existing(path, force=over)
         try:
             self._file: IO[bytes] = path.open("wb" if over else "xb")
@@ -72,7 +71,7 @@ class RecordingWriter:
         Raises:
             OSError: the disk is full or gone.
         """
-        self.add(shot.captured_s, shot.number, encode_shot(shot, self._jpeg_quality))
+        self.add(shot.captured_s, shot.number, encode_shot(shot))
 
     def add(self, captured_s: float, number: int, messages: list[tuple[str, bytes]]) -> None:
         """Add an encoded frame: topics and messages, the image last.
@@ -120,7 +119,6 @@ class CameraRecorder:
         source: Source of frames.
         path: Path of the file.
         about: Metadata of the recording.
-        jpeg_quality: Quality 1..100, None keeps the frames exactly.
         over: Whether to overwrite an existing file.
 
     failure: reason why the recording ended early, or ""
@@ -132,13 +130,11 @@ class CameraRecorder:
         source: FrameSource,
         path: Path,
         about: dict[str, str] | None = None,
-        jpeg_quality: int | None = None,
         over: bool = False,
     ) -> None:
         self._source = source
         self._path = path
         self._about = about or {}
-        self._jpeg_quality = jpeg_quality
         self._over = over
         self._writer: RecordingWriter | None = None
         self._thread: threading.Thread | None = None
@@ -163,7 +159,7 @@ class CameraRecorder:
         if self._writer is None:
             try:
                 self._writer = RecordingWriter(
-                    self._path, self._about, self._jpeg_quality, self._over
+                    self._path, self._about, self._over
                 )
             except BaseException:
                 self._source.close()
@@ -188,7 +184,7 @@ class CameraRecorder:
                     )
                 self.dropped_frames += 1
             elif self._encoders is not None:
-                messages = self._encoders.submit(encode_shot, shot, self._jpeg_quality)
+                messages = self._encoders.submit(encode_shot, shot)
                 self._waiting.put(_QueuedFrame(shot.captured_s, shot.number, messages))
         return shot
 

@@ -90,11 +90,8 @@ def nanoseconds(time_s: float) -> int:
     return round(time_s * 1e9)
 
 
-def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
-    """Encode a frame and its data as messages, the image last.
-
-    jpeg_quality: 1..100, None for PNG
-    """
+def encode_shot(shot: Shot) -> list[tuple[str, bytes]]:
+    """Encode a frame and its data as messages, the image last."""
     stamp = nanoseconds(shot.captured_s)
     found: list[tuple[str, bytes]] = []
     if shot.lens is not None:
@@ -116,12 +113,8 @@ def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]
         found.append((DEPTH, _dump(_image_message("png", file, stamp))))
     if shot.faces is not None:
         found.append((FACES, _dump({"faces": [_face(face) for face in shot.faces]})))
-    if jpeg_quality is None:
-        file = _encode_file(".png", shot.image, _COLOUR_PNG)
-        found.append((PICTURE, _dump(_image_message("png", file, stamp))))
-    else:
-        file = _encode_file(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])
-        found.append((PICTURE, _dump(_image_message("jpeg", file, stamp))))
+    file = _encode_file(".png", shot.image, _COLOUR_PNG)
+    found.append((PICTURE, _dump(_image_message("png", file, stamp))))
     return found
 
 

@@ -22,7 +22,6 @@ STUDY = CommandEntry(
             ("study run nakamoto_2 --participant 7 --mock", "on an emulated head"),
             ("study run study.yaml --simulate 24 --data trial", "24 simulated participants"),
         ),
-        "study delete": (("study delete study-data --participant 7", "all data of a participant"),),
         "study analyse": (("study analyse study-data", "one page, and the answers as CSV"),),
     },
 )

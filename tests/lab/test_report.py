@@ -58,6 +58,7 @@ from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 RIG = load_rig("desk")
@@ -492,3 +493,13 @@ def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> Non
     assert finder.update(tick(2.5, (1, 2), 2, 3)) is None  # no longer new
     assert finder.update(tick(3.0, (1, 2, 3), 2, 3)) is None
     assert finder.update(tick(4.5, (1, 2, 3), 3, 4)) is None  # a choice
+
+
+def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
+    """Figures 8 and 9 of Nakamoto & Tsuruno: a look at the right eye, and one beside the face."""
+    y_m, z_m = PARTS_FACE_M["RE"][1:]
+    density = face.gaze_density(np.array([[y_m, z_m, 2.0], [5.0, 5.0, 9.0]]))
+    row, column = np.unravel_index(int(density.argmax()), density.shape)
+    assert face._Z_M[row] == pytest.approx(z_m, abs=0.005)
+    assert face._Y_M[column] == pytest.approx(y_m, abs=0.005)
+    assert density == pytest.approx(2.0 * face.gaze_density(np.array([[y_m, z_m, 1.0]])))
