@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,15 +14,9 @@ from gazerig.features.study.design import (
     Measure,
     Questionnaire,
     StudyDesign,
-    Test,
     design_measures,
 )
-from gazerig.features.study.journal import (
-    ItemAnswered,
-    ParticipationClosed,
-    ParticipationOpened,
-    StudyFolder,
-)
+from gazerig.features.study.journal import Record, StudyFolder
 from gazerig.features.study.statistics import (
     StatisticalTest,
     chi_square_test,
@@ -32,12 +26,7 @@ from gazerig.features.study.statistics import (
     sign_test,
     signed_rank_test,
 )
-from gazerig.gaze.types import Floats
 
-FASTEST_MS = 300.0
-"""A page of answers that were all given faster is left out."""
-LEAST_SAME = 8
-"""Participants with as many ratings or more, all equal, are left out."""
 Scores = dict[str, dict[str, list[float]]]
 """Condition -> code of the participant -> a value for each trial."""
 
@@ -46,7 +35,7 @@ class Answer(NamedTuple):
     """An answer; left_out: reason of its exclusion, "" if it counts."""
 
     participant: str
-    record: ItemAnswered
+    record: Record
     left_out: str
 
 
@@ -71,21 +60,15 @@ class Decision(NamedTuple):
 
 
 class StudyAnalysis(NamedTuple):
-    """The data of a report; left_out: reason by participant; scores: of ratings, by measure."""
+    """The data of a report; reasons: of each participant's exclusion, "" for those who count."""
 
     design: StudyDesign
     questionnaires: Mapping[str, Questionnaire]
-    participants: tuple[str, ...]
     simulated: bool
-    left_out: dict[str, str]
+    reasons: dict[str, str]
     answers: list[Answer]
     scores: dict[Measure, Scores]
     decisions: list[Decision]
-
-    @property
-    def counted(self) -> int:
-        """Return the number of participants who count."""
-        return len(self.participants) - len(self.left_out)
 
 
 def analyse_study(path: Path) -> StudyAnalysis:
@@ -99,58 +82,31 @@ def analyse_study(path: Path) -> StudyAnalysis:
     design, questionnaires = stored.design, stored.questionnaires
     if not journals:
         raise SetupError(f"{path} has no participant yet: gazerig study run STUDY --participant 1")
-    reasons = {code: _exclusion(records, questionnaires) for code, records in journals.items()}
+    reasons = {code: _exclusion(records) for code, records in journals.items()}
     answers = [
-        Answer(code, row, reasons[code] or left_out)
+        Answer(code, row, reasons[code] or ("practice" if (row.trial or 0) < 0 else ""))
         for code, records in journals.items()
-        for row, left_out in _answers(records)
+        for row in records
+        if row.kind == "answered"
     ]
     counted = [one for one in answers if not one.left_out]
     measures = design_measures(design, questionnaires)
     scores = {one: _scores(one, counted, design, questionnaires) for one in measures.values()}
     decisions = [_decide(one, scores[measures[one.measure]]) for one in design.hypotheses]
-    opened = [one for records in journals.values() for one in records]
     return StudyAnalysis(
-        design, questionnaires, tuple(journals),
-        any(one.simulated for one in opened if isinstance(one, ParticipationOpened)),
-        {code: reason for code, reason in reasons.items() if reason}, answers, scores,
+        design,
+        questionnaires,
+        any(records[0].simulated for records in journals.values()),
+        reasons,
+        answers,
+        scores,
         _correct(decisions, design.plan.alpha),
-    )  # fmt: skip
+    )
 
 
-def _answers(records: Sequence[Any]) -> list[tuple[ItemAnswered, str]]:
-    """Return one participant's answers, with the reasons of their exclusion."""
-    rows = [one for one in records if isinstance(one, ItemAnswered)]
-    slowest_ms: dict[tuple[int | None, str], float] = {}
-    for row in rows:
-        page = row.trial, row.questionnaire
-        slowest_ms[page] = max(slowest_ms.get(page, 0.0), row.ms)
-    found = []
-    for row in rows:
-        left_out = "" if row.value is not None else "not answered"
-        if row.trial is not None and row.trial < 0:
-            left_out = "practice"
-        elif slowest_ms[row.trial, row.questionnaire] < FASTEST_MS:
-            left_out = "answered too fast"
-        found.append((row, left_out))
-    return found
-
-
-def _exclusion(records: Sequence[Any], questionnaires: Mapping[str, Questionnaire]) -> str:
+def _exclusion(records: Sequence[Record]) -> str:
     """Return the reason of a participant's exclusion, "" without one."""
-    closed = [one for one in records if isinstance(one, ParticipationClosed)]
-    if not closed:
-        return "did not finish"
-    if not closed[0].finished:
-        return "withdrew"
-    ratings = [
-        row.value
-        for row, left_out in _answers(records)
-        if row.trial is not None and left_out not in ("practice", "not answered")
-        and questionnaires[row.questionnaire].items[row.item].kind == "rating"
-    ]  # fmt: skip
-    same = len(ratings) >= LEAST_SAME and len(set(ratings)) == 1
-    return "gave one answer to every item of all trials" if same else ""
+    return records[-1].note if records[-1].kind == "closed" else "did not finish"
 
 
 def _scores(
@@ -161,61 +117,49 @@ def _scores(
 ) -> Scores:
     """Return the values of each trial: a rating, or the mean of a scale.
 
-    Reversed items are inverted; a scale with answers to fewer than half of its items has no value.
-    A choice is a 1 under "chosen|other" instead of a condition.
+    Reversed items are inverted. A choice in the pair "a|b" is a 1 for one of "a|b" and "b|a", the
+    first of which is chosen, and a 0 for the other.
     """
     items = questionnaires[measure.questionnaire].items
     pages: dict[tuple[str, int | None, str], list[float]] = {}
     for code, row, _ in counted:
-        if row.questionnaire == measure.questionnaire and row.item in measure.items:
-            item, condition, value = items[row.item], row.condition, 1
-            if isinstance(row.value, int):
-                value = item.points + 1 - row.value if item.reverse else row.value
-            elif row.value == "second":
-                condition = PAIR.join(reversed(condition.split(PAIR)))
+        if row.questionnaire != measure.questionnaire or row.item not in measure.items:
+            continue
+        item, values = items[row.item], dict[str, float]()
+        if isinstance(row.value, int):
+            values[row.condition] = item.points + 1 - row.value if item.reverse else row.value
+        else:
+            values[row.condition] = row.value == "first"
+            values[PAIR.join(reversed(row.condition.split(PAIR)))] = row.value == "second"
+        for condition, value in values.items():
             pages.setdefault((code, row.trial, condition), []).append(value)
     scores: Scores = {condition: {} for condition in design.conditions}
-    for (code, _, condition), values in pages.items():
-        if 2 * len(values) >= len(measure.items):
-            scores.setdefault(condition, {}).setdefault(code, []).append(float(np.mean(values)))
+    for (code, _, condition), parts in pages.items():
+        scores.setdefault(condition, {}).setdefault(code, []).append(float(np.mean(parts)))
     return scores
 
 
 def _decide(one: Hypothesis, scores: Scores) -> Decision:
     """Return the results of a hypothesis' tests."""
+    keys = one.better, one.than
     if one.test == "sign":
-        wins, losses = (
-            scores.get(PAIR.join(pair), {})
-            for pair in ((one.better, one.than), (one.than, one.better))
-        )
-        codes = [*wins.keys() | losses.keys()]
-        leans = np.array([len(wins.get(code, ())) - len(losses.get(code, ())) for code in codes])
-        test = sign_test(leans) if leans.any() else _NO_DIFFERENCE
-        count, of = sum(map(len, wins.values())), sum(map(len, (*wins.values(), *losses.values())))
-        share = count / of if of else nan
-        return Decision(one, len(codes), (share, 1.0 - share), nan, (test,))
-    sides = scores[one.better], scores[one.than]
+        keys = PAIR.join(keys), PAIR.join(reversed(keys))
+    sides = [scores.get(key, {}) for key in keys]
     codes = [code for code in sides[0] if code in sides[1]]
     better, than = (np.array([np.mean(side[code]) for code in codes]) for side in sides)
-    means = (float(better.mean()), float(than.mean())) if codes else (nan, nan)
     if len(codes) < 2 or not (better != than).any():
-        return Decision(one, len(codes), means, nan, (_NO_DIFFERENCE,))
-    tests = tuple([_run_test(key, better, than, one, scores) for key in (one.test, *one.also)])
+        return Decision(one, len(codes), (nan, nan), nan, (_NO_DIFFERENCE,))
+    single = [np.concatenate([*side.values()]) for side in sides]
+    tests = tuple(
+        chi_square_test(*single) if key == "chi_square" else _TESTS[key](better, than)
+        for key in (one.test, *one.also)
+    )
+    means = float(better.mean()), float(than.mean())
     return Decision(one, len(codes), means, cohens_dz(better, than), tests)
 
 
-_NO_DIFFERENCE = StatisticalTest("signed_rank", 0.0, 1.0, 1.0, nan)
-
-
-def _run_test(
-    key: Test, better: Floats, than: Floats, one: Hypothesis, scores: Scores
-) -> StatisticalTest:
-    if key == "signed_rank":
-        return signed_rank_test(better, than)
-    if key == "rank_sum":
-        return rank_sum_test(better, than)
-    single = (np.concatenate([*scores[side].values()]) for side in (one.better, one.than))
-    return chi_square_test(*single)
+_NO_DIFFERENCE = StatisticalTest("none: no differences", 0.0, 1.0, 1.0, nan)
+_TESTS = {"signed_rank": signed_rank_test, "rank_sum": rank_sum_test, "sign": sign_test}
 
 
 def _correct(decisions: Sequence[Decision], alpha: float) -> list[Decision]:

@@ -134,10 +134,9 @@ def run(
     """Run a participant's session in the browser; the same command resumes it."""
     with clear_errors(None, port, mock):
         from gazerig.features.study.film import films
-        from gazerig.features.study.head import HeadPresenter
         from gazerig.features.study.journal import Journal, StudyFolder
         from gazerig.features.study.server import StudyServer
-        from gazerig.features.study.session import HeadLost, Session
+        from gazerig.features.study.session import HeadLost, HeadPresenter, Session
         from gazerig.features.study.simulate import simulate_study
         from gazerig.features.study.study_file import load_study
 
@@ -148,15 +147,7 @@ def run(
         shown, now_s = found.design.presentation, RealClock().now_s
         with ExitStack() as stack:
             if simulate:
-                steps = stack.enter_context(progress_bar())
-                simulate_study(
-                    found,
-                    folder,
-                    simulate,
-                    effect,
-                    seed,
-                    lambda share: steps("participants", share),
-                )
+                simulate_study(found, folder, simulate, effect, seed)
                 print(f"next: gazerig study analyse {folder.path}")
                 return
             folder.claim(found)

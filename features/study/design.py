@@ -14,112 +14,175 @@ import numpy as np
 
 from gazerig.params import Bounds
 
-Test = Literal["signed_rank", "rank_sum", "sign", "chi_square"]
-Texts = Mapping[str, str]
-"""Language -> text; "en" is required, and replaces a missing language."""
 PAIR = "|"
 """Separator of the first and the second presentation of a pair."""
 _ORDERS, _PRACTICE = 0, 1
 """Random streams of one seed."""
 
 
-# fmt: off
 @dataclass(frozen=True)
 class Item:
-    """One question: a rating from ``low`` to ``high``, a choice of a presentation, or free text."""
+    """One question: a rating from ``low`` to ``high``, a choice of a presentation, or free text.
 
-    text: Annotated[Texts, "the question; empty where the anchors say it all"] = field(default_factory=dict)
-    kind: Annotated[Literal["rating", "choice", "text"], "how it is answered"] = "rating"
-    points: Annotated[int, Bounds(2, 11), "steps of a rating"] = 5
-    low: Annotated[Texts, "anchor of the least"] = field(default_factory=dict)
-    high: Annotated[Texts, "anchor of the most"] = field(default_factory=dict)
-    scale: Annotated[str, "scale that the item belongs to"] = ""
-    reverse: Annotated[bool, "more means less of the scale"] = False
+    Attributes:
+        text: The question; empty where the anchors say it all.
+        kind: How it is answered.
+        points: Steps of a rating.
+        low: Anchor of the least.
+        high: Anchor of the most.
+        scale: Scale that the item belongs to.
+        reverse: Whether more means less of the scale.
+    """
+
+    text: str = ""
+    kind: Literal["rating", "choice", "text"] = "rating"
+    points: Annotated[int, Bounds(2, 11)] = 5
+    low: str = ""
+    high: str = ""
+    scale: str = ""
+    reverse: bool = False
 
 
 @dataclass(frozen=True)
 class Questionnaire:
-    """Items on one page."""
+    """Items on one page.
 
-    title: Annotated[str, "name in the report"]
-    source: Annotated[str, "reference in full"]
-    licence: Annotated[str, "under which terms the items may be used"]
-    items: Annotated[Mapping[str, Item], "key -> item, in order"]
-    shuffled: Annotated[bool, "items in an order of their own for each participant and trial"] = False
-    instruction: Annotated[Texts, "text above the items"] = field(default_factory=dict)
+    Attributes:
+        title: Name in the report.
+        source: Reference in full.
+        licence: Under which terms the items may be used.
+        items: Key -> item, in order.
+        shuffled: Whether the items have an order of their own for each participant and trial.
+        instruction: Text above the items.
+    """
+
+    title: str
+    source: str
+    licence: str
+    items: Mapping[str, Item]
+    shuffled: bool = False
+    instruction: str = ""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One gaze of the study; missing entries are those of the rig."""
+    """One gaze of the study; missing entries are those of the rig.
 
-    label: Annotated[str, "name in the report; participants never see it"] = ""
-    profile: Annotated[str | None, "style of gaze by name or path"] = None
-    character: Annotated[str | None, "character by name or path"] = None
-    params: Annotated[Mapping[str, object], "dotted keys of the rig's YAML and their values"] = field(default_factory=dict)
-    film: Annotated[str | None, "film to show (.webm); null: rendered from the condition"] = None
+    Attributes:
+        label: Name in the report; participants never see it.
+        profile: Style of gaze by name or path.
+        character: Character by name or path.
+        params: Dotted keys of the rig's YAML and their values.
+    """
+
+    label: str = ""
+    profile: str | None = None
+    character: str | None = None
+    params: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Presentation:
-    """Presentation of the conditions."""
+    """Presentation of the conditions.
 
-    on: Annotated[Literal["head", "film"], "the head in the room, or a film of it in the browser"] = "film"
-    rig: Annotated[str, "shipped name or path"] = "expressive"
-    scene: Annotated[str | None, "what an emulated head looks at; unused with a camera"] = None
-    seed: Annotated[int, Bounds(0, 2**31 - 1), "seed of the conditions' random generators; the same for all"] = 0
+    Attributes:
+        on: The head in the room, or a film of it in the browser.
+        rig: Shipped name or path.
+        scene: What an emulated head looks at; unused with a camera.
+        seed: Seed of the conditions' random generators; the same for all.
+    """
+
+    on: Literal["head", "film"] = "film"
+    rig: str = "expressive"
+    scene: str | None = None
+    seed: Annotated[int, Bounds(0, 2**31 - 1)] = 0
 
 
 @dataclass(frozen=True)
 class Trials:
-    """Trials of one participant, and their times."""
+    """Trials of one participant, and their times.
 
-    seconds: Annotated[float, Bounds(2, 900), "length of one presentation"] = 30.0
-    repetitions: Annotated[int, Bounds(1, 20), "how often each condition (pair) is shown"] = 1
-    practice: Annotated[int, Bounds(0, 5), "trials before the first that counts"] = 1
-    order: Annotated[Literal["williams", "random"], "Williams' squares, or shuffled by the seed"] = "williams"
-    seed: Annotated[int, Bounds(0, 2**31 - 1), "seed of all orders"] = 0
+    Attributes:
+        seconds: Length of one presentation.
+        repetitions: How often each condition (pair) is shown.
+        practice: Trials before the first that counts.
+        order: Williams' squares, or shuffled by the seed.
+        seed: Seed of all orders.
+    """
+
+    seconds: Annotated[float, Bounds(2, 900)] = 30.0
+    repetitions: Annotated[int, Bounds(1, 20)] = 1
+    practice: Annotated[int, Bounds(0, 5)] = 1
+    order: Literal["williams", "random"] = "williams"
+    seed: Annotated[int, Bounds(0, 2**31 - 1)] = 0
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Expectation, and the test that decides on it."""
+    """Expectation, and the test that decides on it.
 
-    measure: Annotated[str, "questionnaire.item or questionnaire.scale"]
-    better: Annotated[str, "condition for which more is expected"]
-    than: Annotated[str, "condition that it is compared with"]
-    test: Annotated[Test, "what decides: signed_rank, rank_sum; sign for choices"] = "signed_rank"
-    also: Annotated[tuple[Test, ...], "exploratory tests, printed next to it; they decide nothing"] = ()
+    Attributes:
+        measure: "questionnaire.item" or "questionnaire.scale".
+        better: Condition for which more is expected.
+        than: Condition that it is compared with.
+        test: What decides: signed_rank or rank_sum for ratings, sign for choices.
+        also: Exploratory tests of ratings, printed next to it; they decide nothing.
+    """
+
+    measure: str
+    better: str
+    than: str
+    test: Literal["signed_rank", "rank_sum", "sign"] = "signed_rank"
+    also: tuple[Literal["signed_rank", "rank_sum", "chi_square"], ...] = ()
 
 
 @dataclass(frozen=True)
 class StatisticalPlan:
-    """Sample size and level of all tests together (Holm's correction)."""
+    """Sample size and level of all tests together (Holm's correction).
 
-    participants: Annotated[int, Bounds(2, 1000), "how many are invited"] = 24
-    alpha: Annotated[float, Bounds(0.0001, 0.2), "probability of a false alarm, over all hypotheses"] = 0.05
+    Attributes:
+        participants: How many are invited.
+        alpha: Probability of a false alarm, over all hypotheses.
+    """
+
+    participants: Annotated[int, Bounds(2, 1000)] = 24
+    alpha: Annotated[float, Bounds(0.0001, 0.2)] = 0.05
 
 
 @dataclass(frozen=True)
 class StudyDesign:
-    """A study as in its YAML file."""
+    """A study as in its YAML file.
 
-    title: Annotated[str, "title of the report"]
-    conditions: Annotated[Mapping[str, Condition], "two to six gazes"]
-    questionnaires: Annotated[tuple[str, ...], "shipped names or paths, asked after each trial in this order"]
-    after: Annotated[tuple[str, ...], "questionnaires asked once at the end"] = ()
-    description: Annotated[tuple[str, ...], "what is studied, in paragraphs, for the report"] = ()
-    welcome: Annotated[tuple[str, ...], "paragraphs that participants read before they consent; they must not name the difference"] = ()
-    debriefing: Annotated[tuple[str, ...], "paragraphs that participants read at the end"] = ()
-    language: Annotated[str, "of the questions, where they have it"] = "en"
-    task: Annotated[Literal["rating", "pairwise"], "each presentation is rated, or one of two is chosen"] = "rating"
-    may_skip: Annotated[bool, "participants may leave questions unanswered"] = False
+    Attributes:
+        title: Title of the report.
+        conditions: Two to six gazes.
+        questionnaires: Shipped names or paths, asked after each trial in this order.
+        after: Questionnaires asked once at the end.
+        description: What is studied, in paragraphs, for the report.
+        welcome: Paragraphs that participants read before they consent; they must not name the
+            difference.
+        debriefing: Paragraphs that participants read at the end.
+        task: Each presentation is rated, or one of two is chosen.
+        presentation: How the conditions are shown.
+        trials: What one participant sees.
+        hypotheses: What is expected.
+        plan: Sample size and level.
+        contact: Whom participants write to, e.g. to have their data deleted.
+    """
+
+    title: str
+    conditions: Mapping[str, Condition]
+    questionnaires: tuple[str, ...]
+    after: tuple[str, ...] = ()
+    description: tuple[str, ...] = ()
+    welcome: tuple[str, ...] = ()
+    debriefing: tuple[str, ...] = ()
+    task: Literal["rating", "pairwise"] = "rating"
     presentation: Presentation = field(default_factory=Presentation)
     trials: Trials = field(default_factory=Trials)
     hypotheses: tuple[Hypothesis, ...] = ()
     plan: StatisticalPlan = field(default_factory=StatisticalPlan)
-    contact: Annotated[str, "whom participants write to, e.g. to have their data deleted"] = ""
-# fmt: on
+    contact: str = ""
 
 
 class Measure(NamedTuple):

@@ -14,18 +14,16 @@ import msgspec
 import numpy as np
 
 from gazerig.config.parameters import values
-from gazerig.config.rig import Rig
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder
 from gazerig.drivers.files.film_writer import film_writer
-from gazerig.drivers.types import ImageArray
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.study_file import Study
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.description.files import description_files
 from gazerig.robot.model.types import order_joints
@@ -42,59 +40,6 @@ _BELOW_EYES_M = 0.02
 _SAMPLES, _SHADOW_PX = 4, 0  # at this distance shadows would speckle the skin
 
 
-class HeadPictures:
-    """Pictures of a rig's head from one position.
-
-    Args:
-        rig: the rig.
-        p_viewer_m: position of the viewer, world frame of the rig.
-
-    Raises:
-        SetupError: the feature world or MuJoCo is missing, or rendering is impossible here.
-    """
-
-    def __init__(self, rig: Rig, p_viewer_m: Vec3) -> None:
-        try:
-            from gazerig.features.world.gl_context import import_mujoco
-        except ModuleNotFoundError as error:
-            raise SetupError(f"films are rendered by the feature world: {error}") from error
-        mujoco: Any = import_mujoco()
-        from gazerig.features.world.renderer import Renderer, RendererParams
-
-        self._description = description_of(rig)
-        files = description_files(self._description, ["mjcf"])
-        scene = files.pop("scene.xml").decode()
-        self._mujoco = mujoco
-        self._model = mujoco.MjModel.from_xml_string(scene, files)
-        self._data = mujoco.MjData(self._model)
-        params = RendererParams(_SHADOW_PX, _SAMPLES)
-        self._renderer = Renderer(self._model, SIZE_PX, SIZE_PX, params)
-        shape = rig.geometry
-        up_mm = shape.pitch_axis_height_mm + shape.eyes_above_mm
-        middle = np.array([0.001 * shape.eyes_ahead_mm, 0.0, 0.001 * up_mm - _BELOW_EYES_M])
-        # Optical axes of a camera that looks at the middle of the face.
-        self._p_m = np.array(p_viewer_m)
-        ahead = middle - self._p_m
-        away_m = float(np.linalg.norm(ahead))
-        ahead /= away_m
-        right = np.cross(ahead, (0.0, 0.0, 1.0))
-        right /= np.linalg.norm(right)
-        self._R = np.column_stack((right, np.cross(ahead, right), ahead))
-        focal_px = _HEAD_SHARE * SIZE_PX * away_m / _HEAD_M
-        self._lens = Intrinsics(focal_px, focal_px, 0.5 * (SIZE_PX - 1), 0.5 * (SIZE_PX - 1))
-
-    def draw(self, names: tuple[str, ...], position_rad: tuple[float, ...]) -> ImageArray:
-        """Return a BGR picture with the joints at these angles."""
-        for name, angle in self._description.angles(names, position_rad).items():
-            self._data.qpos[self._model.joint(name).qposadr[0]] = angle
-        self._mujoco.mj_forward(self._model, self._data)
-        return self._renderer.render(self._data, self._lens, self._R, self._p_m).image
-
-    def close(self) -> None:
-        """Free the renderer."""
-        self._renderer.close()
-
-
 def films(study: Study, folder: Path, progress: Callable[[str, float], object]) -> dict[str, Path]:
     """Return the film of each condition; missing ones are rendered.
 
@@ -105,10 +50,7 @@ def films(study: Study, folder: Path, progress: Callable[[str, float], object]) 
     """
     make_folder(folder)
     found: dict[str, Path] = {}
-    for key, condition in study.design.conditions.items():
-        if condition.film is not None:
-            found[key] = Path(study.locate(condition.film))
-            continue
+    for key in study.design.conditions:
         shown = [study.design.presentation, study.design.trials.seconds, values(study.rigs[key])]
         name = sha256(msgspec.json.encode(shown, enc_hook=str)).hexdigest()[:16]
         found[key] = folder / f"{name}.webm"
@@ -119,32 +61,46 @@ def films(study: Study, folder: Path, progress: Callable[[str, float], object]) 
 
 def _render(study: Study, key: str, path: Path, progress: Callable[[str, float], object]) -> None:
     """Write the film of a condition."""
+    try:
+        from gazerig.features.world.gl_context import import_mujoco
+    except ModuleNotFoundError as error:
+        raise SetupError(f"films are rendered by the feature world: {error}") from error
+    mujoco: Any = import_mujoco()
+    from gazerig.features.world.renderer import Renderer, RendererParams
+
     rig, seconds = study.rigs[key], study.design.trials.seconds
     shown = study.design.presentation
     options = RunOptions(
         mock=True, fast=True, seed=shown.seed, scene=shown.scene, seconds=SETTLES_S + seconds,
         no_page=True,
     ).check_and_complete()  # fmt: skip
-    assembly = assemble(rig, options)
-    people = () if assembly.scene is None else assembly.scene.people(0.0)
-    assembly.close()
     ticks = list[Tick]()
     simulate(rig, options, watch=ticks.append)
-    first_s = ticks[0].t_s + SETTLES_S
-    names = order_joints(rig.joints)
-    # At the nose of the person the head looks at.
-    pictures = HeadPictures(rig, people[0].p_world_face_m if people else VIEWER_M)
-    partial = path.with_name(f".{path.name}")
-    try:
-        with film_writer(partial, (SIZE_PX, SIZE_PX), RATE_HZ) as write:
-            count = 0
-            for tick in ticks:
-                at_s = count / RATE_HZ - 1e-9
-                if tick.t_s - first_s >= at_s and at_s < seconds - 1e-6:
-                    write(pictures.draw(names, tick.joints.position_rad))
-                    count += 1
-                    progress(f"film of {key}", at_s / seconds)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-        pictures.close()
+    description = description_of(rig)
+    files = description_files(description, ["mjcf"])
+    model = mujoco.MjModel.from_xml_string(files.pop("scene.xml").decode(), files)
+    data = mujoco.MjData(model)
+    renderer = Renderer(model, SIZE_PX, SIZE_PX, RendererParams(_SHADOW_PX, _SAMPLES))
+    # At the nose of the person the head looks at, with optical axes, to the middle of the face.
+    people = load_scene(shown.scene, shown.seed).people(0.0) if shown.scene else ()
+    p_m = np.array(people[0].p_world_face_m if people else VIEWER_M)
+    shape = rig.geometry
+    up_m = 0.001 * (shape.pitch_axis_height_mm + shape.eyes_above_mm) - _BELOW_EYES_M
+    ahead = np.array([0.001 * shape.eyes_ahead_mm, 0.0, up_m]) - p_m
+    away_m = float(np.linalg.norm(ahead))
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    axes = np.column_stack([right, np.cross(ahead, right), ahead])
+    R = axes / np.linalg.norm(axes, axis=0)
+    focal_px, middle_px = _HEAD_SHARE * SIZE_PX * away_m / _HEAD_M, 0.5 * (SIZE_PX - 1)
+    lens = Intrinsics(focal_px, focal_px, middle_px, middle_px)
+    pictures_s = ticks[0].t_s + SETTLES_S + np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    names, partial = order_joints(rig.joints), path.with_name(f".{path.name}")
+    with film_writer(partial, (SIZE_PX, SIZE_PX), RATE_HZ) as write:
+        for i in np.searchsorted([tick.t_s for tick in ticks], pictures_s - 1e-9):
+            angles = description.angles(names, ticks[i].joints.position_rad)
+            for name, angle in angles.items():
+                data.qpos[model.joint(name).qposadr[0]] = angle
+            mujoco.mj_forward(model, data)
+            write(renderer.render(data, lens, R, p_m).image)
+            progress(f"film of {key}", i / len(ticks))
+    os.replace(partial, path)

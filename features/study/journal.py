@@ -13,7 +13,7 @@ import contextlib
 import fcntl
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -23,84 +23,36 @@ from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.design import Questionnaire, StudyDesign
 from gazerig.features.study.study_file import Study
 
-AnswerValue = int | str | None
-"""A rating 1..points, "first"/"second", free text, or None: not answered."""
+AnswerValue = int | str
+"""A rating 1..points, "first"/"second", or free text."""
 _JOURNAL, _DESIGN = "journal.jsonl", "design.json"
 _SHOWN = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
 """Sections of a rig that determine its appearance, whatever its servos and camera."""
 
 
-class Record(msgspec.Struct, frozen=True, tag_field="kind"):
-    """One record of a journal."""
+class Record(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One record of a journal.
 
-
-class ParticipationOpened(Record, frozen=True):
-    """A session began or was resumed."""
-
-    program: str
-    utc: str
-    simulated: bool = False
-
-
-class ConsentGiven(Record, frozen=True):
-    """The participant has consented."""
-
-    utc: str
-
-
-class TrialBegan(Record, frozen=True):
-    """A presentation began.
-
-    trial: 0-based row of the order, practice trials below 0
+    kind: what happened; "opened" also at each resumption; "closed" is permanent
+    note: "opened": the program's version; "ended": why a presentation was interrupted, "" if it
+        was complete; "closed": "withdrew" if the participant declined or left
+    trial: 0-based row of the order, practice trials below 0, None at the end of the session
     side: 0, or 1 for the second presentation of a pair
-    """
-
-    trial: int
-    side: int
-    condition: str
-    utc: str
-
-
-class TrialEnded(Record, frozen=True):
-    """A presentation ended; interrupted: the reason, "" if it was complete."""
-
-    trial: int
-    side: int
-    utc: str
-    interrupted: str = ""
-
-
-class ItemAnswered(Record, frozen=True):
-    """One item was answered.
-
-    trial: None for questions at the end; condition: "a|b" for a pair
+    condition: that of the presentation, or of the answered trial; "a|b" for a pair
     ms: from the page's appearance to the answer, as measured by the browser
     """
 
-    trial: int | None
-    condition: str
-    questionnaire: str
-    item: str
-    value: AnswerValue
-    ms: float
+    kind: Literal["opened", "consented", "began", "ended", "answered", "closed"]
     utc: str
-
-
-class ParticipationClosed(Record, frozen=True):
-    """The session has ended permanently: finished, or the participant declined or left."""
-
-    finished: bool
-    utc: str
-
-
-Records = list[
-    ParticipationOpened
-    | ConsentGiven
-    | TrialBegan
-    | TrialEnded
-    | ItemAnswered
-    | ParticipationClosed
-]
+    note: str = ""
+    simulated: bool = False
+    trial: int | None = None
+    side: int = 0
+    condition: str = ""
+    questionnaire: str = ""
+    item: str = ""
+    value: AnswerValue = ""
+    ms: float = 0.0
 
 
 class Journal:
@@ -158,14 +110,14 @@ class Journal:
         self._file.close()
 
 
-def _read(path: Path) -> tuple[list[Any], int]:
+def _read(path: Path) -> tuple[list[Record], int]:
     """Return the records of the complete lines of a journal, and the size of these lines."""
     data = path.read_bytes()
     size = data.rfind(b"\n") + 1
-    records: list[Any] = []
+    records: list[Record] = []
     for number, line in enumerate(data[:size].splitlines(), start=1):
         try:
-            records += msgspec.json.decode(line, type=Records)
+            records += msgspec.json.decode(line, type=list[Record])
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
             raise SetupError(f"{path}:{number}: changed or damaged ({error})") from error
     return records, size
@@ -221,7 +173,7 @@ class StudyFolder:
         """Return the folder of a participant."""
         return self.path / "participants" / f"P{number:03d}"
 
-    def journals(self) -> dict[str, list[Any]]:
+    def journals(self) -> dict[str, list[Record]]:
         """Return the records of every participant by code.
 
         Raises:

@@ -74,7 +74,7 @@ class StudyServer:
         """Serve until ``stopped`` returns a reason.
 
         Raises:
-            SetupError: the address is not available.
+            OSError: the address is not available.
             HeadLost: the head cannot show conditions any more.
         """
         app = web.Application(middlewares=[self._admit], client_max_size=_SENT_BYTES)
@@ -85,14 +85,7 @@ class StudyServer:
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.5)
         await runner.setup()
         try:
-            try:
-                await web.TCPSite(runner, *self._address, reuse_address=True).start()
-            except OSError as error:
-                host, port = self._address
-                raise SetupError(
-                    f"the page cannot be served at {host}:{port} ({error.strerror or error}): "
-                    "name another address with --page HOST:PORT"
-                ) from error
+            await web.TCPSite(runner, *self._address, reuse_address=True).start()
             while stopped() is None:
                 if self._lost is not None:
                     raise self._lost
@@ -115,8 +108,8 @@ class StudyServer:
         path = _FILES / (request.match_info["name"] or "participant.html")
         return _file(path.read_bytes(), mimetypes.guess_type(path)[0] or "")
 
-    async def _get_page(self, request: web.Request) -> web.Response:
-        return self._present_page(200)
+    async def _get_page(self, request: web.Request, status: int = 200) -> web.Response:
+        return web.json_response(self._session.page_json(), status=status, headers=_HEADERS)
 
     async def _post_event(self, request: web.Request) -> web.Response:
         """Apply an event; the answer is the present page, with 409 if the event's page is over."""
@@ -134,7 +127,7 @@ class StudyServer:
             return _text(503, "not saved")
         if self._session.closed:
             self._say("the session is over: Ctrl-C ends the program")
-        return self._present_page(200 if applied else 409)
+        return await self._get_page(request, 200 if applied else 409)
 
     async def _get_film(self, request: web.Request) -> web.Response:
         """Send the present film without its name or date, which could identify the condition."""
@@ -145,9 +138,6 @@ class StudyServer:
         body = self._films[session.condition].read_bytes()
         session.film_fetched()
         return _file(body, "video/webm")
-
-    def _present_page(self, status: int) -> web.Response:
-        return web.json_response(self._session.page_json(), status=status, headers=_HEADERS)
 
 
 def _text(status: int, text: str) -> web.Response:

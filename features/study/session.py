@@ -5,28 +5,25 @@ the same place; only a presentation that was in progress starts again.
 """
 
 from collections.abc import Callable, Iterator
-from typing import Any, Literal, NamedTuple, Protocol
+from dataclasses import asdict
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
 
 import gazerig
-from gazerig.features.study.design import PAIR, Item, Texts, participant_order, practice_trials
-from gazerig.features.study.journal import (
-    AnswerValue,
-    ConsentGiven,
-    ItemAnswered,
-    Journal,
-    ParticipationClosed,
-    ParticipationOpened,
-    Record,
-    TrialBegan,
-    TrialEnded,
-)
-from gazerig.features.study.study_file import WHOLE_SHARE, Study
+from gazerig.errors import Error
+from gazerig.features.study.design import PAIR, Item, participant_order, practice_trials
+from gazerig.features.study.journal import AnswerValue, Journal, Record
+from gazerig.features.study.study_file import Study
+from gazerig.local_head import LocalHead
 
+WHOLE_SHARE = 0.9
+"""Share of a film that must be played for a complete presentation."""
 LONGEST_TEXT = 5000
 """Longest free text, characters."""
+_HELD_S = 1.0
+"""Time without motion after which a head has lost its condition, seconds."""
 _ITEMS = 2
 """Random stream of the trials' seed; orders use others."""
 
@@ -39,14 +36,50 @@ class HeadLost(Exception):
     """The head cannot show conditions any more; the message gives the reason."""
 
 
-class Presenter(Protocol):
-    """The head in the room; both methods raise HeadLost if it cannot show conditions."""
+class HeadPresenter:
+    """Shows conditions on a running head.
+
+    Args:
+        study: a checked study.
+        head: a head with the study's rig.
+        now_s: returns the time of the host's clock.
+    """
+
+    def __init__(self, study: Study, head: LocalHead, now_s: Callable[[], float]) -> None:
+        self._study, self._head, self._now_s = study, head, now_s
+        self._condition: str | None = None
+        self._moved_s = now_s()
 
     def show(self, condition: str) -> None:
-        """Show a condition from now on."""
+        """Show a condition from the next tick on.
+
+        Raises:
+            HeadLost: it cannot be shown.
+        """
+        try:
+            if changes := self._study.changes(self._condition, condition):
+                self._head.set(changes)
+        except Error as error:
+            raise HeadLost(f"the condition cannot be shown: {error}") from error
+        self._condition = condition
 
     def check(self) -> None:
-        """Check that the head moves."""
+        """Check that the head moves.
+
+        Raises:
+            HeadLost: it was stopped, is held for longer than a moment, or has ended.
+        """
+        try:
+            state = self._head.state
+        except Error as error:
+            raise HeadLost(str(error)) from error
+        now_s = self._now_s()
+        if state.stopped:
+            raise HeadLost(f"stopped: {state.stopped}")
+        if state.level not in ("hold", "torque_off"):
+            self._moved_s = now_s
+        if now_s - self._moved_s > _HELD_S:
+            raise HeadLost(f"the joints are held: {'; '.join(state.reasons[:3])}")
 
 
 class Event(msgspec.Struct):
@@ -97,7 +130,7 @@ class Session:
         journal: Journal,
         now_s: Callable[[], float],
         utc: Callable[[], str],
-        head: Presenter | None = None,
+        head: HeadPresenter | None = None,
         simulated: bool = False,
     ) -> None:
         self.code = f"P{number:03d}"
@@ -109,7 +142,7 @@ class Session:
         self._began_s = float("inf")
         self.place = self._find_place()
         if not self.closed:
-            self._store(ParticipationOpened(gazerig.__version__, utc(), simulated))
+            self._store(Record("opened", utc(), gazerig.__version__, simulated))
 
     @property
     def trial(self) -> str:
@@ -135,21 +168,15 @@ class Session:
         """Return the present page, which contains nothing that distinguishes conditions."""
         design, place, records = self._design, self.place, self._journal.records
         asked = self._study.questionnaires.get(place.questionnaire)
-        finished = ParticipationClosed in map(type, records) and records[-1].finished
+        finished = records[-1].kind == "closed" and not records[-1].note
         return {
             **place._asdict(), "page": self.page, "code": self.code, "film": self._head is None,
-            "pairs": design.task == "pairwise", "practice": design.trials.practice,
-            "count": len(self._trials), "seconds": design.trials.seconds,
-            "contact": design.contact, "welcome": design.welcome, "may_skip": design.may_skip,
+            "practice": design.trials.practice, "count": len(self._trials),
+            "pairs": design.task == "pairwise", "seconds": design.trials.seconds,
+            "contact": design.contact, "welcome": design.welcome,
             "finished": finished, "debriefing": design.debriefing if finished else (),
-            "instruction": self._text(asked.instruction) if asked else "",
-            "items": [
-                {
-                    "kind": item.kind, "points": item.points, "text": self._text(item.text),
-                    "low": self._text(item.low), "high": self._text(item.high),
-                }
-                for _, item in self.items()
-            ],
+            "instruction": asked.instruction if asked else "",
+            "items": [asdict(item) for _, item in self.items()],
         }  # fmt: skip
 
     def items(self) -> list[tuple[str, Item]]:
@@ -177,9 +204,9 @@ class Session:
             return False
         match self.place.step, event.do:
             case "consent", "consent":
-                self._store(ConsentGiven(self._utc()))
+                self._store(Record("consented", self._utc()))
             case ("consent", "decline") | ("ready" | "presentation" | "questions", "leave"):
-                self._store(ParticipationClosed(False, self._utc()))
+                self._store(Record("closed", self._utc(), "withdrew"))
             case "ready", "begin":
                 self._begin()
             case "presentation", "seen" if self._head is None:
@@ -218,14 +245,18 @@ class Session:
         place = self.place
         if self._head is not None:
             self._head.show(self.condition)
-        self._store(TrialBegan(place.trial or 0, place.side, self.condition, self._utc()))
+        self._store(self._presentation("began"))
         self._began_s = float("inf") if self._head is None else self._now_s()
         self.place = place._replace(step="presentation")
 
     def _end(self, interrupted: str) -> None:
-        self._store(TrialEnded(self.place.trial or 0, self.place.side, self._utc(), interrupted))
+        self._store(self._presentation("ended", interrupted))
 
-    def _answers(self, event: Event) -> Iterator[ItemAnswered]:
+    def _presentation(self, kind: Literal["began", "ended"], note: str = "") -> Record:
+        trial, side = self.place.trial, self.place.side
+        return Record(kind, self._utc(), note, trial=trial, side=side, condition=self.condition)
+
+    def _answers(self, event: Event) -> Iterator[Record]:
         """Yield the records of a page of answers."""
         items, place, utc = self.items(), self.place, self._utc()
         if not len(items) == len(event.values) == len(event.ms):
@@ -233,41 +264,38 @@ class Session:
         for (key, item), value, ms in zip(items, event.values, event.ms, strict=True):
             if not self._is_valid(item, value):
                 raise WrongEvent(f"{value!r:.40} is no answer to the question {item.text}")
-            yield ItemAnswered(place.trial, self.trial, place.questionnaire, key, value, ms, utc)
+            yield Record(
+                "answered", utc, trial=place.trial, condition=self.trial,
+                questionnaire=place.questionnaire, item=key, value=value, ms=ms,
+            )  # fmt: skip
 
     def _is_valid(self, item: Item, value: AnswerValue) -> bool:
         if item.kind == "text":
             return isinstance(value, str) and len(value) <= LONGEST_TEXT
-        if value is None:
-            return self._design.may_skip
         if item.kind == "choice":
             return value in ("first", "second")
         return isinstance(value, int) and 1 <= value <= item.points
-
-    def _text(self, texts: Texts) -> str:
-        return texts.get(self._design.language) or texts.get("en", "")
 
     def _store(self, *records: Record) -> None:
         """Write records to disk, then go to the next place; the last record closes the session."""
         self._journal.write(*records)
         self.place = self._find_place()
-        if self.closed and not isinstance(records[-1], ParticipationClosed):
-            self._journal.write(ParticipationClosed(True, self._utc()))
+        if self.closed and records[-1].kind != "closed":
+            self._journal.write(Record("closed", self._utc()))
 
     def _find_place(self) -> Place:
         """Return the place that follows from the records."""
         done: set[object] = set()
         for one in self._journal.records:
-            match one:
-                case ParticipationClosed():
-                    return Place("end")
-                case TrialEnded(interrupted=""):
-                    done.add((one.trial, one.side))
-                case ItemAnswered():
-                    done.add((one.trial, one.questionnaire))
-                case ConsentGiven():
-                    done.add(ConsentGiven)
-        if ConsentGiven not in done:
+            if one.kind == "ended" and not one.note:
+                done.add((one.trial, one.side))
+            elif one.kind == "answered":
+                done.add((one.trial, one.questionnaire))
+            else:
+                done.add(one.kind)
+        if "closed" in done:
+            return Place("end")
+        if "consented" not in done:
             return Place("consent")
         for trial, shown in self._trials.items():
             for side, _ in enumerate(shown.split(PAIR)):

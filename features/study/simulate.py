@@ -6,7 +6,6 @@ between neighbouring conditions have the required d_z; that of the answers is a 
 because points are whole.
 """
 
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from math import sqrt
 
@@ -35,14 +34,7 @@ def condition_levels(design: StudyDesign) -> dict[str, int]:
     return found
 
 
-def simulate_study(
-    study: Study,
-    folder: StudyFolder,
-    count: int,
-    effect: float,
-    seed: int,
-    progress: Callable[[float], None],
-) -> None:
+def simulate_study(study: Study, folder: StudyFolder, count: int, effect: float, seed: int) -> None:
     """Run participants 1 to ``count`` through a study; equal seeds give equal journals.
 
     Args:
@@ -51,7 +43,6 @@ def simulate_study(
         count: number of participants.
         effect: d_z of neighbouring conditions.
         seed: seed of the answers.
-        progress: receives the finished share.
 
     Raises:
         SetupError: the folder has data of participants, or the data cannot be written.
@@ -63,7 +54,6 @@ def simulate_study(
         journal = Journal(folder.participant(number))
         _run_session(study, number, journal, effect, np.random.default_rng((seed, number)))
         journal.close()
-        progress(number / count)
 
 
 def _run_session(

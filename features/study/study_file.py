@@ -1,4 +1,4 @@
-"""Studies by name or path, checked with their questionnaires, rigs and films."""
+"""Studies by name or path, checked with their questionnaires and rigs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -10,27 +10,18 @@ from gazerig.config.parameters import NEXT_START, apply_changes, differences, ef
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.files.film_writer import film_seconds
 from gazerig.features.study.design import (
-    Condition,
-    Hypothesis,
-    Measure,
     Questionnaire,
     StudyDesign,
     balanced_group_size,
     design_measures,
 )
-from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.model.commands import Value
-from gazerig.robot.model.types import JOINT_NAME
 
 HOME = Path(__file__).parent
 """The folder with ``studies`` and ``questionnaires``."""
-WHOLE_SHARE = 0.9
-"""Share of a film that must be played for a complete presentation."""
 Faults = Iterator[tuple[str, str]]
 """(dotted key, broken rule)."""
-_NAME = "no name: small letters, digits and _, a letter first, at most 40"
 
 
 @dataclass(frozen=True)
@@ -64,18 +55,24 @@ def load_study(name_or_path: str) -> Study:
     """Return a study by shipped name or path.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault, each with the study's line.
+        SetupError: with every fault of the study's file, each with its line, or with those of a
+            file that it names.
     """
     path = _find("studies", name_or_path, Path())
-    design = load(path, StudyDesign, checks=[lambda raw: _faults(raw, path.parent)])
-    asked = (*design.questionnaires, *design.after)
-    return Study(
-        path,
-        _with_keys(design),
-        {_key(name): load_questionnaire(name, path.parent) for name in asked},
-        load_rig(_locate(path.parent, design.presentation.rig)),
-        {key: condition_rig(design, one, path.parent) for key, one in design.conditions.items()},
+    design, folder = load(path, StudyDesign), path.parent
+    names = (*design.questionnaires, *design.after)
+    questionnaires, after = (
+        tuple(map(_key, names)) for names in (design.questionnaires, design.after)
     )
+    study = Study(
+        path,
+        replace(design, questionnaires=questionnaires, after=after),
+        {_key(name): load_questionnaire(name, folder) for name in names},
+        load_rig(_locate(folder, design.presentation.rig)),
+        {key: _condition_rig(design, key, path) for key in design.conditions},
+    )
+    load(path, StudyDesign, checks=[lambda _: _faults(study)])
+    return study
 
 
 def load_questionnaire(name_or_path: str, folder: Path) -> Questionnaire:
@@ -88,17 +85,16 @@ def load_questionnaire(name_or_path: str, folder: Path) -> Questionnaire:
     return load(path, Questionnaire, checks=[_questionnaire_faults])
 
 
-def condition_rig(design: StudyDesign, condition: Condition, folder: Path) -> Rig:
-    """Return the rig of a condition, with all its changes applied.
-
-    Raises:
-        gazerig.config.load.ConfigError: with every fault.
-    """
+def _condition_rig(design: StudyDesign, key: str, path: Path) -> Rig:
+    """Return the rig of a condition, with all its changes applied."""
+    condition = design.conditions[key]
     files = (design.presentation.rig, condition.character, condition.profile)
-    rig, character, profile = (name and _locate(folder, name) for name in files)
-    loaded = load_rig(rig or "", character, profile)
-    changes = cast(Mapping[str, Value], condition.params)
-    return apply_changes(loaded, changes) if changes else loaded
+    rig, character, profile = (name and _locate(path.parent, name) for name in files)
+    try:
+        loaded = load_rig(rig or "", character, profile)
+        return apply_changes(loaded, cast(Mapping[str, Value], condition.params))
+    except ConfigError as error:
+        raise SetupError(f"{path}: conditions.{key}: {error}") from error
 
 
 def _differences(before: Rig, after: Rig) -> dict[str, Value]:
@@ -108,7 +104,7 @@ def _differences(before: Rig, after: Rig) -> dict[str, Value]:
 
 
 def _is_path(name: str) -> bool:
-    return "/" in name or name.endswith((".yaml", ".webm"))
+    return "/" in name or name.endswith(".yaml")
 
 
 def _locate(folder: Path, name: str) -> str:
@@ -123,120 +119,43 @@ def _key(name: str) -> str:
     return Path(name).stem
 
 
-def _with_keys(design: StudyDesign) -> StudyDesign:
-    """Return a design with questionnaires by their keys."""
-    asked, after = (tuple(map(_key, names)) for names in (design.questionnaires, design.after))
-    return replace(design, questionnaires=asked, after=after)
-
-
-def _faults(design: StudyDesign, folder: Path) -> Faults:
-    """Yield every fault of a design and of the files that it names."""
+def _faults(study: Study) -> Faults:
+    """Yield the faults of a design whose files are good."""
+    design = study.design
     if not 2 <= len(design.conditions) <= 6:
         yield "conditions", "a study compares two to six; add or remove some"
         return
-    shown = design.presentation
-    if shown.scene is not None and shown.scene not in scene_names():
-        yield "presentation.scene", f"no scene {shown.scene!r}; there is {', '.join(scene_names())}"
-    planned, every = design.plan.participants, balanced_group_size(design)
-    if planned % every:
-        near = f"{planned // every * every or every} or {(planned // every + 1) * every}"
-        rule = f"{planned} is no multiple of the {every} orders of Williams' squares: take {near}"
-        yield "plan.participants", f"{rule}, or trials.order: random"
-    found: dict[str, Questionnaire] = {}
-    for list_name in ("questionnaires", "after"):
-        for i, name in enumerate(getattr(design, list_name)):
-            try:
-                found[_key(name)] = load_questionnaire(name, folder)
-            except ConfigError as error:
-                yield from _at(f"{list_name}.{i}", error)
-    if len(found) == len({*design.questionnaires, *design.after}):
-        measures = design_measures(_with_keys(design), found)
-        kinds = {one.kind for one in measures.values()}
-        if ("choice" in kinds) != (design.task == "pairwise"):
-            yield (
-                "task",
-                "pairwise needs a questionnaire with a choice in each trial, and rating none",
-            )
-        for i, one in enumerate(design.hypotheses):
-            yield from _hypothesis_faults(f"hypotheses.{i}", design, one, measures)
-    yield from _condition_faults(design, folder)
-
-
-def _at(key: str, error: ConfigError) -> Faults:
-    """Yield the faults of a file at the key that names it."""
-    for fault in error.faults:
-        yield key, str(fault)
-
-
-def _hypothesis_faults(
-    at: str, design: StudyDesign, one: Hypothesis, measures: Mapping[str, Measure]
-) -> Faults:
-    """Yield the reasons why a hypothesis cannot be tested."""
-    for key, name in (("better", one.better), ("than", one.than)):
-        if name not in design.conditions:
-            yield f"{at}.{key}", f"no condition {name!r}; there is {', '.join(design.conditions)}"
-    if one.better == one.than:
-        yield f"{at}.than", "is the condition itself; name another"
-    measure = measures.get(one.measure)
-    if measure is None:
-        yield f"{at}.measure", f"no trial asks {one.measure!r}; there is {', '.join(measures)}"
-        return
-    fit = ["sign"] if measure.kind == "choice" else ["signed_rank", "rank_sum"]
-    if one.test not in fit or (design.task == "pairwise") != (measure.kind == "choice"):
-        yield f"{at}.test", f"{one.test} cannot decide on a {measure.kind}; {' or '.join(fit)} can"
-    single = len(measure.items) == 1
-    for test in one.also:
-        if test == "sign" or (test == "chi_square" and not single):
-            yield f"{at}.also", f"{test} does not test {one.measure}; remove it"
-
-
-def _condition_faults(design: StudyDesign, folder: Path) -> Faults:
-    """Yield conditions that cannot be shown at all, or on a running head, or are equal."""
-    try:
-        own = load_rig(_locate(folder, design.presentation.rig))
-    except ConfigError as error:
-        yield from _at("presentation.rig", error)
-        return
-    on_head, rigs = design.presentation.on == "head", dict[str, Rig]()
-    for key, one in design.conditions.items():
-        at = f"conditions.{key}"
-        if not JOINT_NAME.fullmatch(key):
-            yield at, _NAME
-        if one.film is not None:
-            try:
-                seconds = film_seconds(_locate(folder, one.film))
-            except SetupError as error:
-                yield f"{at}.film", str(error)
-                continue
-            if on_head or seconds < WHOLE_SHARE * design.trials.seconds:
-                yield f"{at}.film", f"needs presentation.on: film, and lasts {seconds:.1f} s"
-            continue
-        try:
-            rigs[key] = condition_rig(design, one, folder)
-        except ConfigError as error:
-            for fault in error.faults:
-                given = fault.key in one.params
-                yield (f"{at}.params.{fault.key}", fault.rule) if given else (at, str(fault))
-            continue
-        for changed in _differences(own, rigs[key]) if on_head else ():
+    every = balanced_group_size(design)
+    if design.plan.participants % every:
+        rule = f"no multiple of the {every} orders of Williams' squares"
+        yield "plan.participants", f"{rule}; take one, or trials.order: random"
+    measures = design_measures(design, study.questionnaires)
+    choices = [name for name, one in measures.items() if one.kind == "choice"]
+    if bool(choices) != (design.task == "pairwise"):
+        yield "task", "pairwise needs a questionnaire with a choice in each trial, and rating none"
+    for i, one in enumerate(design.hypotheses):
+        at = f"hypotheses.{i}"
+        for name in (one.better, one.than):
+            if name not in design.conditions:
+                yield at, f"no condition {name!r}; there is {', '.join(design.conditions)}"
+        if one.measure not in measures or (choices and one.measure not in choices):
+            tested = ", ".join(choices or measures)
+            yield f"{at}.measure", f"no trial asks {one.measure!r}; there is {tested}"
+        elif (one.test == "sign") != bool(choices):
+            yield f"{at}.test", "sign decides on choices, signed_rank and rank_sum on ratings"
+    for key, rig in study.rigs.items():
+        if [*study.rigs.values()].count(rig) > 1:
+            yield f"conditions.{key}", "shows the same as another; change a value, or remove it"
+        for changed in _differences(study.rig, rig) if design.presentation.on == "head" else ():
             if effect_time(changed).startswith(NEXT_START):
-                yield at, f"{changed} cannot change while the head runs: presentation.on: film"
-        for other in rigs:
-            if other != key and not _differences(rigs[other], rigs[key]):
-                yield at, f"shows the same as {other!r}; change a value of one, or remove one"
+                rule = f"{changed} cannot change while the head runs: presentation.on: film"
+                yield f"conditions.{key}", rule
 
 
 def _questionnaire_faults(asked: Questionnaire) -> Faults:
     """Yield faults within a questionnaire."""
     points: dict[str, int] = {}
     for key, item in asked.items.items():
-        at = f"items.{key}"
-        if not JOINT_NAME.fullmatch(key):
-            yield at, _NAME
-        for name in ("low", "high") if item.kind == "rating" else ("text",):
-            if not getattr(item, name).get("en"):
-                yield f"{at}.{name}", "needs en, which replaces a missing language"
-        if item.scale in asked.items or item.points != points.setdefault(
-            item.scale or key, item.points
-        ):
-            yield f"{at}.scale", "is no key of an item, and all its items have as many points"
+        same = points.setdefault(item.scale or key, item.points)
+        if item.scale in asked.items or item.points != same:
+            yield f"items.{key}.scale", "is no key of an item; all its items have as many points"

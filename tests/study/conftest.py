@@ -9,12 +9,14 @@ from shown_page import free_port
 from study_helpers import Program
 
 from gazerig.drivers.files.film_writer import film_writer
+from gazerig.features.study import film
+from gazerig.features.study.study_file import Study, load_study
 
 STUDY = """\
 title: Short
 conditions:
-  alpha: { film: ./alpha.webm }
-  beta: { film: ./beta.webm }
+  alpha: { profile: mitake }
+  beta: {}
 trials: { seconds: 2, practice: 0 }
 questionnaires: [nakamoto_tsuruno]
 after: [free_text]
@@ -25,14 +27,18 @@ plan: { participants: 2 }
 
 
 @pytest.fixture
-def study(tmp_path: Path) -> Path:
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A study of two films of two seconds."""
-    for shade, name in enumerate(("alpha", "beta")):
-        with film_writer(tmp_path / f"{name}.webm", (64, 64), 10.0) as write:
+
+    def draw(study: Study, key: str, path: Path, progress: object) -> None:
+        with film_writer(path, (64, 64), 10.0) as write:
             for _ in range(20):
-                write(np.full((64, 64, 3), 100 * shade, np.uint8))
+                write(np.full((64, 64, 3), 100 * (key == "beta"), np.uint8))
+
+    monkeypatch.setattr(film, "_render", draw)
     path = tmp_path / "short.yaml"
     path.write_text(STUDY)
+    film.films(load_study(str(path)), tmp_path / "data" / "films", lambda what, share: None)
     return path
 
 

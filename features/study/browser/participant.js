@@ -186,12 +186,12 @@ function questions(page) {
   const missing = make("p", { className: "wrong", role: "alert" });
   const form = make(
     "form", { noValidate: true }, title("Your impression"),
-    ...paragraphs(page.instruction, page.may_skip ? "You may leave questions unanswered." : ""),
+    ...paragraphs(page.instruction),
     ...fields, missing, make("button", { type: "submit", className: "main" }, "Next"),
   );
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    const open = page.may_skip ? [] : fields.filter((_, i) => isOpen(i));
+    const open = fields.filter((_, i) => isOpen(i));
     for (const one of open) one.classList.add("open");
     missing.textContent = open.length ? `Please answer ${open.length} more.` : "";
     if (open.length) return focus(open[0]);
