@@ -29,9 +29,7 @@ class RecordingWriter:
     written_frames: number of frames so far
     """
 
-    def __init__(
-        self, path: Path, about: dict[str, str], over: bool = False
-    ) -> None:
+    def __init__(self, path: Path, about: dict[str, str], over: bool = False) -> None:
         """Create the file.
 
         about: metadata of the recording; over:
@@ -158,9 +156,7 @@ class CameraRecorder:
         self._source.open()
         if self._writer is None:
             try:
-                self._writer = RecordingWriter(
-                    self._path, self._about, self._over
-                )
+                self._writer = RecordingWriter(self._path, self._about, self._over)
             except BaseException:
                 self._source.close()
                 raise

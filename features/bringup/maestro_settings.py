@@ -11,7 +11,6 @@ kept in multiples of 16 us) and 4.e (serial settings).
 from collections.abc import Iterator, Sequence
 from math import ceil, floor
 
-from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.maestro.commands import accel_units, speed_units
 from gazerig.drivers.maestro.params import MaestroParams
@@ -79,18 +78,3 @@ def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool
             f"Acceleration {accel:3}    {setup.name}"
         )
     yield "  tab Script: no script, 'Run script on startup' off. Then Apply Settings, and close it."
-
-
-def clipping_text(setup: ServoConfig, asked_steps: float, got_steps: float) -> str:
-    """Return a message that a board clips its goals, with the remedy."""
-    low, high = range_us(setup)
-    if not got_steps:
-        return (
-            f"{servo_label(setup)} gives no pulses: set its channel to Servo in Pololu's program; "
-            "gazerig doctor names errors of the board"
-        )
-    sent, got = f"{asked_steps / US_STEPS:g} us", f"{got_steps / US_STEPS:g} us"
-    return (
-        f"{servo_label(setup)} is sent to {sent} and the board stays at {got}: set its Min to "
-        f"{low} and its Max to {high} in Pololu's program"
-    )

@@ -162,7 +162,7 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
     sees = {"webcam": "--camera 0", "oak": "--oak", "none": "--scene visitor"}[rig.camera]
     steps = [(f"gazerig run {named} --mock", "the head in your browser, without any hardware")]
     if rig.board != "none":
-        numbers = "moves each channel" if rig.board in ("maestro", "pca9685") else "gives ids"
+        numbers = "names a board's settings" if rig.board in ("maestro", "pca9685") else "gives ids"
         steps += [
             (f"gazerig setup {named}", f"with the board plugged in: {numbers}"),
             (f"gazerig doctor {named} --fix", "check port, servos and settings against the file"),

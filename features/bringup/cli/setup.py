@@ -1,4 +1,4 @@
-"""The command ``gazerig setup``: each servo gets its id, each channel is tested."""
+"""The command ``gazerig setup``: each servo gets its id, each board its settings."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -49,7 +49,7 @@ def setup(
     mock: MockOption = False,
     yes: YesOption = False,
 ) -> None:
-    """Set id and baud rate of the servos, connected one at a time; test a Maestro's channels."""
+    """Set id and baud rate of the servos, connected one at a time; print a board's settings."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "setup")
@@ -63,13 +63,16 @@ def setup(
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
             if mine:
                 task = SetupTask(model, rig, bus, mine, port, mock, yes)
-                left += BOARDS.get(model.bus_named(bus).kind, _set_up_chain)(task)
+                if set_up_board := BOARDS.get(model.bus_named(bus).kind):
+                    set_up_board(task)
+                else:
+                    left += _set_up_chain(task)
         if left:
             say(f"skipped: {', '.join(left)}")
         say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor")
 
 
-BOARDS: dict[str, Callable[[SetupTask], list[str]]] = {
+BOARDS: dict[str, Callable[[SetupTask], None]] = {
     "maestro": set_up_maestro,
     "pca9685": set_up_pca9685,
 }
