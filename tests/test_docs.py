@@ -32,7 +32,7 @@ from gazerig.sim_mock.scenes import script
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
 design = pytest.importorskip("gazerig.features.study.design")
-HOME = pytest.importorskip("gazerig.features.study.study_file").HOME
+HOME = pytest.importorskip("gazerig.features.study.design").HOME
 WORLDS = pytest.importorskip("gazerig.features.world.room").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")

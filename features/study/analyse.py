@@ -1,4 +1,8 @@
-"""Analysis of a study's answers: what counts, scores of each condition, and decisions."""
+"""Analysis of a study's answers: what counts, scores of each condition, tests and decisions.
+
+Large-sample p values are SciPy's, corrected for ties and for continuity; exact ones count all
+signs or swaps of the participants' answers, including midranks (Streitberg & Roehmel 1986).
+"""
 
 from collections.abc import Mapping, Sequence
 from math import nan
@@ -6,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.design import (
@@ -17,18 +22,100 @@ from gazerig.features.study.design import (
     design_measures,
 )
 from gazerig.features.study.journal import Record, StudyFolder
-from gazerig.features.study.statistics import (
-    StatisticalTest,
-    chi_square_test,
-    cohens_dz,
-    correct_p_values,
-    rank_sum_test,
-    sign_test,
-    signed_rank_test,
-)
+from gazerig.gaze.types import Floats
 
 Scores = dict[str, dict[str, list[float]]]
 """Condition -> code of the participant -> a value for each trial."""
+
+
+class StatisticalTest(NamedTuple):
+    """The results of one test.
+
+    p: from the statistic's distribution in large samples; exact_p: nan if it was not computed
+    effect: matched rank-biserial correlation, Cliff's delta, net share of participants or
+        Cramer's V
+    """
+
+    key: str
+    statistic: float
+    p: float
+    exact_p: float
+    effect: float
+
+
+def signed_rank_test(better: Floats, than: Floats) -> StatisticalTest:
+    """Test the participants' differences: Wilcoxon's signed-rank test, zeros left out."""
+    d = better - than
+    d = d[d != 0.0]
+    found = stats.wilcoxon(d, correction=True, method="asymptotic")
+    exact = exact_sign_p(np.sign(d) * stats.rankdata(np.abs(d)))
+    effect = matched_correlation(better, than)
+    return StatisticalTest("signed_rank", found.statistic, found.pvalue, exact, effect)
+
+
+def rank_sum_test(better: Floats, than: Floats) -> StatisticalTest:
+    """Test whether answers tend to be higher: Wilcoxon's rank-sum (Mann and Whitney's U).
+
+    The large-sample p value treats both answers of a participant as those of two people; the exact
+    one swaps each participant's two answers, and is valid for any dependence between them.
+    """
+    found = stats.mannwhitneyu(better, than, method="asymptotic")
+    ranks = stats.rankdata([better, than]).reshape(2, -1)
+    exact = exact_sign_p(ranks[0] - ranks[1])
+    effect = dominance(better, than)
+    return StatisticalTest("rank_sum", found.statistic, found.pvalue, exact, effect)
+
+
+def sign_test(better: Floats, than: Floats) -> StatisticalTest:
+    """Test whether more participants lean to one side than to the other: the exact sign test."""
+    above, kept = int((better > than).sum()), int((better != than).sum())
+    p = stats.binomtest(above, kept).pvalue
+    return StatisticalTest("sign", above, p, p, 2.0 * above / kept - 1.0)
+
+
+def chi_square_test(better: Floats, than: Floats) -> StatisticalTest:
+    """Test whether single answers have one distribution: Pearson's chi-square of the counts.
+
+    Without correction for continuity, and with each answer as another person's.
+    """
+    table = np.array(
+        [[np.sum(side == x) for x in np.union1d(better, than)] for side in (better, than)]
+    )
+    found = stats.chi2_contingency(table, correction=False)
+    effect = float(np.sqrt(found.statistic / table.sum()))
+    return StatisticalTest("chi_square", found.statistic, found.pvalue, nan, effect)
+
+
+def exact_sign_p(scores: Floats) -> float:
+    """Return the share of all signs of scores (n,), halves allowed, with as extreme a sum."""
+    doubled = np.rint(2.0 * scores).astype(np.int64)
+    chances = np.zeros(int(np.abs(doubled).sum()) + 1)
+    chances[0] = 1.0
+    for size in np.abs(doubled):
+        chances = 0.5 * (chances + np.roll(chances, size))  # what is rolled over is zero
+    seen = int(doubled[doubled > 0].sum())
+    return min(1.0, 2.0 * float(min(chances[seen:].sum(), chances[: seen + 1].sum())))
+
+
+def correct_p_values(p_values: Sequence[float]) -> list[float]:
+    """Return p values corrected by Holm's step-down procedure (1979), in their order."""
+    corrected, least = list(p_values), 0.0
+    for rank, k in enumerate(np.argsort(p_values)):
+        least = max(least, min(1.0, (len(p_values) - rank) * p_values[k]))
+        corrected[k] = least
+    return corrected
+
+
+def matched_correlation(better: Floats, than: Floats) -> float:
+    """Return the matched-pairs rank-biserial correlation (Kerby 2014), nan without differences."""
+    d = better - than
+    ranks = stats.rankdata(np.abs(d[d != 0.0]))
+    return float((np.sign(d[d != 0.0]) * ranks).sum() / ranks.sum()) if len(ranks) else nan
+
+
+def dominance(better: Floats, than: Floats) -> float:
+    """Return Cliff's delta (1993): P(better > than) - P(better < than)."""
+    return float(np.sign(np.subtract.outer(better, than)).mean())
 
 
 class Answer(NamedTuple):
@@ -43,7 +130,7 @@ class Decision(NamedTuple):
     """The decision on one hypothesis.
 
     n: participants with both conditions; means: of the better and of the other condition, for
-        choices the shares; d_z: Cohen's d_z of the participants' differences
+        choices the shares
     tests: the planned test, then exploratory ones
     corrected_p: p value of the planned test, corrected over all hypotheses
     verdict: "supported", "not supported", "against" (significant, but of the other sign), or "too
@@ -53,7 +140,6 @@ class Decision(NamedTuple):
     hypothesis: Hypothesis
     n: int
     means: tuple[float, float]
-    d_z: float
     tests: tuple[StatisticalTest, ...]
     corrected_p: float = nan
     verdict: str = "too few"
@@ -82,7 +168,10 @@ def analyse_study(path: Path) -> StudyAnalysis:
     design, questionnaires = stored.design, stored.questionnaires
     if not journals:
         raise SetupError(f"{path} has no participant yet: gazerig study run STUDY --participant 1")
-    reasons = {code: _exclusion(records) for code, records in journals.items()}
+    reasons = {
+        code: records[-1].note if records[-1].kind == "closed" else "did not finish"
+        for code, records in journals.items()
+    }
     answers = [
         Answer(code, row, reasons[code] or ("practice" if (row.trial or 0) < 0 else ""))
         for code, records in journals.items()
@@ -102,11 +191,6 @@ def analyse_study(path: Path) -> StudyAnalysis:
         scores,
         _correct(decisions, design.plan.alpha),
     )
-
-
-def _exclusion(records: Sequence[Record]) -> str:
-    """Return the reason of a participant's exclusion, "" without one."""
-    return records[-1].note if records[-1].kind == "closed" else "did not finish"
 
 
 def _scores(
@@ -148,14 +232,14 @@ def _decide(one: Hypothesis, scores: Scores) -> Decision:
     codes = [code for code in sides[0] if code in sides[1]]
     better, than = (np.array([np.mean(side[code]) for code in codes]) for side in sides)
     if len(codes) < 2 or not (better != than).any():
-        return Decision(one, len(codes), (nan, nan), nan, (_NO_DIFFERENCE,))
+        return Decision(one, len(codes), (nan, nan), (_NO_DIFFERENCE,))
     single = [np.concatenate([*side.values()]) for side in sides]
     tests = tuple(
         chi_square_test(*single) if key == "chi_square" else _TESTS[key](better, than)
         for key in (one.test, *one.also)
     )
     means = float(better.mean()), float(than.mean())
-    return Decision(one, len(codes), means, cohens_dz(better, than), tests)
+    return Decision(one, len(codes), means, tests)
 
 
 _NO_DIFFERENCE = StatisticalTest("none: no differences", 0.0, 1.0, 1.0, nan)

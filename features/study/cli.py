@@ -17,7 +17,7 @@ from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import is_desktop_here, open_page
 from gazerig.robot.cli.examples import complete_shipped
 from gazerig.robot.cli.progress_bar import progress_bar
-from gazerig.robot.cli.terminal import ForceOption, clear_errors, record_signals, say
+from gazerig.robot.cli.terminal import clear_errors, record_signals, say
 from gazerig.robot.model.clock import RealClock
 
 EXAMPLE = """\
@@ -73,35 +73,20 @@ def design(
     example: Annotated[
         bool, typer.Option("--example", help="Write an example with two gazes to STUDY.")
     ] = False,
-    force: ForceOption = False,
 ) -> None:
     """Check a study's YAML."""
     with clear_errors():
         if example:
-            write_file(Path(study), EXAMPLE, force)
+            write_file(Path(study), EXAMPLE)
             print(f"{study}: written; change it, then: gazerig study design {study}")
             return
-        from gazerig.features.study.study_file import load_study
+        from gazerig.features.study.design import load_study
 
         found = load_study(study).design
         print(f"{study}: good: {found.title!r}, conditions {', '.join(found.conditions)}")
         for one in found.hypotheses:
             print(f"hypothesis: {one.measure}: {one.better} > {one.than}, by {one.test}")
         print(f"next: gazerig study run {study} --simulate {found.plan.participants} --data trial")
-
-
-@app.command()
-def film(study: StudyArgument = "study.yaml", data: DataOption = None) -> None:
-    """Make the films of a study's conditions; those that are there already are kept."""
-    with clear_errors():
-        from gazerig.features.study.film import films
-        from gazerig.features.study.study_file import load_study
-
-        found = load_study(study)
-        with progress_bar(remaining=True) as steps:
-            made = films(found, _data_folder(found.path, data) / "films", steps)
-        for key, path in made.items():
-            print(f"{key}: {path}")
 
 
 @app.command()
@@ -129,25 +114,24 @@ def run(
     effect: Annotated[
         float, typer.Option(help="With --simulate: d_z of neighbouring conditions.")
     ] = 0.6,
-    seed: Annotated[int, typer.Option(min=0, help="With --simulate: seed of the answers.")] = 0,
 ) -> None:
     """Run a participant's session in the browser; the same command resumes it."""
     with clear_errors(None, port, mock):
+        from gazerig.features.study.design import load_study
         from gazerig.features.study.film import films
         from gazerig.features.study.journal import Journal, StudyFolder
         from gazerig.features.study.server import StudyServer
         from gazerig.features.study.session import HeadLost, HeadPresenter, Session
         from gazerig.features.study.simulate import simulate_study
-        from gazerig.features.study.study_file import load_study
 
         if (participant == 0) == (simulate == 0):
             raise SetupError("write --participant N, or --simulate N for simulated participants")
         found = load_study(study)
-        folder = StudyFolder(_data_folder(found.path, data))
+        folder = StudyFolder(data or Path(f"{found.path.stem}-data"))
         shown, now_s = found.design.presentation, RealClock().now_s
         with ExitStack() as stack:
             if simulate:
-                simulate_study(found, folder, simulate, effect, seed)
+                simulate_study(found, folder, simulate, effect, seed=0)
                 print(f"next: gazerig study analyse {folder.path}")
                 return
             folder.claim(found)
@@ -203,10 +187,6 @@ def analyse(
             what = f"{one.hypothesis.measure}: {one.hypothesis.better} > {one.hypothesis.than}"
             print(f"{what}: {one.verdict} (corrected p = {one.corrected_p:.3g}, n = {one.n})")
         print(f"{page}: the report; answers.csv next to it")
-
-
-def _data_folder(study: Path, data: Path | None) -> Path:
-    return data or Path(f"{study.stem}-data")
 
 
 def _utc() -> str:

@@ -16,7 +16,6 @@ STUDY = CommandEntry(
             ("study design --example study.yaml", "a study of two gazes to start from"),
             ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
         ),
-        "study film": (("study film study.yaml", "its films, to look at before people come"),),
         "study run": (
             ("study run study.yaml --participant 7", "a session, in the browser"),
             ("study run nakamoto_2 --participant 7 --mock", "on an emulated head"),

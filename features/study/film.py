@@ -19,7 +19,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder
 from gazerig.drivers.files.film_writer import film_writer
 from gazerig.features.lab.simulated_run import simulate
-from gazerig.features.study.study_file import Study
+from gazerig.features.study.design import Study
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of

@@ -20,8 +20,7 @@ import msgspec
 from gazerig.config.parameters import values
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
-from gazerig.features.study.design import Questionnaire, StudyDesign
-from gazerig.features.study.study_file import Study
+from gazerig.features.study.design import Questionnaire, Study, StudyDesign
 
 AnswerValue = int | str
 """A rating 1..points, "first"/"second", or free text."""

@@ -3,7 +3,6 @@
 import csv
 from io import StringIO
 from pathlib import Path
-from textwrap import fill
 
 import jinja2
 import numpy as np
@@ -69,7 +68,7 @@ def _figure(one: Measure, scores: Scores, names: dict[str, str]) -> str:
         axes.scatter(at, np.full(len(at), row), 40.0 * counts, alpha=0.45)
         if values:
             axes.plot(np.mean(values), row, "k|", markersize=24)
-    axes.set_yticks(range(len(names)), [fill(name, 24) for name in names.values()])
+    axes.set_yticks(range(len(names)), [*names.values()])
     axes.set_xlim(0.7, one.points + 0.3)
     axes.set_ylim(len(names) - 0.4, -0.6)
     text = StringIO()

@@ -99,14 +99,14 @@ class StudyServer:
         """Accept a request, redirect it to an address without token, or refuse it in one line."""
         refusal = self._admission.refusal(request)
         if refusal is not None:
-            return _text(403, refusal)
+            return _reply(403, refusal.encode())
         if "token" in request.query:
             return self._admission.with_cookie(request, _HEADERS)
         return await handler(request)
 
     async def _get_file(self, request: web.Request) -> web.Response:
         path = _FILES / (request.match_info["name"] or "participant.html")
-        return _file(path.read_bytes(), mimetypes.guess_type(path)[0] or "")
+        return _reply(200, path.read_bytes(), mimetypes.guess_type(path)[0] or "")
 
     async def _get_page(self, request: web.Request, status: int = 200) -> web.Response:
         return web.json_response(self._session.page_json(), status=status, headers=_HEADERS)
@@ -117,14 +117,14 @@ class StudyServer:
             event = msgspec.json.decode(await request.read(), type=Event)
             applied = self._session.handle(event)
         except (msgspec.DecodeError, UnicodeDecodeError, WrongEvent) as error:
-            return _text(400, str(error))
+            return _reply(400, str(error).encode())
         except SetupError as error:
             self._say(str(error))
             # The message may contain file names, which are not for participants.
-            return _text(507, "not saved")
+            return _reply(507, b"not saved")
         except HeadLost as lost:
             self._lost = lost
-            return _text(503, "not saved")
+            return _reply(503, b"not saved")
         if self._session.closed:
             self._say("the session is over: Ctrl-C ends the program")
         return await self._get_page(request, 200 if applied else 409)
@@ -134,15 +134,11 @@ class StudyServer:
         session = self._session
         presenting = session.place.step == "presentation" and self._films
         if not presenting or request.match_info["page"] != session.page:
-            return _text(404, "there is no film at this address")
+            return _reply(404, b"there is no film at this address")
         body = self._films[session.condition].read_bytes()
         session.film_fetched()
-        return _file(body, "video/webm")
+        return _reply(200, body, "video/webm")
 
 
-def _text(status: int, text: str) -> web.Response:
-    return web.Response(status=status, text=f"{text}\n", headers=_HEADERS)
-
-
-def _file(body: bytes, kind: str) -> web.Response:
-    return web.Response(body=body, content_type=kind, headers=_HEADERS)
+def _reply(status: int, body: bytes, kind: str = "text/plain") -> web.Response:
+    return web.Response(status=status, body=body, content_type=kind, headers=_HEADERS)

@@ -13,15 +13,19 @@ import numpy as np
 
 import gazerig
 from gazerig.errors import Error
-from gazerig.features.study.design import PAIR, Item, participant_order, practice_trials
+from gazerig.features.study.design import (
+    PAIR,
+    Item,
+    Study,
+    participant_order,
+    practice_trials,
+    rig_changes,
+)
 from gazerig.features.study.journal import AnswerValue, Journal, Record
-from gazerig.features.study.study_file import Study
 from gazerig.local_head import LocalHead
 
 WHOLE_SHARE = 0.9
 """Share of a film that must be played for a complete presentation."""
-LONGEST_TEXT = 5000
-"""Longest free text, characters."""
 _HELD_S = 1.0
 """Time without motion after which a head has lost its condition, seconds."""
 _ITEMS = 2
@@ -47,7 +51,7 @@ class HeadPresenter:
 
     def __init__(self, study: Study, head: LocalHead, now_s: Callable[[], float]) -> None:
         self._study, self._head, self._now_s = study, head, now_s
-        self._condition: str | None = None
+        self._rig = study.rig
         self._moved_s = now_s()
 
     def show(self, condition: str) -> None:
@@ -57,11 +61,11 @@ class HeadPresenter:
             HeadLost: it cannot be shown.
         """
         try:
-            if changes := self._study.changes(self._condition, condition):
+            if changes := rig_changes(self._rig, self._study.rigs[condition]):
                 self._head.set(changes)
         except Error as error:
             raise HeadLost(f"the condition cannot be shown: {error}") from error
-        self._condition = condition
+        self._rig = self._study.rigs[condition]
 
     def check(self) -> None:
         """Check that the head moves.
@@ -271,7 +275,7 @@ class Session:
 
     def _is_valid(self, item: Item, value: AnswerValue) -> bool:
         if item.kind == "text":
-            return isinstance(value, str) and len(value) <= LONGEST_TEXT
+            return isinstance(value, str)
         if item.kind == "choice":
             return value in ("first", "second")
         return isinstance(value, int) and 1 <= value <= item.points

@@ -13,10 +13,9 @@ import numpy as np
 from scipy import special
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.design import PAIR, Item, StudyDesign
+from gazerig.features.study.design import PAIR, Item, Study, StudyDesign
 from gazerig.features.study.journal import AnswerValue, Journal, StudyFolder
 from gazerig.features.study.session import Event, Session
-from gazerig.features.study.study_file import Study
 
 BETWEEN_SD, ITEM_SD = 0.8, 1.0
 """Standard deviations of participants, and of an item's answers of one participant."""

@@ -10,7 +10,7 @@ from study_helpers import Program
 
 from gazerig.drivers.files.film_writer import film_writer
 from gazerig.features.study import film
-from gazerig.features.study.study_file import Study, load_study
+from gazerig.features.study.design import Study, load_study
 
 STUDY = """\
 title: Short

@@ -12,9 +12,9 @@ from http.cookiejar import CookieJar
 from pathlib import Path
 from typing import Any
 
+from gazerig.features.study.design import load_study
 from gazerig.features.study.journal import Journal
 from gazerig.features.study.session import Event, Session
-from gazerig.features.study.study_file import load_study
 
 
 def session_of(study: Path, journal: Journal) -> Session:

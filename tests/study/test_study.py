@@ -17,12 +17,11 @@ from gazerig.config.load import ConfigError
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.analyse import analyse_study
-from gazerig.features.study.design import participant_order, williams
+from gazerig.features.study.design import HOME, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
 from gazerig.features.study.report import answers_csv, write_report
 from gazerig.features.study.session import Event, WrongEvent
 from gazerig.features.study.simulate import simulate_study
-from gazerig.features.study.study_file import HOME, load_study
 
 
 @pytest.mark.parametrize("n", range(2, 7))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.features.study import statistics as s
+from gazerig.features.study import analyse as s
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 
