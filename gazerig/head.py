@@ -22,7 +22,7 @@ from gazerig.robot.model.commands import (
     FAR_M,
     Ask,
     Command,
-    ControlTrack,
+    EndTrack,
     Express,
     Frame,
     Jog,
@@ -183,7 +183,7 @@ class Head(ABC):
     # Face and behaviour
 
     def play(
-        self, track: str, *, speed: float = 1.0, times: int = 0, from_s: float = 0.0,
+        self, track: str, *, speed: float = 1.0, times: int = 0, from_s: float | str = 0.0,
         loop: bool = False,
     ) -> Order:  # fmt: skip
         """Play a track, once; the eyes keep their target unless it moves them.
@@ -194,7 +194,7 @@ class Head(ABC):
             track: its name; "" ends all tracks.
             speed: factor on the speed at which it was written.
             times: number of repetitions; 0: as the track defines.
-            from_s: position at which it begins.
+            from_s: position, in s or as the name of a cue, at which it begins.
             loop: whether it repeats until it is ended.
 
         Raises:
@@ -202,41 +202,9 @@ class Head(ABC):
         """
         return self._send(Play(track, speed, times, self._who, from_s, loop))
 
-    def pause_track(self, track: str = "") -> Order:
-        """Pause a track, or all; its joints come to rest on it.
-
-        Raises:
-            Refused: it does not play.
-        """
-        return self._send(ControlTrack("pause", track, who=self._who))
-
-    def resume_track(self, track: str = "") -> Order:
-        """Continue a paused track, or all."""
-        return self._send(ControlTrack("resume", track, who=self._who))
-
-    def seek_track(self, to: float | str, track: str = "") -> Order:
-        """Continue a track, or all, at another position, without a jump.
-
-        Args:
-            to: position in s, or the name of a cue.
-            track: its name; "" for all.
-
-        Raises:
-            Refused: it does not play, or has no such position or cue.
-        """
-        return self._send(ControlTrack("seek", track, to, self._who))
-
-    def set_track_speed(self, speed: float, track: str = "") -> Order:
-        """Change the speed of a track, or all.
-
-        Raises:
-            Refused: it does not play, or the rig cannot play it at this speed.
-        """
-        return self._send(ControlTrack("speed", track, speed, self._who))
-
     def end_track(self, track: str = "") -> Order:
         """End a track, or all; its joints return to gaze."""
-        return self._send(ControlTrack("end", track, who=self._who))
+        return self._send(EndTrack(track, self._who))
 
     def sync_track(self, number: int, position_s: float) -> Order:
         """Give the position of a track by a clock of yours, at most some ten times per second.

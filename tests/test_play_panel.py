@@ -7,7 +7,7 @@ from ticked_rig import Outbox
 
 from gazerig.robot.dashboard.panels.play_panel import PlayPanel, SoundWaves, timeline_html
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.model.commands import ControlTrack, Play
+from gazerig.robot.model.commands import EndTrack, Play
 from gazerig.robot.model.control_source import FINISHED, TrackState
 
 SHOW = TrackState(
@@ -52,7 +52,7 @@ def test_buttons_speed_and_loop() -> None:
     ]  # fmt: skip
 
 
-def test_a_playing_track_is_controlled() -> None:
+def test_a_playing_track_is_ended() -> None:
     drawer = Drawer()
     drawer.show(1.0, SHOW, replace_state(SHOW, number=5, name="tilt", position_s=0.5))
     panel = drawer.panel
@@ -60,21 +60,13 @@ def test_a_playing_track_is_controlled() -> None:
     assert panel.which.options == ("all", "show", "tilt")
     panel.which.receive_input("show", "5")
     drawer.show(1.1, SHOW)  # too soon to be drawn
-    assert panel.seek.value == 0.5
+    assert panel.tracks.current == "tilt"
     drawer.show(1.3, SHOW)
-    assert panel.seek.value == 12.0 and panel.seek.ends == (0.0, 60.0)
-    assert panel.cues.options == ("verse",)
-    panel.actions.receive_input("pause", "5")
-    panel.seek.receive_input(20.0, "5")
-    panel.cues.receive_input("verse", "5")
-    panel.speed.receive_input(0.5, "5")
+    assert panel.tracks.current == "show"
+    panel.end.receive_input("end", "5")
     panel.which.receive_input("all", "5")
-    panel.actions.receive_input("end", "5")
-    assert [asked for asked, _ in drawer.outbox.asked] == [
-        ControlTrack("pause", "show"), ControlTrack("seek", "show", 20.0),
-        ControlTrack("seek", "show", "verse"), ControlTrack("speed", "show", 0.5),
-        ControlTrack("end"),
-    ]  # fmt: skip
+    panel.end.receive_input("end", "5")
+    assert [asked for asked, _ in drawer.outbox.asked] == [EndTrack("show"), EndTrack()]
     drawer.show(9.0)
     assert panel.tracks.current == "none" and "no track plays" in panel.timeline.content
 

@@ -21,7 +21,7 @@ from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import (
     Ask,
     Command,
-    ControlTrack,
+    EndTrack,
     Jog,
     LookAt,
     Play,
@@ -184,10 +184,8 @@ frames:
   - {time_s: 2.0, head_yaw_deg: 0, eyes_yaw_deg: 0, look_at: null}
 """
 COMMANDS: dict[int, Command] = {
-    100: Play("a_show", loop=True), 180: ControlTrack("seek", "a_show", "here"),
-    220: ControlTrack("pause"), 260: Play("wink_brow"), 300: ControlTrack("resume"),
-    340: SyncTrack(1, 1.2), 360: SyncTrack(1, 0.1), 420: ControlTrack("speed", "a_show", 0.6),
-    520: ControlTrack("end", "a_show"),
+    100: Play("a_show", loop=True, from_s="here"), 260: Play("wink_brow"),
+    340: SyncTrack(1, 1.2), 360: SyncTrack(1, 0.1), 520: EndTrack("a_show"),
     550: Speak("absent.wav", 0.3, "mouth", ((0.1, 0.6), (0.2, 0.0))), 600: Play("a_show", from_s=1.0), 680: Stop("test", "me"),
 }  # fmt: skip
 

@@ -262,7 +262,7 @@ def test_other_programs_say_files_and_streams(folder: Path) -> None:
         assert asyncio.run(say(os.getpid())) == "arrived"
 
 
-def test_the_sound_of_a_track_file_follows_its_pauses_and_seeks(folder: Path) -> None:
+def test_the_sound_of_a_track_file_begins_and_ends_with_it(folder: Path) -> None:
     show = "description: x\nsound: long.wav\nframes: [{time_s: 50, head_yaw_deg: 3}]\nfit: slow\n"
     (folder / "show.yaml").write_text(show, "utf-8")
     text = (folder / "rig.yaml").read_text("utf-8")
@@ -270,15 +270,13 @@ def test_the_sound_of_a_track_file_follows_its_pauses_and_seeks(folder: Path) ->
     with opened(folder) as head:
         assert head.play("show").reply.track.duration_s >= 59.9
         wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
-        head.pause_track("show")
+        head.end_track("show")
         wait_for(lambda: is_silent(head))
-        head.resume_track("show")
-        wait_for(lambda: not is_silent(head))
-        head.seek_track(30.0, "show")
+        head.play("show", from_s=30.0)
         wait_for(lambda: (sound_s(head) or 0.0) > 30.0)
         track = head.state.tracks[-1]
         assert track.position_s == pytest.approx(sound_s(head), abs=2.0)
-        head.set_track_speed(0.5, "show")
+        head.play("show", speed=0.5)
         wait_for(lambda: is_silent(head))
         assert "without its sound, which plays at speed 1" in head.state.tracks[-1].limited
     (folder / "rig.yaml").write_text(text, "utf-8")

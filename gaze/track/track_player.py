@@ -3,7 +3,7 @@
 The offsets of a track begin from rest and return to rest. When another one replaces it, or it ends
 early, its offset returns to rest on a fifth-order polynomial that begins with the present offset,
 speed and acceleration, and the next track is added to that. A seek continues from the present
-motion in the same manner. A pause and a new speed change the speed of the track's clock smoothly.
+motion in the same manner; a small error against another clock changes the speed of the track's own.
 Channels that a track owns blend from gaze to the track and back. Each of these transitions takes as
 long as the limits of the joints require.
 """
@@ -108,14 +108,14 @@ class Fade:
 class Voice:
     """One track that plays.
 
-    clock: position by the time of the loop; wanted: speed without pause and correction
+    clock: position by the time of the loop; wanted: speed without correction
     ends: whether it has ended and only blends out
     passed: names of the cues that it has passed since they were taken
     """
 
     def __init__(self, number: int, played: PlayedTrack, clock: TrackClock, loop: bool) -> None:
         self.number, self.played, self.clock, self.loop = number, played, clock, loop
-        self.wanted, self.paused, self.ends = played.speed, False, False
+        self.wanted, self.ends = played.speed, False
         self.passed: list[str] = []
         self._fade: Fade | None = None
         self._corrected_s: float | None = None
@@ -209,33 +209,6 @@ class Voice:
         _, speed, acceleration = self._sample(clock, fade, t_s, time_s)
         return self.played.stretch(speed, acceleration)
 
-    def set_speed(self, t_s: float, speed: float) -> None:
-        """Change the speed; of a paused track for its next start."""
-        self.wanted = speed
-        if not self.paused:
-            self._change_speed(t_s, speed)
-
-    def _change_speed(self, t_s: float, speed: float) -> None:
-        """Change the speed of the clock, along the track, as fast as the limits permit."""
-        self._corrected_s, time_s = None, _CHANGE_S
-        for _ in range(_ATTEMPTS):
-            clock = self.clock.change_speed(t_s, speed, time_s)
-            excess = self._excess(clock, self._fade, t_s, time_s)
-            if excess <= 1.0:
-                break
-            time_s = min(time_s * max(_LONGER, excess), _LONGEST_S)
-        self.clock = clock
-
-    def pause(self, t_s: float) -> None:
-        """Come to rest on the track."""
-        self.paused = True
-        self._change_speed(t_s, 0.0)
-
-    def resume(self, t_s: float) -> None:
-        """Continue at the speed before the pause."""
-        self.paused = False
-        self._change_speed(t_s, self.wanted)
-
     def seek(self, t_s: float, position_s: float, catches_up: bool = False) -> None:
         """Continue at another position, from the present motion.
 
@@ -245,12 +218,12 @@ class Voice:
         now = self.state(t_s)
         position_s = min(position_s, self.played.length_s) + self.ahead_s
         self._corrected_s = None
-        rate = 0.0 if self.paused else self.wanted
+        rate = self.wanted
         runs = TrackClock(t_s, position_s, rate)
         least_s = self.played.blend_s[1]
         rests = TrackClock(t_s, position_s, 0.0)
         least_s *= max(1.0, self._excess(rests, self._away(rests, now, t_s, least_s), t_s, least_s))
-        for from_rest in (False, True) if rate else (True,):
+        for from_rest in (False, True):
             time_s = least_s
             for _ in range(_ATTEMPTS if from_rest else 2):
                 clock = runs
@@ -291,7 +264,7 @@ class Voice:
             off_s = (off_s + half_s) % (2.0 * half_s) - half_s
         if abs(off_s) >= SYNC_S:
             self.seek(t_s, max(0.0, position_s), catches_up=True)
-        elif abs(off_s) >= _SYNCED_S and not self.paused:
+        elif abs(off_s) >= _SYNCED_S:
             share = min(max(off_s / _CORRECTED_IN_S, -_SYNC_SHARE), _SYNC_SHARE)
             self.clock = self.clock.change_speed(t_s, self.wanted * (1.0 + share), _CHANGE_S)
             self._corrected_s = t_s + off_s / (share * self.wanted)

@@ -38,7 +38,7 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import MAX_SPEECH_S, check_command
-from gazerig.robot.model.commands import Command, ControlTrack, Say, SetLevel, Speak, SyncTrack
+from gazerig.robot.model.commands import Command, EndTrack, Say, SetLevel, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, TrackState
 from gazerig.robot.model.reply import CommandTaker
 
@@ -340,7 +340,7 @@ class RunVoice:
         self._tick = tick
         seen = (
             tick.stopped,
-            *[(one.number, one.paused, one.speed, one.end_reason) for one in tick.tracks],
+            *[(one.number, one.end_reason) for one in tick.tracks],
         )
         if seen != self._seen:
             self._seen = seen
@@ -410,10 +410,10 @@ class RunVoice:
         if self._stream is not None:
             self._end_stream(tick)
         elif self._played is not None:
-            self._try(ControlTrack("end", self._played.name))
+            self._try(EndTrack(self._played.name))
 
     def _follow_tracks(self, player: SoundPlayer, tick: Tick | None, now_s: float) -> None:
-        """Start, stop, seek or synchronise the sound of the newest track that has one."""
+        """Start, stop or synchronise the sound of the newest track that has one."""
         wanted, stream = _sounding_track(tick), self._stream
         if stream is not None and wanted is not None and wanted.number < stream.track:
             wanted = None  # the tick is older than the stream
@@ -483,7 +483,7 @@ class RunVoice:
         if level in self._rig().levels:
             self._try(SetLevel(level, 0.0))
         if tick is not None and not _has_ended(stream.track, tick):
-            self._try(ControlTrack("end", SPEECH))
+            self._try(EndTrack(SPEECH))
 
     def _try(self, command: Command) -> None:
         """Queue a command; a refusal is not important, as the next one follows."""
@@ -506,11 +506,7 @@ def _sounding_track(tick: Tick | None) -> TrackState | None:
     """Return the newest track whose sound is to be heard."""
     if tick is None or tick.stopped:
         return None
-    found = [
-        one
-        for one in tick.tracks
-        if one.sound and one.is_playing and not one.paused and one.speed == 1.0
-    ]
+    found = [one for one in tick.tracks if one.sound and one.is_playing and one.speed == 1.0]
     return max(found, key=lambda one: one.number, default=None)
 
 

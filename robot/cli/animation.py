@@ -11,11 +11,11 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.sound.params import KINDS
-from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_TRACK, TrackAction
+from gazerig.robot.model.commands import NO_TRACK
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -96,15 +96,10 @@ def play(
             help="Number of repetitions; 0: as the track defines.",
         ),
     ] = 0,
-    from_s: Annotated[
-        float, typer.Option("--from", min=0.0, max=MAX_DURATION_S, help="Start at S seconds.")
-    ] = 0.0,
+    start: Annotated[
+        str, typer.Option("--from", metavar="S|CUE", help="Start at a time or a cue.")
+    ] = "0",
     loop: Annotated[bool, typer.Option("--loop", help="Repeat it until it is ended.")] = False,
-    pause: Annotated[bool, typer.Option("--pause", help="Pause the tracks that play.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue paused tracks.")] = False,
-    seek: Annotated[
-        str | None, typer.Option(metavar="S|CUE", help="Continue at a time or a cue.")
-    ] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the tracks.")] = False,
     pid: PidOption = None,
 ) -> None:
@@ -113,19 +108,13 @@ def play(
         if track is None and (speed, count, from_s, loop) != (1.0, 0, 0.0, False):
             raise SetupError("--speed, --count, --from and --loop need a track, e.g. nod")
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
-        action: TrackAction | None = (
-            "pause" if pause else "resume" if resume else "seek" if seek is not None else None
-        )
-        if action is not None:
-            value = seek if seek is not None else 0.0
-            with contextlib.suppress(ValueError):
-                value = float(value)
-            say(rig.control_track(action, track or "", value).text() or "done")
-            return
         if track is None or listed:
             for one in rig.tracks():
                 say(_track_line(one))
             return
+        from_s: float | str = start
+        with contextlib.suppress(ValueError):
+            from_s = float(start)
         say(rig.play("" if track == NO_TRACK else track, speed, count, from_s, loop).text())
 
 

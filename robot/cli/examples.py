@@ -88,7 +88,6 @@ EXAMPLES: dict[str, Examples] = {
         ("ctl play nod", "nod twice; the eyes stay on the person"),
         ("ctl play laugh --count 6 --speed 1.2", "longer and faster"),
         ("ctl play --list", "the tracks, and whether this rig can play them"),
-        ("ctl play --pause", "pause all; --resume continues, --seek 12.5 or --seek CUE goes there"),
         ("ctl play none", "end all"),
     ),
     "talk": (

@@ -20,7 +20,7 @@ from gazerig.robot.model.commands import (
     Ask,
     Command,
     ControlCommand,
-    ControlTrack,
+    EndTrack,
     Express,
     Jog,
     LookAtPerson,
@@ -140,8 +140,8 @@ class CommandExecutor:
                 if self._stop.stop_reason:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 return self._play(command, t_s)
-            case ControlTrack():
-                return self._tracks.control(command, t_s, self._guard.limits)
+            case EndTrack():
+                return self._tracks.end(command, t_s, self._guard.limits)
             case SyncTrack():
                 self._tracks.sync(command, t_s)
             case Express(name, strength):

@@ -13,7 +13,7 @@ from gazerig.gaze.track.track import KEEP, MAX_TRACKS, Track, TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
 from gazerig.robot.control.joint_latency import JointLatency
-from gazerig.robot.model.commands import ControlTrack, Play, Speak, SyncTrack
+from gazerig.robot.model.commands import EndTrack, Play, Speak, SyncTrack
 from gazerig.robot.model.control_source import FINISHED, SHOWN_S, TrackState
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.reply import CommandReply, TrackReply
@@ -145,8 +145,6 @@ class TrackChoices:
             state, passed = self._playing[number], voice.passed
             self._playing[number] = state._replace(
                 position_s=voice.position_s(t_s) - voice.ahead_s,
-                speed=voice.wanted,
-                paused=voice.paused,
                 cue=passed[-1] if passed else state.cue,
                 cues=state.cues + len(passed),
             )
@@ -178,7 +176,7 @@ class TrackChoices:
         if isinstance(made, TrackRefused):
             raise ValueError(f"{command.track}: {made}")
         length_s = max(made.motion.duration_s, self._sounds.get(made.track.sound, 0.0))
-        if command.from_s > length_s:
+        if self._start_s(command) > length_s:
             raise ValueError(f"{command.track} lasts {length_s:.2f} s: from_s must be less")
 
     def prepare(self, command: Speak) -> dict[str, TrackMotions]:
@@ -268,6 +266,18 @@ class TrackChoices:
             track.sound, tuple(track.cues.items()), track.layers,
         )  # fmt: skip
 
+    def _start_s(self, command: Play) -> float:
+        """Return the position at which a track begins.
+
+        Raises:
+            ValueError: It has no such cue; the message lists the available ones.
+        """
+        cues, start = self._tracks[command.track].cues, command.from_s
+        if isinstance(start, str) and start not in cues:
+            there = ", ".join(cues) or "none"
+            raise ValueError(f"{command.track} has no cue {start!r}; available: {there}")
+        return cues[start] if isinstance(start, str) else start
+
     def play(
         self, command: Play, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
     ) -> CommandReply:
@@ -299,7 +309,9 @@ class TrackChoices:
         track, loop = self._tracks[command.track], command.loop or made.track.loop
         for voice in replaced:
             self._end_state(voice.number, f"another track: {command.track}", t_s)
-        self._player.play(fitted.track, self._number, t_s, fade_s, wait_s, command.from_s, loop)
+        self._player.play(
+            fitted.track, self._number, t_s, fade_s, wait_s, self._start_s(command), loop
+        )
         reply = TrackReply(
             command.track,
             wait_s + fitted.track.duration_s,
@@ -331,63 +343,15 @@ class TrackChoices:
             voice.motion.owned for voice in self._player.overlapping(made.motion)
         )
 
-    def control(
-        self, command: ControlTrack, t_s: float, limits: Sequence[JointLimit]
-    ) -> CommandReply:
-        """Pause, resume, seek, speed up, slow down or end tracks that play."""
+    def end(self, command: EndTrack, t_s: float, limits: Sequence[JointLimit]) -> CommandReply:
+        """End tracks that play; to end all is done with none."""
         voices = [
             voice for voice in self._player.voices if command.track in ("", voice.played.name)
         ]
         if not voices and command.track:
             there = ", ".join(voice.played.name for voice in self._player.voices) or "none"
             return CommandReply(f"{command.track} is not playing; playing: {there}")
-        if not voices and command.action != "end":  # to end all tracks is done with none
-            return CommandReply(f"no track is playing: play one first, then {command.action}")
-        if command.action == "end":
-            return self._end(voices, t_s, limits, command.who)
-        try:
-            changes = [self._change(voice, command, limits) for voice in voices]
-        except ValueError as refused:
-            return CommandReply(str(refused))
-        for voice, value in zip(voices, changes, strict=True):
-            match command.action:
-                case "pause":
-                    voice.pause(t_s)
-                case "resume":
-                    voice.resume(t_s)
-                case "seek":
-                    voice.seek(t_s, value)
-                case "speed":
-                    voice.set_speed(t_s, value)
-        return CommandReply()
-
-    def _change(self, voice: Voice, command: ControlTrack, limits: Sequence[JointLimit]) -> float:
-        """Return the position or the speed that a track can take.
-
-        Raises:
-            ValueError: It has no such position, or the speed is too high.
-        """
-        name, value = voice.played.name, command.value
-        if command.action == "seek":
-            cues = self._tracks[name].cues
-            if isinstance(value, str):
-                if value not in cues:
-                    there = ", ".join(cues) or "none"
-                    raise ValueError(f"{name} has no cue {value!r}; available: {there}")
-                value = cues[value]
-            if value > (length_s := voice.played.length_s):
-                raise ValueError(f"{name} lasts {length_s:.2f} s, not {value:g}")
-        elif command.action == "speed":
-            share, speed = self._params.limit_share, float(value)
-            others = [one for one in self._player.voices if one is not voice]
-            limits = self._remaining(limits, others)
-            value, joint = self._fit.fit_speed(
-                self._tracks[name], voice.played, speed, limits, share
-            )
-            slower = f"slower by {speed / value:.2f} for {joint}" if joint else ""
-            limited = _limits_text(slower, self._tracks[name].sound, value)
-            self._playing[voice.number] = self._playing[voice.number]._replace(limited=limited)
-        return float(value)
+        return self._end(voices, t_s, limits, command.who)
 
     def sync(self, command: SyncTrack, t_s: float) -> None:
         """Correct the position of a track by another clock; an ended track is ignored."""

@@ -13,7 +13,7 @@ from gazerig.robot.model.commands import (
     Ask,
     Command,
     ControlCommand,
-    ControlTrack,
+    EndTrack,
     Express,
     Jog,
     Look,
@@ -33,7 +33,6 @@ from gazerig.robot.model.commands import (
     SyncTrack,
     Talk,
     TalkOrder,
-    TrackAction,
     Tune,
 )
 from gazerig.robot.model.types import JOINT_NAME
@@ -103,8 +102,13 @@ def check_command(command: Command) -> None:
         case SetLevel(level, value):
             _check_share("a level", "value", level, value)
         case Play(track, speed, times, who, from_s, loop, lead_s, sound_s):
-            _check_track(track, speed)
-            _check_position(from_s)
+            _check_track(track)
+            if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:
+                raise ValueError(
+                    f"the speed of a track must be a number {MIN_SPEED:g}..{MAX_SPEED:g}"
+                )
+            if not (isinstance(from_s, str) and len(from_s) <= MAX_WORDS):
+                _check_position(from_s)
             _check_position(sound_s)
             if not isinstance(loop, bool):
                 raise ValueError("loop must be true or false")
@@ -112,13 +116,8 @@ def check_command(command: Command) -> None:
             if type(times) is not int or not 0 <= times <= MAX_COUNT:
                 raise ValueError(f"the times of a track must be a whole number 0..{MAX_COUNT}")
             _check_who(who)
-        case ControlTrack(action, track, value, who):
-            if action not in get_args(TrackAction):
-                actions = ", ".join(get_args(TrackAction))
-                raise ValueError(f"action {action!r:.40}: expected one of {actions}")
-            _check_track(track, value if action == "speed" else 1.0)
-            if action != "speed" and not (isinstance(value, str) and len(value) <= MAX_WORDS):
-                _check_position(value)
+        case EndTrack(track, who):
+            _check_track(track)
             _check_who(who)
         case SyncTrack(number, position_s, clock):
             if type(number) is not int or not 1 <= number <= MAX_NUMBER:
@@ -157,19 +156,14 @@ def check_command(command: Command) -> None:
                 raise ValueError("changes must be pairs of a dotted key and a value")
 
 
-def _check_track(track: object, speed: object) -> None:
+def _check_track(track: object) -> None:
     if not isinstance(track, str) or len(track) > MAX_WORDS:
         raise ValueError("a track must be given by its name")
-    if not _is_within(speed, MAX_SPEED) or speed < MIN_SPEED:  # type: ignore[operator]
-        raise ValueError(f"the speed of a track must be a number {MIN_SPEED:g}..{MAX_SPEED:g}")
 
 
 def _check_position(position_s: object) -> None:
     if not _is_within(position_s, MAX_DURATION_S) or position_s < 0.0:  # type: ignore[operator]
-        raise ValueError(
-            f"a position in a track must be a number of seconds 0..{MAX_DURATION_S:g}, or for a "
-            "seek the name of a cue"
-        )
+        raise ValueError(f"a position in a track must be a number of seconds 0..{MAX_DURATION_S:g}")
 
 
 def _check_look(command: Look) -> None:
@@ -392,7 +386,7 @@ def from_recorded_json(data: dict[str, object]) -> Command:
 
 def set_client(command: Command, who: str) -> Command:
     """Return a command with its client's name; commands without that field stay unchanged."""
-    named = ControlCommand | Play | ControlTrack | Say | Speak | Talk | Renew | Stop | Resume
+    named = ControlCommand | Play | EndTrack | Say | Speak | Talk | Renew | Stop | Resume
     if isinstance(command, named):
         return command._replace(who=who[:MAX_WORDS])
     return command

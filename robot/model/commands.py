@@ -161,7 +161,7 @@ class Play(NamedTuple):
         speed: Factor on its defined speed.
         times: Number of repetitions, 0 for the track's own.
         who: Name of the client.
-        from_s: Position in the track at which it begins.
+        from_s: Position in the track, in s or as the name of a cue, at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
         lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
             execution for the recording.
@@ -172,28 +172,21 @@ class Play(NamedTuple):
     speed: float = 1.0
     times: int = 0
     who: str = ""
-    from_s: float = 0.0
+    from_s: float | str = 0.0
     loop: bool = False
     lead_s: tuple[float, ...] | None = None
     sound_s: float = 0.0
 
 
-TrackAction = Literal["pause", "resume", "seek", "speed", "end"]
-
-
-class ControlTrack(NamedTuple):
-    """Control tracks that are playing.
+class EndTrack(NamedTuple):
+    """End tracks that are playing.
 
     Attributes:
-        action: Action on them.
         track: Name of the track, "" for all.
-        value: Position in s or name of a cue for seek, factor for speed.
         who: Name of the client.
     """
 
-    action: TrackAction
     track: str = ""
-    value: float | str = 0.0
     who: str = ""
 
 
@@ -342,7 +335,7 @@ Command = (
     | Express
     | SetLevel
     | Play
-    | ControlTrack
+    | EndTrack
     | SyncTrack
     | Talk
     | Say
@@ -361,7 +354,7 @@ COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
     "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
     "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
-    "play": Play, "control_track": ControlTrack, "sync_track": SyncTrack,
+    "play": Play, "end_track": EndTrack, "sync_track": SyncTrack,
     "talk": Talk, "say": Say, "speak": Speak, "opponent": MoveOpponent,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip

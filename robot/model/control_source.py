@@ -56,8 +56,7 @@ class TrackState(NamedTuple):
         name: Its name.
         position_s: Position in the track; below 0 while the motion begins before the sound.
         duration_s: Its duration at its own speed.
-        speed: Factor on that speed, also while it is paused.
-        paused: Whether it is paused.
+        speed: Factor on that speed.
         loop: Whether it repeats until it is ended.
         owns: Joints that gaze does not move meanwhile.
         who: Name of the client, "" if unknown.
@@ -76,7 +75,6 @@ class TrackState(NamedTuple):
     position_s: float = 0.0
     duration_s: float = 0.0
     speed: float = 1.0
-    paused: bool = False
     loop: bool = False
     owns: tuple[str, ...] = ()
     who: str = ""

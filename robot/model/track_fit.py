@@ -448,24 +448,6 @@ class TrackFit:
                 )
         return left
 
-    def fit_speed(
-        self, track: Track, played: PlayedTrack, speed: float, limits: Sequence[JointLimit],
-        share: float,
-    ) -> tuple[float, str]:  # fmt: skip
-        """Return another speed for a track that plays, and the joint that reduces it.
-
-        Raises:
-            TrackRefused: The speed is too high, and the track must not be slowed.
-        """
-        samples = played.motion.samples.scale(np.array(played.sizes), speed)
-        matrix = self._matrix_of(played.motion)
-        factor, joint, text = self._too_fast(samples, limits, share, matrix)
-        if factor <= 1.0 + _ROUNDING:
-            return speed, ""
-        if track.fit != "slow":
-            raise TrackRefused(text)
-        return speed / factor, joint
-
     def _matrix_of(self, motion: TrackMotion) -> Floats:
         """Return joint angles per offset: eyes that a track owns do not compensate the head."""
         owned = [i for i in self._eyes if i in motion.owned]

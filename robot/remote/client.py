@@ -26,7 +26,6 @@ from gazerig.robot.model.commands import (
     Ask,
     Command,
     ControlCommand,
-    ControlTrack,
     Express,
     Jog,
     LookAt,
@@ -38,7 +37,6 @@ from gazerig.robot.model.commands import (
     Stop,
     SyncTrack,
     Talk,
-    TrackAction,
     Value,
 )
 from gazerig.robot.model.parameter import JsonValue, ParamChange, Parameter, SavedFile
@@ -388,7 +386,7 @@ class RobotClient:
         self._command(SetLevel(level, value))
 
     def play(
-        self, track: str, speed: float = 1.0, times: int = 0, from_s: float = 0.0,
+        self, track: str, speed: float = 1.0, times: int = 0, from_s: float | str = 0.0,
         loop: bool = False,
     ) -> CommandReply:  # fmt: skip
         """Play a track; "" ends all tracks.
@@ -397,7 +395,7 @@ class RobotClient:
             track: Name of the track.
             speed: Factor on the track's own speed.
             times: Number of repetitions; 0: as the track defines.
-            from_s: Position at which it begins.
+            from_s: Position, in s or as the name of a cue, at which it begins.
             loop: Whether it repeats until it is ended.
 
         Returns:
@@ -408,21 +406,6 @@ class RobotClient:
                 manual control or the rig is stopped.
         """
         return self._command(Play(track, speed, times, self.who, from_s, loop))
-
-    def control_track(
-        self, action: TrackAction, track: str = "", value: float | str = 0.0
-    ) -> CommandReply:
-        """Pause, resume, seek, change the speed of or end tracks that play.
-
-        Args:
-            action: Action on them.
-            track: Name of the track; "" for all.
-            value: Position in s or cue for seek; factor for speed.
-
-        Raises:
-            RequestRejected: no such track plays, or it has no such position, cue or speed.
-        """
-        return self._command(ControlTrack(action, track, value, self.who))
 
     def sync_track(self, number: int, position_s: float) -> None:
         """Give the position of a track by another clock, at most some ten times per second."""

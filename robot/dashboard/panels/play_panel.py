@@ -2,8 +2,6 @@
 
 import threading
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
-from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +11,7 @@ from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import LINE_PX, box, heading, line, note, svg, text
 from gazerig.robot.dashboard.widgets.widget import Buttons
 from gazerig.robot.dashboard.widgets.widgets import Container
-from gazerig.robot.model.commands import NO_TRACK, ControlTrack, Play
+from gazerig.robot.model.commands import NO_TRACK, EndTrack, Play
 from gazerig.robot.model.control_source import FINISHED, TrackState
 from gazerig.robot.model.types import Snapshot
 
@@ -21,7 +19,6 @@ ALL = "all"
 """Choice of all tracks that play."""
 _SPEEDS, _SPEED_STEP = (0.25, 4.0), 0.05
 """Slowest and fastest speed of tracks, and its step."""
-_SEEK_STEP_S = 0.1
 _BINS = 160
 _ROW_PX, _WAVE_PX, _BAR_PX = 62.0, 22.0, 7.0
 _DRAWN_EVERY_S = 0.2
@@ -53,15 +50,10 @@ class PlayPanel:
         self.loops = place.checkbox("loop", value=False, hint="repeat until it is ended", order=3)
         self.timeline = place.html(note("no track plays"), order=4)
         self.which = place.choice("track", (ALL,), order=5)
-        self.actions = place.buttons("", ("pause", "resume", "end"), order=6)
-        self.seek = place.slider("seek, s", (0.0, 1.0), _SEEK_STEP_S, 0.0, order=7)
-        self.cues = place.buttons("cue", (), order=8)
-        self.list = place.section("all tracks", is_open=False, order=9).html()
+        self.end = place.buttons("", ("end",), order=6)
+        self.list = place.section("all tracks", is_open=False, order=7).html()
         self.tracks.on_press(self._play)
-        self.actions.on_press(lambda action, who: self._control(action, 0.0, who))
-        self.seek.on_change(partial(self._control, "seek"))
-        self.cues.on_press(lambda cue, who: self._control("seek", cue, who))
-        self.speed.on_change(partial(self._control, "speed"))
+        self.end.on_press(lambda _, who: self._end(who))
         self._draw_list()
 
     def add_infos(self, infos: Iterable[Mapping[str, object]]) -> None:
@@ -79,21 +71,15 @@ class PlayPanel:
         self.tracks.current = playing[-1].name if playing else NO_TRACK
         self.which.options = (ALL, *dict.fromkeys(track.name for track in playing))
         self.timeline.content = timeline_html(shown, self._infos, self._waves)
-        chosen = [track for track in playing if self.which.value in (ALL, track.name)]
-        if chosen:
-            newest = chosen[-1]
-            self.seek.ends = (0.0, ceil(newest.duration_s / _SEEK_STEP_S) * _SEEK_STEP_S)
-            self.seek.value = round(min(max(newest.position_s, 0.0), newest.duration_s), 1)
-            self.cues.options = [name for name, _ in _cues(self._infos.get(newest.name, {}))]
 
     def _play(self, name: str, who: str) -> None:
         track = "" if name == NO_TRACK else name
         self._outbox.command(Play(track, float(self.speed.value), loop=self.loops.value), who)
 
-    def _control(self, action: str, value: float | str, who: str) -> None:
+    def _end(self, who: str) -> None:
         track = "" if self.which.value == ALL else self.which.value
         if len(self.which.options) > 1:  # something plays
-            self._outbox.command(ControlTrack(action, track, value), who)  # type: ignore[arg-type]
+            self._outbox.command(EndTrack(track), who)
 
     def _draw_list(self) -> None:
         if self.tracks is not None and self._infos:
@@ -129,8 +115,11 @@ def _row(
     """Return one track: its name and time, sound, bar with cues, layers and owned joints."""
     lasts_s = max(track.duration_s, 1e-3)
     x = min(max(track.position_s / lasts_s, 0.0), 1.0) * LINE_PX
-    state = track.end_reason and "ended" or track.paused and "paused" or ""
-    extra = [state, "loop" if track.loop else "", f"x{track.speed:g}" if track.speed != 1 else ""]
+    extra = [
+        "ended" if track.end_reason else "",
+        "loop" if track.loop else "",
+        f"x{track.speed:g}" if track.speed != 1 else "",
+    ]
     yield text(0.0, top + 12.0, " ".join([track.name, *filter(None, extra)]))
     clock = f"{max(track.position_s, 0.0):.1f} of {track.duration_s:.1f} s"
     if track.clock != "loop":
