@@ -6,15 +6,12 @@ import tarfile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 COLOUR_FX = 3080.0  # px of a frame of 3840 x 2160
 DISTORTION = (8.1, -61.0, 0.0004, -0.0003, 152.0, 7.95, -60.2, 150.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """Of the usual rational model: k1 k2 p1 p2 k3 k4 k5 k6, thin prism and tilt."""
-_NONE = np.eye(3).tolist()
 
 
-def calibrated(dai: Any, stereo: bool = True, colour: bool = True) -> Any:
+def calibrated(dai: Any, colour: bool = True) -> Any:
     """Return the calibration of an OAK-D: what its memory would hold."""
     handler, socket = dai.CalibrationHandler(), dai.CameraBoardSocket
     handler.setDeviceName("OAK-D")
@@ -25,12 +22,6 @@ def calibrated(dai: Any, stereo: bool = True, colour: bool = True) -> Any:
         handler.setDistortionCoefficients(socket.CAM_A, list(DISTORTION))
         handler.setFov(socket.CAM_A, 68.8)
         handler.setLensPosition(socket.CAM_A, 130)
-    if stereo:
-        K = [[800.0, 0.0, 640.0], [0.0, 800.0, 400.0], [0.0, 0.0, 1.0]]
-        for side in (socket.CAM_B, socket.CAM_C):
-            handler.setCameraIntrinsics(side, K, 1280, 800)
-        handler.setCameraExtrinsics(socket.CAM_B, socket.CAM_C, _NONE, [-7.5, 0.0, 0.0])
-        handler.setCameraExtrinsics(socket.CAM_C, socket.CAM_A, _NONE, [3.75, 0.0, 0.0])
     return handler
 
 

@@ -4,10 +4,11 @@ import threading
 
 import numpy as np
 import pytest
-from oak_packets import calibrated, face_archive
+from oak_packets import face_archive
 from oak_stand_in import Message, Rig, info, real, sdk
 
 from gazerig.drivers.camera.oak.discovery import UDEV_RULE, find_oak
+from gazerig.drivers.camera.oak.face_archive import kind_of, read_archive
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.errors import CameraError
 
@@ -72,27 +73,17 @@ def rig():
     return Rig()
 
 
-def test_e97_camera_without_stereo_goes_on_without_depth(rig):
+def test_e97_camera_without_stereo_is_refused_where_depth_is_wanted(rig):
     rig.device.sockets = rig.device.sockets[:1]
-    source = rig.opened()
-    (reported,) = source.events()
-    assert "no stereo pair (nothing at CAM_B and CAM_C)" in reported
-    assert "oak.depth: false" in reported and not rig.asked.depth
-    source.close()
-    plain = rig.opened(depth=False)
-    assert plain.events() == ()
-
-
-def test_stereo_that_is_not_calibrated_goes_on_without_depth(rig):
-    rig.device.calibration = calibrated(real(), stereo=False)
-    source = rig.opened()
-    (reported,) = source.events()
-    assert "stereo pair is not calibrated" in reported and not rig.asked.depth
+    with pytest.raises(CameraError, match=r"OAK-D has no camera at CAM_B, CAM_C: set oak.depth"):
+        rig.source().open()
+    assert rig.device.closed
+    assert rig.opened(depth=False).events() == ()
 
 
 def test_camera_without_colour_is_refused(rig):
     rig.device.sockets = rig.device.sockets[1:]
-    with pytest.raises(CameraError, match=r"OAK-D has no camera at socket CAM_A.*use a model"):
+    with pytest.raises(CameraError, match="OAK-D has no camera at CAM_A: use a model with colour"):
         rig.source().open()
     assert rig.device.closed
 
@@ -110,16 +101,17 @@ def test_camera_without_colour_is_refused(rig):
         ({"outputs": ("cls", "obj", "bbox")}, "it has no outputs kps_8, kps_16, kps_32"),
     ],
 )
-def test_face_model_of_another_kind_is_told_and_left_out(rig, tmp_path, archive, told):
-    rig.device.platform = getattr(real().Platform, archive.pop("platform", "RVC4"))
-    file = face_archive(tmp_path / "faces.tar.xz", **archive)
-    source = rig.opened(face_model=str(file))
-    reported = source.events()
-    assert len(reported) == bool(told)
-    assert bool(rig.asked.face_model) == (not told)
-    for line in reported:
-        assert told in line and "faces are found on the host" in line
-        assert f"converted for {rig.device.platform.name}" in line and "\n" not in line
+def test_face_model_of_another_kind_is_refused(tmp_path, archive, told):
+    dai = real()
+    platform = getattr(dai.Platform, archive.pop("platform", "RVC4"))
+    file = str(face_archive(tmp_path / "faces.tar.xz", **archive))
+    if not told:
+        assert kind_of(read_archive(dai, file), platform, file) in ("yunet", "yolo")
+        return
+    with pytest.raises(CameraError) as caught:
+        kind_of(read_archive(dai, file), platform, file)
+    line = str(caught.value)
+    assert told in line and f"converted for {platform.name}" in line and "\n" not in line
 
 
 def test_usb_2_is_refused_where_that_is_wanted():

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gazerig.drivers.camera.depth_roi import resize_depth, to_metres
-from gazerig.drivers.camera.oak.abilities import kind_of, read_archive
+from gazerig.drivers.camera.oak.face_archive import kind_of, read_archive
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.yunet_decoder import FoundFaces, yunet_faces
 from gazerig.drivers.camera.pinhole import Intrinsics

@@ -8,7 +8,6 @@ from math import inf
 from typing import Any
 
 from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
-from gazerig.drivers.camera.oak.abilities import full_line_text, supported_settings, usb2_text
 from gazerig.drivers.camera.oak.calibration import raw_distortion
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
 from gazerig.drivers.camera.oak.params import OakParams
@@ -31,6 +30,10 @@ _SLICE = timedelta(milliseconds=100)  # longest delay of a stop request
 # The camera's stamp in host time is used if it is not older than this and not in the future.
 _OLDEST_STAMP_S = 1.0
 
+_USB2_BYTES_S = 30e6
+"""Capacity of a USB 2 line for frames."""
+_COLOUR_BYTES, _DEPTH_BYTES = 1.5, 2.0  # per pixel, NV12 and RAW16
+
 
 class OakSource:
     """An OAK-D as a source of frames; nothing is imported or opened before ``open``.
@@ -49,7 +52,7 @@ class OakSource:
         on_device: bool = True,
         load: Callable[[], Any] = load_depthai,
     ) -> None:
-        self._params = self._asked = params
+        self._params = params
         self._nodes = nodes
         self._on_device = on_device
         self._load = load
@@ -76,7 +79,7 @@ class OakSource:
         """
         self.close()
         self._dai = self._load()
-        self._asked, self._slow_line, self._face_fault_told = self._params, None, False
+        self._slow_line, self._face_fault_told = None, False
         try:
             if self._on_device:
                 info = find_oak(self._dai, self._params.device)
@@ -88,8 +91,8 @@ class OakSource:
                 self._pipeline = self._dai.Pipeline(self._device)
             else:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
-            outputs = self._nodes(self._dai, self._pipeline, self._asked)
-            self._queue = join_outputs(self._dai, self._pipeline, outputs, self._asked.rate_hz)
+            outputs = self._nodes(self._dai, self._pipeline, self._params)
+            self._queue = join_outputs(self._dai, self._pipeline, outputs, self._params.rate_hz)
             self._face_fault = outputs.face_fault
             self._pipeline.start()
         except RuntimeError as error:
@@ -157,22 +160,37 @@ class OakSource:
         self.close()
 
     def _prepare(self) -> None:
-        """Check the device's features and USB speed; switch its dot projector on."""
+        """Check the device's cameras and USB speed; switch its dot projector on."""
         if not self._params.undistort:
             stored = self._device.readCalibration()
             self._distortion = raw_distortion(self._dai, stored, self._params)
-        self._asked, left_out = supported_settings(self._dai, self._device, self._params)
-        self._events.extend(left_out)
+        self._check_cameras()
         speed = self._device.getUsbSpeed()
         slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
         if speed in slow:
-            text = usb2_text(self._asked, speed.name)
+            text = _usb2_text(self._params, speed.name)
             if self._params.usb2 == "refuse":
                 raise CameraError(text)
             self._events.append(text)
-            self._slow_line = FrameRateMonitor("the OAK camera", self._asked.rate_hz)
+            self._slow_line = FrameRateMonitor("the OAK camera", self._params.rate_hz)
         if self._params.dot_projector > 0.0:
             self._device.setIrLaserDotProjectorIntensity(self._params.dot_projector)
+
+    def _check_cameras(self) -> None:
+        """Check that the device has the cameras of the rig's settings.
+
+        Raises:
+            CameraError: it has no colour camera, or none for the requested depth.
+        """
+        socket, found = self._dai.CameraBoardSocket, set(self._device.getConnectedCameras())
+        wanted = [socket.CAM_A]
+        if self._params.depth:
+            wanted += [socket.CAM_B, socket.CAM_C]
+        missing = ", ".join(one.name for one in wanted if one not in found)
+        if missing:
+            cure = "set oak.depth: false" if socket.CAM_A in found else "use a model with colour"
+            name = self._device.getDeviceName() or "this OAK camera"
+            raise CameraError(f"{name} has no camera at {missing}: {cure}")
 
     def _shot(self, group: Any, arrived_s: float) -> Shot | None:
         """Convert a group of messages to a frame."""
@@ -188,8 +206,8 @@ class OakSource:
             line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
             measured_hz = self._slow_line.measured_hz
             if line and measured_hz is not None:
-                if measured_hz < self._asked.rate_hz and "again" not in line:
-                    line = full_line_text(self._asked, measured_hz)
+                if measured_hz < self._params.rate_hz and "again" not in line:
+                    line = _full_line_text(self._params, measured_hz)
                 self._events.append(line)
         # The lens of a frame, with distortion if the camera has not undistorted it.
         lens = lens_of(group)
@@ -259,3 +277,26 @@ def _create_end(pipeline: Any) -> Callable[[], None] | None:
 def _one_line(error: BaseException) -> str:
     """Return an error's text on one line."""
     return " ".join(str(error).split())
+
+
+def _usb2_text(params: OakParams, speed: str) -> str:
+    """Return a message about the effect of a USB 2 line on the requested frames."""
+    frame = params.width_px * params.height_px * (_COLOUR_BYTES + _DEPTH_BYTES * params.depth)
+    most_hz = _USB2_BYTES_S / frame
+    text = f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second"
+    if most_hz >= params.rate_hz:
+        return f"{text}: enough for the requested frames; a USB 3 cable and port reduce the delay"
+    fewer = f"oak.rate_hz {most_hz:.0f}" if most_hz >= 1.0 else "smaller frames"
+    return (
+        f"{text}, and {frame * params.rate_hz / 1e6:.0f} are requested: "
+        f"use a USB 3 cable (its plug is often blue) and port, or set {fewer}"
+        f"{' or oak.depth: false' if params.depth else ''}"
+    )
+
+
+def _full_line_text(params: OakParams, measured_hz: float) -> str:
+    """Return a message about a full USB 2 line, with the remedy."""
+    return (
+        f"the OAK camera's USB 2 line is full: {measured_hz:.1f} of {params.rate_hz:g} frames a "
+        f"second arrive; use a USB 3 cable and port, or set oak.rate_hz {max(1.0, measured_hz):.0f}"
+    )
