@@ -105,7 +105,7 @@ def play(
 ) -> None:
     """Play a track on the running head, or list all tracks with their fit to this rig."""
     with clear_errors():
-        if track is None and (speed, count, from_s, loop) != (1.0, 0, 0.0, False):
+        if track is None and (speed, count, start, loop) != (1.0, 0, "0", False):
             raise SetupError("--speed, --count, --from and --loop need a track, e.g. nod")
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
         if track is None or listed:
