@@ -21,7 +21,7 @@ from gazerig.features.study.design import (
     StudyDesign,
     design_measures,
 )
-from gazerig.features.study.journal import Record, StudyFolder
+from gazerig.features.study.journal import JournalRecord, StudyFolder
 from gazerig.gaze.types import Floats
 
 Scores = dict[str, dict[str, list[float]]]
@@ -118,11 +118,11 @@ def dominance(better: Floats, than: Floats) -> float:
     return float(np.sign(np.subtract.outer(better, than)).mean())
 
 
-class Answer(NamedTuple):
+class CountedAnswer(NamedTuple):
     """An answer; left_out: reason of its exclusion, "" if it counts."""
 
     participant: str
-    record: Record
+    record: JournalRecord
     left_out: str
 
 
@@ -152,7 +152,7 @@ class StudyAnalysis(NamedTuple):
     questionnaires: Mapping[str, Questionnaire]
     simulated: bool
     reasons: dict[str, str]
-    answers: list[Answer]
+    answers: list[CountedAnswer]
     scores: dict[Measure, Scores]
     decisions: list[Decision]
 
@@ -173,7 +173,7 @@ def analyse_study(path: Path) -> StudyAnalysis:
         for code, records in journals.items()
     }
     answers = [
-        Answer(code, row, reasons[code] or ("practice" if (row.trial or 0) < 0 else ""))
+        CountedAnswer(code, row, reasons[code] or ("practice" if (row.trial or 0) < 0 else ""))
         for code, records in journals.items()
         for row in records
         if row.kind == "answered"
@@ -195,7 +195,7 @@ def analyse_study(path: Path) -> StudyAnalysis:
 
 def _scores(
     measure: Measure,
-    counted: Sequence[Answer],
+    counted: Sequence[CountedAnswer],
     design: StudyDesign,
     questionnaires: Mapping[str, Questionnaire],
 ) -> Scores:

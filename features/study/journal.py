@@ -29,7 +29,7 @@ _SHOWN = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
 """Sections of a rig that determine its appearance, whatever its servos and camera."""
 
 
-class Record(msgspec.Struct, frozen=True, omit_defaults=True):
+class JournalRecord(msgspec.Struct, frozen=True, omit_defaults=True):
     """One record of a journal.
 
     kind: what happened; "opened" also at each resumption; "closed" is permanent
@@ -86,7 +86,7 @@ class Journal:
             os.fsync(names)  # the entries of new files
             os.close(names)
 
-    def write(self, *records: Record) -> None:
+    def write(self, *records: JournalRecord) -> None:
         """Add the records of one step; on return they are on disk.
 
         Raises:
@@ -109,14 +109,14 @@ class Journal:
         self._file.close()
 
 
-def _read(path: Path) -> tuple[list[Record], int]:
+def _read(path: Path) -> tuple[list[JournalRecord], int]:
     """Return the records of the complete lines of a journal, and the size of these lines."""
     data = path.read_bytes()
     size = data.rfind(b"\n") + 1
-    records: list[Record] = []
+    records: list[JournalRecord] = []
     for number, line in enumerate(data[:size].splitlines(), start=1):
         try:
-            records += msgspec.json.decode(line, type=list[Record])
+            records += msgspec.json.decode(line, type=list[JournalRecord])
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
             raise SetupError(f"{path}:{number}: changed or damaged ({error})") from error
     return records, size
@@ -172,7 +172,7 @@ class StudyFolder:
         """Return the folder of a participant."""
         return self.path / "participants" / f"P{number:03d}"
 
-    def journals(self) -> dict[str, list[Record]]:
+    def journals(self) -> dict[str, list[JournalRecord]]:
         """Return the records of every participant by code.
 
         Raises:

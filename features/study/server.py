@@ -16,7 +16,7 @@ from aiohttp.typedefs import Handler
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.features.study.session import Event, HeadLost, Session, WrongEvent
+from gazerig.features.study.session import HeadLost, PageEvent, Session, WrongEvent
 from gazerig.robot.dashboard.door.admission import Admission, page_url
 
 _FILES = Path(__file__).parent / "browser"
@@ -114,7 +114,7 @@ class StudyServer:
     async def _post_event(self, request: web.Request) -> web.Response:
         """Apply an event; the answer is the present page, with 409 if the event's page is over."""
         try:
-            event = msgspec.json.decode(await request.read(), type=Event)
+            event = msgspec.json.decode(await request.read(), type=PageEvent)
             applied = self._session.handle(event)
         except (msgspec.DecodeError, UnicodeDecodeError, WrongEvent) as error:
             return _reply(400, str(error).encode())

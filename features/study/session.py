@@ -21,7 +21,7 @@ from gazerig.features.study.design import (
     practice_trials,
     rig_changes,
 )
-from gazerig.features.study.journal import AnswerValue, Journal, Record
+from gazerig.features.study.journal import AnswerValue, Journal, JournalRecord
 from gazerig.local_head import LocalHead
 
 WHOLE_SHARE = 0.9
@@ -86,7 +86,7 @@ class HeadPresenter:
             raise HeadLost(f"the joints are held: {'; '.join(state.reasons[:3])}")
 
 
-class Event(msgspec.Struct):
+class PageEvent(msgspec.Struct):
     """A participant's action on a page.
 
     page: name of the page; values, ms: answers and response times in the order of the questions
@@ -98,7 +98,7 @@ class Event(msgspec.Struct):
     ms: list[float] = []
 
 
-class Place(NamedTuple):
+class SessionPlace(NamedTuple):
     """A participant's place in a study.
 
     trial: practice trials below 0, None outside trials; side: 1 in the second half of a pair
@@ -146,7 +146,7 @@ class Session:
         self._began_s = float("inf")
         self.place = self._find_place()
         if not self.closed:
-            self._store(Record("opened", utc(), gazerig.__version__, simulated))
+            self._store(JournalRecord("opened", utc(), gazerig.__version__, simulated))
 
     @property
     def trial(self) -> str:
@@ -196,7 +196,7 @@ class Session:
             items = [items[i] for i in rng.permutation(len(items))]
         return items
 
-    def handle(self, event: Event) -> bool:
+    def handle(self, event: PageEvent) -> bool:
         """Apply an event; on return it is on disk. Return False if its page is over.
 
         Raises:
@@ -208,9 +208,9 @@ class Session:
             return False
         match self.place.step, event.do:
             case "consent", "consent":
-                self._store(Record("consented", self._utc()))
+                self._store(JournalRecord("consented", self._utc()))
             case ("consent", "decline") | ("ready" | "presentation" | "questions", "leave"):
-                self._store(Record("closed", self._utc(), "withdrew"))
+                self._store(JournalRecord("closed", self._utc(), "withdrew"))
             case "ready", "begin":
                 self._begin()
             case "presentation", "seen" if self._head is None:
@@ -256,11 +256,13 @@ class Session:
     def _end(self, interrupted: str) -> None:
         self._store(self._presentation("ended", interrupted))
 
-    def _presentation(self, kind: Literal["began", "ended"], note: str = "") -> Record:
+    def _presentation(self, kind: Literal["began", "ended"], note: str = "") -> JournalRecord:
         trial, side = self.place.trial, self.place.side
-        return Record(kind, self._utc(), note, trial=trial, side=side, condition=self.condition)
+        return JournalRecord(
+            kind, self._utc(), note, trial=trial, side=side, condition=self.condition
+        )
 
-    def _answers(self, event: Event) -> Iterator[Record]:
+    def _answers(self, event: PageEvent) -> Iterator[JournalRecord]:
         """Yield the records of a page of answers."""
         items, place, utc = self.items(), self.place, self._utc()
         if not len(items) == len(event.values) == len(event.ms):
@@ -268,7 +270,7 @@ class Session:
         for (key, item), value, ms in zip(items, event.values, event.ms, strict=True):
             if not self._is_valid(item, value):
                 raise WrongEvent(f"{value!r:.40} is no answer to the question {item.text}")
-            yield Record(
+            yield JournalRecord(
                 "answered", utc, trial=place.trial, condition=self.trial,
                 questionnaire=place.questionnaire, item=key, value=value, ms=ms,
             )  # fmt: skip
@@ -280,14 +282,14 @@ class Session:
             return value in ("first", "second")
         return isinstance(value, int) and 1 <= value <= item.points
 
-    def _store(self, *records: Record) -> None:
+    def _store(self, *records: JournalRecord) -> None:
         """Write records to disk, then go to the next place; the last record closes the session."""
         self._journal.write(*records)
         self.place = self._find_place()
         if self.closed and records[-1].kind != "closed":
-            self._journal.write(Record("closed", self._utc()))
+            self._journal.write(JournalRecord("closed", self._utc()))
 
-    def _find_place(self) -> Place:
+    def _find_place(self) -> SessionPlace:
         """Return the place that follows from the records."""
         done: set[object] = set()
         for one in self._journal.records:
@@ -298,17 +300,17 @@ class Session:
             else:
                 done.add(one.kind)
         if "closed" in done:
-            return Place("end")
+            return SessionPlace("end")
         if "consented" not in done:
-            return Place("consent")
+            return SessionPlace("consent")
         for trial, shown in self._trials.items():
             for side, _ in enumerate(shown.split(PAIR)):
                 if (trial, side) not in done:
-                    return Place("ready", trial, side)
+                    return SessionPlace("ready", trial, side)
             for key in self._design.questionnaires:
                 if (trial, key) not in done:
-                    return Place("questions", trial, questionnaire=key)
+                    return SessionPlace("questions", trial, questionnaire=key)
         for key in self._design.after:
             if (None, key) not in done:
-                return Place("questions", questionnaire=key)
-        return Place("end")
+                return SessionPlace("questions", questionnaire=key)
+        return SessionPlace("end")

@@ -15,7 +15,7 @@ from scipy import special
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.design import PAIR, Item, Study, StudyDesign
 from gazerig.features.study.journal import AnswerValue, Journal, StudyFolder
-from gazerig.features.study.session import Event, Session
+from gazerig.features.study.session import PageEvent, Session
 
 BETWEEN_SD, ITEM_SD = 0.8, 1.0
 """Standard deviations of participants, and of an item's answers of one participant."""
@@ -86,4 +86,4 @@ def _run_session(
             session.film_fetched()
             elapsed_s += study.design.trials.seconds
         elapsed_s += sum(times_ms) / 1000.0
-        session.handle(Event(session.page, _ACTIONS[step], values, times_ms))
+        session.handle(PageEvent(session.page, _ACTIONS[step], values, times_ms))

@@ -14,7 +14,7 @@ from typing import Any
 
 from gazerig.features.study.design import load_study
 from gazerig.features.study.journal import Journal
-from gazerig.features.study.session import Event, Session
+from gazerig.features.study.session import PageEvent, Session
 
 
 def session_of(study: Path, journal: Journal) -> Session:
@@ -32,7 +32,7 @@ def events(session: Session) -> list[str]:
         session.film_fetched()
         kinds = {"rating": 3, "choice": "first", "text": "well"}
         values: list[Any] = [kinds[item.kind] for _, item in session.items()]
-        assert session.handle(Event(session.page, do[step], values, [900.0] * len(values)))
+        assert session.handle(PageEvent(session.page, do[step], values, [900.0] * len(values)))
     return steps
 
 

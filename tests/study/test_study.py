@@ -20,7 +20,7 @@ from gazerig.features.study.analyse import analyse_study
 from gazerig.features.study.design import HOME, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
 from gazerig.features.study.report import answers_csv, write_report
-from gazerig.features.study.session import Event, WrongEvent
+from gazerig.features.study.session import PageEvent, WrongEvent
 from gazerig.features.study.simulate import simulate_study
 
 
@@ -91,15 +91,15 @@ def test_answers_that_do_not_count(study: Path, tmp_path: Path) -> None:
     for number in (1, 2):
         journal = Journal(folder.participant(number))
         session = session_of(study, journal)
-        session.handle(Event(session.page, "consent"))
+        session.handle(PageEvent(session.page, "consent"))
         while session.place.step != "questions":
             session.film_fetched()
             session.handle(
-                Event(session.page, "begin" if session.place.step == "ready" else "seen")
+                PageEvent(session.page, "begin" if session.place.step == "ready" else "seen")
             )
-        session.handle(Event(session.page, "answer", [4, 5], [900.0, 900.0]))
+        session.handle(PageEvent(session.page, "answer", [4, 5], [900.0, 900.0]))
         if number == 1:
-            session.handle(Event(session.page, "leave"))
+            session.handle(PageEvent(session.page, "leave"))
         else:
             events(session)
         journal.close()
@@ -125,8 +125,8 @@ def test_events_that_do_not_fit_change_nothing(study: Path, tmp_path: Path) -> N
     journal = Journal(tmp_path / "data")
     session = session_of(study, journal)
     with pytest.raises(WrongEvent):
-        session.handle(Event(session.page, "answer", [3], [1.0]))
-    assert not session.handle(Event("P001-ready-0-0-", "begin"))
+        session.handle(PageEvent(session.page, "answer", [3], [1.0]))
+    assert not session.handle(PageEvent("P001-ready-0-0-", "begin"))
     assert len(journal.records) == 1
     journal.close()
 
@@ -134,9 +134,9 @@ def test_events_that_do_not_fit_change_nothing(study: Path, tmp_path: Path) -> N
 def test_a_film_that_is_cut_short_starts_again(study: Path, tmp_path: Path) -> None:
     journal = Journal(tmp_path / "data")
     session = session_of(study, journal)
-    session.handle(Event(session.page, "consent"))
-    session.handle(Event(session.page, "begin"))
-    session.handle(Event(session.page, "seen"))  # it was not even fetched
+    session.handle(PageEvent(session.page, "consent"))
+    session.handle(PageEvent(session.page, "begin"))
+    session.handle(PageEvent(session.page, "seen"))  # it was not even fetched
     assert session.place.step == "ready"
     journal.close()
 
@@ -169,7 +169,7 @@ def test_a_step_that_cannot_be_written_is_repeated(
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         with pytest.raises(SetupError, match="No space"):
-            session.handle(Event(session.page, "consent"))
+            session.handle(PageEvent(session.page, "consent"))
     assert session.place.step == "consent"
     assert events(session)
     journal.close()
