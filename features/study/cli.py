@@ -121,7 +121,7 @@ def run(
         from gazerig.features.study.film import films
         from gazerig.features.study.journal import Journal, StudyFolder
         from gazerig.features.study.server import StudyServer
-        from gazerig.features.study.session import HeadLost, HeadPresenter, Session
+        from gazerig.features.study.session import HeadLost, HeadPresenter, StudySession
         from gazerig.features.study.simulate import simulate_study
 
         if (participant == 0) == (simulate == 0):
@@ -152,7 +152,7 @@ def run(
                     scene=shown.scene if drawn else None, seed=shown.seed,
                 )  # fmt: skip
                 presenter = HeadPresenter(found, stack.enter_context(head), now_s)
-            session = Session(found, participant, journal, now_s, _utc, presenter)
+            session = StudySession(found, participant, journal, now_s, _utc, presenter)
             if session.closed:
                 raise SetupError(f"{session.code} has ended the session already: take another")
             server = StudyServer(

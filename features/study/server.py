@@ -16,7 +16,7 @@ from aiohttp.typedefs import Handler
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.features.study.session import HeadLost, PageEvent, Session, WrongEvent
+from gazerig.features.study.session import HeadLost, PageEvent, StudySession, WrongEvent
 from gazerig.robot.dashboard.door.admission import Admission, page_url
 
 _FILES = Path(__file__).parent / "browser"
@@ -56,7 +56,7 @@ class StudyServer:
 
     def __init__(
         self,
-        session: Session,
+        session: StudySession,
         address: tuple[str, int],
         folder: Path,
         films: Mapping[str, Path],

@@ -110,7 +110,7 @@ class SessionPlace(NamedTuple):
     questionnaire: str = ""
 
 
-class Session:
+class StudySession:
     """A participant's session; each event is on disk before the next page is shown.
 
     Attributes:

@@ -15,7 +15,7 @@ from scipy import special
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.design import PAIR, Item, Study, StudyDesign
 from gazerig.features.study.journal import AnswerValue, Journal, StudyFolder
-from gazerig.features.study.session import PageEvent, Session
+from gazerig.features.study.session import PageEvent, StudySession
 
 BETWEEN_SD, ITEM_SD = 0.8, 1.0
 """Standard deviations of participants, and of an item's answers of one participant."""
@@ -78,7 +78,7 @@ def _run_session(
         rating = 1 + int(item.points * (1.0 - share if item.reverse else share))
         return rating if item.kind == "rating" else ""
 
-    session = Session(study, number, journal, lambda: elapsed_s, utc, simulated=True)
+    session = StudySession(study, number, journal, lambda: elapsed_s, utc, simulated=True)
     while (step := session.place.step) != "end":
         times_ms: list[float] = [_MEDIAN_MS * rng.lognormal(0.0, 0.35) for _ in session.items()]
         values = [answer(item) for _, item in session.items()]

@@ -14,16 +14,16 @@ from typing import Any
 
 from gazerig.features.study.design import load_study
 from gazerig.features.study.journal import Journal
-from gazerig.features.study.session import PageEvent, Session
+from gazerig.features.study.session import PageEvent, StudySession
 
 
-def session_of(study: Path, journal: Journal) -> Session:
+def session_of(study: Path, journal: Journal) -> StudySession:
     """A session whose clock advances by a minute whenever it is read."""
     now_s = itertools.count(0.0, 60.0).__next__
-    return Session(load_study(str(study)), 1, journal, now_s, lambda: "now")
+    return StudySession(load_study(str(study)), 1, journal, now_s, lambda: "now")
 
 
-def events(session: Session) -> list[str]:
+def events(session: StudySession) -> list[str]:
     """Do what each page asks for to the end; return the steps."""
     steps: list[str] = []
     do = {"consent": "consent", "ready": "begin", "presentation": "seen", "questions": "answer"}
