@@ -44,13 +44,18 @@ class StatisticalTest(NamedTuple):
 
 
 def signed_rank_test(better: Floats, than: Floats) -> StatisticalTest:
-    """Test the participants' differences: Wilcoxon's signed-rank test, zeros left out."""
+    """Test the participants' differences: Wilcoxon's signed-rank test, zeros left out.
+
+    The effect is the matched-pairs rank-biserial correlation (Kerby 2014).
+    """
     d = better - than
     d = d[d != 0.0]
     found = stats.wilcoxon(d, correction=True, method="asymptotic")
-    exact = exact_sign_p(np.sign(d) * stats.rankdata(np.abs(d)))
-    effect = matched_correlation(better, than)
-    return StatisticalTest("signed_rank", found.statistic, found.pvalue, exact, effect)
+    ranks = np.sign(d) * stats.rankdata(np.abs(d))
+    effect = float(ranks.sum() / np.abs(ranks).sum())
+    return StatisticalTest(
+        "signed_rank", found.statistic, found.pvalue, exact_sign_p(ranks), effect
+    )
 
 
 def rank_sum_test(better: Floats, than: Floats) -> StatisticalTest:
@@ -104,13 +109,6 @@ def correct_p_values(p_values: Sequence[float]) -> list[float]:
         least = max(least, min(1.0, (len(p_values) - rank) * p_values[k]))
         corrected[k] = least
     return corrected
-
-
-def matched_correlation(better: Floats, than: Floats) -> float:
-    """Return the matched-pairs rank-biserial correlation (Kerby 2014), nan without differences."""
-    d = better - than
-    ranks = stats.rankdata(np.abs(d[d != 0.0]))
-    return float((np.sign(d[d != 0.0]) * ranks).sum() / ranks.sum()) if len(ranks) else nan
 
 
 def dominance(better: Floats, than: Floats) -> float:

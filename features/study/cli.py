@@ -84,8 +84,6 @@ def design(
 
         found = load_study(study).design
         print(f"{study}: good: {found.title!r}, conditions {', '.join(found.conditions)}")
-        for one in found.hypotheses:
-            print(f"hypothesis: {one.measure}: {one.better} > {one.than}, by {one.test}")
         print(f"next: gazerig study run {study} --simulate {found.plan.participants} --data trial")
 
 
@@ -111,13 +109,10 @@ def run(
     simulate: Annotated[
         int, typer.Option(metavar="N", min=0, help="Simulate N participants instead; 0: none.")
     ] = 0,
-    effect: Annotated[
-        float, typer.Option(help="With --simulate: d_z of neighbouring conditions.")
-    ] = 0.6,
 ) -> None:
     """Run a participant's session in the browser; the same command resumes it."""
     with clear_errors(None, port, mock):
-        from gazerig.features.study.design import load_study
+        from gazerig.features.study.design import SEED, load_study
         from gazerig.features.study.film import films
         from gazerig.features.study.journal import Journal, StudyFolder
         from gazerig.features.study.server import StudyServer
@@ -131,7 +126,7 @@ def run(
         shown, now_s = found.design.presentation, RealClock().now_s
         with ExitStack() as stack:
             if simulate:
-                simulate_study(found, folder, simulate, effect, seed=0)
+                simulate_study(found, folder, simulate, seed=0)
                 print(f"next: gazerig study analyse {folder.path}")
                 return
             folder.claim(found)
@@ -149,7 +144,7 @@ def run(
                     raise SetupError("the head needs a camera: --camera N, --oak, or --mock")
                 head = gazerig.open(
                     found.locate(shown.rig), mock=mock, port=port, camera=seen, oak=oak, say=say,
-                    scene=shown.scene if drawn else None, seed=shown.seed,
+                    scene=shown.scene if drawn else None, seed=SEED,
                 )  # fmt: skip
                 presenter = HeadPresenter(found, stack.enter_context(head), now_s)
             session = StudySession(found, participant, journal, now_s, _utc, presenter)

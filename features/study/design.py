@@ -27,6 +27,8 @@ Faults = Iterator[tuple[str, str]]
 """(dotted key, broken rule)."""
 PAIR = "|"
 """Separator of the first and the second presentation of a pair."""
+SEED = 0
+"""Seed of all orders, and of the conditions' random generators: the same in every study."""
 _ORDERS, _PRACTICE = 0, 1
 """Random streams of one seed."""
 
@@ -100,13 +102,11 @@ class Presentation:
         on: The head in the room, or a film of it in the browser.
         rig: Shipped name or path.
         scene: What an emulated head looks at; unused with a camera.
-        seed: Seed of the conditions' random generators; the same for all.
     """
 
     on: Literal["head", "film"] = "film"
     rig: str = "expressive"
     scene: str | None = None
-    seed: Annotated[int, Bounds(0, 2**31 - 1)] = 0
 
 
 @dataclass(frozen=True)
@@ -115,17 +115,13 @@ class Trials:
 
     Attributes:
         seconds: Length of one presentation.
-        repetitions: How often each condition (pair) is shown.
         practice: Trials before the first that counts.
-        order: Williams' squares, or shuffled by the seed.
-        seed: Seed of all orders.
+        order: Williams' squares, or shuffled.
     """
 
     seconds: Annotated[float, Bounds(2, 900)] = 30.0
-    repetitions: Annotated[int, Bounds(1, 20)] = 1
     practice: Annotated[int, Bounds(0, 5)] = 1
     order: Literal["williams", "random"] = "williams"
-    seed: Annotated[int, Bounds(0, 2**31 - 1)] = 0
 
 
 @dataclass(frozen=True)
@@ -232,42 +228,33 @@ def williams(n: int) -> list[tuple[int, ...]]:
     return square + ([row[::-1] for row in square] if n % 2 and n > 1 else [])
 
 
-def balanced_group_size(design: StudyDesign) -> int:
-    """Return the number of participants that use every order once; 1 for random orders."""
-    if design.trials.order == "random":
-        return 1
-    orders = len(williams(len(_block(design))))
-    return orders if design.task == "rating" else 2 * orders
-
-
 def participant_order(design: StudyDesign, participant: int) -> list[str]:
     """Return the trials of a participant in order, each a condition key or a pair "a|b".
 
-    Each repetition is a block with the next order. The seed assigns conditions to the squares.
-    Pairs are turned for the second half of the balanced group.
+    Conditions are assigned to the squares at random, for all studies alike. Pairs are turned for
+    the second half of a balanced group.
 
     Args:
         design: a checked design.
         participant: from 1; it selects the row of the table, or the random order.
     """
-    trials, seed = _block(design), design.trials.seed
+    trials = _block(design)
     table = np.array(williams(len(trials)))
-    letters = np.random.default_rng((seed, 0, _ORDERS)).permutation(len(trials))
-    rng = np.random.default_rng((seed, participant, _ORDERS))
+    letters = np.random.default_rng((SEED, 0, _ORDERS)).permutation(len(trials))
+    rng = np.random.default_rng((SEED, participant, _ORDERS))
     order: list[str] = []
-    for block in range(design.trials.repetitions):
-        turn, row = divmod(participant - 1 + block, len(table))
-        random = design.trials.order == "random"
-        for one in rng.permutation(len(trials)) if random else letters[table[row]]:
-            turned = (turn + one) % 2
-            order.append(PAIR.join(trials[one].split(PAIR)[:: -1 if turned else 1]))
+    turn, row = divmod(participant - 1, len(table))
+    random = design.trials.order == "random"
+    for one in rng.permutation(len(trials)) if random else letters[table[row]]:
+        turned = (turn + one) % 2
+        order.append(PAIR.join(trials[one].split(PAIR)[:: -1 if turned else 1]))
     return order
 
 
 def practice_trials(design: StudyDesign, participant: int) -> list[str]:
     """Return the practice trials of a participant, drawn at random; they do not count."""
     trials = _block(design)
-    rng = np.random.default_rng((design.trials.seed, participant, _PRACTICE))
+    rng = np.random.default_rng((SEED, participant, _PRACTICE))
     drawn = rng.permutation(len(trials))
     return [trials[drawn[i % len(drawn)]] for i in range(design.trials.practice)]
 
@@ -333,7 +320,7 @@ def load_questionnaire(name_or_path: str, folder: Path) -> Questionnaire:
         gazerig.config.load.ConfigError: with every fault.
     """
     path = _find("questionnaires", name_or_path, folder)
-    return load(path, Questionnaire, checks=[_questionnaire_faults])
+    return load(path, Questionnaire)
 
 
 def _condition_rig(design: StudyDesign, key: str, path: Path) -> Rig:
@@ -376,10 +363,6 @@ def _faults(study: Study) -> Faults:
     if not 2 <= len(design.conditions) <= 6:
         yield "conditions", "a study compares two to six; add or remove some"
         return
-    every = balanced_group_size(design)
-    if design.plan.participants % every:
-        rule = f"no multiple of the {every} orders of Williams' squares"
-        yield "plan.participants", f"{rule}; take one, or trials.order: random"
     measures = design_measures(design, study.questionnaires)
     choices = [name for name, one in measures.items() if one.kind == "choice"]
     if bool(choices) != (design.task == "pairwise"):
@@ -401,12 +384,3 @@ def _faults(study: Study) -> Faults:
             if effect_time(changed).startswith(NEXT_START):
                 rule = f"{changed} cannot change while the head runs: presentation.on: film"
                 yield f"conditions.{key}", rule
-
-
-def _questionnaire_faults(asked: Questionnaire) -> Faults:
-    """Yield faults within a questionnaire."""
-    points: dict[str, int] = {}
-    for key, item in asked.items.items():
-        same = points.setdefault(item.scale or key, item.points)
-        if item.scale in asked.items or item.points != same:
-            yield f"items.{key}.scale", "is no key of an item; all its items have as many points"

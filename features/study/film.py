@@ -19,7 +19,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder
 from gazerig.drivers.files.film_writer import film_writer
 from gazerig.features.lab.simulated_run import simulate
-from gazerig.features.study.design import Study
+from gazerig.features.study.design import SEED, Study
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
@@ -71,7 +71,7 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
     rig, seconds = study.rigs[key], study.design.trials.seconds
     shown = study.design.presentation
     options = RunOptions(
-        mock=True, fast=True, seed=shown.seed, scene=shown.scene, seconds=SETTLES_S + seconds,
+        mock=True, fast=True, seed=SEED, scene=shown.scene, seconds=SETTLES_S + seconds,
         no_page=True,
     ).check_and_complete()  # fmt: skip
     ticks = list[Tick]()
@@ -82,7 +82,7 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
     data = mujoco.MjData(model)
     renderer = Renderer(model, SIZE_PX, SIZE_PX, RendererParams(_SHADOW_PX, _SAMPLES))
     # At the nose of the person the head looks at, with optical axes, to the middle of the face.
-    people = load_scene(shown.scene, shown.seed).people(0.0) if shown.scene else ()
+    people = load_scene(shown.scene, SEED).people(0.0) if shown.scene else ()
     p_m = np.array(people[0].p_world_face_m if people else VIEWER_M)
     shape = rig.geometry
     up_m = 0.001 * (shape.pitch_axis_height_mm + shape.eyes_above_mm) - _BELOW_EYES_M

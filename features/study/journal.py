@@ -13,11 +13,10 @@ import contextlib
 import fcntl
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
-from gazerig.config.parameters import values
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.design import Questionnaire, Study, StudyDesign
@@ -25,8 +24,6 @@ from gazerig.features.study.design import Questionnaire, Study, StudyDesign
 AnswerValue = int | str
 """A rating 1..points, "first"/"second", or free text."""
 _JOURNAL, _DESIGN = "journal.jsonl", "design.json"
-_SHOWN = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
-"""Sections of a rig that determine its appearance, whatever its servos and camera."""
 
 
 class JournalRecord(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -123,12 +120,11 @@ def _read(path: Path) -> tuple[list[JournalRecord], int]:
 
 
 class StoredDesign(msgspec.Struct):
-    """The design in a data folder; shown: the values of each condition that can be seen."""
+    """The design in a data folder."""
 
     name: str
     design: StudyDesign
     questionnaires: dict[str, Questionnaire]
-    shown: dict[str, dict[str, Any]]
 
 
 class StudyFolder:
@@ -143,12 +139,8 @@ class StudyFolder:
         Raises:
             SetupError: it has data of another design, or cannot be written.
         """
-        shown = {
-            key: {name: value for name, value in values(rig).items() if name.startswith(_SHOWN)}
-            for key, rig in study.rigs.items()
-        }
-        stored = StoredDesign(study.path.stem, study.design, dict(study.questionnaires), shown)
-        encoded, path = msgspec.json.encode(stored, enc_hook=str), self.path / _DESIGN
+        stored = StoredDesign(study.path.stem, study.design, dict(study.questionnaires))
+        encoded, path = msgspec.json.encode(stored), self.path / _DESIGN
         if self.journals() and path.read_bytes() != encoded:
             raise SetupError(
                 f"{self.path} has data of another design: a design does not change after its first "

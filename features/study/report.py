@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.analyse import Scores, StudyAnalysis
 from gazerig.features.study.design import Measure
-from gazerig.gaze.types import Floats
 
 
 def write_report(study: StudyAnalysis, out: Path) -> Path:
@@ -22,7 +21,7 @@ def write_report(study: StudyAnalysis, out: Path) -> Path:
     """
     names = {key: one.label or key for key, one in study.design.conditions.items()}
     sections = [
-        (one, _table(scores, names), _figure(one, scores, names))
+        (one, _figure(one, scores, names))
         for one, scores in study.scores.items()
         if study.design.task == "rating"
     ]
@@ -46,16 +45,6 @@ def answers_csv(study: StudyAnalysis) -> str:
     for code, row, left_out in study.answers:
         writer.writerow([code, *(getattr(row, name) for name in fields), left_out])
     return text.getvalue()
-
-
-def _table(scores: Scores, names: dict[str, str]) -> list[tuple[str, int, Floats]]:
-    """Return each condition's name, participants, and mean, SD and median of their means."""
-    rows = []
-    for key, name in names.items():
-        means = np.array([np.mean(values) for values in scores[key].values()])
-        figures = (means.mean(), means.std(ddof=1), np.median(means)) if len(means) > 1 else ()
-        rows.append((name, len(means), np.array(figures)))
-    return rows
 
 
 def _figure(one: Measure, scores: Scores, names: dict[str, str]) -> str:

@@ -15,6 +15,7 @@ import gazerig
 from gazerig.errors import Error
 from gazerig.features.study.design import (
     PAIR,
+    SEED,
     Item,
     Study,
     participant_order,
@@ -192,7 +193,7 @@ class StudySession:
         if self._study.questionnaires[key].shuffled:
             at = (*design.questionnaires, *design.after).index(key)
             row = 0 if trial is None else trial + design.trials.practice + 1
-            rng = np.random.default_rng((design.trials.seed, self._number, _ITEMS, at, row))
+            rng = np.random.default_rng((SEED, self._number, _ITEMS, at, row))
             items = [items[i] for i in rng.permutation(len(items))]
         return items
 

@@ -19,6 +19,8 @@ from gazerig.features.study.session import PageEvent, StudySession
 
 BETWEEN_SD, ITEM_SD = 0.8, 1.0
 """Standard deviations of participants, and of an item's answers of one participant."""
+EFFECT = 0.6
+"""Usual difference of neighbouring conditions, in standard deviations of the differences."""
 _MEDIAN_MS = 2600.0
 _BEGAN = datetime(2000, 1, 1, tzinfo=UTC)
 _ACTIONS = {"consent": "consent", "ready": "begin", "presentation": "seen", "questions": "answer"}
@@ -33,15 +35,17 @@ def condition_levels(design: StudyDesign) -> dict[str, int]:
     return found
 
 
-def simulate_study(study: Study, folder: StudyFolder, count: int, effect: float, seed: int) -> None:
+def simulate_study(
+    study: Study, folder: StudyFolder, count: int, seed: int, effect: float = EFFECT
+) -> None:
     """Run participants 1 to ``count`` through a study; equal seeds give equal journals.
 
     Args:
         study: the study.
         folder: a folder without data.
         count: number of participants.
-        effect: d_z of neighbouring conditions.
         seed: seed of the answers.
+        effect: d_z of neighbouring conditions.
 
     Raises:
         SetupError: the folder has data of participants, or the data cannot be written.
