@@ -8,20 +8,20 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 LARGEST = {
-    "gaze": 72_700,
-    "drivers": 145_900,
-    "sim_mock": 80_400,
-    "config": 25_100,
-    "robot": 244_700,
-    "robot/dashboard": 64_600,
-    "gazerig": 21_400,
+    "gaze": 72_500,
+    "drivers": 135_900,
+    "sim_mock": 80_000,
+    "config": 25_200,
+    "robot": 218_400,
+    "robot/dashboard": 58_900,
+    "gazerig": 21_200,
     "doors": 10_300,
-    "features/animation": 8_000,
-    "features/bringup": 62_500,
-    "features/lab": 47_200,
-    "features/study": 52_700,
-    "features/world": 56_700,
-    "tests": 863_100,
+    "features/animation": 6_800,
+    "features/bringup": 53_300,
+    "features/lab": 54_900,
+    "features/study": 10_500,
+    "features/world": 49_700,
+    "tests": 597_000,
 }
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)
