@@ -282,3 +282,13 @@ def as_yaml(tree, flow_below, depth=0):
 
 def as_dict(data):
     return {k: as_dict(v) for k, v in data.items()} if isinstance(data, dict) else data
+
+
+def test_somebody_elses_change_meanwhile_is_not_lost(small):
+    def slow(path):
+        small.write_text(SMALL + "spare: {id: 77}\n")
+        return check(path)
+
+    with pytest.raises(ConfigError, match="changed by another program"):
+        save(small, {"name": "mine"}, NOW, slow, Head)
+    assert "id: 77" in small.read_text()
