@@ -21,7 +21,7 @@ LARGEST = {
     "features/lab": 54_900,
     "features/study": 10_500,
     "features/world": 49_700,
-    "tests": 597_000,
+    "tests": 600_000,
 }
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)
