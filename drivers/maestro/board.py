@@ -15,7 +15,6 @@ from gazerig.drivers.hobby_board.start import read_every_pulse
 from gazerig.drivers.maestro.commands import (
     ACCEL_STEPS_S2,
     ERRORS,
-    MICRO,
     MOST_INPUT,
     SPEED_STEPS_S,
     accel_units,
@@ -166,27 +165,3 @@ class MaestroBus(HobbyBoardBus):
     def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: MaestroParams) -> None:
         self._maestro = MaestroBoard(port, params)
         super().__init__(self._maestro, setups)
-
-    def go_home(self) -> None:
-        """Send all channels to their home as set in Pololu's program, and release them.
-
-        Home may be a position, to which servos move at the armed speed, or no pulses at all.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-        self._supervisor.stop_supervision()
-        self._maestro.line.send(self._maestro.line.codec.go_home())
-
-    def moving(self) -> bool | None:
-        """Return whether any channel with a limit is moving; None if unknown.
-
-        The Micro Maestro has no such request.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-        if self._maestro.params.channels <= MICRO:
-            return None
-        answer = self._maestro.line.ask(self._maestro.line.codec.moving(), 1)
-        return None if answer is None else bool(answer[0])

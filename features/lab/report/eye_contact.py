@@ -3,12 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.analysis.mutual_gaze import BRIDGED_S, HALF_HIGH_M, HALF_WIDE_M
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, longest, mean, median
 from gazerig.gaze.types import Floats
 
 _FACING_DEG = 12.0
+BRIDGED_S = 0.15
+"""Gaps and looks that are shorter are ignored."""
+HALF_WIDE_M, HALF_HIGH_M = 0.085, 0.125
+"""Oval of an adult's face around the nose."""
 
 
 def on_face(run: GazeTrace) -> NDArray[np.bool_]:
