@@ -49,6 +49,16 @@ from gazerig.robot.recording.run_info import (
 from gazerig.robot.recording.viewer_messages import orientation
 
 
+def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
+    """Return the times of the frames that are picked of these."""
+    picker, picture = FramePicker(rate_hz), np.zeros((2, 2, 3), np.uint8)
+    return [
+        at_s
+        for number, at_s in enumerate(times_s, 1)
+        if picker.is_due(Detections(at_s, number, 2, 2, image=picture))
+    ]
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     with pytest.MonkeyPatch.context() as patch:
@@ -254,3 +264,9 @@ def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: str) -> Non
 def test_a_rotation_as_a_quaternion() -> None:
     turned = orientation(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     assert turned == pytest.approx({"x": 0.0, "y": 0.0, "z": 0.5**0.5, "w": 0.5**0.5})
+
+
+def test_a_late_frame_does_not_delay_those_that_follow() -> None:
+    camera = (k / 100.0 for k in range(200) if not 40 <= k < 45 and not 100 <= k < 170)
+    wanted = [0.0, 0.2, 0.45, 0.6, 0.8, 1.7, 1.9]  # after a long gap the count starts again
+    assert picked_s(5.0, camera) == pytest.approx(wanted)
