@@ -3,6 +3,7 @@
 import base64
 import json
 from collections import Counter
+from collections.abc import Iterable
 from datetime import datetime
 from math import inf, nan
 from pathlib import Path
@@ -29,6 +30,7 @@ from scipy.spatial.transform import Rotation
 from gazerig.config.load import load
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import Rig, load_rig, load_walk
+from gazerig.drivers.types import Detections
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
@@ -39,6 +41,7 @@ from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.recorder import FramePicker
 from gazerig.robot.recording.run_info import (
     RunEnd,
     RunInfo,
