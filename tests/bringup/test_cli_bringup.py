@@ -262,19 +262,3 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
         code, out, _ = invoked("scan", "--port", path)
         assert code == 0 and "12 channels" in out
         assert invoked("doctor", "maker", "--port", path).code == 0
-
-
-def test_setup_of_a_maestro_finds_a_range_that_cuts_and_a_servo_on_another_channel():
-    with served("maker") as (port, _, command):
-        command("set max-us 1900")
-        command("script 0")
-        code, _, err = invoked(
-            "setup", "maker", "--port", port, "--joint", "eyes_pan",
-            # set; supply off; on again; move; it was another; move; that is it
-            answers="\ny\n\ny\nn\ny\ny\n",
-        )  # fmt: skip
-        assert code == 0 and "was running its own script: stopped" in err
-        assert "and the board stays at 1900 us: set its Min to 1088 and its Max to 1936" in err
-        assert "plug its servo into channel 0" in err and "done: 1 of 1" in err
-        first = json.loads(command("status"))["servos"][0]
-        assert first["position"] == 0
