@@ -1,5 +1,6 @@
 """The page's process: it delays no one, ends with its parent and finds a free port."""
 
+import contextlib
 import os
 import signal
 import socket
@@ -20,7 +21,13 @@ from page_visitor import PATIENCE_S, Visitor
 from present import present
 from shown_page import AHEAD, free_port, running_page, wait_for
 
-from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
+from gazerig.robot.dashboard.feed.page_process import (
+    CANNOT_OPEN,
+    FOLDER_VARIABLE,
+    TOKEN_VARIABLE,
+    URL,
+    PageProcess,
+)
 from gazerig.robot.dashboard.requests.inbox import BEAT
 from gazerig.robot.model.types import SeenFace
 
@@ -75,6 +82,21 @@ def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
         "sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", check]).returncode == 0
+
+
+def test_page_ends_if_its_folder_is_gone(tmp_path: Path) -> None:
+    with contextlib.ExitStack() as stack:
+        ends = [stack.enter_context(one) for _ in range(2) for one in socket.socketpair()]
+        links = [str(ends[0].fileno()), str(ends[2].fileno())]
+        page = subprocess.run(
+            [sys.executable, "-m", "gazerig.robot.dashboard.page_main", *links,
+             str(os.getpid()), "127.0.0.1", str(free_port())],
+            pass_fds=[int(link) for link in links],
+            env={**os.environ, TOKEN_VARIABLE: "x", FOLDER_VARIABLE: str(tmp_path / "gone")},
+            stderr=subprocess.PIPE, text=True, timeout=60,
+        )  # fmt: skip
+    assert page.returncode == CANNOT_OPEN
+    assert page.stderr.endswith(": No such file or directory\n")
 
 
 def test_unopened_page_drops() -> None:

@@ -8,6 +8,7 @@ it and bypass the door. So it listens on a Unix socket that no other user can re
 import asyncio
 import contextlib
 import functools
+import socket
 from collections.abc import Awaitable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -74,11 +75,15 @@ def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
 def _listening_inside(path: Path) -> Iterator[None]:
     """Within the block, make viser's server, which supports only ports, listen on a socket file."""
     serve = websocket_server.serve
+    # Bound here: viser would try again and then wait without end, if the folder of a killed rig
+    # has been removed meanwhile.
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(str(path))
 
     @functools.wraps(serve)
     def for_the_door(handler: object, host: str, port: int, **settings: Any) -> object:
         settings["max_size"] = FROM_BROWSER_BYTES
-        return serve(handler, unix=True, path=str(path), **settings)  # type: ignore[arg-type]
+        return serve(handler, unix=True, sock=listener, **settings)  # type: ignore[arg-type]
 
     websocket_server.serve = for_the_door  # type: ignore[assignment, misc]
     try:
