@@ -4,9 +4,11 @@ import json
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from importlib import import_module
+from itertools import count
 from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,6 +34,7 @@ from gazerig.robot.app import run_bus, session
 from gazerig.robot.app.assemble import RIGS_OWN, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.guardian import guardian
 from gazerig.sim_mock.pty.client import PtyBuses
 
 KINDS = ("dynamixel", "feetech", "maestro", "pca9685")
@@ -128,30 +131,48 @@ def test_a_rule_that_returns_no_point_ends_the_run() -> None:
 # --- parts that hang
 
 
+def wait(*_: object) -> None:
+    threading.Event().wait()
+
+
+def ask_for_ever(bus: Any, *_: object) -> None:
+    assert all(bus._line.ask(99, 28) is None for _ in count())
+
+
 class Hanging:
     """A rule that hangs after some ticks."""
 
     ticks = 0
 
-    def choose(self, percept: object, state: object, t_s: float) -> None:
+    def __init__(self, hang: Callable[..., None] = wait) -> None:
+        self.hang = hang
+
+    def choose(self, *words: object) -> Any:
         self.ticks += 1
         if self.ticks == 50:
             print("moving", flush=True)
         if self.ticks > 100:
-            threading.Event().wait()
+            self.hang(*words)
 
 
-def _hang(path: str, file: str) -> None:
-    with gazerig.open(file, port=path, attention=Hanging(), say=lambda line: None):
+def _hang(path: str, file: str, method: str, hang: Callable[..., None]) -> None:
+    hanging, rule = Hanging(hang), None
+    if method == "choose":
+        rule = hanging
+    else:
+        bus = import_module("gazerig_lx16a.bus").Lx16aBus
+        usual = getattr(bus, method)
+        setattr(bus, method, lambda *words: hanging.choose(*words) or usual(*words))
+    with gazerig.open(file, port=path, attention=rule, say=lambda line: None):
         time.sleep(2.0 * PATIENCE_S)
 
 
 @contextmanager
-def _hanging(file: str) -> Iterator[Driven]:
+def _hanging(file: str, *words: Any) -> Iterator[Driven]:
     rig = load_rig(file)
     with PtyBuses() as buses:
         (path,) = buses.start(emulated_lines(rig)).values()
-        loop = Branch(partial(_hang, path, file), stdout=subprocess.PIPE, text=True)
+        loop = Branch(partial(_hang, path, file, *words), stdout=subprocess.PIPE, text=True)
         late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
         late.start()
         try:
@@ -167,7 +188,23 @@ def test_a_rule_that_hangs_leaves_limp_servos(kind: str, tmp_path: Path) -> None
     text = shipped_path("rigs", RIGS[kind]).read_text(encoding="utf-8")
     file = tmp_path / "rig.yaml"
     file.write_text(text.replace("kind: maestro", f"kind: {kind}"), encoding="utf-8")
-    with _hanging(str(file)) as it:
+    _leaves_limp_servos(str(file), "choose", wait)
+
+
+@pytest.mark.usefixtures("odd")
+@pytest.mark.parametrize(
+    ("method", "hang"), [("choose", wait), ("write", wait), ("read", ask_for_ever)]
+)
+def test_a_hang_on_a_packages_bus_leaves_limp_servos(
+    method: str, hang: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "site"))  # of the guardian and the servos
+    monkeypatch.setattr(guardian, "LONGEST_CALL_S", 2.0)
+    _leaves_limp_servos(str(HEAD), method, hang)
+
+
+def _leaves_limp_servos(file: str, *words: Any) -> None:
+    with _hanging(file, *words) as it:
         it.line("moving")
         assert any(it.holding())
         assert it.limp_after_s(time.monotonic(), PATIENCE_S) is not None

@@ -76,7 +76,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     plans = release_plans(rig, paths)
     guarded = list(plans)
     guardian = Guardian(tuple(plans.values())) if plans else None
-    beat = guardian.beat if guardian is not None else None
+    beat = guardian.beat_on_traffic if guardian is not None else None
     shares = []
     for name in bus_names(rig):
         share = _bus_share(rig, name, port_at_path(paths[name], on_traffic=beat))

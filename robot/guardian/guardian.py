@@ -19,6 +19,7 @@ from gazerig.robot.guardian.heartbeat import (
     shared_file,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, encode
+from gazerig.robot.model.clock import RealClock
 
 RETRY_S = 1.0
 """Time between attempts to switch the torque of servos on again, s."""
@@ -40,6 +41,12 @@ RESTART_S = 5.0
 
 HUNG_S = 2.0
 """A guardian that has not read the heartbeat for this time hangs; it reads 50 times a second."""
+
+LONGEST_CALL_S = 10.0
+"""Longest time that the traffic of one call of a bus counts as heartbeats, s.
+
+To prepare many servos on a noisy line takes seconds. A bus that asks for ever hangs.
+"""
 
 
 class Guardian:
@@ -64,8 +71,8 @@ class Guardian:
         self._check_s = self._restart_s = 0.0
         self._looks = (0, inf)
         self._events: list[str] = []
-        self.beat = self._heartbeat.beat
-        """Count one heartbeat; only the control loop's thread may call it."""
+        self._clock = RealClock()
+        self._beat_s = inf
 
     def __del__(self) -> None:
         os.close(self._fd)
@@ -74,6 +81,16 @@ class Guardian:
     def pid(self) -> int | None:
         """Return the process id of the guardian, None if it does not run."""
         return None if self._process is None else self._process.pid
+
+    def beat(self) -> None:
+        """Count one heartbeat; only the control loop's thread may call it."""
+        self._beat_s = self._clock.now_s()
+        self._heartbeat.beat()
+
+    def beat_on_traffic(self) -> None:
+        """Count one heartbeat for traffic, unless the last other one is too long ago."""
+        if self._clock.now_s() < self._beat_s + LONGEST_CALL_S:
+            self._heartbeat.beat()
 
     def join(self, plan: int) -> None:
         """Register one port and start the guardian if it is not running, without waiting for it.
