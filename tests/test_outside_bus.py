@@ -14,12 +14,15 @@ from typer.testing import CliRunner
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.robot.app import run_bus as run_buses
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.main import app
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, rig_message
+from gazerig.robot.description.build import describe
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
@@ -114,6 +117,16 @@ def test_the_guardian_switches_its_torque_off(example):
     assert not any(servo.torque for servo in device.servos.values())
     device.faults.command("lose 3")
     assert releaser(plan)(port) == (3,)
+
+
+def test_the_page_draws_it(example):
+    made = assemble(load_rig(str(HEAD)), RunOptions(mock=True, fast=True))
+    message = rig_message(LiveRig(40.0, made.shown_rig()))
+    made.close()
+    del SERVOS["lx-16a"]  # the page's process loads no package
+    feed = LiveFeed()
+    assert feed.handle_message(message) and feed.shape is not None
+    assert describe(feed.shape).joints
 
 
 @pytest.mark.parametrize("words", ["doctor", "setup", "monitor --once", "calibrate joints", "scan"])

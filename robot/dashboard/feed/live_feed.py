@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
@@ -135,8 +136,8 @@ class FrameHeader(NamedTuple):
 
 
 def rig_message(rig: LiveRig) -> bytes:
-    """Return a message with the rig's properties."""
-    return RIG + pickle.dumps(tuple(rig), pickle.HIGHEST_PROTOCOL)
+    """Return a message with the rig's properties, and the servo models of other packages."""
+    return RIG + pickle.dumps((SERVOS, *rig), pickle.HIGHEST_PROTOCOL)
 
 
 def state_message(state: RunState) -> bytes:
@@ -208,7 +209,9 @@ class LiveFeed:
         elif kind == STATE:
             self._state = RunState(*decode_plain(body))
         elif kind == RIG:
-            rig = LiveRig(*pickle.loads(body))
+            models, *parts = pickle.loads(body)
+            SERVOS.update(models)
+            rig = LiveRig(*parts)
             if self._builder is None:
                 self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
                 self._poses = PoseHistory(rig.shown.kinematics)
