@@ -1,10 +1,12 @@
 """Events of gaze, people and tracks are those of the ticks, each once and in order."""
 
+from typing import get_args
+
 import pytest
 from commanded_robot import running_desk
 
 import gazerig
-from gazerig.robot.control.gaze_events import EVENT_KINDS
+from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.model.commands import Play
 
@@ -20,7 +22,7 @@ def test_every_saccade_blink_and_track_of_the_ticks_is_an_event() -> None:
     for tick in ticks:
         feed.update(tick)
     found = [event for event in feed.events() if event.kind != "message"]
-    times = {kind: [e.t_s for e in found if e.kind == kind] for kind in EVENT_KINDS}
+    times = {kind: [e.t_s for e in found if e.kind == kind] for kind in get_args(EventKind)}
     saccades = ticks[-1].gaze.saccades - ticks[0].gaze.saccades
     assert saccades > 8 and abs(len(times["saccade_start"]) - saccades) <= 1
     pairs = list(zip(times["saccade_start"], times["saccade_landing"], strict=False))

@@ -144,7 +144,6 @@ def assemble(
     rig: Rig,
     options: RunOptions,
     substitutes: Substitutes = RIGS_OWN,
-    room: RunRoom | None = None,
 ) -> Assembly:
     """Build the robot of a rig once; only the emulated bus is opened.
 
@@ -153,8 +152,6 @@ def assemble(
         options: options of the run.
         substitutes: wrappers or replacements of the rig's own parts, by a recording, a rerun or a
             calibration.
-        room: open surroundings with other robots of the caller; None: they are opened if
-            ``options`` name some.
 
     Raises:
         gazerig.config.load.ConfigError: the profile or walk that the rig names is invalid.
@@ -167,8 +164,8 @@ def assemble(
     camera, notes = camera_placement(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
     clock: Clock = SimulatedClock() if options.fast else RealClock()
-    if room is None and options.world is not None:
-        room = surroundings(options.world).open(rig, options, clock)
+    world = options.world
+    room = surroundings(world).open(rig, options, clock) if world is not None else None
     if room is None:
         scene = scene_of(rig, options)
         opened = run_bus(rig, options, clock)

@@ -12,7 +12,6 @@ from gazerig.robot.control.tick import Tick
 Basis = Literal["measured", "partly estimated", "estimated"]
 
 ESTIMATED = "estimated from commands and known servo speeds, not measured"
-PARTLY = "partly estimated from commands and known servo speeds, not measured"
 
 
 def estimated_joints(tick: Tick) -> tuple[str, ...]:

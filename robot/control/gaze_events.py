@@ -1,7 +1,7 @@
 """Events of gaze, people and tracks, found in consecutive ticks."""
 
 from collections.abc import Iterator, Sequence
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.control.tick import Tick
@@ -14,7 +14,6 @@ EventKind = Literal[
     "person_left", "track_finished", "cue",
 ]  # fmt: skip
 """message: of the bus, the camera or a program's request; all others are found in the ticks."""
-EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
 
 
 class GazeChange(NamedTuple):

@@ -180,7 +180,7 @@ def head_segments(look: PersonLook, fineness: float = 1.0) -> HeadSegments:
     mouth = lips(_HEAD, _MOUTH, red, dark)
     inside = _MOUTH._replace(upper=0.03, lower=_MOUTH.lower + 0.045, half_width=0.30)
     open_mouth = move_mesh(lips(_HEAD, inside, dark, dark).lower, (-0.004, 0.0, 0.0))
-    eye, glint, lid, still = _eye_parts(look, fineness, 20)
+    eye, glint, lid, still = _eye_parts(look, fineness)
     # The glint is flat on the eyeball, so that the lid covers it.
     flat = move_mesh(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
     solid = _head_solid(look, fineness)
@@ -224,7 +224,7 @@ class _EyeParts(NamedTuple):
     fixed_mesh: list[Painted]
 
 
-def _eye_parts(look: PersonLook, fineness: float, around: int = 48) -> _EyeParts:
+def _eye_parts(look: PersonLook, fineness: float) -> _EyeParts:
     """Return the parts of a left eye."""
     rings = 5 if fineness < 1.0 else 9
     around = 18 if fineness < 0.5 else 48

@@ -99,11 +99,6 @@ class Statics:
             shafts[first], shafts[second] = shares.tolist()
         return {name: torque / self._stall_nm[name] for name, torque in shafts.items()}
 
-    def torque_nm(self, name: str, load: float) -> float:
-        """Return the joint torque for a servo's load, which is a fraction of its stall torque."""
-        torque = load * self._stall_nm[name]
-        return torque if self.joints[name].make_linkage().rising else -torque
-
     def friction_nm(self, name: str) -> float:
         """Return the dry friction that holds a joint without torque."""
         return GEAR_FRICTION * self._stall_nm[name] + self.joints[name].friction_nm
