@@ -55,6 +55,25 @@ class Odd:
         self.fail()
         return ()
 """
+CLOSED = """
+from time import sleep
+from numpy import zeros
+from gazerig.drivers.camera.source import Shot
+
+class Seeing:
+    def open(self): pass
+    def events(self): return ()
+    def latest(self, now_s): return None
+    def close(self): raise KeyError("no lens")
+
+class Frames(Seeing):
+    latest = None
+    number = 0
+    def take(self, now_s, stop):
+        self.number += 1
+        sleep(0.02)
+        return Shot(now_s(), self.number, zeros((120, 160, 3), "u1"))
+"""
 
 
 @pytest.fixture
@@ -64,12 +83,19 @@ def odd(tmp_path: Path) -> Iterator[None]:
     parts = {group: {"odd": f"odd_{name}:Odd"} for name, group in groups.items()}
     install_example(tmp_path / "site")
     with on_path(tmp_path / "site") as site:
-        install(site, "odd", parts, {f"odd_{name}": ODD for name in groups})
+        modules = {f"odd_{name}": ODD for name in groups}
+        for name in ("Seeing", "Frames"):
+            parts["gazerig.camera"][name.lower()] = f"odd_{name}:{name}"
+            modules[f"odd_{name}"] = CLOSED
+        install(site, "odd", parts, modules)
         yield
 
 
 def end_of_run(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch, **options: Any
+    rig: Rig,
+    monkeypatch: pytest.MonkeyPatch,
+    stopped: Callable[[PtyBuses], str | None] = lambda buses: None,
+    **options: Any,
 ) -> tuple[str, list[str], bool]:
     """Run a rig; return the reason of its end, its lines, and whether torque stays on."""
     devices: list[Any] = []
@@ -80,12 +106,22 @@ def end_of_run(
         return devices[-1]
 
     monkeypatch.setattr(run_bus, "build", build)
-    chosen = RunOptions(**{"mock": True, "fast": True, "seconds": 5.0, "seed": 0, **options})
-    composed = session.ComposedRun(chosen, assemble(rig, chosen, RIGS_OWN), None, None)
+    options = {"mock": True, "fast": True, "seconds": 5.0, "seed": 0, **options}
     lines: list[str] = []
-    figures = session.run(composed, lambda: None, lines.append)
-    status = [json.loads(device.faults.command("status")) for device in devices]
-    held = [s.get("target", s.get("torque")) for one in status for s in one["servos"]]
+    with PtyBuses() as buses:
+        if not options["fast"]:
+            (path,) = buses.start(emulated_lines(rig)).values()
+            options |= {"mock": False, "port": path}
+        chosen = RunOptions(**options)
+        composed = session.ComposedRun(chosen, assemble(rig, chosen, RIGS_OWN), None, None)
+        figures = session.run(composed, lambda: stopped(buses), lines.append)
+        commands = [device.faults.command for device in devices] or [buses.command]
+        held = [
+            one.get("target", one.get("torque"))
+            for command in commands
+            for one in json.loads(command("status"))["servos"]
+        ]
+    assert held
     return str(figures["stopped_by"]), lines, any(held)
 
 
@@ -116,6 +152,41 @@ def test_another_part_that_raises_ends_the_run(part: str, monkeypatch: pytest.Mo
     ended, lines, held = end_of_run(rig, monkeypatch, **options)
     assert part in ended and label in ended and ended.endswith("failed (KeyError: 'no body')")
     assert not held and "torque off" in lines[-1]
+
+
+@pytest.mark.usefixtures("odd")
+@pytest.mark.parametrize(
+    ("camera", "ending", "told"),
+    [
+        ("seeing", "SIGINT", "SIGINT: parked, torque off"),
+        ("frames", "SIGINT", "SIGINT: parked, torque off"),
+        (
+            "seeing",
+            "rule",
+            "fault: attention 'odd' of odd 1.2 failed (KeyError: 'no body'): parked",
+        ),
+        ("seeing", "unplug", "seconds: not parked, torque-off could not be sent (/tmp/"),
+    ],
+)
+def test_a_camera_that_fails_as_it_closes_hides_no_reason(
+    camera: str, ending: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ticks = count()
+
+    def stopped(buses: PtyBuses) -> str | None:
+        if next(ticks) == 100 and ending == "unplug":
+            buses.command("unplug")
+        return "SIGINT" if next(ticks) > 200 and ending == "SIGINT" else None
+
+    rig = apply_changes(load_rig("desk"), {"gaze.chooser": "odd"} if ending == "rule" else {})
+    _, (*_, closed, ended), held = end_of_run(
+        rig, monkeypatch, stopped, camera=camera, fast=False, seconds=1.5
+    )
+    assert (
+        closed == f"closing the camera: camera '{camera}' of odd 1.2 failed (KeyError: 'no lens')"
+    )
+    assert ended.startswith(f"stopped by {told}")
+    assert held == (ending == "unplug")  # its watchdog stops it
 
 
 def test_a_rule_that_returns_no_point_ends_the_run() -> None:

@@ -8,7 +8,7 @@ from time import perf_counter
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG, CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource, Shot, to_bgr
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.plugins import plugin_error
+from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
 
 
@@ -269,8 +269,12 @@ class CaptureLoop:
         self._frames.retune(detector, motion, locate)
 
     def close(self) -> None:
-        """Free the source; safe to call twice."""
-        self._source.close()
+        """Free the source; safe to call twice. An error is reported: nothing can be done."""
+        try:
+            self._source.close()
+        except Exception as error:
+            named = plugin_error(error) or describe_error(error)
+            self._report(f"closing the camera: {named}")
 
     def _take(self, stop: threading.Event) -> Shot | None:
         """Return the next frame, reopening a lost source; None if ``stop`` was set."""
@@ -296,7 +300,8 @@ class CaptureLoop:
                 continue
             if shot is not None and lost_s is not None:
                 self._report(f"{BACK} after {self._now_s() - lost_s:.1f} s")
-            return shot
+            # A source of another package may disregard ``stop``.
+            return None if stop.is_set() else shot
 
 
 def detection_error(failure: BaseException) -> CameraError:

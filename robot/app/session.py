@@ -322,12 +322,9 @@ def shut_down(
     assembly: Assembly,
     count: LoopCount,
     say: Callable[[str], None],
-    interrupts: Interrupts | None = None,
 ) -> None:
     """Park, switch the torque off, close, and report the results; every end uses it."""
-    leaving = prepare_shutdown(
-        assembly, say, interrupts if interrupts is not None else Interrupts()
-    )
+    leaving = prepare_shutdown(assembly, say, Interrupts())
     leaving.cause = count.stopped_by
     leaving.shut_down()
 
@@ -339,9 +336,18 @@ def prepare_shutdown(
     watch: Callable[[Tick], object] | None = None,
 ) -> PowerDown:
     """Return the shutdown of a run of this robot; watch: receives every tick of parking."""
+    robot = assembly.robot
+
+    def torque_off() -> tuple[str, ...]:
+        try:
+            return robot.stop()
+        finally:
+            for event in robot.closing_events:
+                say(event)
+
     return PowerDown(
         lambda again: park_unless_stopped(assembly, again, watch),
-        assembly.robot.stop,
+        torque_off,
         say,
         interrupts,
     )

@@ -6,7 +6,7 @@ from math import inf, radians
 from typing import NamedTuple
 
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.plugins import plugin_error
+from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.attention.turn_gaze import TurnGaze
@@ -84,6 +84,8 @@ class Robot:
         tune: Applies changed parameters and returns messages about it.
         pixels: Converts pixels of a camera frame to points in the world.
         messages: Lines for the events of the next tick; other components add theirs.
+
+    closing_events: the camera's messages as it was closed
     """
 
     def __init__(
@@ -125,6 +127,7 @@ class Robot:
         self._lead = ClientControl()
         self._conversation = Conversation()
         self._messages: list[str] = messages if messages is not None else []
+        self.closing_events: tuple[str, ...] = ()
         self._stop = StopControl(self._messages)
         self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(
@@ -220,7 +223,7 @@ class Robot:
                 ready()
             goals = self.body.start(clock)
         except BaseException:
-            self.camera.close()
+            self._close_camera()
             raise
         try:
             self._initialize(clock.now_s(), goals)
@@ -370,7 +373,16 @@ class Robot:
         try:
             return self.body.stop()
         finally:
+            self._close_camera()
+
+    def _close_camera(self) -> None:
+        """Close the camera; its error must not hide the reason of the end."""
+        try:
             self.camera.close()
+            self.closing_events = tuple(self.camera.events())
+        except Exception as error:
+            named = plugin_error(error) or describe_error(error)
+            self.closing_events = (f"closing the camera: {named}",)
 
     def _execute_commands(self, t_s: float) -> tuple[Command, ...]:
         """Execute and return the queued commands, and end a control that was not renewed."""
