@@ -36,6 +36,15 @@ def place(patch: pytest.MonkeyPatch, angles_deg: Mapping[str, float]) -> None:
     patch.setattr(run_bus, "STOP_BEYOND_DEG", 150.0)
 
 
+def rig_of(name: str) -> Rig:
+    """Return a shipped rig, or the desk's with the eye on a bus of its own."""
+    if name != "two buses":
+        return load_rig(name)
+    rig = load_rig("desk")
+    joints = {**rig.joints, EYE: replace(rig.joints[EYE], bus="eye")}
+    return replace(rig, buses={"eye": rig.bus}, joints=joints)
+
+
 @pytest.fixture
 def slipped(monkeypatch: pytest.MonkeyPatch) -> None:
     place(monkeypatch, {EYE: FAR})
@@ -86,24 +95,25 @@ class Bench:
         self.shafts.devices[""].faults.command(text)
 
 
-@pytest.mark.parametrize("rig", ["desk", "feetech"])
+@pytest.mark.parametrize("rig", ["desk", "feetech", "two buses"])
 @pytest.mark.usefixtures("slipped")
 def test_no_servo_of_the_rig_gets_torque(rig: str) -> None:
-    bench = Bench(load_rig(rig))
+    bench = Bench(rig_of(rig))
     with pytest.raises(SetupError, match=SAID) as refused:
         bench.start()
     assert "gazerig doctor" in str(refused.value) and "\n" not in str(refused.value)
     assert not any(
         servo.torque if hasattr(servo, "torque") else servo.drive.torque
-        for servo in bench.shafts.devices[""].servos  # type: ignore[attr-defined]
+        for device in bench.shafts.devices.values()
+        for servo in device.servos  # type: ignore[attr-defined]
     )
     assert bench.angle_deg() == pytest.approx(FAR, abs=0.2)
 
 
-@pytest.mark.parametrize("rig", ["desk", "feetech"])
+@pytest.mark.parametrize("rig", ["desk", "feetech", "two buses"])
 @pytest.mark.usefixtures("slipped")
 def test_on_request_it_moves_inside_slowly_and_the_run_goes_on(rig: str) -> None:
-    bench = Bench(load_rig(rig), recover=True)
+    bench = Bench(rig_of(rig), recover=True)
     bench.start()
     angles = bench.run(7.0)
     assert bench.said == [
