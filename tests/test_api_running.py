@@ -1,5 +1,6 @@
 """A head next to its program in real time: however its block ends, it parks and releases."""
 
+import asyncio
 import os
 import re
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from slow_rigs import at_rate
 
 import gazerig
 from gazerig.robot.control.loop import Robot, Tick
+from gazerig.robot.control.tick_feed import TickFeed
 
 LET_GO = "(not )?parked, torque off"
 """On a starved machine the time for parking may be over before."""
@@ -218,6 +221,34 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
     for state in head.states(rate_hz=50.0):
         if not state.controlled_by:
             break
+
+
+def test_a_state_after_an_awaited_reply_is_as_new(
+    opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = TickFeed.update
+
+    def update_late(feed: TickFeed, tick: Tick) -> None:
+        time.sleep(0.005)
+        usual(feed, tick)
+
+    monkeypatch.setattr(TickFeed, "update", update_late)
+
+    async def orders() -> list[tuple[int, int, str]]:
+        seen = []
+        async with gazerig.aio.connect(os.getpid()) as far:
+            for k in range(30):
+                reply = await far.look_at(1.0, 0.01 * k, 0.3).reply()
+                state = await far.state()
+                seen.append((reply.control_number, state.client_control.number, state.stopped))
+            await far.stop("a hand").reply()
+            seen.append((1, 1, (await far.state()).stopped))
+        return seen
+
+    with opened():
+        *moves, stop = asyncio.run(orders())
+    assert [there for _, there, _ in moves] == [number for number, _, _ in moves]
+    assert moves[0][0] > 0 and stop[2] == "a hand"
 
 
 def run_script(
