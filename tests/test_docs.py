@@ -304,7 +304,7 @@ def test_every_span_names_something_that_is_there() -> None:
     words |= {field.name for one in scripts for field in fields(one)}
     words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD, script.BASE}
     forms = (
-        *(design.StudyDesign, design.Presentation, design.Trials, design.StatisticalPlan),
+        *(design.StudyDesign, design.Presentation, design.Trials),
         *(design.Questionnaire, design.Item, design.Condition, design.Hypothesis),
     )
     words |= {field.name for form in forms for field in fields(form)}

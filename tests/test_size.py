@@ -19,7 +19,7 @@ LARGEST = {
     "features/animation": 6_800,
     "features/bringup": 53_300,
     "features/lab": 54_900,
-    "features/study": 10_500,
+    "features/study": 10_200,
     "features/world": 49_700,
     "tests": 600_000,
 }

@@ -25,7 +25,7 @@ def main() -> None:
             "title: Short\nconditions: {a: {profile: robot}, b: {profile: mitake}}\n"
             "presentation: {on: head, scene: face-to-face}\n"
             "trials: {seconds: 2, practice: 0}\nquestionnaires: [nakamoto_tsuruno]\n"
-            "plan: {participants: 2}\n"
+            "participants: 2\n"
         )
         page = ("--page", f"127.0.0.1:{free_port()}", "--no-browser", "--data", f"{folder}/data")
         one = Program(str(study), "--mock", "--participant", "1", *page)

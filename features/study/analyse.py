@@ -24,6 +24,8 @@ from gazerig.features.study.design import (
 from gazerig.features.study.journal import JournalRecord, StudyFolder
 from gazerig.gaze.types import Floats
 
+ALPHA = 0.05
+"""Probability of a false alarm, over all hypotheses (Holm's correction)."""
 Scores = dict[str, dict[str, list[float]]]
 """Condition -> code of the participant -> a value for each trial."""
 
@@ -67,7 +69,7 @@ def rank_sum_test(better: Floats, than: Floats) -> StatisticalTest:
     found = stats.mannwhitneyu(better, than, method="asymptotic")
     ranks = stats.rankdata([better, than]).reshape(2, -1)
     exact = exact_sign_p(ranks[0] - ranks[1])
-    effect = dominance(better, than)
+    effect = float(np.sign(np.subtract.outer(better, than)).mean())  # Cliff's delta (1993)
     return StatisticalTest("rank_sum", found.statistic, found.pvalue, exact, effect)
 
 
@@ -109,11 +111,6 @@ def correct_p_values(p_values: Sequence[float]) -> list[float]:
         least = max(least, min(1.0, (len(p_values) - rank) * p_values[k]))
         corrected[k] = least
     return corrected
-
-
-def dominance(better: Floats, than: Floats) -> float:
-    """Return Cliff's delta (1993): P(better > than) - P(better < than)."""
-    return float(np.sign(np.subtract.outer(better, than)).mean())
 
 
 class CountedAnswer(NamedTuple):
@@ -179,16 +176,9 @@ def analyse_study(path: Path) -> StudyAnalysis:
     counted = [one for one in answers if not one.left_out]
     measures = design_measures(design, questionnaires)
     scores = {one: _scores(one, counted, design, questionnaires) for one in measures.values()}
-    decisions = [_decide(one, scores[measures[one.measure]]) for one in design.hypotheses]
-    return StudyAnalysis(
-        design,
-        questionnaires,
-        any(records[0].simulated for records in journals.values()),
-        reasons,
-        answers,
-        scores,
-        _correct(decisions, design.plan.alpha),
-    )
+    decisions = _correct([_decide(one, scores[measures[one.measure]]) for one in design.hypotheses])
+    simulated = any(records[0].simulated for records in journals.values())
+    return StudyAnalysis(design, questionnaires, simulated, reasons, answers, scores, decisions)
 
 
 def _scores(
@@ -222,7 +212,6 @@ def _scores(
 
 
 def _decide(one: Hypothesis, scores: Scores) -> Decision:
-    """Return the results of a hypothesis' tests."""
     keys = one.better, one.than
     if one.test == "sign":
         keys = PAIR.join(keys), PAIR.join(reversed(keys))
@@ -244,15 +233,14 @@ _NO_DIFFERENCE = StatisticalTest("none: no differences", 0.0, 1.0, 1.0, nan)
 _TESTS = {"signed_rank": signed_rank_test, "rank_sum": rank_sum_test, "sign": sign_test}
 
 
-def _correct(decisions: Sequence[Decision], alpha: float) -> list[Decision]:
-    """Return the decisions with corrected p values and verdicts."""
+def _correct(decisions: Sequence[Decision]) -> list[Decision]:
     corrected = correct_p_values([one.tests[0].exact_p for one in decisions])
     found = []
     for one, p in zip(decisions, corrected, strict=True):
         verdict = "not supported"
-        if 2.0 * 0.5**one.n > alpha:
+        if 2.0 * 0.5**one.n > ALPHA:
             verdict = "too few"
-        elif p <= alpha:
+        elif p <= ALPHA:
             verdict = "supported" if one.tests[0].effect > 0.0 else "against"
         found.append(one._replace(corrected_p=p, verdict=verdict))
     return found

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 import gazerig
+from gazerig.config.load import shipped_path
 from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
@@ -20,33 +21,6 @@ from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.terminal import clear_errors, record_signals, say
 from gazerig.robot.model.clock import RealClock
 
-EXAMPLE = """\
-# A study of two gazes: does blinking look natural? Change it, then: gazerig study design study.yaml
-title: Blinking against staring
-welcome: # what participants read first; it must not name the difference
-  - You will see short films of a robot's face and answer two questions about each.
-conditions: # two to six; each contains its differences from the rig below
-  blinks: {}
-  stares:
-    params: # any key of a rig's YAML; gazerig ctl get lists them. Or profile:, character:
-      gaze.lids.blinks_per_min: 0.0
-      gaze.lids.conversation_per_min: 0.0
-presentation:
-  on: film # films in the browser; head: the head in the room
-  rig: expressive
-  scene: face-to-face # what an emulated head looks at
-trials:
-  seconds: 20
-questionnaires: [nakamoto_tsuruno] # or godspeed, rosas, free_text; choice with task: pairwise
-hypotheses:
-  - measure: nakamoto_tsuruno.naturalness
-    better: blinks
-    than: stares
-plan:
-  participants: 26
-contact: "" # whom participants write to
-"""
-"""A design to start from; written by --example."""
 HOME = Path(__file__).parent
 app = typer.Typer(
     name="study",
@@ -61,10 +35,6 @@ StudyArgument = Annotated[
         autocompletion=complete_shipped("studies", HOME),
     ),
 ]
-DataOption = Annotated[
-    Path | None,
-    typer.Option("--data", help="Folder of the study's data; default: NAME-data, after the file."),
-]
 
 
 @app.command()
@@ -77,14 +47,14 @@ def design(
     """Check a study's YAML."""
     with clear_errors():
         if example:
-            write_file(Path(study), EXAMPLE)
+            write_file(Path(study), shipped_path("studies", "example", HOME).read_bytes())
             print(f"{study}: written; change it, then: gazerig study design {study}")
             return
         from gazerig.features.study.design import load_study
 
         found = load_study(study).design
         print(f"{study}: good: {found.title!r}, conditions {', '.join(found.conditions)}")
-        print(f"next: gazerig study run {study} --simulate {found.plan.participants} --data trial")
+        print(f"next: gazerig study run {study} --simulate {found.participants} --data trial")
 
 
 @app.command()
@@ -93,18 +63,14 @@ def run(
     participant: Annotated[
         int, typer.Option(metavar="N", min=0, help="Number of the participant; no names.")
     ] = 0,
-    data: DataOption = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the data; default: NAME-data, after the file.")
+    ] = None,
     mock: options.Mock = False,
     port: options.Port = None,
     camera: options.Camera = None,
     oak: options.Oak = False,
-    page: Annotated[
-        str,
-        typer.Option(
-            metavar="HOST:PORT",
-            help="Address of the page; for a phone or another computer 0.0.0.0:8090.",
-        ),
-    ] = "127.0.0.1:8090",
+    page: options.Page = "127.0.0.1:8090",
     no_browser: options.NoBrowser = False,
     simulate: Annotated[
         int, typer.Option(metavar="N", min=0, help="Simulate N participants instead; 0: none.")
@@ -116,13 +82,13 @@ def run(
         from gazerig.features.study.film import films
         from gazerig.features.study.journal import Journal, StudyFolder
         from gazerig.features.study.server import StudyServer
-        from gazerig.features.study.session import HeadLost, HeadPresenter, StudySession
+        from gazerig.features.study.session import StudySession
         from gazerig.features.study.simulate import simulate_study
 
         if (participant == 0) == (simulate == 0):
             raise SetupError("write --participant N, or --simulate N for simulated participants")
         found = load_study(study)
-        folder = StudyFolder(data or Path(f"{found.path.stem}-data"))
+        folder = StudyFolder(data or Path(f"{Path(study).stem}-data"))
         shown, now_s = found.design.presentation, RealClock().now_s
         with ExitStack() as stack:
             if simulate:
@@ -130,7 +96,7 @@ def run(
                 print(f"next: gazerig study analyse {folder.path}")
                 return
             folder.claim(found)
-            presenter, made = None, dict[str, Path]()
+            head, made = None, dict[str, Path]()
             stopped = stack.enter_context(record_signals())
             journal = Journal(folder.participant(participant))
             stack.callback(journal.close)
@@ -142,12 +108,15 @@ def run(
                 drawn = seen is None and not oak
                 if drawn and not mock:
                     raise SetupError("the head needs a camera: --camera N, --oak, or --mock")
-                head = gazerig.open(
-                    found.locate(shown.rig), mock=mock, port=port, camera=seen, oak=oak, say=say,
+                opened = gazerig.open(
+                    found.rig_name, mock=mock, port=port, camera=seen, oak=oak, say=say,
                     scene=shown.scene if drawn else None, seed=SEED,
                 )  # fmt: skip
-                presenter = HeadPresenter(found, stack.enter_context(head), now_s)
-            session = StudySession(found, participant, journal, now_s, _utc, presenter)
+                head = stack.enter_context(opened)
+            session = StudySession(
+                found, participant, journal, now_s,
+                lambda: datetime.now(UTC).isoformat(timespec="milliseconds"), head,
+            )  # fmt: skip
             if session.closed:
                 raise SetupError(f"{session.code} has ended the session already: take another")
             server = StudyServer(
@@ -158,11 +127,10 @@ def run(
                 open_page(server.url)
             try:
                 asyncio.run(server.serve(stopped))
-            except HeadLost as lost:
+            except gazerig.Error as lost:
                 raise SetupError(f"{lost}; the same command resumes the session") from lost
-            print(
-                "the session is over" if session.closed else "not over: the same command resumes it"
-            )
+            if not session.closed:
+                print("not over: the same command resumes it")
 
 
 @app.command()
@@ -182,7 +150,3 @@ def analyse(
             what = f"{one.hypothesis.measure}: {one.hypothesis.better} > {one.hypothesis.than}"
             print(f"{what}: {one.verdict} (corrected p = {one.corrected_p:.3g}, n = {one.n})")
         print(f"{page}: the report; answers.csv next to it")
-
-
-def _utc() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -7,13 +7,9 @@ STUDY = CommandEntry(
     "Design, run and analyse a blind study in which people judge two to six styles of gaze.",
     "Study",
     examples={
-        "study": (
-            ("study design --example study.yaml", "a study of two gazes to start from"),
-            ("study design study.yaml", "check it"),
-            ("study run study.yaml --participant 1", "the first participant's session"),
-        ),
+        "study": (("study design --example study.yaml", "a study of two gazes to start from"),),
         "study design": (
-            ("study design --example study.yaml", "a study of two gazes to start from"),
+            ("study design study.yaml", "check it"),
             ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
         ),
         "study run": (

@@ -19,18 +19,16 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.params import Bounds
+from gazerig.robot.app.scene_files import is_path
 from gazerig.robot.model.commands import Value
 
 HOME = Path(__file__).parent
 """The folder with ``studies`` and ``questionnaires``."""
-Faults = Iterator[tuple[str, str]]
-"""(dotted key, broken rule)."""
 PAIR = "|"
 """Separator of the first and the second presentation of a pair."""
 SEED = 0
 """Seed of all orders, and of the conditions' random generators: the same in every study."""
-_ORDERS, _PRACTICE = 0, 1
-"""Random streams of one seed."""
+_ORDERS, _PRACTICE = 0, 1  # random streams of one seed
 
 
 @dataclass(frozen=True)
@@ -39,11 +37,9 @@ class Item:
 
     Attributes:
         text: The question; empty where the anchors say it all.
-        kind: How it is answered.
         points: Steps of a rating.
         low: Anchor of the least.
         high: Anchor of the most.
-        scale: Scale that the item belongs to.
         reverse: Whether more means less of the scale.
     """
 
@@ -61,17 +57,13 @@ class Questionnaire:
     """Items on one page.
 
     Attributes:
-        title: Name in the report.
         source: Reference in full.
-        licence: Under which terms the items may be used.
         items: Key -> item, in order.
         shuffled: Whether the items have an order of their own for each participant and trial.
-        instruction: Text above the items.
     """
 
     title: str
     source: str
-    licence: str
     items: Mapping[str, Item]
     shuffled: bool = False
     instruction: str = ""
@@ -116,7 +108,6 @@ class Trials:
     Attributes:
         seconds: Length of one presentation.
         practice: Trials before the first that counts.
-        order: Williams' squares, or shuffled.
     """
 
     seconds: Annotated[float, Bounds(2, 900)] = 30.0
@@ -131,7 +122,6 @@ class Hypothesis:
     Attributes:
         measure: "questionnaire.item" or "questionnaire.scale".
         better: Condition for which more is expected.
-        than: Condition that it is compared with.
         test: What decides: signed_rank or rank_sum for ratings, sign for choices.
         also: Exploratory tests of ratings, printed next to it; they decide nothing.
     """
@@ -144,36 +134,18 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class StatisticalPlan:
-    """Sample size and level of all tests together (Holm's correction).
-
-    Attributes:
-        participants: How many are invited.
-        alpha: Probability of a false alarm, over all hypotheses.
-    """
-
-    participants: Annotated[int, Bounds(2, 1000)] = 24
-    alpha: Annotated[float, Bounds(0.0001, 0.2)] = 0.05
-
-
-@dataclass(frozen=True)
 class StudyDesign:
     """A study as in its YAML file.
 
     Attributes:
-        title: Title of the report.
         conditions: Two to six gazes.
         questionnaires: Shipped names or paths, asked after each trial in this order.
         after: Questionnaires asked once at the end.
-        description: What is studied, in paragraphs, for the report.
         welcome: Paragraphs that participants read before they consent; they must not name the
             difference.
         debriefing: Paragraphs that participants read at the end.
         task: Each presentation is rated, or one of two is chosen.
-        presentation: How the conditions are shown.
-        trials: What one participant sees.
-        hypotheses: What is expected.
-        plan: Sample size and level.
+        participants: How many are invited.
         contact: Whom participants write to, e.g. to have their data deleted.
     """
 
@@ -188,7 +160,7 @@ class StudyDesign:
     presentation: Presentation = field(default_factory=Presentation)
     trials: Trials = field(default_factory=Trials)
     hypotheses: tuple[Hypothesis, ...] = ()
-    plan: StatisticalPlan = field(default_factory=StatisticalPlan)
+    participants: Annotated[int, Bounds(2, 1000)] = 24
     contact: str = ""
 
 
@@ -231,12 +203,9 @@ def williams(n: int) -> list[tuple[int, ...]]:
 def participant_order(design: StudyDesign, participant: int) -> list[str]:
     """Return the trials of a participant in order, each a condition key or a pair "a|b".
 
+    The number of a participant, from 1, selects the row of the table, or the random order.
     Conditions are assigned to the squares at random, for all studies alike. Pairs are turned for
     the second half of a balanced group.
-
-    Args:
-        design: a checked design.
-        participant: from 1; it selects the row of the table, or the random order.
     """
     trials = _block(design)
     table = np.array(williams(len(trials)))
@@ -271,22 +240,18 @@ class Study:
     """A checked study.
 
     Attributes:
-        path: The file.
         design: The content of the file, with questionnaires by their keys.
         questionnaires: By the keys in the design.
+        rig_name: Name of the rig, or its path from the working folder.
         rig: The study's own rig, without any condition.
         rigs: The rig of each condition, with profile, character and parameters applied.
     """
 
-    path: Path
     design: StudyDesign
     questionnaires: Mapping[str, Questionnaire]
+    rig_name: str
     rig: Rig
     rigs: Mapping[str, Rig]
-
-    def locate(self, name: str) -> str:
-        """Return a path relative to the working folder instead of the study's; names unchanged."""
-        return _locate(self.path.parent, name)
 
 
 def load_study(name_or_path: str) -> Study:
@@ -298,29 +263,24 @@ def load_study(name_or_path: str) -> Study:
     """
     path = _find("studies", name_or_path, Path())
     design, folder = load(path, StudyDesign), path.parent
-    names = (*design.questionnaires, *design.after)
-    questionnaires, after = (
-        tuple(map(_key, names)) for names in (design.questionnaires, design.after)
-    )
+    files = {
+        name: _find("questionnaires", name, folder)
+        for name in (*design.questionnaires, *design.after)
+    }
+    rig_name = _locate(folder, design.presentation.rig)
     study = Study(
-        path,
-        replace(design, questionnaires=questionnaires, after=after),
-        {_key(name): load_questionnaire(name, folder) for name in names},
-        load_rig(_locate(folder, design.presentation.rig)),
+        replace(
+            design,
+            questionnaires=tuple(files[name].stem for name in design.questionnaires),
+            after=tuple(files[name].stem for name in design.after),
+        ),
+        {file.stem: load(file, Questionnaire) for file in files.values()},
+        rig_name,
+        load_rig(rig_name),
         {key: _condition_rig(design, key, path) for key in design.conditions},
     )
     load(path, StudyDesign, checks=[lambda _: _faults(study)])
     return study
-
-
-def load_questionnaire(name_or_path: str, folder: Path) -> Questionnaire:
-    """Return a questionnaire by shipped name, or by path relative to a folder.
-
-    Raises:
-        gazerig.config.load.ConfigError: with every fault.
-    """
-    path = _find("questionnaires", name_or_path, folder)
-    return load(path, Questionnaire)
 
 
 def _condition_rig(design: StudyDesign, key: str, path: Path) -> Rig:
@@ -341,28 +301,19 @@ def rig_changes(before: Rig, after: Rig) -> dict[str, Value]:
     return {key: value for key, value in found.items() if key not in ("name", "profile")}
 
 
-def _is_path(name: str) -> bool:
-    return "/" in name or name.endswith(".yaml")
-
-
 def _locate(folder: Path, name: str) -> str:
-    return str(folder / Path(name).expanduser()) if _is_path(name) else name
+    return str(folder / Path(name).expanduser()) if is_path(name) else name
 
 
 def _find(kind: str, name: str, folder: Path) -> Path:
-    return Path(_locate(folder, name)) if _is_path(name) else shipped_path(kind, name, HOME)
+    return Path(_locate(folder, name)) if is_path(name) else shipped_path(kind, name, HOME)
 
 
-def _key(name: str) -> str:
-    return Path(name).stem
-
-
-def _faults(study: Study) -> Faults:
-    """Yield the faults of a design whose files are good."""
+def _faults(study: Study) -> Iterator[tuple[str, str]]:
+    """Yield dotted key and broken rule of the faults of a design whose files are good."""
     design = study.design
     if not 2 <= len(design.conditions) <= 6:
         yield "conditions", "a study compares two to six; add or remove some"
-        return
     measures = design_measures(design, study.questionnaires)
     choices = [name for name, one in measures.items() if one.kind == "choice"]
     if bool(choices) != (design.task == "pairwise"):

@@ -1,7 +1,6 @@
 """Films of conditions: the head as seen by the person it looks at, rendered without a display.
 
-The run is simulated with the condition's rig. The head is the robot description of the rig
-(gazerig.robot.description); the camera is fixed at the nose of the scene's first person.
+The run is simulated with the condition's rig, whose robot description is the head.
 """
 
 import os
@@ -29,14 +28,12 @@ from gazerig.robot.description.files import description_files
 from gazerig.robot.model.types import order_joints
 
 SIZE_PX, RATE_HZ = 720, 25.0
-SETTLES_S = 3.0
-"""Time of a simulated run before its film, in which the head finds the person, seconds."""
-VIEWER_M: Vec3 = (1.0, 0.0, 0.25)
-"""Position of the camera for a head that looks at no one."""
-_HEAD_M, _HEAD_SHARE = 0.24, 0.8
-"""Height of a head, and its share of the picture's height."""
-_BELOW_EYES_M = 0.02
-"""Distance of the picture's centre below the eyes."""
+# Time of a simulated run before its film, in which the head finds the person, seconds.
+_SETTLES_S = 3.0
+# Position of the camera for a head that looks at no one.
+_VIEWER_M: Vec3 = (1.0, 0.0, 0.25)
+# Height of a head, its share of the picture's height, and the picture's centre below the eyes.
+_HEAD_M, _HEAD_SHARE, _BELOW_EYES_M = 0.24, 0.8, 0.02
 _SAMPLES, _SHADOW_PX = 4, 0  # at this distance shadows would speckle the skin
 
 
@@ -60,7 +57,6 @@ def films(study: Study, folder: Path, progress: Callable[[str, float], object]) 
 
 
 def _render(study: Study, key: str, path: Path, progress: Callable[[str, float], object]) -> None:
-    """Write the film of a condition."""
     try:
         from gazerig.features.world.gl_context import import_mujoco
     except ModuleNotFoundError as error:
@@ -71,7 +67,7 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
     rig, seconds = study.rigs[key], study.design.trials.seconds
     shown = study.design.presentation
     options = RunOptions(
-        mock=True, fast=True, seed=SEED, scene=shown.scene, seconds=SETTLES_S + seconds,
+        mock=True, fast=True, seed=SEED, scene=shown.scene, seconds=_SETTLES_S + seconds,
         no_page=True,
     ).check_and_complete()  # fmt: skip
     ticks = list[Tick]()
@@ -83,7 +79,7 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
     renderer = Renderer(model, SIZE_PX, SIZE_PX, RendererParams(_SHADOW_PX, _SAMPLES))
     # At the nose of the person the head looks at, with optical axes, to the middle of the face.
     people = load_scene(shown.scene, SEED).people(0.0) if shown.scene else ()
-    p_m = np.array(people[0].p_world_face_m if people else VIEWER_M)
+    p_m = np.array(people[0].p_world_face_m if people else _VIEWER_M)
     shape = rig.geometry
     up_m = 0.001 * (shape.pitch_axis_height_mm + shape.eyes_above_mm) - _BELOW_EYES_M
     ahead = np.array([0.001 * shape.eyes_ahead_mm, 0.0, up_m]) - p_m
@@ -93,7 +89,7 @@ def _render(study: Study, key: str, path: Path, progress: Callable[[str, float],
     R = axes / np.linalg.norm(axes, axis=0)
     focal_px, middle_px = _HEAD_SHARE * SIZE_PX * away_m / _HEAD_M, 0.5 * (SIZE_PX - 1)
     lens = Intrinsics(focal_px, focal_px, middle_px, middle_px)
-    pictures_s = ticks[0].t_s + SETTLES_S + np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    pictures_s = ticks[0].t_s + _SETTLES_S + np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     names, partial = order_joints(rig.joints), path.with_name(f".{path.name}")
     with film_writer(partial, (SIZE_PX, SIZE_PX), RATE_HZ) as write:
         for i in np.searchsorted([tick.t_s for tick in ticks], pictures_s - 1e-9):

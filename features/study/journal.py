@@ -52,13 +52,10 @@ class JournalRecord(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Journal:
-    """The journal of a participant, open in one session only.
+    """The journal of a participant in a folder, which is created; open in one session only.
 
     Attributes:
         records: All records on disk.
-
-    Args:
-        folder: folder of the participant; it is created.
 
     Raises:
         SetupError: another session has opened it, or it cannot be read.
@@ -122,7 +119,6 @@ def _read(path: Path) -> tuple[list[JournalRecord], int]:
 class StoredDesign(msgspec.Struct):
     """The design in a data folder."""
 
-    name: str
     design: StudyDesign
     questionnaires: dict[str, Questionnaire]
 
@@ -139,7 +135,7 @@ class StudyFolder:
         Raises:
             SetupError: it has data of another design, or cannot be written.
         """
-        stored = StoredDesign(study.path.stem, study.design, dict(study.questionnaires))
+        stored = StoredDesign(study.design, dict(study.questionnaires))
         encoded, path = msgspec.json.encode(stored), self.path / _DESIGN
         if self.journals() and path.read_bytes() != encoded:
             raise SetupError(

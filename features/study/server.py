@@ -16,7 +16,8 @@ from aiohttp.typedefs import Handler
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.features.study.session import HeadLost, PageEvent, StudySession, WrongEvent
+from gazerig.errors import Error
+from gazerig.features.study.session import PageEvent, StudySession, WrongEvent
 from gazerig.robot.dashboard.door.admission import Admission, page_url
 
 _FILES = Path(__file__).parent / "browser"
@@ -34,21 +35,10 @@ _HEADERS = {
 }
 
 
-def _page_token(folder: Path) -> str:
-    """Return the token of a participant's page, the same after a resumption."""
-    path = folder / "token"
-    if not path.exists():
-        write_file(path, secrets.token_hex(16))
-        path.chmod(0o600)
-    return path.read_text()
-
-
 class StudyServer:
     """Serves the page of one session.
 
     Args:
-        session: the session.
-        address: host and port.
         folder: folder of the participant, with the token of the page.
         films: film of each condition; empty with a head.
         say: receives messages for the experimenter.
@@ -63,8 +53,12 @@ class StudyServer:
         say: Callable[[str], None],
     ) -> None:
         self._session, self._address, self._films, self._say = session, address, films, say
-        self._lost: HeadLost | None = None
-        token = _page_token(folder)
+        self._lost: Error | None = None
+        token_file = folder / "token"
+        if not token_file.exists():  # after a resumption it is the same
+            write_file(token_file, secrets.token_hex(16))
+            token_file.chmod(0o600)
+        token = token_file.read_text()
         self.url = f"{page_url(*address)}/?token={token}"
         self._admission = Admission(
             *address, token, f"gazerig_study_{address[1]}", "open the address of your session"
@@ -75,7 +69,7 @@ class StudyServer:
 
         Raises:
             OSError: the address is not available.
-            HeadLost: the head cannot show conditions any more.
+            gazerig.Error: the head cannot show conditions any more.
         """
         app = web.Application(middlewares=[self._admit], client_max_size=_SENT_BYTES)
         app.router.add_get("/page", self._get_page)
@@ -122,7 +116,7 @@ class StudyServer:
             self._say(str(error))
             # The message may contain file names, which are not for participants.
             return _reply(507, b"not saved")
-        except HeadLost as lost:
+        except Error as lost:
             self._lost = lost
             return _reply(503, b"not saved")
         if self._session.closed:

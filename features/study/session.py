@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 import gazerig
-from gazerig.errors import Error
+from gazerig.errors import Error, HeadEnded
 from gazerig.features.study.design import (
     PAIR,
     SEED,
@@ -24,67 +24,17 @@ from gazerig.features.study.design import (
 )
 from gazerig.features.study.journal import AnswerValue, Journal, JournalRecord
 from gazerig.local_head import LocalHead
+from gazerig.robot.control.head_state import HeadState
 
 WHOLE_SHARE = 0.9
 """Share of a film that must be played for a complete presentation."""
 _HELD_S = 1.0
 """Time without motion after which a head has lost its condition, seconds."""
-_ITEMS = 2
-"""Random stream of the trials' seed; orders use others."""
+_ITEMS = 2  # random stream of the seed; orders use others
 
 
 class WrongEvent(ValueError):
     """A browser sent data that do not fit the present page."""
-
-
-class HeadLost(Exception):
-    """The head cannot show conditions any more; the message gives the reason."""
-
-
-class HeadPresenter:
-    """Shows conditions on a running head.
-
-    Args:
-        study: a checked study.
-        head: a head with the study's rig.
-        now_s: returns the time of the host's clock.
-    """
-
-    def __init__(self, study: Study, head: LocalHead, now_s: Callable[[], float]) -> None:
-        self._study, self._head, self._now_s = study, head, now_s
-        self._rig = study.rig
-        self._moved_s = now_s()
-
-    def show(self, condition: str) -> None:
-        """Show a condition from the next tick on.
-
-        Raises:
-            HeadLost: it cannot be shown.
-        """
-        try:
-            if changes := rig_changes(self._rig, self._study.rigs[condition]):
-                self._head.set(changes)
-        except Error as error:
-            raise HeadLost(f"the condition cannot be shown: {error}") from error
-        self._rig = self._study.rigs[condition]
-
-    def check(self) -> None:
-        """Check that the head moves.
-
-        Raises:
-            HeadLost: it was stopped, is held for longer than a moment, or has ended.
-        """
-        try:
-            state = self._head.state
-        except Error as error:
-            raise HeadLost(str(error)) from error
-        now_s = self._now_s()
-        if state.stopped:
-            raise HeadLost(f"stopped: {state.stopped}")
-        if state.level not in ("hold", "torque_off"):
-            self._moved_s = now_s
-        if now_s - self._moved_s > _HELD_S:
-            raise HeadLost(f"the joints are held: {'; '.join(state.reasons[:3])}")
 
 
 class PageEvent(msgspec.Struct):
@@ -116,16 +66,12 @@ class StudySession:
 
     Attributes:
         code: Code of the participant, such as P007.
-        place: The participant's place.
 
     Args:
-        study: the study.
         number: number of the participant, which selects the order.
-        journal: the participant's journal.
         now_s: returns the time of a steady clock.
         utc: returns date and time.
-        head: the head in the room; None: the browser shows films.
-        simulated: whether the participant is simulated.
+        head: the head in the room, with the study's rig; None: the browser shows films.
     """
 
     def __init__(
@@ -135,7 +81,7 @@ class StudySession:
         journal: Journal,
         now_s: Callable[[], float],
         utc: Callable[[], str],
-        head: HeadPresenter | None = None,
+        head: LocalHead | None = None,
         simulated: bool = False,
     ) -> None:
         self.code = f"P{number:03d}"
@@ -145,6 +91,7 @@ class StudySession:
         trials = (*practice, *participant_order(self._design, number))
         self._trials = dict(enumerate(trials, start=-len(practice)))
         self._began_s = float("inf")
+        self._shown, self._moved_s = study.rig, now_s()
         self.place = self._find_place()
         if not self.closed:
             self._store(JournalRecord("opened", utc(), gazerig.__version__, simulated))
@@ -203,7 +150,7 @@ class StudySession:
         Raises:
             WrongEvent: it does not fit the page; nothing has changed.
             SetupError: it could not be written; nothing has changed.
-            HeadLost: the head cannot show the next condition.
+            gazerig.Error: the head cannot show the next condition.
         """
         if event.page != self.page:
             return False
@@ -217,7 +164,7 @@ class StudySession:
             case "presentation", "seen" if self._head is None:
                 shown_s = max(0.0, self._now_s() - self._began_s)
                 whole = shown_s >= WHOLE_SHARE * self._design.trials.seconds
-                self._end("" if whole else f"the film was shown for {shown_s:.1f} s")
+                self._record("ended", "" if whole else f"the film was shown for {shown_s:.1f} s")
             case "questions", "answer":
                 self._store(*self._answers(event))
             case step, do:
@@ -228,43 +175,52 @@ class StudySession:
         """End the head's presentation when its time is over; call it often.
 
         Raises:
-            HeadLost: the head does not move any more; its presentation has ended.
+            gazerig.Error: the head does not move any more; its presentation has ended.
         """
         if self._head is None or self.closed:
             return
         presenting = self.place.step == "presentation"
         try:
-            self._head.check()
-        except HeadLost as lost:
+            self._check_head(self._head.state)
+        except Error as lost:
             if presenting:
-                self._end(f"head lost: {lost}")
+                self._record("ended", f"head lost: {lost}")
             raise
         if presenting and self._now_s() - self._began_s >= self._design.trials.seconds:
-            self._end("")
+            self._record("ended")
 
     def film_fetched(self) -> None:
         """Note that the browser has the present film; its time begins now."""
         self._began_s = min(self._began_s, self._now_s())
 
     def _begin(self) -> None:
-        place = self.place
+        place, rig = self.place, self._study.rigs[self.condition]
         if self._head is not None:
-            self._head.show(self.condition)
-        self._store(self._presentation("began"))
+            if changes := rig_changes(self._shown, rig):
+                self._head.set(changes)
+            self._shown = rig
+        self._record("began")
         self._began_s = float("inf") if self._head is None else self._now_s()
         self.place = place._replace(step="presentation")
 
-    def _end(self, interrupted: str) -> None:
-        self._store(self._presentation("ended", interrupted))
+    def _check_head(self, state: HeadState) -> None:
+        """Raise an error if the head was stopped, or is held for longer than a moment."""
+        now_s = self._now_s()
+        if state.stopped:
+            raise HeadEnded(f"stopped: {state.stopped}")
+        if state.level not in ("hold", "torque_off"):
+            self._moved_s = now_s
+        if now_s - self._moved_s > _HELD_S:
+            raise HeadEnded(f"the joints are held: {'; '.join(state.reasons[:3])}")
 
-    def _presentation(self, kind: Literal["began", "ended"], note: str = "") -> JournalRecord:
+    def _record(self, kind: Literal["began", "ended"], note: str = "") -> None:
+        """Record that a presentation began or ended."""
         trial, side = self.place.trial, self.place.side
-        return JournalRecord(
-            kind, self._utc(), note, trial=trial, side=side, condition=self.condition
+        self._store(
+            JournalRecord(kind, self._utc(), note, trial=trial, side=side, condition=self.condition)
         )
 
     def _answers(self, event: PageEvent) -> Iterator[JournalRecord]:
-        """Yield the records of a page of answers."""
         items, place, utc = self.items(), self.place, self._utc()
         if not len(items) == len(event.values) == len(event.ms):
             raise WrongEvent(f"{len(items)} questions need as many answers and times")
@@ -291,7 +247,6 @@ class StudySession:
             self._journal.write(JournalRecord("closed", self._utc()))
 
     def _find_place(self) -> SessionPlace:
-        """Return the place that follows from the records."""
         done: set[object] = set()
         for one in self._journal.records:
             if one.kind == "ended" and not one.note:

@@ -19,8 +19,6 @@ from gazerig.features.study.session import PageEvent, StudySession
 
 BETWEEN_SD, ITEM_SD = 0.8, 1.0
 """Standard deviations of participants, and of an item's answers of one participant."""
-EFFECT = 0.6
-"""Usual difference of neighbouring conditions, in standard deviations of the differences."""
 _MEDIAN_MS = 2600.0
 _BEGAN = datetime(2000, 1, 1, tzinfo=UTC)
 _ACTIONS = {"consent": "consent", "ready": "begin", "presentation": "seen", "questions": "answer"}
@@ -36,16 +34,12 @@ def condition_levels(design: StudyDesign) -> dict[str, int]:
 
 
 def simulate_study(
-    study: Study, folder: StudyFolder, count: int, seed: int, effect: float = EFFECT
+    study: Study, folder: StudyFolder, count: int, seed: int, effect: float = 0.6
 ) -> None:
     """Run participants 1 to ``count`` through a study; equal seeds give equal journals.
 
-    Args:
-        study: the study.
-        folder: a folder without data.
-        count: number of participants.
-        seed: seed of the answers.
-        effect: d_z of neighbouring conditions.
+    ``effect`` is the difference of neighbouring conditions, in standard deviations of the
+    differences (d_z).
 
     Raises:
         SetupError: the folder has data of participants, or the data cannot be written.
@@ -62,7 +56,6 @@ def simulate_study(
 def _run_session(
     study: Study, number: int, journal: Journal, effect: float, rng: np.random.Generator
 ) -> None:
-    """Run one participant, in simulated time."""
     elapsed_s, own, levels = 0.0, BETWEEN_SD * rng.normal(), condition_levels(study.design)
     middle = 0.5 * max(levels.values())
 

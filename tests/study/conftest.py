@@ -22,7 +22,7 @@ questionnaires: [nakamoto_tsuruno]
 after: [free_text]
 debriefing: [It was the difference.]
 hypotheses: [{ measure: nakamoto_tsuruno.naturalness, better: alpha, than: beta }]
-plan: { participants: 2 }
+participants: 2
 """
 
 

@@ -36,7 +36,7 @@ def test_orders_balance_positions_and_successors(n: int) -> None:
 def test_pairs_are_seen_in_both_orders(tmp_path: Path) -> None:
     path = tmp_path / "pairs.yaml"
     path.write_text(
-        "title: Pairs\ntask: pairwise\nquestionnaires: [choice]\nplan: {participants: 12}\n"
+        "title: Pairs\ntask: pairwise\nquestionnaires: [choice]\nparticipants: 12\n"
         "conditions: {a: {profile: robot}, b: {profile: mitake}, c: {profile: nakamoto}}\n"
         "hypotheses: [{measure: choice.alive, better: a, than: b, test: sign}]\n"
     )
