@@ -4,10 +4,15 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import child_processes
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from gazerig.config.schema import Rig
+    from gazerig.gaze.scanpath.scanpath import Walk
 
 # The same examples every time; HYPOTHESIS_PROFILE=search draws others. A busy machine is no fault.
 settings.register_profile("steady", derandomize=True, deadline=None)
@@ -58,6 +63,30 @@ def no_process_outlives_its_test() -> Iterator[None]:
     yield
     if left := child_processes.end_others(before):
         pytest.fail(f"the test left processes that went on: {left}")
+
+
+def shipped_rig(name: str) -> "Rig":
+    from gazerig.config.schema import load_rig
+
+    return load_rig(name)
+
+
+@pytest.fixture(scope="session")
+def desk_rig() -> "Rig":
+    return shipped_rig("desk")
+
+
+@pytest.fixture(scope="session")
+def maker_rig() -> "Rig":
+    return shipped_rig("maker")
+
+
+@pytest.fixture(scope="session")
+def printed_walk() -> "Walk":
+    """The walk over a face with the numbers that Nakamoto & Tsuruno print."""
+    from gazerig.config.schema import load_walk
+
+    return load_walk("nakamoto_tsuruno")
 
 
 @pytest.fixture(scope="module")

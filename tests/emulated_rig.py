@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from math import degrees
 
-from mixed_rig import mixed_rig as mixed_rig
-
 from gazerig.config.schema import Rig
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.model.clock import SimulatedClock

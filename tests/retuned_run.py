@@ -16,7 +16,6 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Value
 
-RIG = load_rig("desk")
 DT_S = 1.0 / 200.0
 STEPS_PER_RAD = 4096.0 / (2.0 * pi)
 
@@ -43,8 +42,8 @@ class Running(NamedTuple):
         self.made.robot.command(self.made.live_params.prepare(base, apply_changes(base, changes)))
 
 
-def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene=scene))
+def started(scene: str = "visitor", rig: Rig | None = None) -> Running:
+    made = assemble(rig or load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
     goals: list[list[int]] = []
     write = made.robot.body.bus.write
 

@@ -14,20 +14,26 @@ import numpy as np
 import pytest
 from gaze_trace_rig import CENTRED, DESK, NO_RELIEF, Rig
 
+from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, angle_between, direction, scale
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor.params import PursuitParams
+from gazerig.gaze.oculomotor.params import OculomotorParams, PursuitParams
 from gazerig.gaze.types import GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
 
 DT = 0.005
 HALF_M = CENTRED.interocular_mm / 2e3
-MITAKE = load_rig("desk", profile="mitake").gaze
-AT_ONCE = replace(MITAKE.oculomotor, eye_lag_ms=0.0)
-NO_SACCADES = replace(AT_ONCE, saccade_deg=30.0)
 FAR_M = 10.0
+
+
+def mitake(profile: str = "mitake") -> GazeConfig:
+    return load_rig("desk", profile=profile).gaze
+
+
+def without_saccades() -> OculomotorParams:
+    return replace(mitake().oculomotor, eye_lag_ms=0.0, saccade_deg=30.0)
 
 
 class Followed(NamedTuple):
@@ -54,13 +60,13 @@ def eyes(
     begin: Target | None = None,
     turning: Callable[[float], float] | None = None,
     geometry: GeometryParams = CENTRED,
-    pursuit: PursuitParams = MITAKE.pursuit,
+    pursuit: PursuitParams | None = None,
 ) -> Followed:
     """Let the eyes follow; they begin at rest on ``begin`` or the first target.
 
     turning: yaw of the head in radians, which is held by hand
     """
-    rig = Rig(geometry=geometry, params=NO_SACCADES, pursuit=pursuit)
+    rig = Rig(geometry=geometry, params=without_saccades(), pursuit=pursuit or mitake().pursuit)
     rows = []
     first = begin if begin is not None else where(0.0)._replace(v_world_m_s=(0.0, 0.0, 0.0))
     settle = round(4.0 / dt)
@@ -103,9 +109,9 @@ def sine_numbers(hz: float, dt: float) -> tuple[float, float]:
 
 
 def test_the_profile_mitake_runs_this_controller_and_the_others_do_not() -> None:
-    assert MITAKE.pursuit.model == "binocular"
+    assert mitake().pursuit.model == "binocular"
     for profile in ("robot", "nakamoto", "small"):
-        assert load_rig("desk", profile=profile).gaze.pursuit.model != "binocular"
+        assert mitake(profile).pursuit.model != "binocular"
 
 
 @pytest.mark.parametrize("speed", [10.0, 20.0, 30.0])
@@ -193,10 +199,11 @@ def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> N
     # One camera sees for both eyes: a stopped eye continues with the other.
     # Without a margin of the eyes: with one the head turns, so that the stopped eye can follow.
     head = replace(NO_RELIEF, eye_margin_deg=0.0)
-    rig = Rig(head=head, params=NO_SACCADES, pursuit=MITAKE.pursuit)
+    params = without_saccades()
+    rig = Rig(head=head, params=params, pursuit=mitake().pursuit)
     span = (-1.0, 1.0)
     limits = ((span, span), ((-1.0, radians(-1.0)), span))
-    rig.oculomotor.retune(NO_SACCADES, limits)
+    rig.oculomotor.retune(params, limits)
     path = lambda t: -3.0 + 1.5 * min(max(t - 1.0, 0.0), 1.0)  # noqa: E731
     last = None
     for k in range(800):
@@ -207,13 +214,13 @@ def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> N
     wanted = path(4.0)
     assert degrees(last.eye_left_rad[0]) == pytest.approx(wanted, abs=0.25)
     assert degrees(last.eye_right_rad[0]) == pytest.approx(wanted, abs=0.25)
-    rig.oculomotor.retune(NO_SACCADES, ((span, span), ((-1.0, radians(-2.0)), span)))
+    rig.oculomotor.retune(params, ((span, span), ((-1.0, radians(-2.0)), span)))
     covered = rig.tick(aim(wanted, t=4.0), 4.0, DT)
     assert degrees(covered.eye_right_rad[0]) == pytest.approx(-2.0)
     assert degrees(covered.eye_left_rad[0]) == pytest.approx(
         degrees(last.eye_left_rad[0]), abs=0.01
     )
-    rig.oculomotor.retune(NO_SACCADES, ((span, span), (span, span)))
+    rig.oculomotor.retune(params, ((span, span), (span, span)))
     free = rig.tick(aim(wanted, t=4.005), 4.005, DT)
     assert abs(degrees(free.eye_right_rad[0] - last.eye_right_rad[0])) < 0.1
 
@@ -252,7 +259,7 @@ def test_a_reflex_of_another_gain_takes_back_its_share_of_the_heads_turn(gain: f
     trace = eyes(
         lambda t: lost, 2.0, begin=aim(0.0, 0.0, 100.0, -4.0),
         turning=lambda t: radians(10.0) * min(max(t - 0.5, 0.0), 1.0),
-        pursuit=replace(MITAKE.pursuit, reflex_gain=gain),
+        pursuit=replace(mitake().pursuit, reflex_gain=gain),
     )  # fmt: skip
     assert trace.version[trace.t < 0.45] == pytest.approx(0.0, abs=0.01)
     assert trace.version[-1] == pytest.approx(-10.0 * gain, abs=0.1)
@@ -260,7 +267,7 @@ def test_a_reflex_of_another_gain_takes_back_its_share_of_the_heads_turn(gain: f
 
 def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
     exact = PursuitParams(model="binocular", reflex_delay_ms=0.0, gain_1_s=0.0, velocity_gain=0.0)
-    rig = Rig(geometry=DESK, params=NO_SACCADES, pursuit=exact)
+    rig = Rig(geometry=DESK, params=without_saccades(), pursuit=exact)
     target = Target((1.5, 0.2, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
     held = rig.run(lambda t: target, 1.0)
     before, _ = lines(rig, held.commands[-1], rig.kinematics.forward(rig.joints))
@@ -305,7 +312,8 @@ def test_e58_a_lost_target_fades() -> None:
 
 
 def test_a_saccade_prescribes_the_angles_and_pursuit_goes_on_after_it() -> None:
-    rig = Rig(params=AT_ONCE, pursuit=MITAKE.pursuit)
+    gaze = mitake()
+    rig = Rig(params=replace(gaze.oculomotor, eye_lag_ms=0.0), pursuit=gaze.pursuit)
     yaws, phases = [], []
     for k in range(400):
         t = k * DT

@@ -17,13 +17,14 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.model.commands import Value
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
-RIG = apply_changes(
-    load_rig("desk"),
-    {"gaze.aversion.silent_mutual_s": 0.0, "gaze.head.goal_model": "attention"},
-)
+KEEPS_TO_THE_FACE: dict[str, Value] = {
+    "gaze.aversion.silent_mutual_s": 0.0,
+    "gaze.head.goal_model": "attention",
+}
 """The gaze stays on the face, on which it is measured; the head turns nearly all the way."""
 STEP_AT_S, ARRIVED_S = 2.0, 2.7
 """The step of steps-aside."""
@@ -55,8 +56,9 @@ class Seen(NamedTuple):
 
 def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen:
     """Run a drawn scene and compare the measured gaze with the true place of the face part."""
-    made = assemble(RIG, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
-    kinematics, _ = kinematics_and_oculomotor(RIG, 0)
+    rig = apply_changes(load_rig("desk"), KEEPS_TO_THE_FACE)
+    made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
+    kinematics, _ = kinematics_and_oculomotor(rig, 0)
     assert made.scene is not None
     people = made.scene.people
     rows: list[tuple[float, ...]] = []

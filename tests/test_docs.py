@@ -39,7 +39,11 @@ pytest.importorskip("gazerig.features.lab")
 
 FOLDERS = ("config", "doors", "drivers", "features", "gaze", "gazerig", "robot", "sim_mock")
 PARAMETERS = ROOT / "docs/parameters.md"
-RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
+
+
+@cache
+def rigs() -> tuple[Rig, ...]:
+    return tuple(load_rig(name) for name in shipped_names("rigs"))
 
 
 # ---- the YAML
@@ -48,7 +52,7 @@ RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
 @cache
 def keys() -> set[str]:
     """Return every key of a rig file and every choice there is for one."""
-    found = set(RIGS)
+    found = set(shipped_names("rigs"))
 
     def walk(shape: Shape) -> None:
         found.update(str(choice) for choice in shape.choices)
@@ -61,14 +65,14 @@ def keys() -> set[str]:
 
     walk(Shape("params", params=Rig))
     walk(Shape("params", params=Track))
-    for rig in RIGS.values():
+    for rig in rigs():
         found |= set(rig.joints)
     return found
 
 
 def is_key(dotted: str) -> bool:
     """Return whether one of the shipped rigs has this key."""
-    for rig in RIGS.values():
+    for rig in rigs():
         try:
             value_of(rig, dotted)
         except ConfigError:
@@ -88,7 +92,7 @@ def test_keys_named_are_keys() -> None:
                 assert is_key(key[1]), f"{paper.name}: {span}"
 
 
-def test_values_set_in_the_papers_are_allowed() -> None:
+def test_values_set_in_the_papers_are_allowed(desk_rig: Rig) -> None:
     sets = [words.split()[2:] for words in COMMANDS if words.startswith("ctl set ")]
     pairs = [
         (key, float(value))
@@ -100,15 +104,15 @@ def test_values_set_in_the_papers_are_allowed() -> None:
         pairs += [(key, float(value)) for key, value in found]
     assert len(pairs) >= 4
     for key, value in pairs:
-        assert apply_changes(RIGS["desk"], {key: value}) != RIGS["desk"], key
+        assert apply_changes(desk_rig, {key: value}) != desk_rig, key
     for words in COMMANDS:
         if words.startswith("get ") and "--" not in words:
             assert is_key(words.split()[1]), words
 
 
-def test_what_waits_for_the_next_start_is_told() -> None:
+def test_what_waits_for_the_next_start_is_told(desk_rig: Rig) -> None:
     text = (ROOT / "docs/tuning.md").read_text(encoding="utf-8")
-    every = parameters(RIGS["desk"], RIGS["desk"])
+    every = parameters(desk_rig, desk_rig)
     later = [knob.key for knob in every if knob.live != NEXT_TICK]
     assert f"all keys of the desk rig but {len(later)}, which are marked" in text
     rows = text.split("| keys | wait")[1].split("\n\n")[0].splitlines()[2:]

@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
@@ -17,7 +16,7 @@ from fakes.films import write_film
 from oak_packets import face_archive
 from present import present
 
-from gazerig.config.load import ConfigError
+from gazerig.config.load import ConfigError, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
@@ -200,9 +199,6 @@ def test_depthai_that_is_not_there_is_named_with_its_extra(monkeypatch):
 # Exposure, flicker and focus from the rig's file to the camera, and what is refused
 
 
-RIG = (Path(__file__).parents[1] / "config/rigs/maker.yaml").read_text(encoding="utf-8")
-
-
 def commands(dai, **wanted):
     """Return the text of what is sent to a camera; untouched commands are not in it."""
     control = dai.CameraControl()
@@ -231,7 +227,8 @@ def test_exposure_limit_flicker_and_focus_are_sent(dai):
 )
 def test_keys_are_checked(tmp_path, keys, told):
     file = tmp_path / "rig.yaml"
-    file.write_text(RIG + f"\noak:\n  {keys}\n")
+    maker = shipped_path("rigs", "maker").read_text(encoding="utf-8")
+    file.write_text(maker + f"\noak:\n  {keys}\n")
     with pytest.raises(ConfigError) as caught:
         load_rig(str(file))
     assert told in str(caught.value)

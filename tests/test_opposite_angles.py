@@ -10,7 +10,6 @@ from gazerig.gaze.oculomotor.binocular import EyeGeometry, Eyes, OppositeAngles
 from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.app.gaze_models import rig_kinematics
 
-KINEMATICS = rig_kinematics(load_rig("desk"))
 POINT: Vec3 = (1.0, 0.0, 0.125)
 TARGET = Target(POINT, (0.0, 0.0, 0.0), 0.0, "face", 1, 0.5, True, "N", 1, "a face")
 LIMIT_RAD = radians(20.0)
@@ -27,8 +26,9 @@ def in_range(eyes: Eyes) -> Eyes:
 
 def view(head_deg: Angles3) -> EyeGeometry:
     yaw, pitch, roll = head_deg
-    R, p = KINEMATICS.head_pose((radians(yaw), radians(pitch), radians(roll)))
-    return EyeGeometry(R, p, KINEMATICS.eye_angles_to, 0.2, in_range)
+    kinematics = rig_kinematics(load_rig("desk"))
+    R, p = kinematics.head_pose((radians(yaw), radians(pitch), radians(roll)))
+    return EyeGeometry(R, p, kinematics.eye_angles_to, 0.2, in_range)
 
 
 def stand(model: OppositeAngles, head_deg: Angles3, gaze: Vec3 = POINT) -> tuple[Eyes, Vec3]:

@@ -14,20 +14,26 @@ from gazerig.config.parameters import (
     parameters,
     value_of,
 )
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.model.commands import Value
+from gazerig.robot.model.parameter import Parameter
 
-RIG = load_rig("desk")
-PARAMETERS = parameters(RIG, RIG)
 LENS = {"width_px": 640, "height_px": 480, "fx_px": 500.0, "fy_px": 500.0}
 
 
-def test_all_have_words_and_structure_waits_for_the_next_start() -> None:
-    waiting = {parameter.key for parameter in PARAMETERS if parameter.live.startswith(NEXT_START)}
+@pytest.fixture(scope="module")
+def knobs(desk_rig: Rig) -> tuple[Parameter, ...]:
+    return parameters(desk_rig, desk_rig)
+
+
+def test_all_have_words_and_structure_waits_for_the_next_start(
+    knobs: tuple[Parameter, ...],
+) -> None:
+    waiting = {parameter.key for parameter in knobs if parameter.live.startswith(NEXT_START)}
     assert {"bus.port", "joints.neck_yaw.id", "oak.rate_hz", "camera.mount", "name"} <= waiting
     models = {key for key in waiting if key.startswith(("gaze.", "guard.", "tracks.", "loop."))}
     assert models == {"gaze.chooser"}  # of a package, perhaps, which is loaded at the start
-    for parameter in PARAMETERS:
+    for parameter in knobs:
         assert parameter.description, parameter.key
         assert parameter.live == NEXT_TICK or len(parameter.live) > len("next start: "), (
             parameter.key
@@ -53,33 +59,33 @@ def test_all_have_words_and_structure_waits_for_the_next_start() -> None:
     ],
 )
 def test_what_is_wrong_is_refused_in_the_words_of_a_file(
-    changes: dict[str, object], words: str
+    desk_rig: Rig, changes: dict[str, object], words: str
 ) -> None:
     with pytest.raises(ConfigError) as refused:
-        apply_changes(RIG, changes)  # type: ignore[arg-type]
+        apply_changes(desk_rig, changes)  # type: ignore[arg-type]
     assert words in str(refused.value)
 
 
-def test_all_faults_are_told_at_once() -> None:
+def test_all_faults_are_told_at_once(desk_rig: Rig) -> None:
     with pytest.raises(ConfigError) as refused:
         apply_changes(
-            RIG, {"loop.rate_hz": 5.0, "guard.soft_start_ms": -1.0, "gaze.lids.close_ms": "x"}
+            desk_rig, {"loop.rate_hz": 5.0, "guard.soft_start_ms": -1.0, "gaze.lids.close_ms": "x"}
         )
     assert len(refused.value.faults) == 3
 
 
 @pytest.mark.parametrize("name", shipped_names("characters"))
-def test_differences_turn_one_rig_into_the_other_and_back(name: str) -> None:
+def test_differences_turn_one_rig_into_the_other_and_back(desk_rig: Rig, name: str) -> None:
     other = load_rig("desk", name)
-    found = differences(RIG, other)
-    assert found and apply_changes(RIG, found) == other
-    assert apply_changes(other, differences(other, RIG)) == RIG
+    found = differences(desk_rig, other)
+    assert found and apply_changes(desk_rig, found) == other
+    assert apply_changes(other, differences(other, desk_rig)) == desk_rig
 
 
-def test_entries_and_groups_come_and_go() -> None:
+def test_entries_and_groups_come_and_go(desk_rig: Rig) -> None:
     rule: dict[str, Value] = {"look_at": "hand", "salience": 1.0}
     other = apply_changes(
-        RIG,
+        desk_rig,
         {
             "gaze.top_down.rules.point": rule,
             "face_parts_mm.N": (1, 2, 3),
@@ -89,35 +95,35 @@ def test_entries_and_groups_come_and_go() -> None:
     )
     assert other.face_parts_mm == {"N": (1.0, 2.0, 3.0)}
     assert value_of(other, "gaze.top_down.rules.point.salience") == 1.0
-    assert apply_changes(RIG, differences(RIG, other)) == other
-    assert apply_changes(other, differences(other, RIG)) == RIG
-    flat = flatten_changes(other, differences(RIG, other))
+    assert apply_changes(desk_rig, differences(desk_rig, other)) == other
+    assert apply_changes(other, differences(other, desk_rig)) == desk_rig
+    flat = flatten_changes(other, differences(desk_rig, other))
     assert flat["gaze.top_down.rules.point.look_at"] == "hand"
     assert flat["camera.lens.fx_px"] == 500.0
 
 
-def test_an_unknown_key_has_no_value() -> None:
+def test_an_unknown_key_has_no_value(desk_rig: Rig) -> None:
     with pytest.raises(ConfigError, match="did you mean 'lids'"):
-        value_of(RIG, "gaze.lid")
-    assert value_of(RIG, "park_deg.left_eye_pan") == 0.0
-
-
-NUMBERS = [k for k in PARAMETERS if k.kind in ("number", "whole") and k.low is not None]
+        value_of(desk_rig, "gaze.lid")
+    assert value_of(desk_rig, "park_deg.left_eye_pan") == 0.0
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.data())
-def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(data: st.DataObject) -> None:
-    parameter = data.draw(st.sampled_from(NUMBERS))
+def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(
+    desk_rig: Rig, knobs: tuple[Parameter, ...], data: st.DataObject
+) -> None:
+    numbers = [k for k in knobs if k.kind in ("number", "whole") and k.low is not None]
+    parameter = data.draw(st.sampled_from(numbers))
     assert parameter.low is not None and parameter.high is not None
     whole = st.integers(int(parameter.low), int(parameter.high))
     value = data.draw(
         whole if parameter.kind == "whole" else st.floats(parameter.low, parameter.high)
     )
     try:
-        other = apply_changes(RIG, {parameter.key: value})
+        other = apply_changes(desk_rig, {parameter.key: value})
     except ConfigError as refused:
         assert all(fault.rule for fault in refused.faults)
         return
     assert value_of(other, parameter.key) == value
-    assert set(differences(RIG, other)) <= {parameter.key}
+    assert set(differences(desk_rig, other)) <= {parameter.key}

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from retuned_run import DT_S, RIG, Judge, Running, inside, put, started
+from retuned_run import DT_S, Judge, Running, inside, put, started
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import NEXT_START, apply_changes, parameters, value_of
-from gazerig.config.schema import Rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.command_json import as_json, from_json
@@ -93,7 +93,8 @@ def live_knobs() -> tuple[Parameter, ...]:
     # The desk rig has no lower lids, so nothing obeys their angles, and no joint that may be limp.
     # A character acts by its values, which the store of parameters changes together with its name.
     without = (".limp_when_idle_s", "character")
-    knobs = [k for k in parameters(RIG, RIG) if not k.key.endswith(without)]
+    rig = load_rig("desk")
+    knobs = [k for k in parameters(rig, rig) if not k.key.endswith(without)]
     there = (k for k in knobs if not k.key.startswith(ABSENT))
     return tuple(k for k in there if not k.live.startswith(NEXT_START))
 
@@ -132,10 +133,10 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
 # A running head with a changed range, zero, rate or detector
 
 
-def test_a_running_head_keeps_its_joints() -> None:
-    joints = {name: joint for name, joint in RIG.joints.items() if name != "neck_roll"}
+def test_a_running_head_keeps_its_joints(desk_rig: Rig) -> None:
+    joints = {name: joint for name, joint in desk_rig.joints.items() if name != "neck_roll"}
     with pytest.raises(ConfigError, match="joints: neck_roll: a running head keeps its joints"):
-        started().made.live_params.prepare(RIG, replace(RIG, joints=joints))
+        started().made.live_params.prepare(desk_rig, replace(desk_rig, joints=joints))
 
 
 def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
@@ -252,10 +253,10 @@ def test_a_changed_zero_moves_the_joint_without_a_jump(changes: dict[str, Value]
     assert max(deg for name, deg in off_deg.items() if "lid" not in name) < 5.0  # those may blink
 
 
-def test_what_looks_at_pictures_is_retuned_too() -> None:
-    made = assemble(RIG, RunOptions(True, True, 0, "visitor", pixels=True))
+def test_what_looks_at_pictures_is_retuned_too(desk_rig: Rig) -> None:
+    made = assemble(desk_rig, RunOptions(True, True, 0, "visitor", pixels=True))
     camera = made.live_params.parts.camera
-    other = apply_changes(RIG, {"detector.min_face_px": 60, "motion.max_blobs": 3})
+    other = apply_changes(desk_rig, {"detector.min_face_px": 60, "motion.max_blobs": 3})
     put(made, other)
     held = inside(vars(camera), "", {})
     assert 60 in [v for k, v in held.items() if k.endswith("_params.min_face_px")]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.config.load import load, shipped_path
+from gazerig.config.schema import load_walk
 from gazerig.gaze.scanpath.dwell import stationary
 from gazerig.gaze.scanpath.fit import FitParams, PartFixation, fit_walk
 from gazerig.gaze.scanpath.models import MarkovWalk
@@ -25,7 +25,6 @@ from gazerig.gaze.scanpath.scanpath import (
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
-WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 PRINTED = ScanpathParams(
     min_dwell_ms=0.0, diagonal="refixation", start="as_walk", least_shift_deg=0.0
 )
@@ -34,37 +33,46 @@ ONE_REST = ScanpathParams(diagonal="one_rest", least_shift_deg=0.0)
 
 
 def walker(seed: int = 1, params: ScanpathParams = PRINTED) -> Scanpath:
-    return Scanpath(params, WALK, np.random.default_rng(seed))
+    return Scanpath(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(seed))
 
 
 @cache
 def drawn(count: int) -> np.ndarray:
-    walk, parts = markov_walk(PRINTED, WALK, np.random.default_rng(1)), [0]
+    walk, parts = markov_walk(PRINTED, load_walk("nakamoto_tsuruno"), np.random.default_rng(1)), [0]
     for _ in range(count):
         parts.append(walk.next_part(parts[-1]))
     return np.array(parts)
 
 
-def test_printed_matrix_is_as_printed() -> None:
-    assert [round(sum(row), 1) for row in WALK.matrix] == [0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9]
-    assert WALK.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
-    assert WALK.start == "FR"
+def test_printed_matrix_is_as_printed(printed_walk: Walk) -> None:
+    assert [round(sum(row), 1) for row in printed_walk.matrix] == [
+        0.9,
+        0.8,
+        1.1,
+        1.1,
+        0.9,
+        1.0,
+        1.0,
+        0.9,
+    ]
+    assert printed_walk.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
+    assert printed_walk.start == "FR"
 
 
-def test_e35_transitions_follow_the_normalised_matrix() -> None:
+def test_e35_transitions_follow_the_normalised_matrix(printed_walk: Walk) -> None:
     parts = drawn(200_000)
     counts = np.zeros((8, 8))
     np.add.at(counts, (parts[:-1], parts[1:]), 1)
-    wanted = normalise(WALK.matrix)
+    wanted = normalise(printed_walk.matrix)
     assert np.abs(counts / counts.sum(axis=1, keepdims=True) - wanted).max() < 0.02
     assert counts[wanted == 0.0].sum() == 0
 
 
-def test_e36_rows_are_from_and_columns_to() -> None:
+def test_e36_rows_are_from_and_columns_to(printed_walk: Walk) -> None:
     parts = drawn(200_000)
     share = np.bincount(parts, minlength=8) / len(parts)
-    assert share[WALK.order.index("N")] == pytest.approx(0.222, abs=0.010)
-    assert share[WALK.order.index("RE")] == pytest.approx(0.255, abs=0.010)
+    assert share[printed_walk.order.index("N")] == pytest.approx(0.222, abs=0.010)
+    assert share[printed_walk.order.index("RE")] == pytest.approx(0.255, abs=0.010)
 
 
 FACE = Face(
@@ -94,18 +102,18 @@ def test_e37_face_time_share() -> None:
         assert time[part] / total == pytest.approx(share, abs=0.03), part
 
 
-def test_e40_dwell_times() -> None:
-    walk = markov_walk(PRINTED, WALK, np.random.default_rng(3))
+def test_e40_dwell_times(printed_walk: Walk) -> None:
+    walk = markov_walk(PRINTED, printed_walk, np.random.default_rng(3))
     for part in range(8):
         times = np.array([walk.dwell_s(part) for _ in range(200_000)])
         assert times.min() > 0.0
-        assert times.mean() == pytest.approx(WALK.dwell_mean_s[part], rel=0.04)
-        assert times.std() == pytest.approx(WALK.dwell_sd_s[part], rel=0.10)
+        assert times.mean() == pytest.approx(printed_walk.dwell_mean_s[part], rel=0.04)
+        assert times.std() == pytest.approx(printed_walk.dwell_sd_s[part], rel=0.10)
 
 
-def test_tempo() -> None:
+def test_tempo(printed_walk: Walk) -> None:
     def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
-        return markov_walk(params, WALK, np.random.default_rng(seed))
+        return markov_walk(params, printed_walk, np.random.default_rng(seed))
 
     slow = walk(5, replace(PRINTED, rate_scale=0.5))
     quick = walk(5, PRINTED)
@@ -144,15 +152,15 @@ def test_other_targets_pass_through_and_a_new_face_starts_anew() -> None:
     assert walk.wander(TARGET, PERCEPT, 3.2, settled=True).part == "FR"
 
 
-def test_wrong_shapes_are_named() -> None:
+def test_wrong_shapes_are_named(printed_walk: Walk) -> None:
     with pytest.raises(ValueError, match="8 rows of 8"):
-        replace(WALK, matrix=WALK.matrix[:7])
+        replace(printed_walk, matrix=printed_walk.matrix[:7])
     with pytest.raises(ValueError, match="each of DN"):
-        replace(WALK, order=("DN",) * 8)
+        replace(printed_walk, order=("DN",) * 8)
     with pytest.raises(ValueError, match="positive"):
-        replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 8))
+        replace(printed_walk, matrix=(*printed_walk.matrix[:7], (0.0,) * 8))
     with pytest.raises(ValueError, match="8 numbers each"):
-        replace(WALK, dwell_sd_s=(0.1,))
+        replace(printed_walk, dwell_sd_s=(0.1,))
 
 
 # ---- rests as the default robot makes them ----------------------------------------------
@@ -160,7 +168,11 @@ def test_wrong_shapes_are_named() -> None:
 
 def rests(count: int, rate_scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the parts of a walk in their order of the matrix, and the rest on each."""
-    walk = markov_walk(replace(ONE_REST, rate_scale=rate_scale), WALK, np.random.default_rng(4))
+    walk = markov_walk(
+        replace(ONE_REST, rate_scale=rate_scale),
+        load_walk("nakamoto_tsuruno"),
+        np.random.default_rng(4),
+    )
     parts, times, part = [], [], 0
     for _ in range(count):
         part = walk.next_part(part)
@@ -180,11 +192,13 @@ def test_rests_are_never_short_and_keep_the_rate_of_the_table() -> None:
     assert np.histogram(times, np.arange(0.0, 2.0, 0.01))[0].max() / len(times) < 0.13
 
 
-def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest() -> None:
+def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest(
+    printed_walk: Walk,
+) -> None:
     parts, times = rests(40_000)
     visits = [times[parts == part].mean() + ONE_REST.shift_ms / 1e3 for part in range(8)]
     table = (0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165)
-    for name, visit, wanted in zip(WALK.order, visits, table, strict=True):
+    for name, visit, wanted in zip(printed_walk.order, visits, table, strict=True):
         low, high = (1.05, 1.25) if name in ("LE", "UP") else (0.95, 1.0)
         assert low * wanted < visit < high * wanted, name
 
@@ -201,18 +215,20 @@ def test_a_rate_beyond_the_shortest_rests_is_as_fast_as_they_allow() -> None:
     assert times.min() >= 0.14 and times.mean() == pytest.approx(0.14 * 1.15, rel=0.02)
 
 
-def test_a_walk_with_a_part_that_is_never_left_still_rests() -> None:
-    stuck = replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 7 + (1.0,)))
+def test_a_walk_with_a_part_that_is_never_left_still_rests(printed_walk: Walk) -> None:
+    stuck = replace(printed_walk, matrix=(*printed_walk.matrix[:7], (0.0,) * 7 + (1.0,)))
     walk = markov_walk(ScanpathParams(), stuck, np.random.default_rng(0))
     assert walk.next_part(7) == 7
     assert all(0.14 <= walk.dwell_s(part) < 30.0 for part in range(8))
 
 
 @pytest.mark.parametrize("diagonal", ["refixation", "whole_visit"])
-def test_any_reading_begins_at_the_shortest_dwell_and_keeps_the_means_above(diagonal: str) -> None:
+def test_any_reading_begins_at_the_shortest_dwell_and_keeps_the_means_above(
+    printed_walk: Walk, diagonal: str
+) -> None:
     params = ScanpathParams(diagonal=diagonal, min_dwell_ms=100.0)  # type: ignore[arg-type]
-    walk = markov_walk(params, WALK, np.random.default_rng(6))
-    for part, mean_s in enumerate(WALK.dwell_mean_s):
+    walk = markov_walk(params, printed_walk, np.random.default_rng(6))
+    for part, mean_s in enumerate(printed_walk.dwell_mean_s):
         times = np.array([walk.dwell_s(part) for _ in range(20_000)])
         assert times.min() >= 0.1
         assert (times == times.min()).sum() == 1  # drawn, not cut off
@@ -271,7 +287,7 @@ def walked(count: int, seed: int = 1, dwell_distribution: str = "gamma") -> list
     params = ScanpathParams(
         min_dwell_ms=0.0, diagonal="refixation", dwell_distribution=dwell_distribution
     )
-    walk = markov_walk(params, WALK, np.random.default_rng(seed))
+    walk = markov_walk(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(seed))
     part, t_s, out = 5, 0.0, []
     for _ in range(count):
         dwell_s = walk.dwell_s(part)
@@ -286,17 +302,19 @@ def dice() -> np.random.Generator:
 
 
 @pytest.mark.parametrize("smoothing", ["none", "laplace", "bootstrap"])
-def test_a_known_walk_is_recovered(smoothing: str) -> None:
+def test_a_known_walk_is_recovered(printed_walk: Walk, smoothing: str) -> None:
     fitted = fit_walk(walked(20_000), FitParams(smoothing=smoothing, resamples=200), dice())
-    wanted = normalise(WALK.matrix)
+    wanted = normalise(printed_walk.matrix)
     for row, counts, truth in zip(fitted.matrix, fitted.counts, wanted, strict=True):
         n = sum(counts)
         for cell, p in zip(row, truth, strict=True):
             # Four standard errors of a share, and what the added half counts may move it by.
             assert abs(cell.value - p) <= 4.0 * np.sqrt(p * (1.0 - p) / n) + 4.0 / n
     for i in range(8):
-        n, sd = fitted.visits[i], WALK.dwell_sd_s[i]
-        assert abs(fitted.dwell_mean_s[i].value - WALK.dwell_mean_s[i]) < 4.0 * sd / np.sqrt(n)
+        n, sd = fitted.visits[i], printed_walk.dwell_sd_s[i]
+        assert abs(
+            fitted.dwell_mean_s[i].value - printed_walk.dwell_mean_s[i]
+        ) < 4.0 * sd / np.sqrt(n)
         assert fitted.dwell_sd_s[i].value == pytest.approx(sd, rel=0.15)
     assert fitted.start == "FR" and fitted.outside_fixations == 0 and fitted.pooled_parts == ()
     assert np.sum([[c.value for c in row] for row in fitted.matrix], axis=1) == pytest.approx(
@@ -304,8 +322,8 @@ def test_a_known_walk_is_recovered(smoothing: str) -> None:
     )
 
 
-def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
-    wanted, held, cells = normalise(WALK.matrix), 0, 0
+def test_intervals_hold_the_truth_about_as_often_as_they_say(printed_walk: Walk) -> None:
+    wanted, held, cells = normalise(printed_walk.matrix), 0, 0
     dwells_held = 0
     for seed in range(18):
         fitted = fit_walk(walked(600, seed), FitParams(smoothing="none", resamples=200), dice())
@@ -318,7 +336,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
                     assert cell.value == 0.0 and cell.low == 0.0 and cell.high > 0.0
         dwells_held += sum(
             mean.low <= truth <= mean.high
-            for mean, truth in zip(fitted.dwell_mean_s, WALK.dwell_mean_s, strict=True)
+            for mean, truth in zip(fitted.dwell_mean_s, printed_walk.dwell_mean_s, strict=True)
         )
     assert 0.90 < held / cells < 0.98
     assert 0.80 < dwells_held / (18 * 8) < 0.98  # skewed laws: the bootstrap is known to fall short
@@ -372,12 +390,10 @@ def test_what_cannot_be_trusted_is_refused() -> None:
 
 # ---- the average observer, and one observer --------------------------------------------
 
-PEOPLE = load(shipped_path("scanpaths", "people"), Walk)
-
 
 def visited(face: Face, params: ScanpathParams | None = None, seed: int = 1) -> dict[str, float]:
     """Return the share of the looks at each part of a face 1 m or more ahead."""
-    walk = Scanpath(params or ScanpathParams(), PEOPLE, np.random.default_rng(seed))
+    walk = Scanpath(params or ScanpathParams(), load_walk("people"), np.random.default_rng(seed))
     percept, parts = Percept(0.0, Bodies(), (face,)), []
     target = TARGET._replace(p_world_m=face.p_world_m)
     shift = None
@@ -399,12 +415,14 @@ def face_at(away_m: float, speaks: bool = False) -> Face:
     return Face(3, centre, (0.0, 0.0, 0.0), R, parts, 0.9, speaks=speaks)
 
 
-def test_the_average_observer_looks_at_the_eyes_most() -> None:
+def test_the_average_observer_looks_at_the_eyes_most(printed_walk: Walk) -> None:
     share = visited(face_at(0.8))
     assert 0.40 < share["LE"] + share["RE"] < 0.50
     assert 0.18 < share["N"] < 0.27 and 0.07 < share["M"] < 0.14
-    never = np.array(WALK.matrix) == 0.0
-    assert (np.array(PEOPLE.matrix)[never] == 0.0).all(), "shifts of the paper and no others"
+    never = np.array(printed_walk.matrix) == 0.0
+    assert (np.array(load_walk("people").matrix)[never] == 0.0).all(), (
+        "shifts of the paper and no others"
+    )
 
 
 def test_speech_draws_looks_to_the_mouth() -> None:
@@ -417,7 +435,7 @@ def test_a_look_that_returns_from_the_side_begins_at_an_eye_or_the_nose() -> Non
     percept = Percept(0.0, Bodies(), (face,))
     target = TARGET._replace(p_world_m=face.p_world_m)
     for aside in (-1.0, 1.0):
-        walk = Scanpath(ScanpathParams(), PEOPLE, np.random.default_rng(0))
+        walk = Scanpath(ScanpathParams(), load_walk("people"), np.random.default_rng(0))
         look = walk.wander(target, percept, 0.0, True, gaze_world_m=(0.8, aside, -0.3))
         assert look.part in ENTRY_PARTS
 
@@ -437,12 +455,13 @@ def test_parts_of_a_far_face_that_are_close_together_are_one_look() -> None:
 
 
 def test_rests_of_the_average_observer_are_as_different_as_peoples() -> None:
-    steps, dwells = steps_and_dwells(ScanpathParams(), PEOPLE)
+    people = load_walk("people")
+    steps, dwells = steps_and_dwells(ScanpathParams(), people)
     share, rng = stationary(steps), np.random.default_rng(3)
     parts = rng.choice(8, 20_000, p=share)
     rests = np.array([dwells[part](rng) for part in parts])
     assert 0.5 < rests.std() / rests.mean() < 0.62
     assert 0.07 < (rests > 0.5).mean() < 0.14
-    eyes = np.isin(parts, [PEOPLE.order.index(part) for part in ("LE", "RE")])
+    eyes = np.isin(parts, [people.order.index(part) for part in ("LE", "RE")])
     assert 0.003 < (rests[eyes] > 1.0).mean() < 0.04
     assert 2.0 < 1.0 / (rests.mean() + 0.036) < 3.0

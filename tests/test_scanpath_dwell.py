@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from gazerig.config.load import load, shipped_path
 from gazerig.gaze.scanpath.dwell import dwell_distribution
 from gazerig.gaze.scanpath.scanpath import Walk
+from gazerig.gaze.types import PARTS
 
-WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
-TABLE_1 = list(zip(WALK.order, WALK.dwell_mean_s, WALK.dwell_sd_s, strict=True))
+
+@pytest.fixture(params=PARTS)
+def mean_and_sd_s(request: pytest.FixtureRequest, printed_walk: Walk) -> tuple[float, float]:
+    """A row of Table 1."""
+    row = printed_walk.order.index(request.param)
+    return printed_walk.dwell_mean_s[row], printed_walk.dwell_sd_s[row]
 
 
 def drawn(law: str, mean_s: float, sd_s: float, count: int = 50_000) -> np.ndarray:
@@ -17,14 +21,14 @@ def drawn(law: str, mean_s: float, sd_s: float, count: int = 50_000) -> np.ndarr
 
 
 @pytest.mark.parametrize("law", ["lognormal", "gamma"])
-@pytest.mark.parametrize(("part", "mean_s", "sd_s"), TABLE_1)
 def test_e40_lognormal_and_gamma_keep_mean_and_sd(
-    law: str, part: str, mean_s: float, sd_s: float
+    law: str, mean_and_sd_s: tuple[float, float]
 ) -> None:
+    mean_s, sd_s = mean_and_sd_s
     times = drawn(law, mean_s, sd_s, 100_000)
     assert times.min() > 0.0
-    assert times.mean() == pytest.approx(mean_s, rel=0.04), part
-    assert times.std() == pytest.approx(sd_s, rel=0.10), part
+    assert times.mean() == pytest.approx(mean_s, rel=0.04)
+    assert times.std() == pytest.approx(sd_s, rel=0.10)
 
 
 @pytest.mark.parametrize("sd_s", [0.002, 0.04, 0.1, 0.15, 0.18, 0.195])
@@ -42,23 +46,21 @@ def test_truncated_normal_of_half_a_bell_is_one() -> None:
     assert np.quantile(times, 0.9) == pytest.approx(1.6449, abs=0.02)
 
 
-@pytest.mark.parametrize(("part", "mean_s", "sd_s"), TABLE_1)
-def test_truncated_normal_of_table_1_is_exponential(part: str, mean_s: float, sd_s: float) -> None:
+def test_truncated_normal_of_table_1_is_exponential(mean_and_sd_s: tuple[float, float]) -> None:
+    mean_s, sd_s = mean_and_sd_s
     times = drawn("truncated_normal", mean_s, sd_s)
     assert times.min() > 0.0
-    assert times.mean() == pytest.approx(mean_s, rel=0.02), part
-    assert times.std() == pytest.approx(mean_s, rel=0.03), part
-    assert np.median(times) == pytest.approx(mean_s * np.log(2.0), rel=0.03), part
+    assert times.mean() == pytest.approx(mean_s, rel=0.02)
+    assert times.std() == pytest.approx(mean_s, rel=0.03)
+    assert np.median(times) == pytest.approx(mean_s * np.log(2.0), rel=0.03)
 
 
-@pytest.mark.parametrize(("part", "mean_s", "sd_s"), TABLE_1)
-def test_uniform_spans_mean_and_sd_and_stays_positive(
-    part: str, mean_s: float, sd_s: float
-) -> None:
+def test_uniform_spans_mean_and_sd_and_stays_positive(mean_and_sd_s: tuple[float, float]) -> None:
+    mean_s, sd_s = mean_and_sd_s
     times = drawn("uniform", mean_s, sd_s, 20_000)
-    assert 0.0 < times.min() < 0.01, part
-    assert times.max() == pytest.approx(mean_s + sd_s, rel=0.01), part
-    assert times.mean() == pytest.approx(0.5 * (mean_s + sd_s), rel=0.03), part
+    assert 0.0 < times.min() < 0.01
+    assert times.max() == pytest.approx(mean_s + sd_s, rel=0.01)
+    assert times.mean() == pytest.approx(0.5 * (mean_s + sd_s), rel=0.03)
 
 
 def test_uniform_with_a_small_sd_is_the_plain_interval() -> None:

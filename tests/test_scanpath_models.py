@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gazerig.config.load import load, shipped_path
+from gazerig.config.schema import load_walk
 from gazerig.gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
 from gazerig.gaze.angles import rotate_back as seen_from
 from gazerig.gaze.scanpath.scanpath import (
@@ -21,7 +21,6 @@ from gazerig.gaze.scanpath.scanpath import (
 )
 from gazerig.gaze.types import PARTS, Face, Percept, Target, Vec3
 
-WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 HEAD: Vec3 = (0.02, -0.01, 0.25)
 FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -46,7 +45,7 @@ PRINTED = ScanpathParams(min_dwell_ms=0.0, diagonal="refixation", least_shift_de
 
 
 def looks_of(params: ScanpathParams, seconds: float, dt: float, seed: int = 1) -> list[Target]:
-    path = Scanpath(params, WALK, np.random.default_rng(seed))
+    path = Scanpath(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(seed))
     steps = range(round(seconds / dt))
     return [path.wander(TARGET, PERCEPT, k * dt, True, HEAD) for k in steps]
 
@@ -75,7 +74,7 @@ def test_e41_simple_model_waits_for_arrival_and_takes_another_order() -> None:
     params = ScanpathParams(
         model="simple", simple_order=("LE", "M"), simple_dwell_ms=(100.0, 200.0), rate_scale=0.5
     )
-    path = Scanpath(params, WALK, np.random.default_rng(1))
+    path = Scanpath(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(1))
     for k in range(100):
         assert path.wander(TARGET, PERCEPT, k * 0.1, settled=False).part == "LE"
     assert path.wander(TARGET, PERCEPT, 10.0, settled=True).part == "LE"
@@ -108,8 +107,10 @@ def test_e42_random_baseline() -> None:
     assert all(norm(point) == pytest.approx(far) for point in points)
 
 
-def test_e42_random_gaze_keeps_its_angles_between_jumps_while_the_face_moves() -> None:
-    path = Scanpath(ScanpathParams(model="random"), WALK, np.random.default_rng(2))
+def test_e42_random_gaze_keeps_its_angles_between_jumps_while_the_face_moves(
+    printed_walk: Walk,
+) -> None:
+    path = Scanpath(ScanpathParams(model="random"), printed_walk, np.random.default_rng(2))
     seen: dict[int, list[tuple[float, float]]] = {}
     for k in range(2000):
         face = face_at((1.0, 0.4 * np.sin(0.01 * k), 0.3))
@@ -123,8 +124,8 @@ def test_e42_random_gaze_keeps_its_angles_between_jumps_while_the_face_moves() -
         assert np.ptp(angles, axis=0).max() < 1e-9
 
 
-def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face() -> None:
-    path = Scanpath(ScanpathParams(model="face_tracking"), WALK, np.random.default_rng(1))
+def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face(printed_walk: Walk) -> None:
+    path = Scanpath(ScanpathParams(model="face_tracking"), printed_walk, np.random.default_rng(1))
     start, v = (1.0, -0.6, 0.3), (0.0, 0.3, 0.02)
     worst, shifts = 0.0, set()
     for k in range(800):
@@ -142,8 +143,10 @@ def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face() -> None:
 
 
 @pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
-def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model: Any) -> None:
-    path = Scanpath(ScanpathParams(model=model), WALK, np.random.default_rng(1))
+def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(
+    printed_walk: Walk, model: Any
+) -> None:
+    path = Scanpath(ScanpathParams(model=model), printed_walk, np.random.default_rng(1))
     hand = TARGET._replace(kind="hand", id=9, why="hand 9")
     assert path.wander(hand, PERCEPT, 0.0, True, HEAD) == hand
     look = path.wander(TARGET, PERCEPT, 0.1, True, HEAD)
@@ -179,19 +182,19 @@ def test_the_start_part_can_be_chosen() -> None:
     assert looks_of(ScanpathParams(start="M"), 0.05, 0.01)[0].part == "M"
 
 
-def test_whole_visit_merges_refixations() -> None:
-    merged = merge_refixations(WALK.matrix)
+def test_whole_visit_merges_refixations(printed_walk: Walk) -> None:
+    merged = merge_refixations(printed_walk.matrix)
     assert np.diag(merged).max() == 0.0
     assert merged.sum(axis=1) == pytest.approx(np.ones(8))
     # Proportions between the other parts stay: from N, M to RE as .1 to .3.
-    n, m, re = (WALK.order.index(part) for part in ("N", "M", "RE"))
+    n, m, re = (printed_walk.order.index(part) for part in ("N", "M", "RE"))
     assert merged[n, re] == pytest.approx(3.0 * merged[n, m])
 
 
-def test_whole_visit_shares_of_steps_and_rate() -> None:
+def test_whole_visit_shares_of_steps_and_rate(printed_walk: Walk) -> None:
     # Stationary shares of the merged chain, and 5.66 shifts a second without travel or floor.
     params = ScanpathParams(diagonal="whole_visit", min_dwell_ms=0.0, least_shift_deg=0.0)
-    walk = markov_walk(params, WALK, np.random.default_rng(8))
+    walk = markov_walk(params, printed_walk, np.random.default_rng(8))
     parts = [0]
     for _ in range(50_000):
         parts.append(walk.next_part(parts[-1]))
@@ -210,16 +213,18 @@ def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
     assert shifts == pytest.approx(3.68, abs=0.2)
 
 
-def test_a_part_that_is_never_left_keeps_its_row() -> None:
-    rows = (*WALK.matrix[:7], (0.0,) * 7 + (1.0,))
+def test_a_part_that_is_never_left_keeps_its_row(printed_walk: Walk) -> None:
+    rows = (*printed_walk.matrix[:7], (0.0,) * 7 + (1.0,))
     assert merge_refixations(rows)[7].tolist() == [0.0] * 7 + [1.0]
 
 
-def test_row_sums_are_reported_as_printed() -> None:
-    assert WALK.row_sums == pytest.approx((0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9))
-    assert row_sums_note(WALK) == (
+def test_row_sums_are_reported_as_printed(printed_walk: Walk) -> None:
+    assert printed_walk.row_sums == pytest.approx((0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9))
+    assert row_sums_note(printed_walk) == (
         "the walk's rows do not all sum to 1 (DN 0.9, FL 0.8, LE 1.1, M 1.1, N 0.9, UP 0.9); "
         "they are normalised"
     )
-    whole = replace(WALK, matrix=tuple(map(tuple, normalise(WALK.matrix).round(4).tolist())))
+    whole = replace(
+        printed_walk, matrix=tuple(map(tuple, normalise(printed_walk.matrix).round(4).tolist()))
+    )
     assert row_sums_note(whole) is None

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from gazerig.config.load import shipped_names
 from gazerig.config.schema import load_rig
 from gazerig.config.tracks import shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
@@ -93,12 +94,13 @@ def interrupted(track: str, rig_name: str, moments: int, seed: int, dt_s: float 
     )
 
 
+TRACKS = shipped_names("tracks")
 RIG_OF = dict(
-    zip(shipped_tracks(), ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
+    zip(TRACKS, ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("track", shipped_tracks())
+@pytest.mark.parametrize("track", TRACKS)
 def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(track: str) -> None:
     found = interrupted(track, RIG_OF[track], 400, seed=len(track))
     assert found.began > 280

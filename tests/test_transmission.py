@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig
 from gazerig.robot.model.joint import JointParams, MeasuredLinkage
 
 ROD = [[-30.0, 1900.0], [-10.0, 1640.0], [0.0, 1500.0], [15.0, 1350.0], [30.0, 1100.0]]
-MAKER = load_rig("maker")
 
 
 @st.composite
@@ -113,9 +112,8 @@ def test_a_joint_beyond_its_servo_or_its_measuring_is_refused(
         hobby(**other)
 
 
-def test_the_shipped_rods_give_every_joint_its_whole_range() -> None:
-    for name in MAKER.names:
-        joint = MAKER.joints[name]
+def test_the_shipped_rods_give_every_joint_its_whole_range(maker_rig: Rig) -> None:
+    for name, joint in maker_rig.joints.items():
         setup = joint.setup(name, 0.0)
         assert setup.max_steps - setup.min_steps > 4 * 250, name
         assert 2000 <= setup.min_steps < setup.max_steps <= 10000, name

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig
 from gazerig.features.bringup.calibration.face_steering import (
     AIMED_DEG,
     FARTHEST_MM,
@@ -114,7 +114,6 @@ def test_back_and_skip_take_a_choice_back() -> None:
 # --- A gaze steered over a face: the nearest one, the eyes on the point, and what is refused
 
 
-RIG = load_rig("desk")
 REST = (1.5, 0.0, 0.2)
 TOP_DOWN: Any = object()
 POSE: Any = type("Pose", (), {"p_world_head_m": (0.0, 0.0, 0.1)})()
@@ -168,14 +167,14 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
 
 
 @pytest.fixture
-def steered() -> FaceSteering:
-    return FaceSteering(initial_calibration({}), TopDown(RIG.gaze.top_down), REST)
+def steered(desk_rig: Rig) -> FaceSteering:
+    return FaceSteering(initial_calibration({}), TopDown(desk_rig.gaze.top_down), REST)
 
 
 @pytest.fixture
-def made(steered: FaceSteering) -> Iterator[Assembly]:
+def made(steered: FaceSteering, desk_rig: Rig) -> Iterator[Assembly]:
     options = RunOptions(mock=True, fast=True, seed=1, scene="sits-still")
-    found = assemble(exact_gaze(RIG), options, Substitutes(chooser=lambda own: steered))
+    found = assemble(exact_gaze(desk_rig), options, Substitutes(chooser=lambda own: steered))
     yield found
     found.close()
 

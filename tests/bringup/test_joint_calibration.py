@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
@@ -452,10 +452,6 @@ def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
 # --- A joint behind a push rod: places marked by eye over an emulated board, and their linkage
 
 
-MAKER = load_rig("maker")
-PAN, LID = MAKER.joints["eyes_pan"], MAKER.joints["left_lower_lid"]
-
-
 @given(
     left=st.floats(6.0, 60.0),
     right=st.floats(6.0, 60.0),
@@ -465,17 +461,18 @@ PAN, LID = MAKER.joints["eyes_pan"], MAKER.joints["left_lower_lid"]
     margin=st.floats(0.0, 3.0),
 )
 def test_the_range_lies_inside_what_was_marked(
-    left: float, right: float, zero: int, reach: int, rising: bool, margin: float
+    maker_rig: Rig, left: float, right: float, zero: int, reach: int, rising: bool, margin: float
 ) -> None:
+    pan = maker_rig.joints["eyes_pan"]
     way = reach if rising else -reach
     marked = [(0.0, float(zero)), (left, float(zero + way)), (-right, float(zero - way))]
-    made = fit_linkage("eyes_pan", marked, PAN, margin)
+    made = fit_linkage("eyes_pan", marked, pan, margin)
     assert [at for _, at in made.transmission_points] == sorted(
         (at for _, at in marked), reverse=not rising
     )
     assert -right - 0.051 + margin <= made.min_deg < 0.0 < made.max_deg <= left + 0.051 - margin
     assert made.max_deg >= left - margin - 0.151 and made.min_deg <= margin - right + 0.151
-    joint = replace(PAN, **made._asdict())
+    joint = replace(pan, **made._asdict())
     assert joint.steps(0.0) == zero * 4
     assert joint.make_linkage().rising == rising
 
@@ -494,15 +491,13 @@ def test_the_range_lies_inside_what_was_marked(
     ],
 )
 def test_what_makes_no_linkage_is_refused_with_the_rule(
-    name: str, marked: list[tuple[float, float]], says: str
+    maker_rig: Rig, name: str, marked: list[tuple[float, float]], says: str
 ) -> None:
     with pytest.raises(CalibrationRefused, match=says):
-        fit_linkage(name, marked, MAKER.joints[name], 2.0)
+        fit_linkage(name, marked, maker_rig.joints[name], 2.0)
 
 
 # --- measured by eye
-
-BOARD = MAKER.bus.maestro
 
 
 class LinkageBench:
@@ -513,16 +508,23 @@ class LinkageBench:
     """
 
     def __init__(self, name: str, *answers: str, pulses: tuple[float, float] = (500, 2500)) -> None:
+        rig = load_rig("maker")
         self.clock = SimulatedClock()
-        self.board = build(emulated_lines(MAKER)[""], self.clock.now_s)
+        self.board = build(emulated_lines(rig)[""], self.clock.now_s)
         self.sent: list[bytes] = []
         self.port = InProcessPort(self.board, self.sent.append, sleep_until=self.clock.sleep_until)
         self.why: str | None = None
         self.answers = list(answers)
         self.said: list[str] = []
-        self.channel = MAKER.joints[name].id
+        self.channel = rig.joints[name].id
         self.hobby = HobbyServoAccess(
-            name, MAKER.joints[name], self.port, BOARD, self.clock, lambda: self.why, pulses
+            name,
+            rig.joints[name],
+            self.port,
+            rig.bus.maestro,
+            self.clock,
+            lambda: self.why,
+            pulses,
         )
         self.placer = HobbyMarker(self.hobby, self)
 
@@ -583,10 +585,10 @@ def test_eyes_are_measured_and_their_pulses_end() -> None:
     assert any("cut the servo power" in line for line in bench.said)
 
 
-def test_a_channel_that_gives_pulses_does_not_jump() -> None:
+def test_a_channel_that_gives_pulses_does_not_jump(maker_rig: Rig) -> None:
     bench = LinkageBench("eyes_pan", "", "1550", "", "", "1450", "", "")
     bench.port.setBaudRate(115_200)
-    bench.port.write(MaestroCodec(crc=BOARD.crc).target(0, 1534 * 4))
+    bench.port.write(MaestroCodec(crc=maker_rig.bus.maestro.crc).target(0, 1534 * 4))
     bench.clock.sleep_until(1.0)
     before = bench.place_us()
     bench.hobby.open()

@@ -2,16 +2,15 @@
 
 from collections.abc import Iterator
 from math import degrees, nan, radians
-from pathlib import Path
 from typing import Any, cast
 
 import pytest
 from desk import GAZE_JOINTS
-from emulated_rig import EmulatedRig, mixed_rig
+from emulated_rig import EmulatedRig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, duration_s
 from gazerig.robot.app.bus_wiring import rig_bus
@@ -21,23 +20,15 @@ from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.devices import DynamixelLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-RIGS = {name: load_rig(name) for name in ("desk", "feetech", "maker")}
-RIG = RIGS["desk"]
 CROOKED = {"neck_yaw": -12.0, "left_eye_pan": 6.0, "neck_pitch": -8.0}
 
 
 class Bench(EmulatedRig):
     """An emulated rig that is moved by command, and every step of it."""
 
-    def __init__(self, rig: Rig = RIG, params: JogParams | None = None) -> None:
-        lines = None
-        if rig is RIG:  # without a rig's mechanical stops, if the test needs it
-            joints = ((name, rig.joints[name]) for name in GAZE_JOINTS)
-            specs = tuple(
-                ServoSpec(j.id, j.model, round(j.steps(radians(CROOKED.get(name, 0.0)))))
-                for name, j in joints
-            )
-            lines = {"": DynamixelLine(specs)}
+    def __init__(
+        self, rig: Rig, speed_deg_s: float, lines: dict[str, DynamixelLine] | None = None
+    ) -> None:
         super().__init__(rig, lines)
         guard = Guard(rig.guard, limits(rig.joints), rig.names)
         self.steps: list[Step] = []
@@ -47,7 +38,7 @@ class Bench(EmulatedRig):
             Body(rig_bus(rig, self.ports), rig.joints, park_rad(rig)),
             guard,
             self.clock,
-            params or JogParams(speed_deg_s=20.0 if rig is RIG else 40.0),
+            JogParams(speed_deg_s=speed_deg_s),
             lambda: self.why,
             self.note,
         )
@@ -62,26 +53,23 @@ class Bench(EmulatedRig):
         return [servo.torque for servo in cast(Any, self.devices[""]).servos]
 
 
+def crooked(rig: Rig, speed_deg_s: float = 20.0) -> Bench:
+    """Return a rig whose joints are not at rest, without its mechanical stops."""
+    joints = ((name, rig.joints[name]) for name in rig.names)
+    specs = tuple(
+        ServoSpec(j.id, j.model, round(j.steps(radians(CROOKED.get(name, 0.0)))))
+        for name, j in joints
+    )
+    return Bench(rig, speed_deg_s, {"": DynamixelLine(specs)})
+
+
 @pytest.fixture
-def bench() -> Iterator[Bench]:
-    made = Bench()
+def bench(desk_rig: Rig) -> Iterator[Bench]:
+    made = crooked(desk_rig)
     made.control.start()
     yield made
     made.control.stop()
     assert not any(made.torque())
-
-
-@pytest.fixture
-def other(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Bench]:
-    """Return a moving rig of the kind that the test names."""
-    made = Bench(mixed_rig(tmp_path) if request.param == "mixed" else RIGS[request.param])
-    made.control.start()
-    yield made
-    made.control.stop()
-
-
-def on(kind: str) -> pytest.MarkDecorator:
-    return pytest.mark.parametrize("other", [kind], indirect=True)
 
 
 def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
@@ -103,12 +91,12 @@ def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
     speed=st.floats(5.0, 60.0),
 )
 def test_no_goal_is_faster_than_asked_nor_outside_the_range(
-    joint: str, angle: float, speed: float
+    desk_rig: Rig, joint: str, angle: float, speed: float
 ) -> None:
-    bench = Bench(params=JogParams(speed_deg_s=speed))
+    bench = crooked(desk_rig, speed)
     bench.control.start()
     moved = bench.control.pose({joint: angle})
-    i, params = GAZE_JOINTS.index(joint), RIG.joints[joint]
+    i, params = GAZE_JOINTS.index(joint), desk_rig.joints[joint]
     low, high = radians(params.min_deg), radians(params.max_deg)
     sent = [(s.t_s, s.guard_result.command_rad[i]) for s in bench.steps]
     for (t0, a), (t1, b) in zip(sent, sent[1:], strict=False):
@@ -162,11 +150,11 @@ def test_a_latched_fault_ends_it(bench: Bench) -> None:
     assert any("overload" in reason for reason in moved.joint_move("neck_yaw").reasons)
 
 
-def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench) -> None:
+def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench, desk_rig: Rig) -> None:
     bench.why = "SIGINT"
     moved = bench.control.jog("neck_yaw", 40.0)
     assert moved.end_reason == "SIGINT" and moved.seconds < 0.1
-    assert bench.control.park(RIG.park_deg).arrived
+    assert bench.control.park(desk_rig.park_deg).arrived
     assert bench.where()["neck_pitch"] == pytest.approx(-12.0, abs=2.0)
 
 
@@ -196,11 +184,13 @@ def test_nonsense_is_refused_before_anything_moves(
 # --- other kinds of servo
 
 
-@on("maker")
-def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench) -> None:
+def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(maker_rig: Rig) -> None:
+    other = Bench(maker_rig, 40.0)
+    other.control.start()
     moved = other.control.pose({"eyes_pan": -15.0, "left_lower_lid": 12.0})
     assert moved.arrived
     assert str(moved.joint_move("eyes_pan")) == "eyes_pan: desired -15.0, estimated -15.0 deg"
     where = other.where()
     assert where["eyes_pan"] == pytest.approx(-15.0, abs=1.0)
     assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
+    other.control.stop()

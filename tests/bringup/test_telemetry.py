@@ -35,7 +35,6 @@ from gazerig.robot.model.track_fit import track_motions
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-MAKER = load_rig("maker")
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0, sign=-1, ratio=2.0, zero_step=2000)
 GET_POSITION = 0x90
@@ -153,11 +152,11 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
 # --- boards
 
 
-def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees() -> None:
-    bench = Bench(MAKER)
+def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees(maker_rig: Rig) -> None:
+    bench = Bench(maker_rig)
     limp = bench.see("eyes_pan")
     assert limp.pulse_us == 0.0 and limp.position_deg is None and not limp.torque
-    bench.ports[""].write(MaestroCodec(crc=MAKER.bus.maestro.crc).target(0, 1634 * 4))
+    bench.ports[""].write(MaestroCodec(crc=maker_rig.bus.maestro.crc).target(0, 1634 * 4))
     bench.clock.sleep_until(0.5)
     seen = bench.see("eyes_pan")
     assert seen.pulse_us == 1634.0 and seen.position_deg == pytest.approx(10.0)
@@ -166,8 +165,8 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees() -> None
     assert untold == (None,) * 5
 
 
-def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors() -> None:
-    bench = Bench(MAKER)
+def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors(maker_rig: Rig) -> None:
+    bench = Bench(maker_rig)
     bench.command("error protocol")
     bench.sent[""].clear()
     for _ in range(3):
@@ -179,29 +178,25 @@ def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors() -> None:
 # --- A track that is recorded by hand: torque off, and the head's motion becomes its keys
 
 
-DESK = load_rig("desk")
-
-
 class HandBench:
     """The desk rig, emulated, with a hand on its neck."""
 
-    def __init__(self) -> None:
+    def __init__(self, rig: Rig) -> None:
         # Its head is balanced, so that the limp neck stays where the hand has turned it.
         balanced = MassParams(head=LinkMassParams(com_mm=(0.0, 0.0, 0.0)))
-        self.rig = EmulatedRig(replace(DESK, mass=balanced))
+        self.rig = EmulatedRig(replace(rig, mass=balanced))
         self.port = self.rig.ports[""]
-        self.port.setBaudRate(DESK.bus.baud)
-        joints = {name: DESK.joints[name] for name in DESK.names}
+        self.port.setBaudRate(rig.bus.baud)
         reader = SmartServoTelemetry(self.port, KINDS["dynamixel"])
-        self.monitor = Monitor({"": reader}, joints, self.rig.clock.now_s)
+        self.monitor = Monitor({"": reader}, rig.joints, self.rig.clock.now_s)
         self._at: dict[str, float] = {}
 
     def servo(self, joint: str) -> Any:
-        return cast(Any, self.rig.devices[""]).find_servo(DESK.joints[joint].id)
+        return cast(Any, self.rig.devices[""]).find_servo(self.rig.rig.joints[joint].id)
 
     def hold(self, joint: str, deg: float) -> None:
         """Turn a joint by hand by an angle from its first position."""
-        joint_params = DESK.joints[joint]
+        joint_params = self.rig.rig.joints[joint]
         steps = joint_params.steps(np.radians(deg)) - joint_params.steps(0.0)
         self.servo(joint).turn(steps - self._at.get(joint, 0.0))
         self._at[joint] = steps
@@ -217,22 +212,24 @@ class HandBench:
         return sample
 
 
-def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(tmp_path: Path) -> None:
-    bench = HandBench()
-    switch_off(DESK.joints, bench.port)
+def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(
+    desk_rig: Rig, tmp_path: Path
+) -> None:
+    bench = HandBench(desk_rig)
+    switch_off(desk_rig.joints, bench.port)
 
     def how(t: float) -> dict[str, float]:
         up = 10.0 * sin(pi * t) ** 2 if t < 2.0 else 0.0
         return {"neck_pitch": -up, "neck_yaw": 0.4 * up}
 
     found = record_hand_motion(bench.moved(how), bench.rig.clock, lambda: None, 2.5)
-    assert found.ended_by == "the time is over" and set(found.series) == set(DESK.names)
-    text = track_text(DESK, found.series, "by hand").text
-    path, on_rig = write_track(DESK, "mine", text, tmp_path, False)
+    assert found.ended_by == "the time is over" and set(found.series) == set(desk_rig.names)
+    text = track_text(desk_rig, found.series, "by hand").text
+    path, on_rig = write_track(desk_rig, "mine", text, tmp_path, False)
     track = load_track(path)
     assert track.space == "joint" and len(track.frames) < 40
     assert on_rig.fitted is not None and on_rig.fitted.slowed_by == 1.0
-    motion = track_motions(track, DESK.names).motion
+    motion = track_motions(track, desk_rig.names).motion
     at = np.linspace(0.1, 2.3, 50)
     played = np.degrees(motion.sample_at(at).value)
     wanted = np.array([how(t)["neck_pitch"] for t in at])
@@ -240,9 +237,9 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(tmp_path: Path) -
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved
 
 
-def test_torque_that_comes_on_ends_the_recording() -> None:
-    bench = HandBench()
-    switch_off(DESK.joints, bench.port)
+def test_torque_that_comes_on_ends_the_recording(desk_rig: Rig) -> None:
+    bench = HandBench(desk_rig)
+    switch_off(desk_rig.joints, bench.port)
     left = iter(range(5))
 
     def sample() -> TelemetrySample:
@@ -254,16 +251,17 @@ def test_torque_that_comes_on_ends_the_recording() -> None:
         record_hand_motion(sample, bench.rig.clock, lambda: None, 2.0)
 
 
-def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off() -> None:
-    bench = HandBench()
+def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off(desk_rig: Rig) -> None:
+    bench = HandBench(desk_rig)
     registers = Registers(bench.port, KINDS["dynamixel"].family)
-    for joint in DESK.joints.values():
+    joints = desk_rig.joints
+    for joint in joints.values():
         assert registers.write(joint.id, "torque_enable", 1)
     bench.rig.command("lose 1")
     with pytest.raises(ServoFault, match=r"left_eye_pan \(servo 1\): not known to have let go"):
-        switch_off(DESK.joints, bench.port)
+        switch_off(joints, bench.port)
     bench.rig.command("clear")
-    held = [joint.id for joint in DESK.joints.values() if registers.read(joint.id, "torque_enable")]
+    held = [joint.id for joint in joints.values() if registers.read(joint.id, "torque_enable")]
     assert not held
 
 

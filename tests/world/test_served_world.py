@@ -22,21 +22,20 @@ from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.pty.line import BusSettings
 
-RIG = load_rig("minimal")
-
 
 class Host:
     """A clock that is set, and a world on it."""
 
     def __init__(self, folder: Path) -> None:
-        world = world_of(RIG, RunOptions(mock=True, world="living-room"))
+        self.rig = load_rig("minimal")
+        world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
         assert world is not None
         self.world: RunWorld = world
         self.t_s = 100.0
         self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
-        for name, line in emulated_lines(RIG).items():
+        for name, line in emulated_lines(self.rig).items():
             self.served.device(BusSettings(line, name))
-        joints = RigInState(rig_kinematics(RIG), self.served.joints())
+        joints = RigInState(rig_kinematics(self.rig), self.served.joints())
         self.poses = WorldPoses(folder / "state", joints)
 
     def serve(self, seconds: float, heard: bool) -> None:
@@ -91,7 +90,7 @@ class Broken(CameraProcess):
 def camera(host: Host, error: SetupError | None) -> WorldCamera:
     def ideal(begin_s: float) -> SceneCamera:
         return SceneCamera(
-            SceneCameraParams(missed_share=0.0), host.world.scene, CameraMount(RIG.camera),
+            SceneCameraParams(missed_share=0.0), host.world.scene, CameraMount(host.rig.camera),
             host.poses.head, np.random.default_rng(1), begins_s=begin_s,
         )  # fmt: skip
 

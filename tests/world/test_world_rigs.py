@@ -5,7 +5,7 @@ from math import degrees, radians
 from pathlib import Path
 
 import pytest
-from emulated_rig import mixed_rig
+from mixed_rig import mixed_rig
 from test_coupling import KINDS
 from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
 
