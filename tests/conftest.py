@@ -107,14 +107,6 @@ def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def few_drawings(unlaid_figures: None, monkeypatch: pytest.MonkeyPatch) -> int:
-    """Draw the first three figures alone: all of them take longest, and are drawn elsewhere."""
-    report = pytest.importorskip("gazerig.features.lab.report.report")
-    monkeypatch.setattr(report, "DRAWINGS", report.DRAWINGS[:3])
-    return 3
-
-
-@pytest.fixture
 def simulated_wires(request: pytest.FixtureRequest) -> Iterator[None]:
     """Serve emulated buses here in simulated time, except to a test that is marked ``pty``."""
     from simulated_wires import simulated_wires as served_here

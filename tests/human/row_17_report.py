@@ -11,7 +11,7 @@ from human.measured_run import MeasuredRun
 
 pytest.importorskip("gazerig.features.lab")  # its measures
 
-from gazerig.features.lab.report.report import judge_run  # noqa: E402
+from gazerig.features.lab.report.measures import judge_run  # noqa: E402
 
 SCENES = ("visitor", "face-to-face")
 WANTED = {f"{scene}, outside, most of all seeds": (0.0, 2.0) for scene in SCENES}

@@ -14,10 +14,9 @@ import cv2
 import numpy as np
 import pytest
 from command_line import typed
-from made_traces import EMPTY, run_of, verdicts
 from typer.testing import CliRunner
 
-from gazerig.config.schema import Rig, load_rig, load_walk
+from gazerig.config.schema import Rig, load_walk
 from gazerig.features.lab.analysis import human_norms as bands
 from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.analysis.blink_finder import BlinkEvent, BlinkFinder
@@ -31,7 +30,6 @@ from gazerig.features.lab.analysis.event_detector import (
 )
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import face, landing, rests
-from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.face import published_walk
 from gazerig.features.lab.report.gaze_trace import (
     GazeTrace,
@@ -40,13 +38,14 @@ from gazerig.features.lab.report.gaze_trace import (
     TraceRow,
 )
 from gazerig.features.lab.report.landing import planned_saccades
+from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.page import (
     RunHeader,
     band_text,
 )
-from gazerig.features.lab.report.report import DRAWINGS, judge_run, make_report
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
+    MeasureResult,
     judge,
     longest,
     mean,
@@ -61,14 +60,31 @@ from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-RIG = load_rig("desk")
-SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
-"""Half the ticks: a minute of them is what takes longest here."""
+EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 
 
-def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTrace:
-    """Gather a simulated run."""
-    made, gathering = assemble(rig, RunOptions(True, True, 0, scene, **choice)), GazeTraceBuilder()  # type: ignore[arg-type]
+def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
+    return {finding.band.key: finding for finding in judge_run(run)}
+
+
+def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -> GazeTrace:
+    """Make a run of saccades: amplitude, duration in ms, peak, time of the peak."""
+    every = tuple(
+        SaccadeEvent(0.4 * n, d / 1e3, a, v, at, CommandedSaccade(0.4 * n, d / 1e3, a, v))
+        for n, (a, d, v, at) in enumerate(saccades)
+    )
+    shuts = tuple(BlinkEvent(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
+    rows = np.full((600, len(TraceRow._fields)), np.nan)
+    rows[:, 0] = np.arange(600) * 0.05
+    rows[:, TraceRow._fields.index("mode")] = 0.0
+    return GazeTrace(rows, every, (), shuts, shuts)
+
+
+def looked(rig: Rig, scene: str, seconds: float, **choice: str) -> GazeTrace:
+    """Gather a simulated run, with half the ticks: a minute of them takes longest here."""
+    slower = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
+    made = assemble(slower, RunOptions(True, True, 0, scene, **choice))  # type: ignore[arg-type]
+    gathering = GazeTraceBuilder()
     made.robot.start(made.clock)
     over: Callable[[float], str | None] = lambda s: "over" if s > seconds else None  # noqa: E731
     run(made.robot, made.clock, made.loop, over, gathering.update)
@@ -78,8 +94,8 @@ def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTra
 
 
 @pytest.fixture(scope="module")
-def walking() -> GazeTrace:
-    return looked("face-to-face", 60.0, SLOWER)
+def walking(desk_rig: Rig) -> GazeTrace:
+    return looked(desk_rig, "face-to-face", 60.0)
 
 
 @pytest.mark.slow
@@ -94,8 +110,8 @@ def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: GazeTrace)
 
 
 @pytest.mark.slow
-def test_what_the_paper_makes_other_than_people_is_outside() -> None:
-    seen = verdicts(looked("face-to-face", 20.0, SLOWER, saccade="min_jerk"))
+def test_what_the_paper_makes_other_than_people_is_outside(desk_rig: Rig) -> None:
+    seen = verdicts(looked(desk_rig, "face-to-face", 20.0, saccade="min_jerk"))
     assert seen["duration_small"].verdict == "outside"
     assert seen["duration_small"].measured.commanded_value < 0.35  # as commanded
     assert seen["skew"].value > 0.05  # minimum jerk is symmetric, people rise faster
@@ -189,6 +205,8 @@ def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
 
 @pytest.mark.slow
 def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None:
+    from gazerig.features.lab.report.report import DRAWING, DRAWINGS, make_report
+
     reported: list[tuple[str, float]] = []
     about = RunHeader(
         "a <run>", (("rig", "desk"),), frozenset({"saccade min_jerk"}), warnings=("cut & short",)
@@ -208,7 +226,7 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     assert {row["key"] for row in numbers} == {f.band.key for f in made.findings}
     for finding in made.findings:
         assert finding.band.title in page and band_text(finding.band) in page
-    assert reported[-1] == (build.DRAWING, 1.0)
+    assert reported[-1] == (DRAWING, 1.0)
     assert [share for _, share in reported] == sorted(share for _, share in reported)
 
 
@@ -254,8 +272,8 @@ STEP_DEG = 360.0 / 4096.0
 
 
 @pytest.fixture(scope="module")
-def ticks() -> list[Tick]:
-    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "face-to-face"))
+def ticks(desk_rig: Rig) -> list[Tick]:
+    made = assemble(desk_rig, RunOptions(True, True, 0, "face-to-face"))
     seen: list[Tick] = []
     made.robot.start(made.clock)
     run(made.robot, made.clock, made.loop, lambda s: "over" if s > SECONDS else None, seen.append)
@@ -500,6 +518,7 @@ def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
     y_m, z_m = PARTS_FACE_M["RE"][1:]
     density = face.gaze_density(np.array([[y_m, z_m, 2.0], [5.0, 5.0, 9.0]]))
     row, column = np.unravel_index(int(density.argmax()), density.shape)
-    assert face._Z_M[row] == pytest.approx(z_m, abs=0.005)
-    assert face._Y_M[column] == pytest.approx(y_m, abs=0.005)
+    places_y_m, places_z_m = face.GRID_M
+    assert places_z_m[row] == pytest.approx(z_m, abs=0.005)
+    assert places_y_m[column] == pytest.approx(y_m, abs=0.005)
     assert density == pytest.approx(2.0 * face.gaze_density(np.array([[y_m, z_m, 1.0]])))

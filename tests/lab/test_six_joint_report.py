@@ -10,7 +10,6 @@ from recorded_rigs import Run, recorded
 from six_joints import SIX
 
 from gazerig.config.schema import load_rig
-from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.page import RunHeader
 
@@ -22,11 +21,6 @@ def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return recorded(tmp_path_factory.mktemp("six") / "maker.mcap", load_rig("maker"), 4.2)
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.0)
-
-
 def quiet(words: str, share: float) -> None:
     """Ignore progress."""
 
@@ -34,9 +28,11 @@ def quiet(words: str, share: float) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("unlaid_figures")
 def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
+    from gazerig.features.lab.report.report import make_report, read_run
+
     out = tmp_path / "six.html"
     about = RunHeader("six")
-    made = build.make_report(build.read_run(maker.ticks, about, quiet), about, out, quiet)
+    made = make_report(read_run(maker.ticks, about, quiet), about, out, quiet)
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
     assert {row["basis"] for row in rows.values()} == {"estimated"}
     page = unescape(out.read_text(encoding="utf-8"))

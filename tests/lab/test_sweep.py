@@ -18,9 +18,9 @@ from command_line import Invoked, invoked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.load import ConfigError, shipped_path
+from gazerig.config.load import ConfigError
 from gazerig.config.save_text import params_text
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.human_norms import BY_KEY
 from gazerig.features.lab.sweep.axes import (
@@ -46,7 +46,6 @@ from gazerig.features.lab.sweep.worker_pool import Job, WorkerPool
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 
-RIG, DESK = load_rig("desk"), shipped_path("rigs", "desk")
 COMFORT = "gaze.head.comfort_deg"
 LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
 QUICK = ("--seconds", "1", "--bus", "ideal", "--jobs", "1")
@@ -132,17 +131,17 @@ def test_a_line_that_was_being_written_when_the_power_went_is_done_again(tmp_pat
     assert len(file.read_text(encoding="utf-8").splitlines()) == 2
 
 
-def test_two_processes_make_the_table_of_one(tmp_path: Path) -> None:
+def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> None:
     points: list[Point] = [{COMFORT: 4.0}, {COMFORT: 12.0}]
     runs = [(point, seed) for point in points for seed in (0, 1)]
-    with WorkerPool(Job(OPTIONS, params_text(RIG)), 2, lambda: None) as pool:
+    with WorkerPool(Job(OPTIONS, params_text(desk_rig)), 2, lambda: None) as pool:
         found = dict(pool.outcomes(runs))
         assert len(pool.pids) == 2
         pids = pool.pids
     assert not alive(pids)
     ordered = [found[i] for i in range(len(runs))]
     alone = [
-        Outcome(point, seed, figures_at(RIG, _with_seed(seed), point, lambda: None))
+        Outcome(point, seed, figures_at(desk_rig, _with_seed(seed), point, lambda: None))
         for point, seed in runs
     ]
     assert table_rows(ordered) == table_rows(alone)
@@ -251,7 +250,7 @@ LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
 
 
 def read(*settings: str) -> list[Axis]:
-    return make_axes(RIG, settings, read_value)
+    return make_axes(load_rig("desk"), settings, read_value)
 
 
 def test_steps_lists_and_ranges_are_read() -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from gazerig.features.lab.analysis.human_norms import GROUPS
 from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.page import (
     PageFigure,
     RunHeader,
@@ -19,7 +20,7 @@ from gazerig.features.lab.report.page import (
     write_all,
 )
 from gazerig.features.lab.report.plotting import COLOURS, ShownRun
-from gazerig.features.lab.report.report import Progress, draw_figures, judge_run, read_run
+from gazerig.features.lab.report.report import Progress, draw_figures, read_run
 from gazerig.features.lab.report.statistics import MeasureResult
 from gazerig.robot.control.tick import Tick
 

@@ -6,26 +6,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.analysis.human_norms import BY_KEY, band_applies
 from gazerig.features.lab.report import (
-    blinks,
-    eye_contact,
-    eye_head,
-    face,
     figures_face,
     figures_head,
     figures_lids,
     figures_saccades,
-    landing,
-    pursuit,
-    rests,
-    saccades,
-    turns,
 )
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.features.lab.report.measures import judge_run
 from gazerig.features.lab.report.page import PageFigure, RunHeader, report_page, write_all
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, ShownRun, basis_text, drawing_png
-from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
+from gazerig.features.lab.report.statistics import MeasureResult
 from gazerig.robot.control.tick import Tick
 
 Progress = Callable[[str, float], None]
@@ -94,26 +85,6 @@ def read_run(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> Gaz
     if len(run.rows) < _LEAST_TICKS:
         raise SetupError(f"{about.name}: {len(run.rows)} ticks are too few for a report")
     return run
-
-
-def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
-    """Measure everything that applies to the rig's joints and the run's mode of conversation."""
-    each = (
-        saccades.measures(run), landing.measures(run), rests.measures(run), face.measures(run),
-        eye_head.measures(run), pursuit.measures(run), blinks.measures(run),
-        eye_contact.measures(run), saccades.reaction_measures(run), turns.measures(run.turns()),
-    )  # fmt: skip
-    return tuple(
-        m
-        for group in each
-        for m in group
-        if band_applies(BY_KEY[m.key], run.mode) and not run.joints.left_out(m.key)
-    )
-
-
-def judge_run(run: GazeTrace) -> tuple[MeasureResult, ...]:
-    """Measure a run and compare it with the bands."""
-    return tuple(judge(m, BY_KEY[m.key]) for m in measure_run(run))
 
 
 def draw_figures(runs: Sequence[ShownRun], progress: Progress) -> tuple[PageFigure, ...]:

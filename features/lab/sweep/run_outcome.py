@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from gazerig.drivers.files.file_output import output_file, write_file
 from gazerig.features.lab.analysis.human_norms import BANDS, BY_KEY
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.report import measure_run
+from gazerig.features.lab.report.measures import measure_run
 from gazerig.features.lab.report.statistics import MeasureResult, judge_without_interval
 from gazerig.features.lab.sweep.axes import Point
 
