@@ -10,11 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
-import trimesh
-import yourdfpy
 from command_line import invoked
 from described_rigs import SHIPPED, Poses, compare, random_angles, rigs, shipped
 from hypothesis import given, settings
@@ -24,11 +21,10 @@ from gazerig.config.schema import Rig
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.build import joint_torques_nm
 from gazerig.robot.description.files import description_files
-from gazerig.robot.description.gltf import gltf
 from gazerig.robot.description.links import Description, Inertia
 from gazerig.robot.description.mass import join_inertias
-from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.description.urdf import urdf
+from gazerig.robot.description.mjcf import Mjcf, mjcf
+from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.description.weights import carried_links
 from gazerig.robot.model.coupling_params import CouplingParams
 from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
@@ -47,6 +43,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_all_files_are_read_by_others(written: Path) -> None:
+    import mujoco
+    import trimesh
+    import yourdfpy
+
     model = mujoco.MjModel.from_xml_path(str(written / "scene.xml"))
     assert model.njnt == 11 and model.nu == 27
     robot = yourdfpy.URDF.load(str(written / "expressive.urdf"), load_collision_meshes=True)
@@ -65,6 +65,8 @@ def _links(rig: str) -> tuple[Any, ...]:
 
 
 def test_joints_of_a_urdf_have_limits_and_followers() -> None:
+    import yourdfpy
+
     rig = shipped("minimal")
     text = description_files(description_of(rig), ["urdf"])["minimal.urdf"]
     robot = yourdfpy.URDF.load(io.BytesIO(text), load_meshes=False)
@@ -87,6 +89,12 @@ def test_files_that_are_there_are_kept_unless_forced(tmp_path: Path) -> None:
     assert mine.read_bytes()[:4] == b"glTF"
 
 
+def _glb(rig: Rig) -> bytes:
+    from gazerig.robot.description.gltf import gltf
+
+    return gltf(description_of(rig))
+
+
 def _tree(data: bytes) -> dict[str, Any]:
     size, kind = struct.unpack("<I4s", data[12:20])
     assert data[:4] == b"glTF" and kind == b"JSON"
@@ -95,11 +103,15 @@ def _tree(data: bytes) -> dict[str, Any]:
 
 
 def test_joints_may_be_called_as_parts_of_the_description_are() -> None:
+    import mujoco
+    import yourdfpy
+
     rig = shipped("minimal")
     names = ("base", "camera", "camera_link", "head", "head_fixed", "skin_mesh", "world")
     joints = {**rig.joints, **dict.fromkeys(names, rig.joints["eyes_pan"])}
-    description = description_of(replace(rig, joints=joints))
-    nodes = _tree(gltf(description))["nodes"]
+    rig = replace(rig, joints=joints)
+    description = description_of(rig)
+    nodes = _tree(_glb(rig))["nodes"]
     assert len({node["name"] for node in nodes}) == len(nodes)
     assert {node["extras"]["joint"] for node in nodes if "extras" in node} >= set(names)
     text = urdf(description, looks=False)
@@ -122,7 +134,7 @@ def test_a_joint_has_the_torque_of_all_its_servos() -> None:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_gltf_is_one_tree_of_named_nodes_with_the_joints_in_it(name: str) -> None:
     description = description_of(shipped(name))
-    tree = _tree(gltf(description))
+    tree = _tree(_glb(shipped(name)))
     nodes = tree["nodes"]
     names = [node["name"] for node in nodes]
     assert len(set(names)) == len(names)
@@ -143,7 +155,7 @@ def test_gltf_is_one_tree_of_named_nodes_with_the_joints_in_it(name: str) -> Non
 @pytest.mark.parametrize("name", SHIPPED)
 def test_gltf_is_valid(name: str, tmp_path: Path) -> None:
     path = tmp_path / "rig.glb"
-    path.write_bytes(gltf(description_of(shipped(name))))
+    path.write_bytes(_glb(shipped(name)))
     script = (
         "require('gltf-validator').validateBytes(new Uint8Array(require('fs').readFileSync("
         "process.argv[1]))).then(r => console.log(JSON.stringify(r.issues)))"
@@ -165,18 +177,19 @@ def _own(description: Description, angles: Mapping[str, float]) -> Poses:
 
 
 def _in_mujoco(description: Description, angles: Mapping[str, float]) -> Poses:
-    model = mujoco.MjSpec.from_string(mjcf(description, looks=False).xml).compile()
-    return _mujoco_poses(model, description, angles)
+    return _mujoco_poses(mjcf(description, looks=False), description, angles)
 
 
 def _in_mujoco_awake(description: Description, angles: Mapping[str, float]) -> Poses:
-    text = mjcf(description, looks=False, awake=True).xml
-    return _mujoco_poses(mujoco.MjModel.from_xml_string(text), description, angles)
+    return _mujoco_poses(mjcf(description, looks=False, awake=True), description, angles)
 
 
 def _mujoco_poses(
-    model: mujoco.MjModel, description: Description, angles: Mapping[str, float]
+    text: Mjcf | Urdf, description: Description, angles: Mapping[str, float]
 ) -> Poses:
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(text.xml, text.assets)
     data = mujoco.MjData(model)
     for name, angle in description.angles(tuple(angles), tuple(angles.values())).items():
         data.qpos[model.joint(name).qposadr[0]] = angle
@@ -191,12 +204,12 @@ def _mujoco_poses(
 
 
 def _in_mujoco_from_urdf(description: Description, angles: Mapping[str, float]) -> Poses:
-    text = urdf(description, looks=False)
-    model = mujoco.MjModel.from_xml_string(text.xml, text.assets)
-    return _mujoco_poses(model, description, angles)
+    return _mujoco_poses(urdf(description, looks=False), description, angles)
 
 
 def _in_yourdfpy(description: Description, angles: Mapping[str, float]) -> Poses:
+    import yourdfpy
+
     text = urdf(description, looks=False).xml.encode()
     robot = yourdfpy.URDF.load(io.BytesIO(text), load_meshes=False)
     assert robot.validate()
@@ -230,6 +243,8 @@ def test_any_rig_moves_alike_everywhere(rig: Rig, seed: int) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_whole_model_is_compiled_with_looks(name: str) -> None:
+    import mujoco
+
     description = description_of(shipped(name))
     text = mjcf(description, "one_")
     model = mujoco.MjSpec.from_string(text.xml, assets=text.assets).compile()
@@ -287,6 +302,8 @@ def test_a_head_weighs_what_its_file_says() -> None:
 
 
 def test_the_camera_sees_what_the_lens_covers() -> None:
+    import mujoco
+
     rig = shipped("desk")
     model = mujoco.MjSpec.from_string(mjcf(description_of(rig), looks=False).xml).compile()
     height = 2.0 * np.tan(np.radians(model.cam_fovy[0] / 2.0))

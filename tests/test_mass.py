@@ -6,7 +6,6 @@ from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from described_rigs import shipped
@@ -40,6 +39,8 @@ def with_joint(rig: Rig, name: str, **changes: Any) -> Rig:
 
 
 def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
+    import mujoco
+
     description = description_of(rig, looks=False)
     model = mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
     data = mujoco.MjData(model)

@@ -1,13 +1,11 @@
 """gazerig new: what it asks, what it writes, and that every rig it writes runs."""
 
-import importlib
 import itertools
 import time
 from pathlib import Path
 
 import pytest
 from command_line import invoked, typed
-from matplotlib.figure import Figure
 
 from gazerig.config.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
 from gazerig.config.schema import load_rig
@@ -140,15 +138,3 @@ def test_what_cannot_be_is_one_clear_line_and_writes_nothing(
     assert done.code == 2 and told in done.err, done.err
     assert [path.name for path in Path(".").iterdir()] == ["there.yaml"]
     assert Path("there.yaml").read_text("utf-8") == "mine"
-
-
-def test_the_picture_of_the_mechanisms_shows_every_joint_with_its_number(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "docs")
-    figures = importlib.import_module("start_figures")
-    axes = Figure().add_subplot()
-    for mechanism in MECHANISMS.values():
-        for number, joint in enumerate(mechanism.joints):
-            figures._numbered(axes, joint, number)
-            assert axes.texts[-1].get_text() == f"{joint}\nid {number + 1} · channel {number}"

@@ -25,7 +25,6 @@ from recorded_run import (
     ordered,
     record,
 )
-from scipy.spatial.transform import Rotation
 
 from gazerig.config.load import load
 from gazerig.config.save_text import params_text
@@ -197,6 +196,8 @@ def vector(of: dict[str, float]) -> list[float]:
 
 
 def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) -> None:
+    from scipy.spatial.transform import Rotation
+
     turned = 0.0
     for tick, data in sent_to_viewers(recorded, fmt.TRANSFORMS):
         frames = {one["child_frame_id"]: one for one in data["transforms"]}

@@ -3,26 +3,22 @@
 import json
 import struct
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import SetupError
-from gazerig.features.animation.animation import Series, joint_map, listed
-from gazerig.features.animation.animation_file import read_animation
+from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map, listed
 from gazerig.features.animation.cli.import_track import app
-from gazerig.features.animation.gltf_reader import joint_angles
 from gazerig.robot.app.track_file import fit_to_rig, track_text, write_track
 from gazerig.robot.description.links import Link, LinkJoint
 from gazerig.robot.model.track_fit import track_motions
-
-DESK = load_rig("desk")
 
 
 def table(folder: Path, text: str) -> Path:
@@ -31,8 +27,15 @@ def table(folder: Path, text: str) -> Path:
     return path
 
 
+def animation(path: Path, given: Sequence[str] = (), **options: Any) -> ImportedAnimation:
+    from gazerig.features.animation.animation_file import read_animation
+
+    rig = load_rig("desk")
+    return read_animation(path, rig, joint_map(rig, given), **options)
+
+
 def read(path: Path, fps: float | None = None) -> dict[str, Series]:
-    return read_animation(path, DESK, joint_map(DESK, []), fps=fps).series
+    return animation(path, fps=fps).series
 
 
 WIDE = "time,neck_pitch,neck_yaw\n0,0,5\n0.5,-8,\n1.0,0,9\n"
@@ -45,10 +48,10 @@ EXCEL = "\ufeffsep=;\r\n;;\r\n" + WIDE.replace(",", ";").replace(".", ",").repla
 
 @pytest.mark.parametrize("text", [WIDE, LONG, FRAMES, EXCEL, "# from\n\n" + WIDE])
 def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
-    text: str, tmp_path: Path
+    desk_rig: Rig, text: str, tmp_path: Path
 ) -> None:
-    found = track_text(DESK, read(table(tmp_path, text), 24.0), "x").text
-    path, on_rig = write_track(DESK, "mine", found, tmp_path, False)
+    found = track_text(desk_rig, read(table(tmp_path, text), 24.0), "x").text
+    path, on_rig = write_track(desk_rig, "mine", found, tmp_path, False)
     fitted = on_rig.fitted
     assert fitted is not None
     assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
@@ -74,9 +77,9 @@ BAD = {
 
 
 @pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
-def test_bad_rows_are_named_with_their_line(text: str, tmp_path: Path) -> None:
+def test_bad_rows_are_named_with_their_line(desk_rig: Rig, text: str, tmp_path: Path) -> None:
     with pytest.raises(SetupError) as caught:
-        track_text(DESK, read(table(tmp_path, text)), "x")
+        track_text(desk_rig, read(table(tmp_path, text)), "x")
     assert BAD[text] in str(caught.value)
 
 
@@ -135,20 +138,22 @@ def clip(
     )
 
 
-def turned(axis: str, degrees: list[float]) -> Rotation:
-    return Rotation.from_rotvec(np.outer(degrees, np.eye(3)["xyz".index(axis)]), degrees=True)
-
-
 def about(axis: str, degrees: list[float]) -> np.ndarray[Any, Any]:
-    return np.asarray(turned(axis, degrees).as_quat())
+    half = np.radians(degrees) / 2.0
+    vector = np.outer(np.sin(half), np.eye(3)["xyz".index(axis)])
+    return np.column_stack([vector, np.cos(half)])
 
 
-def read_bytes(data: bytes, folder: Path, name: str = "wave.glb", **options: Any) -> Any:
+def read_bytes(
+    data: bytes, folder: Path, name: str = "wave.glb", **options: Any
+) -> ImportedAnimation:
     (folder / name).write_bytes(data)
-    return read_animation(folder / name, DESK, joint_map(DESK, options.pop("given", [])), **options)
+    return animation(folder / name, **options)
 
 
 def test_gltf_rotations_become_joint_angles(tmp_path: Path) -> None:
+    from scipy.spatial.transform import Rotation
+
     times = [0.0, 0.5, 1.0]
     angles = [0.0, 150.0, 250.0]
     yaw = read_bytes(clip(times, about("z", angles)), tmp_path).series["neck_yaw"]
@@ -160,13 +165,19 @@ def test_gltf_rotations_become_joint_angles(tmp_path: Path) -> None:
     # Pitch is positive upwards: about -y. Blender adds .001 to a name in use.
     pitch = clip(times, about("y", [0.0, 8.0, 0.0]), node="neck_pitch.001")
     assert read_bytes(pitch, tmp_path).series["neck_pitch"][1][1] == pytest.approx(-8.0, abs=1e-4)
-    both = turned("z", [0.0, 20.0, 0.0]) * turned("x", [0.0, 5.0, 0.0])
+    both = Rotation.from_quat(about("z", [0.0, 20.0, 0.0])) * Rotation.from_quat(
+        about("x", [0.0, 5.0, 0.0])
+    )
     found = read_bytes(clip(times, np.asarray(both.as_quat())), tmp_path)
     assert found.series["neck_yaw"][1][1] == pytest.approx(20.0, abs=1e-3)
     assert "5.0 deg about other axes (at 0.50 s)" in found.notes[0]
 
 
 def test_angles_are_relative_to_the_rest_pose_of_a_node() -> None:
+    from scipy.spatial.transform import Rotation
+
+    from gazerig.features.animation.gltf_reader import joint_angles
+
     rest = Rotation.from_rotvec([0.3, -0.8, 0.4])
     axis = (0.6, 0.0, 0.8)
     link = Link(
@@ -178,10 +189,12 @@ def test_angles_are_relative_to_the_rest_pose_of_a_node() -> None:
     assert angles == pytest.approx(wanted, abs=1e-9) and off.max() < 1e-5
 
 
-def test_gltf_steps_and_splines_are_read(tmp_path: Path) -> None:
+def test_gltf_steps_and_splines_are_read(desk_rig: Rig, tmp_path: Path) -> None:
+    from scipy.spatial.transform import Rotation
+
     times, angles = [0.0, 1.0, 2.0], [0.0, 20.0, 0.0]
     at, held = read_bytes(clip(times, about("z", angles), "STEP"), tmp_path).series["neck_yaw"]
-    limit = DESK.joints["neck_yaw"].limit()
+    limit = desk_rig.joints["neck_yaw"].limit()
     leave = at[(at > 0.0) & (at < 1.0)]
     assert len(leave) == 1 and np.interp(leave, at, held) == pytest.approx([0.0], abs=1e-6)
     took, size = 1.0 - leave[0], np.radians(20.0)
@@ -250,8 +263,10 @@ def test_a_bad_file_is_one_message_with_place_and_remedy(name: str, tmp_path: Pa
     assert text.startswith(f"{tmp_path / name}") and message in text and "\n" not in text
 
 
-def test_positions_of_the_blender_add_on_are_those_of_the_servos(tmp_path: Path) -> None:
-    joint = DESK.joints["neck_yaw"]
+def test_positions_of_the_blender_add_on_are_those_of_the_servos(
+    desk_rig: Rig, tmp_path: Path
+) -> None:
+    joint = desk_rig.joints["neck_yaw"]
     steps = [joint.steps(np.radians(angle)) for angle in (0.0, 12.0, -7.0)]
     file = {"fps": 24, "frames": 3, "servos": {"7": {"name": "neck_yaw", "positions": steps}}}
     times, angles = read_bytes(json.dumps(file).encode(), tmp_path, "a.json").series["neck_yaw"]
@@ -264,7 +279,7 @@ def test_positions_of_the_blender_add_on_are_those_of_the_servos(tmp_path: Path)
     assert found.series["neck_yaw"][1] == pytest.approx([0.0, -10.0, 10.0])
 
 
-def test_curves_of_bottango_have_the_handles_of_its_driver(tmp_path: Path) -> None:
+def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig: Rig, tmp_path: Path) -> None:
     # github.com/EvanBottango/Bottango, BezierCurve.py, evaluated here by bisection in time.
     curves = [(0, 800, 4096, 300, 0, 6144, -200, 500), (800, 600, 6144, 100, 0, 2048, -300, 0)]
 
@@ -288,22 +303,24 @@ def test_curves_of_bottango_have_the_handles_of_its_driver(tmp_path: Path) -> No
         read_bytes(json.dumps(file).encode(), tmp_path, "b.json")
     found = read_bytes(json.dumps(file).encode(), tmp_path, "b.json", clip="b")
     times, angles = found.series["neck_yaw"]
-    joint = DESK.joints["neck_yaw"]
+    joint = desk_rig.joints["neck_yaw"]
     for t in np.linspace(20, 1380, 35):
         expected = joint.min_deg + movement(t) * (joint.max_deg - joint.min_deg)
         assert np.interp(t / 1e3, times, angles) == pytest.approx(expected, abs=0.2)
 
 
-def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(tmp_path: Path) -> None:
+def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
+    desk_rig: Rig, tmp_path: Path
+) -> None:
     times = [0.0, 1.0, 2.0]
     (tmp_path / "far.glb").write_bytes(clip(times, about("z", [40.0, -20.0, 30.0])))
     done = CliRunner().invoke(app, ["desk", str(tmp_path / "far.glb"), "--folder", str(tmp_path)])
     assert done.exit_code == 0 and "from the neutral pose to its first one" in done.stderr
     assert "cannot reach" not in done.stderr
     track = load_track(tmp_path / "far.yaml")
-    found = fit_to_rig(DESK, track)
+    found = fit_to_rig(desk_rig, track)
     assert track.owns == ("neck_yaw",) and found.fitted is not None and found.excesses == ()
-    motion = track_motions(track, DESK.names).motion
+    motion = track_motions(track, desk_rig.names).motion
     begins = track.frames[1].time_s
     yaw = np.degrees(motion.sample_at(np.array(times) + begins).value[:, 0])
     assert yaw == pytest.approx([40.0, -20.0, 30.0], abs=1e-3)
@@ -335,6 +352,7 @@ CURVES = {
 def test_a_file_far_too_large_is_refused_at_once(
     name: str, content: str, reported: str, tmp_path: Path
 ) -> None:
+    read(table(tmp_path, WIDE))  # the first file loads what reads files
     path = tmp_path / name
     path.write_text(content, newline="")
     began_s = time.process_time()
@@ -349,8 +367,7 @@ def test_a_table_in_radians_gets_a_hint(largest: str, hinted: bool, tmp_path: Pa
     path = tmp_path / "turn.csv"
     text = f"time,neck_yaw,neck_pitch\n0,0,0.1396\n1,{largest},-0.1\n2,0,0.1396\n"
     path.write_text(text, encoding="utf-8")
-    rig = load_rig("desk")
-    notes = read_animation(path, rig, joint_map(rig, [])).notes
+    notes = animation(path).notes
     assert any("degrees? these look like radians" in note for note in notes) == hinted
 
 

@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
-from PIL import Image
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.features.bringup.calibration.camera_calibration import (
@@ -200,6 +199,8 @@ PX_PER_MM = 12
 
 @pytest.mark.parametrize("paper", sorted(PAPERS_MM))
 def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path) -> None:
+    from PIL import Image
+
     wide_mm, high_mm = PAPERS_MM[paper]
     png, pdf = tmp_path / "board.png", tmp_path / "board.pdf"
     write_page(PRINTED, paper, png)
