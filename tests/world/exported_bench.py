@@ -8,7 +8,6 @@ from dataclasses import replace
 from math import degrees, radians
 from typing import Any, Literal, NamedTuple
 
-import mujoco
 import numpy as np
 from world_rigs import WorldBench, arm, write
 
@@ -59,6 +58,8 @@ class Trace(NamedTuple):
 
 def exported(rig: Rig) -> Any:
     """Return the MJCF that ``gazerig describe`` writes, compiled."""
+    import mujoco
+
     description = description_of(rig, looks=False).with_drives(servo_drives(rig))
     return mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
 
@@ -154,6 +155,8 @@ class Both:
     # --- the exported model alone
 
     def _alone(self) -> Trace:
+        import mujoco
+
         move, model = self._move, exported(self._rig)
         data, at = mujoco.MjData(model), model.joint(move.joint).dofadr[0]
         for name in self._rig.names:

@@ -7,20 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 from described_rigs import SHIPPED
-from world_rigs import mujoco_or_skip
+from exported_bench import Both, Move, exported, moves
 
-mujoco = mujoco_or_skip()
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.rig_description import description_of
+from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.app.servo_drives import servo_drives
+from gazerig.robot.description.urdf import urdf
+from gazerig.robot.model.coupling_params import CouplingParams
 
-import yourdfpy  # noqa: E402
-from exported_bench import Both, Move, exported, moves  # noqa: E402
-
-from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.app.rig_description import description_of  # noqa: E402
-from gazerig.robot.app.run_bus import emulated_lines  # noqa: E402
-from gazerig.robot.app.servo_drives import servo_drives  # noqa: E402
-from gazerig.robot.description.urdf import urdf  # noqa: E402
-from gazerig.robot.model.coupling_params import CouplingParams  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("mujoco")
 SHARE = 0.05
 JUMP_PEAK_SHARE = 0.25
 """Of the peak speed when the goal of an X330 jumps, which no run writes: the emulated servo brakes
@@ -43,27 +39,25 @@ def test_an_exported_model_moves_as_the_running_world(move: Move) -> None:
     assert peaks[1] == pytest.approx(peaks[0], rel=JUMP_PEAK_SHARE if jump else SHARE)
 
 
-def test_an_exported_eye_has_the_inertia_of_the_emulated_one() -> None:
-    rig = load_rig("desk")
-    model = exported(rig)
+def test_an_exported_eye_has_the_inertia_of_the_emulated_one(mujoco: Any, desk_rig: Rig) -> None:
+    model = exported(desk_rig)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
     at = model.joint("left_eye_pan").dofadr[0]
-    (line,) = emulated_lines(rig).values()
-    rotor = servo_drives(rig)["left_eye_pan"].armature_kg_m2
+    (line,) = emulated_lines(desk_rig).values()
+    rotor = servo_drives(desk_rig)["left_eye_pan"].armature_kg_m2
     load: Any = line
     assert rotor == pytest.approx(2.0e-4, rel=0.01)
     assert full[at, at] == pytest.approx(rotor + load.servos[0].physics.load_kg_m2, rel=0.01)
 
 
-def test_two_servos_of_a_pair_share_their_joints() -> None:
+def test_two_servos_of_a_pair_share_their_joints(desk_rig: Rig) -> None:
     """Each of a differential's joints has the rotors, friction and torque of both."""
-    rig = load_rig("desk")
-    alone = servo_drives(rig)["neck_pitch"]
+    alone = servo_drives(desk_rig)["neck_pitch"]
     pair = CouplingParams("differential", "neck_pitch", "neck_roll")
-    both = servo_drives(replace(rig, couplings={"neck": pair}))
+    both = servo_drives(replace(desk_rig, couplings={"neck": pair}))
     for name in ("neck_pitch", "neck_roll"):
         assert both[name].armature_kg_m2 == pytest.approx(2.0 * alone.armature_kg_m2)
         assert both[name].force_nm == pytest.approx(2.0 * alone.force_nm)
@@ -71,8 +65,10 @@ def test_two_servos_of_a_pair_share_their_joints() -> None:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(name: str) -> None:
+def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(mujoco: Any, name: str) -> None:
     """As MuJoCo's importer and yourdfpy read them."""
+    import yourdfpy
+
     rig = load_rig(name)
     text = urdf(description_of(rig, looks=False).with_drives(servo_drives(rig)), looks=False)
     read = mujoco.MjModel.from_xml_string(text.xml, text.assets)

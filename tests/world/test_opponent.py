@@ -11,32 +11,31 @@ import pytest
 from fakes.runs import record
 from present import present
 
-pytest.importorskip("mujoco")
-
-from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.opponent_motion import (  # noqa: E402
+from gazerig.config.schema import load_rig
+from gazerig.features.world.opponent_motion import (
     HOLD_S,
     MAX_M_S,
     MAX_M_S2,
     TAKE_S,
     OpponentMotion,
 )
-from gazerig.features.world.run.run_world import world_scene  # noqa: E402
-from gazerig.features.world.world_scene import WorldScene  # noqa: E402
-from gazerig.gaze.types import Vec3  # noqa: E402
-from gazerig.robot.app.assemble import (  # noqa: E402
+from gazerig.features.world.run.run_world import world_scene
+from gazerig.features.world.world_scene import WorldScene
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import (
     Assembly,
     assemble,
-    with_options,  # noqa: E402
+    with_options,
 )
-from gazerig.robot.app.options import RunOptions  # noqa: E402
-from gazerig.robot.app.resimulate import rerun  # noqa: E402
-from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore  # noqa: E402
-from gazerig.robot.control.tick import Tick  # noqa: E402
-from gazerig.robot.model.command_json import as_json, from_json  # noqa: E402
-from gazerig.robot.model.commands import OPPONENT_BOX_M, MoveOpponent  # noqa: E402
-from gazerig.robot.recording.read import RunRecording  # noqa: E402
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.scene_score import BehaviourScore, PlannerScore
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.commands import OPPONENT_BOX_M, MoveOpponent
+from gazerig.robot.recording.read import RunRecording
 
+pytestmark = pytest.mark.usefixtures("mujoco")
 BOXING = RunOptions(
     mock=True, fast=True, seed=1, rig="desk", world="boxing", no_pictures=True, bus="ideal"
 )

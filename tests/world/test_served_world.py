@@ -5,8 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
-
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.errors import SetupError
@@ -14,7 +12,6 @@ from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.run.poses import RigInState, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld, world_of
 from gazerig.features.world.run.sight import WorldCamera
-from gazerig.features.world.served_world import PUBLISH_MS, ServedWorld
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
@@ -22,11 +19,15 @@ from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.pty.line import BusSettings
 
+pytestmark = pytest.mark.usefixtures("mujoco")
+
 
 class Host:
     """A clock that is set, and a world on it."""
 
     def __init__(self, folder: Path) -> None:
+        from gazerig.features.world.served_world import ServedWorld
+
         self.rig = load_rig("minimal")
         world = world_of(self.rig, RunOptions(mock=True, world="living-room"))
         assert world is not None
@@ -51,6 +52,8 @@ def host(tmp_path: Path) -> Host:
 
 
 def test_people_wait_until_a_client_has_spoken(host: Host) -> None:
+    from gazerig.features.world.served_world import PUBLISH_MS
+
     host.serve(0.05, heard=False)
     assert host.poses.newest() is None and host.poses.begin_s is None
     host.serve(0.05, heard=True)

@@ -1,11 +1,9 @@
 """Hobby servos and ideal ones whose mechanics are a world's."""
 
 import pytest
-from world_rigs import WorldBench, mujoco_or_skip
+from world_rigs import WorldBench
 
-mujoco_or_skip()
-
-
+pytestmark = pytest.mark.usefixtures("mujoco")
 MOVE = 800
 """Quarter microseconds that a servo is sent away, 18 deg."""
 

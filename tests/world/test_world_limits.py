@@ -2,21 +2,22 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import pytest
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.model import world_model
 
 
 @pytest.fixture(autouse=True)
-def not_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+def not_loaded(mujoco: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing may be given to MuJoCo."""
     monkeypatch.setattr(mujoco, "MjSpec", None)
 
 
 def refused(path: Path) -> str:
+    from gazerig.features.world.model import world_model
+
     with pytest.raises(SetupError) as error:
         world_model(None, [], path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)

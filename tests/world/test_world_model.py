@@ -1,29 +1,34 @@
 """Worlds are compiled with every shipped rig in them, at its angles, and from a user's MJCF."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
-from world_rigs import mujoco_or_skip
 
-mujoco = mujoco_or_skip()
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.world.run.run_world import rig_in_world
 
-from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.drivers.errors import SetupError  # noqa: E402
-from gazerig.features.world.model import world_model  # noqa: E402
-from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("mujoco")
 RIGS = ("desk", "expressive", "feetech", "maker", "minimal", "nine_xl330", "six_hobby", "six_xl330")
+
+
+def model_with(name: str, path: Path | None = None) -> Any:
+    """Return a world with a rig in it, of a file or empty."""
+    from gazerig.features.world.model import world_model
+
+    return world_model(None, [rig_in_world(load_rig(name), looks=False)], path)
 
 
 @pytest.mark.parametrize("name", RIGS)
 def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name: str) -> None:
     """Joints of a world are the rig's, one shaft a servo."""
-    rig = rig_in_world(load_rig(name), looks=False)
-    world = World(world_model(None, [rig]), lambda: 0.0)
+    from gazerig.features.world.physics import World
+
+    world = World(model_with(name), lambda: 0.0)
     (placed,) = world.model.rigs
     assert set(placed.qpos) == set(load_rig(name).names) == set(placed.tendon)
-    assert world.joints_rad() == rig.start_rad
+    assert world.joints_rad() == rig_in_world(load_rig(name), looks=False).start_rad
 
 
 def _world_file(folder: Path, inside: str) -> Path:
@@ -32,10 +37,10 @@ def _world_file(folder: Path, inside: str) -> Path:
     return path
 
 
-def test_a_users_world_carries_the_head_at_its_site(tmp_path: Path) -> None:
+def test_a_users_world_carries_the_head_at_its_site(mujoco: Any, tmp_path: Path) -> None:
     """The site is the place of the neck base."""
     path = _world_file(tmp_path, '<site name="gazerig" pos="1 2 3"/>')
-    model = world_model(None, [rig_in_world(load_rig("desk"), looks=False)], path)
+    model = model_with("desk", path)
     data = mujoco.MjData(model.mj)
     mujoco.mj_forward(model.mj, data)
     assert data.body("rig_neck_pitch_link").xpos == pytest.approx((1.0, 2.0, 3.07))
@@ -44,8 +49,7 @@ def test_a_users_world_carries_the_head_at_its_site(tmp_path: Path) -> None:
 def test_a_rig_knows_where_its_neck_base_stands(tmp_path: Path) -> None:
     """A site may be turned."""
     sites = '<site name="gazerig" pos="1 2 3" euler="0 0 90"/>'
-    rig = rig_in_world(load_rig("desk"), looks=False)
-    (first,) = world_model(None, [rig], _world_file(tmp_path, sites)).rigs
+    (first,) = model_with("desk", _world_file(tmp_path, sites)).rigs
     assert first.p_world_base_m == pytest.approx((1.0, 2.0, 3.0))
     assert [*first.R_world_base[0], *first.R_world_base[1]] == pytest.approx([0, -1, 0, 1, 0, 0])
 
@@ -54,7 +58,7 @@ def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path) -
     """The message has the file and the line to add."""
     path = _world_file(tmp_path, '<geom size="1"/>')
     with pytest.raises(SetupError, match=r'own\.xml: no place.*<site name="gazerig"'):
-        world_model(None, [rig_in_world(load_rig("desk"), looks=False)], path)
+        model_with("desk", path)
 
 
 def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path) -> None:
@@ -62,7 +66,7 @@ def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path)
     names = load_rig("minimal").names
     joints = "".join(f'<body><joint name="{name}"/><geom size=".01"/></body>' for name in names)
     path = _world_file(tmp_path, joints)
-    model = world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
+    model = model_with("minimal", path)
     assert model.mj.nbody == 1 + len(names) and model.mj.nu == len(names)
 
 
@@ -89,5 +93,5 @@ def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str
     path = tmp_path / "own.xml"
     path.write_text(text)
     with pytest.raises(SetupError, match=rf"own\.xml: MuJoCo cannot {why}") as found:
-        world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
+        model_with("minimal", path)
     assert len(str(found.value).splitlines()) == 1

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from mixed_rig import mixed_rig
 from test_coupling import KINDS
-from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
+from world_rigs import WorldBench, arm, read, write
 
-mujoco_or_skip()
+from gazerig.config.schema import load_rig
 
-from gazerig.config.schema import load_rig  # noqa: E402
+pytestmark = pytest.mark.usefixtures("mujoco")
 
 
 def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:

@@ -1,30 +1,15 @@
 """People of a world keep out of its furniture and of each other."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from world_rigs import mujoco_or_skip
 from world_scripts import WORLDS, shipped_world
 
-mujoco = mujoco_or_skip()
-
-from gazerig.features.world.figure import Figures  # noqa: E402
-from gazerig.features.world.figure_model import PeoplePlacer, add_people  # noqa: E402
-from gazerig.features.world.room_model import add_room  # noqa: E402
+from gazerig.features.world.figure import Figures
 
 _BETWEEN_M = 0.03
 """Shapes that collide are a little larger than what is seen; hands may touch."""
-
-
-@cache
-def built(name: str) -> tuple[Any, Figures]:
-    figures = Figures(shipped_world(name), 1)
-    spec = mujoco.MjSpec()
-    add_room(spec, figures.script)
-    add_people(spec, figures)
-    return spec.compile(), figures
 
 
 def owner(model: Any, geom: int) -> str:
@@ -32,8 +17,15 @@ def owner(model: Any, geom: int) -> str:
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_people_stay_out_of_the_furniture_and_of_each_other(name: str) -> None:
-    model, figures = built(name)
+def test_people_stay_out_of_the_furniture_and_of_each_other(mujoco: Any, name: str) -> None:
+    from gazerig.features.world.figure_model import PeoplePlacer, add_people
+    from gazerig.features.world.room_model import add_room
+
+    figures = Figures(shipped_world(name), 1)
+    spec = mujoco.MjSpec()
+    add_room(spec, figures.script)
+    add_people(spec, figures)
+    model = spec.compile()
     data = mujoco.MjData(model)
     people = PeoplePlacer(model, figures)
     owners = [owner(model, i) for i in range(model.ngeom)]

@@ -4,9 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
-
 from fakes.runs import ticks
 from rendering import why_not
 
@@ -21,6 +18,7 @@ from gazerig.sim_mock.cameras.detections import SceneCamera
 
 simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
 
+pytestmark = pytest.mark.usefixtures("mujoco")
 FAST = RunOptions(
     mock=True, fast=True, seed=3, world="living-room", no_pictures=True, seconds=1.0
 ).check_and_complete()

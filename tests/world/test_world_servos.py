@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from world_rigs import WorldBench, arm, mujoco_or_skip, write
+from world_rigs import WorldBench, arm, write
 
-mujoco_or_skip()
+from gazerig.config.schema import load_rig
 
-from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.physics import WorldUnstable  # noqa: E402
-
+pytestmark = pytest.mark.usefixtures("mujoco")
 STEP = 200
 """Steps of 4096 that a joint is sent."""
 
@@ -160,6 +158,8 @@ def _after_500_ms() -> bytes:
 
 def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path) -> None:
     """MuJoCo would reset silently, and servos would see a joint jump."""
+    from gazerig.features.world.physics import WorldUnstable
+
     spring = (
         '<body pos="1 0 0"><joint name="s" stiffness="1e12" ref="1"/><geom size=".001"/></body>'
     )

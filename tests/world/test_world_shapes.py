@@ -4,27 +4,23 @@ import pickle
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
-
-import mujoco
-
 from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
-from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import rig_in_world, world_scene
 from gazerig.features.world.shapes import SpecShapes, shapes_of
 from gazerig.features.world.world_spec import WorldSpec
-from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
 from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 
+pytestmark = pytest.mark.usefixtures("mujoco")
 WORLDS = sorted(
     path.stem for path in shipped_path("worlds", "living-room", HOME).parent.glob("*.yaml")
 )
@@ -66,6 +62,8 @@ def triangles(part: WorldPart) -> int:
 
 @pytest.mark.parametrize("world", WORLDS)
 def test_a_shipped_world_is_small_enough_for_a_browser(world: str) -> None:
+    from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
+
     found = shapes(world)
     assert len(pickle.dumps(found)) < 20_000
     parts = parts_of(world)
@@ -81,7 +79,9 @@ def _vertices(part: WorldPart) -> np.ndarray:
     return part.shape.vertices if isinstance(part.shape, TexturedMesh) else part.shape.mesh.vertices
 
 
-def test_everybody_is_where_mujoco_has_them() -> None:
+def test_everybody_is_where_mujoco_has_them(mujoco: Any) -> None:
+    from gazerig.features.world.figure_model import PeoplePlacer
+
     found = pickle.loads(pickle.dumps(shapes("conversation")))
     figures, model = found.spec.figures, found.spec.compile().mj
     data = mujoco.MjData(model)

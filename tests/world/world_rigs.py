@@ -1,21 +1,12 @@
-"""Rigs in a world with physics, for tests; a test that needs mujoco is skipped without it."""
+"""Rigs in a world with physics, for tests."""
 
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.sim_mock.devices import build
-
-MUJOCO_ABSENT = "mujoco is not installed: pip install 'gazerig[world]'"
-
-
-def mujoco_or_skip() -> Any:
-    """Return mujoco, or skip the test that asks for it."""
-    return pytest.importorskip("mujoco", reason=MUJOCO_ABSENT)
 
 
 class WorldBench:
