@@ -121,7 +121,6 @@ def test_faces_are_turned_outwards_for_their_backs_are_not_drawn(part: str) -> N
 
 
 def test_another_reader_finds_the_mesh_in_the_file() -> None:
-
     import trimesh
 
     mesh, colours, normals = head_mesh.eye()

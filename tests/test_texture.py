@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.view.glb import glow_disc
 from gazerig.robot.description import head_mesh, person_shape
 from gazerig.robot.description.mesh import (
     Painted,
@@ -14,6 +13,13 @@ from gazerig.robot.description.mesh import (
     smooth_normals,
 )
 from gazerig.robot.description.texture import TexturedMesh, add_texture
+
+
+def glow() -> Painted:
+    from gazerig.robot.dashboard.view.glb import glow_disc
+
+    return glow_disc((20, 24, 34, 140), 10)
+
 
 SHAPES: dict[str, Callable[[], Painted]] = {
     "eye": head_mesh.eye,
@@ -23,7 +29,7 @@ SHAPES: dict[str, Callable[[], Painted]] = {
     "jaw": lambda: head_mesh.skin().jaw,
     "person": lambda: person_shape.head(1, 0.6),
     "torso": lambda: person_shape.torso(2, 0.4),
-    "glow": lambda: glow_disc((20, 24, 34, 140), 10),
+    "glow": glow,
 }
 
 

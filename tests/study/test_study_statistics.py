@@ -3,16 +3,22 @@
 import itertools
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from gazerig.features.study import analyse as s
-
 GOLDEN = Path(__file__).parents[1] / "golden"
 
 
-def test_p_values_equal_those_of_pingouin() -> None:
+@pytest.fixture
+def s() -> Any:
+    from gazerig.features.study import analyse
+
+    return analyse
+
+
+def test_p_values_equal_those_of_pingouin(s: Any) -> None:
     for one in json.loads((GOLDEN / "study_p_values.json").read_text())["sets"]:
         rows, figures = np.array(one["ratings"]), one["pingouin"]
         than, better = rows[:, 0].astype(float), rows[:, 1].astype(float)
@@ -27,7 +33,7 @@ def test_p_values_equal_those_of_pingouin() -> None:
         )
 
 
-def test_exact_p_values_are_those_of_all_signs() -> None:
+def test_exact_p_values_are_those_of_all_signs(s: Any) -> None:
     rng = np.random.default_rng(5)
     for _ in range(20):
         scores = rng.integers(-6, 7, 8) / 2.0
@@ -37,7 +43,7 @@ def test_exact_p_values_are_those_of_all_signs() -> None:
         assert s.exact_sign_p(scores) == pytest.approx(min(1.0, 2.0 * min(above, below)))
 
 
-def test_nine_people_who_all_answer_higher() -> None:
+def test_nine_people_who_all_answer_higher(s: Any) -> None:
     better, than = np.full(9, 5.0), np.full(9, 1.0)
     assert s.signed_rank_test(better, than).exact_p == pytest.approx(2 / 2**9)
     assert s.rank_sum_test(better, than).exact_p == pytest.approx(2 / 2**9)
@@ -45,6 +51,6 @@ def test_nine_people_who_all_answer_higher() -> None:
     assert s.chi_square_test(better, than).statistic == pytest.approx(18.0)
 
 
-def test_holms_correction() -> None:
+def test_holms_correction(s: Any) -> None:
     assert s.correct_p_values([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
     assert s.correct_p_values([0.9, 0.8]) == [1.0, 1.0]
