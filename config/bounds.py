@@ -159,6 +159,8 @@ def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
     if origin in (typing.Union, types.UnionType) and len(args) == 2 and type(None) in args:
         kept = args[0] if args[1] is type(None) else args[1]
         return dataclasses.replace(inner(kept), optional=True)
+    if origin in (typing.Union, types.UnionType) and typing.get_origin(args[1]) is Literal:
+        return dataclasses.replace(inner(args[0]), choices=typing.get_args(args[1]))
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         return Shape("params", params=kind)
     if origin is tuple and (len(set(args)) == 1 or args[1:] == (...,)):
@@ -206,6 +208,8 @@ def _annotation(shape: Shape) -> Any:
             )
         case Shape(params=type() as params):
             kind = _dataclass_type(params)
+            if shape.choices:
+                kind |= Literal[shape.choices]
     return kind | None if shape.optional else kind
 
 
@@ -270,8 +274,8 @@ def _fill(
     """Return the value at a path from ``data``, except for its faulty parts."""
     if path in faulty:
         return _stand_in(shape, high)
-    if data is None:
-        return None
+    if data is None or (shape.params is not None and data in shape.choices):
+        return data
     parts: dict[Any, Any]
     match shape:
         case Shape(params=type() as params):

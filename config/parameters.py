@@ -222,7 +222,7 @@ def _leaves(
 ) -> Iterator[tuple[str, Shape, Value]]:
     """Return key, shape and value of every leaf below a position."""
     key = ".".join(path)
-    if shape.params is not None and value is not None:
+    if shape.params is not None and value is not None and value not in shape.choices:
         for name, field in shapes_of(shape.params).items():
             yield from _leaves(field, getattr(value, name), (*path, name), unlisted)
     elif shape.form == "mapping" and shape.inner is not None:
@@ -289,7 +289,8 @@ def _iterate_differences(
 ) -> Iterator[tuple[str, Value]]:
     if before is after:
         return
-    if shape.params is not None and before is not None and after is not None:
+    single = (None, *shape.choices)
+    if shape.params is not None and before not in single and after not in single:
         for name, field in shapes_of(shape.params).items():
             if hasattr(before, name):
                 both = getattr(before, name), getattr(after, name)
@@ -318,7 +319,11 @@ def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[Conf
     for step in over:
         if shape is not None:
             shape = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
-        if isinstance(held, dict) and held.get(step, {}) is None and shape is not None:
+        if (
+            isinstance(held, dict)
+            and shape is not None
+            and (held.get(step, {}) is None or (shape.params and held.get(step) in shape.choices))
+        ):
             held[step] = {}
         held = held.setdefault(step, {}) if isinstance(held, dict) else None
     if not isinstance(held, dict):

@@ -17,13 +17,11 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.sound.params import SoundParams
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.gaze.attention.aversion import AversionParams
+from gazerig.gaze.attention.attention import AttentionParams
 from gazerig.gaze.attention.bottom_up import BottomUpParams
+from gazerig.gaze.attention.conversation import AversionParams, ConversationParams, LooksAway
 from gazerig.gaze.attention.idle import IdleParams
-from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDownParams
-from gazerig.gaze.attention.turn_gaze import TurnParams
-from gazerig.gaze.field_of_view import FieldOfViewParams
 from gazerig.gaze.lids.lids import LidParams
 from gazerig.gaze.mouth.params import MouthParams
 from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
@@ -131,14 +129,16 @@ class GazeConfig:
     """The gaze models."""
 
     # fmt: off
-    field_of_view: Annotated[FieldOfViewParams, "visual field of an eye"] = field(default_factory=FieldOfViewParams)
     bottom_up: Annotated[BottomUpParams, "bottom-up attention by motion"] = field(default_factory=BottomUpParams)
     top_down: Annotated[TopDownParams, "gaze target of each behaviour"] = field(default_factory=TopDownParams)
     chooser: Annotated[str, Choices("attention"), "selection of the gaze target: attention, or the rule of a package"] = "attention"
     attention: Annotated[AttentionParams, "who wins"] = field(default_factory=AttentionParams)
     idle: Annotated[IdleParams, "idle gaze without a target"] = field(default_factory=IdleParams)
-    aversion: Annotated[AversionParams, "gaze aversion during conversation"] = field(default_factory=AversionParams)
-    conversation: Annotated[TurnParams, "gaze in reported turns of a conversation"] = field(default_factory=TurnParams)
+    looks_away: Annotated[LooksAway,
+        "looks away from a face; people: as measured in remote talk, mostly aside; eyes_alive: in reported turns as while talking, "
+        "listening and thinking, which looks up; none: never"] = "people"
+    aversion: Annotated[AversionParams, "looks away in reported turns"] = field(default_factory=AversionParams)
+    conversation: Annotated[ConversationParams, "signs of listening"] = field(default_factory=ConversationParams)
     scanpath: Annotated[ScanpathParams, "scanpath over a face"] = field(default_factory=ScanpathParams)
     saccade: Annotated[SaccadeParams, "saccades of the eyes"] = field(default_factory=SaccadeParams)
     pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = field(default_factory=PursuitParams)

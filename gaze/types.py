@@ -38,6 +38,10 @@ def body_name(kind: str, id: int) -> str:
 
 
 Phase = Literal["fixate", "saccade", "pursue"]
+TurnState = Literal["idle", "listening", "thinking", "speaking", "interrupted"]
+"""What the head does in a conversation; interrupted: it listens, after an interruption of its own
+turn.
+"""
 
 # The eight face parts in the order of the transition matrix (Nakamoto & Tsuruno, eq 1);
 # left and right are the owner's own.

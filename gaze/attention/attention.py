@@ -8,76 +8,162 @@ which the paper's comparison needs: so the gaze does not leave a single person b
 several people share it.
 """
 
-from math import exp, inf, log, sqrt
+from dataclasses import dataclass, field
+from math import dist, inf
 from operator import mul
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import add, scale, sub
-from gazerig.gaze.attention.bottom_up import BottomUp
-from gazerig.gaze.attention.comparison import NO_BODY, TargetComparison
+from gazerig.gaze.attention.bottom_up import BottomUp, SalienceRow
 from gazerig.gaze.attention.face_memory import FaceMemory
-from gazerig.gaze.attention.habituation import NO_STAY, Habituation, Stay
+from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.attention.idle import Idle
-from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.attention.reaction import Reaction
 from gazerig.gaze.attention.top_down import RuleTarget, TopDown
-from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
-from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
+from gazerig.gaze.field_of_view import are_visible, line_of_sight
+from gazerig.gaze.types import (
+    Bodies,
+    BodyRows,
+    GazeState,
+    Percept,
+    Salience,
+    Target,
+    Vec3,
+    body_name,
+    vec,
+)
+from gazerig.params import Bounds
+
+STALE_S = 0.4
+"""A frame older than this is not used."""
+NO_BODY = -1
+"""Id of a target that is a point and not a body."""
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _NO_ONE: frozenset[int] = frozenset()
+_NO_TARGET = ("", NO_BODY)
+_LISTED = 3
+"""Number of further saliences that a target lists."""
 _SPEED_OVER_S = 0.2  # longest interval between two positions for a speed of the head
-_LONGEST_EXTRA_S = 6.0  # beyond 15 s on one face a look is a stare
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
 _TURNS_S = 1.5
 """Time after a change of speaker or addressee in which only they are looked at."""
+_IN_CONVERSATION = 0.8
+"""Least salience of faces during a conversation."""
 _URGENT = 3.0
 """Factor of their salience in this time, if a voice agent has reported the change."""
+
+_LOOKS_ELSEWHERE = 0.6
+"""Share of its salience that a face keeps while the person neither looks at the head nor speaks."""
+_SPEAKERS = 0.88
+"""Share of the looks at several people that speaking people get (Vertegaal et al. 2001)."""
+_OWN_MOTION = 0.3
+"""Share of their motion that a person's own hands and clothes keep, unless they are raised to the
+face or reach out; the rest is added to the face.
+"""
+_NEARNESS = 0.5
+"""Exponent with which the weight of several people decreases with distance."""
+_STAY = 1.25**_NEARNESS
+"""The person looked at last counts as 1.25 times nearer."""
+
+
+@dataclass(frozen=True)
+class AttentionParams:
+    """Hysteresis of the choice, and the additions to the published comparison."""
+
+    # fmt: off
+    hysteresis_ratio: Annotated[float, Bounds(1, 10),
+        "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
+    min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
+    habituation: Annotated[HabituationParams | Literal["none"],
+        "habituation to what is looked at, and inhibition of return; none: neither"] = field(default_factory=HabituationParams)
+    reaction: Annotated[Literal["people", "none"],
+        "people: a change of target takes their reaction time; none: it is immediate"] = "people"
+    social: Annotated[Literal["people", "none"],
+        "people: who looks, speaks, gestures or is near counts for more, and faces out of view are remembered; none: all "
+        "bodies count for their motion and by the rules alone"] = "people"
+    # fmt: on
+
+
+class _Comparison(NamedTuple):
+    """Saliences of one decision: those of the bodies, then of a point that the rule names."""
+
+    bodies: Bodies
+    saliences: list[Salience]
+    rule_target: RuleTarget | None
+
+    @property
+    def best(self) -> int:
+        """Return the row with the largest total, -1 without any visible one."""
+        totals = [one.total for one in self.saliences]
+        most = max(totals, default=-inf)
+        return totals.index(most) if most > -inf else -1
+
+    def target(self, row: int, captured_s: float, plan: str) -> Target:
+        """Return the target of a row, with its reason."""
+        first, rule_target = self.saliences[row], self.rule_target
+        others = [one for i, one in enumerate(self.saliences) if i != row and one.total > -inf]
+        others.sort(key=lambda one: -one.total)
+        moving = first.translation + first.looming + first.rotation + first.onset
+        by_rule = rule_target is not None and first.rule > 0.0 and first.rule >= moving
+        name = body_name(first.kind, first.id)
+        if rule_target is not None and by_rule:
+            why = f"{name}: rule {rule_target.behaviour} {first.rule:.2f}"
+        else:
+            why = f"{name}: {_terms(first)}"
+        if rule_target is not None and rule_target.p_world_m is not None and first.id == NO_BODY:
+            p, v = rule_target.p_world_m, rule_target.v_world_m_s
+        else:
+            p, v = vec(self.bodies.p_world_m[row]), vec(self.bodies.v_world_m_s[row])
+        # The head's amplitude follows from the unfactored amount: habituation does not turn the
+        # head.
+        return Target(
+            p, v, captured_s, first.kind, first.id, max(first.rule, moving), by_rule, None, 0, why,
+            plan=plan, saliences=(first, *others[:_LISTED]),
+        )  # fmt: skip
 
 
 class Attention:
     """Choice of the target, once for each new frame.
 
     Args:
-        params: hysteresis, habituation and reaction time.
-        field_of_view: visibility of bodies.
+        params: hysteresis, and what is added to the published comparison.
         bottom_up: salience by motion.
         top_down: the rules.
         idle: gaze without a visible target.
-        rng: draws reaction times; None: every change of target is immediate.
-        stay_rng: draws the additional times of looks at one of several people; None: none.
+        rng: draws reaction times.
+        stay_rng: draws the additional times of looks at one of several people.
     """
 
     def __init__(
         self,
         params: AttentionParams,
-        field_of_view: FieldOfView,
         bottom_up: BottomUp,
         top_down: TopDown,
         idle: Idle,
-        rng: np.random.Generator | None = None,
-        stay_rng: np.random.Generator | None = None,
+        rng: np.random.Generator,
+        stay_rng: np.random.Generator,
     ) -> None:
-        self._params = params
-        self._field_of_view = field_of_view
         self._bottom_up = bottom_up
         self.top_down = top_down
         self._idle = idle
-        self._habituation = Habituation(params.habituation)
-        self._reaction = Reaction(params.reaction, rng)
+        self._habituation = Habituation(params.habituation, stay_rng)
+        self._reaction = Reaction(rng)
         self._memory = FaceMemory()
         self._persons = Persons()
-        self._stay_rng = stay_rng
+        self.retune(params)
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
-        """Change the hysteresis; the present target and all habituation stay."""
+        """Change the parameters; the present target and all habituation stay."""
         self._params = params
-        self._habituation.retune(params.habituation)
-        self._reaction.retune(params.reaction)
+        self._habituation.params = params.habituation
+        self._reaction.immediate = params.reaction == "none"
+        self._social = params.social == "people"
 
     def reset(self, t_s: float) -> None:
         """Forget all targets."""
@@ -92,34 +178,32 @@ class Attention:
         self._target: Target | None = None
         self._shift = 0
         self._since_s = -inf
-        self._identity: tuple[str, int] | None = None
+        self._identity = _NO_TARGET
         self._place = _STILL
-        self._stay = NO_STAY
         self._speakers = _NO_ONE
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
-        self._focus: tuple[float, float] | None = None
+        self._share: float | None = None
         self._partner: int | None = None
         self._turned_s = self._reported_s = -inf
 
-    def converse(self, focus: tuple[float, float] | None, partner: int | None, t_s: float) -> None:
+    def converse(self, share: float | None, partner: int | None, t_s: float) -> None:
         """Let the choice among people follow a conversation.
 
         Args:
-            focus: share of the looks at several people that the partner gets, 0: the share of
-                those who speak; and the least salience of faces. None: no conversation.
+            share: share of the looks at several people that the partner gets, 0: the share of
+                those who speak; None: no conversation.
             partner: id of the partner or addressee, None if unknown.
             t_s: present time.
         """
-        if (focus, partner) != (self._focus, self._partner) and focus is not None:
+        if (share, partner) != (self._share, self._partner) and share is not None:
             self._turned_s = self._reported_s = self._changed_s = t_s
-        self._focus, self._partner = focus, partner
+        self._share, self._partner = share, partner
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target at ``t_s``."""
-        stale_s = self._params.stale_ms / 1e3
-        fresh = percept is not None and t_s - percept.captured_s <= stale_s
+        fresh = percept is not None and t_s - percept.captured_s <= STALE_S
         new = percept is not None and percept.captured_s != self._seen_s
         target = self._target
         if fresh and not new and target is not None and not self._reaction.is_waiting:
@@ -146,7 +230,7 @@ class Attention:
         if identity == self._identity and target.shift == self._shift:
             return target
         if identity != self._identity:
-            if self._identity is not None:
+            if self._identity != _NO_TARGET:
                 self._habituation.record_left(place, t_s)
                 self._reaction.record_left(*self._identity, t_s)
             self._identity = identity
@@ -165,47 +249,39 @@ class Attention:
             self._memory.reset()
             self._persons.reset()
             self._idle.forget_places()
-        attended = self._identity[1] if self._identity is not None else -1
-        lasts_s = self._params.face_memory_s
-        recovery_s = self._params.habituation.rhythm_recovery_s
-        self._persons.update(percept, state.p_world_head_m, recovery_s)
-        unseen_s = self._persons.may_speak_unseen_s if self._params.speaker_share > 0.0 else -inf
-        bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s, unseen_s)
-        speaking = self._persons.speaking
-        if self._focus is not None and speaking.difference(self._speakers):
+        eye, captured_s = state.p_world_head_m, percept.captured_s
+        self._persons.update(percept, eye)
+        bodies, speaking = percept.bodies, self._persons.speaking
+        if self._social:
+            unseen_s = self._persons.may_speak_unseen_s
+            bodies = self._memory.step(bodies, self._identity[1], captured_s, unseen_s)
+        if self._share is not None and speaking.difference(self._speakers):
             self._turned_s = t_s
         self._speakers = speaking.union(bodies.ids[len(percept.bodies) :])
         if self.top_down.plans:
-            self.top_down.plan(percept, state.p_world_head_m, t_s)
+            self.top_down.plan(percept, eye, t_s)
         trait = self.top_down.rule.person
-        self.top_down.named_ids = (
-            self._persons.ids_with_trait(trait) if trait is not None else _NO_ONE
-        )
-        ratio = self._params.looks_elsewhere_ratio
-        elsewhere = [
-            face.id for face in percept.faces if face.looks_at_head is False and not face.speaks
-        ]
-        worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
-        made = self._compare(bodies, worth, state, t_s)
-        self._record_gestures(made)
-        if self._shows_nothing_salient(made):
+        self.top_down.named_ids = self._persons.ids_with_trait(trait) if trait else _NO_ONE
+        made = self._compare(percept, bodies, state, t_s)
+        best = made.best
+        if best < 0 or self._is_faint(made.saliences[best]):
             self._reaction.drop()
-            seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
-            places = [vec(made.bodies.p_world_m[row]) for row in seen]
-            self._idle.record_seen([made.bodies.ids[row] for row in seen], places, t_s)
+            seen = [row for row in range(len(bodies)) if made.saliences[row].total > -inf]
+            places = [vec(bodies.p_world_m[row]) for row in seen]
+            self._idle.record_seen([bodies.ids[row] for row in seen], places, t_s)
             return None
         changed = self._behaviour != self.top_down.behaviour
         if changed:
             self._behaviour, self._changed_s = self.top_down.behaviour, t_s
-        present = self._target_row(made)
-        row = made.best
+        present, row = self._target_row(made), best
         if present is not None:
-            favoured = made.total[present] * self._params.hysteresis_ratio
-            row = present if made.total[row] < favoured else row
+            favoured = made.saliences[present].total * self._params.hysteresis_ratio
+            row = present if made.saliences[best].total < favoured else best
         named = made.rule_target is not None and row in made.rule_target.rows
         if named:
-            self._draw_stay(made.bodies.ids[row])
-        winner = made.target(row, percept.captured_s)
+            self._habituation.start_stay(bodies.ids[row])
+        plan = self.top_down.plan_text
+        winner = made.target(row, captured_s, plan)
         # A change of behaviour waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
             self._reaction.drop()
@@ -213,131 +289,118 @@ class Attention:
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
         self._reaction.start_waiting(winner, dwelt_s)
         if present is not None:
-            return made.target(present, percept.captured_s)
-        return self._target and self._target._replace(plan=made.plan)
+            return made.target(present, captured_s, plan)
+        return self._target and self._target._replace(plan=plan)
 
-    def _draw_stay(self, id: int) -> None:
-        """Draw the additional time of a look at another one of several people."""
-        if id == self._stay.id:
-            return
-        par, extra_s = self._params.habituation, 0.0
-        if self._stay_rng is not None and par.stay_s > 0.0:
-            variance = log(1.0 + par.stay_spread**2)
-            deviation = sqrt(variance) * float(self._stay_rng.standard_normal())
-            extra_s = min(par.stay_s * exp(deviation - 0.5 * variance), _LONGEST_EXTRA_S)
-        self._stay = Stay(id, extra_s)
-
-    def _shows_nothing_salient(self, made: TargetComparison) -> bool:
-        """Return whether there are no bodies, or only things of low salience: gaze is idle."""
-        best, most = made.best, made.total[made.best]
-        if most == -inf or most >= self._params.least_salience:
-            return bool(most == -inf)
-        return best < len(made.bodies) and made.bodies.kinds[best] != "face"
+    def _is_faint(self, best: Salience) -> bool:
+        """Return whether the most salient one is a thing that gets only glances: gaze is idle."""
+        faint = best.total < self._bottom_up.least_salience
+        return faint and best.kind != "face" and best.id != NO_BODY
 
     def _compare(
-        self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
-    ) -> TargetComparison:
-        """Return the amounts that the decision compares.
-
-        worth: additional factor 0..1 of each body's salience
-        """
-        n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
-        seen = self._field_of_view.are_visible(bodies, rows, state)
+        self, percept: Percept, bodies: Bodies, state: GazeState, t_s: float
+    ) -> _Comparison:
+        """Return the saliences that the decision compares."""
+        eye, rows = state.p_world_head_m, bodies.rows()
+        ids, attended = bodies.ids, self._identity[1]
+        worth = self._worth(percept, ids)
+        seen = are_visible(rows, state)
+        gaze = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         v_eye = self._eye_velocity(eye, t_s)
-        motion = self._bottom_up.step(
-            rows, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
-        )
-        rule_target = self.top_down.step(rows, seen, eye)
-        attended = self._identity[1] if self._identity is not None else -1
-        left = self._habituation.step(rows, eye, attended, t_s)
-        left = [*map(mul, left, worth)]
-        if not self.top_down.counts_every_motion:
-            par = self._params
-            ratio = par.habituation.rhythm_ratio
-            self._persons.weaken_known(left, bodies.ids, ratio, par.sinking_ratio)
-        habituation = [*left, 1.0]
-        rule = [0.0] * (n + 1)
-        amount = [*[terms.total for terms in motion], 0.0]
-        point = rule_target is not None and rule_target.point_world_m is not None
-        if rule_target is not None and self._focus is not None:
-            rule_target = self._urge(rule_target, t_s)
+        motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, *self._motion_limits(rows))
+        rule_target = self.top_down.step(rows, seen)
+        factors = [*map(mul, self._habituation.step(rows, eye, attended, t_s), worth)]
+        if not self.top_down.plans:  # fists must be watched
+            self._persons.weaken_known(factors, ids, self._habituation.is_on, self._social)
+        rule = [0.0] * len(ids)
+        point = []
         if rule_target is not None:
-            wanted = [n] if point else rule_target.rows
-            for row in wanted:
-                rule[row] = rule_target.salience
-                amount[row] = max(amount[row], rule_target.salience)
-            if not point:
-                shares = self._rule_shares(rule_target, bodies.ids, worth, attended, t_s)
-                for row, one in zip(wanted, shares, strict=True):
-                    habituation[row] = one
-        total = [
-            one * factor if there else -inf
-            for one, factor, there in zip(amount, habituation, (*seen, point), strict=True)
-        ]
-        best = total.index(max(total))
-        plan = self.top_down.plan_text
-        return TargetComparison(
-            bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
-        )
+            if self._share is not None and self.top_down.rule.kind == "face":
+                urgent = _URGENT if t_s - self._reported_s < _TURNS_S else 1.0
+                least = _IN_CONVERSATION * urgent
+                rule_target = rule_target._replace(salience=max(rule_target.salience, least))
+            shares = self._rule_shares(rule_target, rows, worth, eye, t_s)
+            for row, share in zip(rule_target.rows, shares, strict=True):
+                rule[row], factors[row] = rule_target.salience, share
+            if rule_target.p_world_m is not None:
+                amount = rule_target.salience
+                point = [
+                    Salience(NO_BODY, rule_target.kind, 0.0, 0.0, 0.0, 0.0, amount, 1.0, amount)
+                ]
+        saliences = [
+            Salience(
+                id, kind, one.translation, one.looming, one.rotation, one.onset, wanted, factor,
+                max(one.total, wanted) * factor if there else -inf,
+            )
+            for id, kind, one, wanted, factor, there in zip(
+                ids, bodies.kinds, motion, rule, factors, seen, strict=True
+            )
+        ]  # fmt: skip
+        self._record_gestures(ids, motion)
+        return _Comparison(bodies, saliences + point, rule_target)
 
-    def _urge(self, rule_target: RuleTarget, t_s: float) -> RuleTarget:
-        """Return the targets of a rule with the salience of faces in a conversation."""
-        if self._focus is None or self.top_down.rule.kind != "face":
-            return rule_target
-        least = self._focus[1] * (_URGENT if t_s - self._reported_s < _TURNS_S else 1.0)
-        return rule_target._replace(salience=max(rule_target.salience, least))
+    def _worth(self, percept: Percept, ids: tuple[int, ...]) -> list[float]:
+        """Return a further factor of each body: of faces that look elsewhere."""
+        elsewhere = {
+            face.id
+            for face in percept.faces
+            if self._social and face.looks_at_head is False and not face.speaks
+        }
+        return [_LOOKS_ELSEWHERE if id in elsewhere else 1.0 for id in ids]
 
     def _favoured(self, ids: list[int], t_s: float) -> tuple[frozenset[int], float]:
         """Return the people who have a share of the looks together, and that share.
 
         A mouth shows late who speaks, so a partner just reported is favoured above speakers.
         """
-        share, partner = self._params.speaker_share, [id for id in ids if id == self._partner]
+        share = _SPEAKERS if self._social else 0.0
         found = self._speakers.intersection(ids)
+        partner = frozenset(id for id in ids if id == self._partner)
         reported = t_s - self._reported_s < _TURNS_S
-        if self._focus is not None and partner and (self._focus[0] > 0.0 or reported or not found):
-            return frozenset(partner), self._focus[0] or share
+        if self._share is not None and partner and (self._share > 0.0 or reported or not found):
+            return partner, self._share or share
         return found, share
 
-    def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
+    def _motion_limits(self, rows: BodyRows) -> tuple[list[float], list[float]]:
         """Return the limit of each body's motion, and the share of it that counts."""
-        parts, ratio = self._persons.parts, self._params.own_motion_ratio
-        usual, of_hands = self._bottom_up.limit(), self._bottom_up.limit(hand=True)
-        most, worth = [], []
-        for id, kind in zip(bodies.ids, bodies.kinds, strict=True):
-            most.append(of_hands if kind == "hand" and id in self._persons.raised else usual)
-            worth.append(ratio if id in parts else 1.0)
-        return most, worth
+        persons = self._persons
+        most = [
+            self._bottom_up.limit(hand=kind == "hand" and id in persons.raised)
+            for id, kind in zip(rows.ids, rows.kinds, strict=True)
+        ]
+        own = persons.parts if self._social else ()
+        return most, [_OWN_MOTION if id in own else 1.0 for id in rows.ids]
 
-    def _record_gestures(self, made: TargetComparison) -> None:
+    def _record_gestures(self, ids: tuple[int, ...], motion: list[SalienceRow]) -> None:
         """Record the motion of each person's own body, which counts in the next decision."""
-        ratio, self._gestures = self._params.own_motion_ratio, {}
-        if ratio == 0.0 or ratio == 1.0:
-            return
-        for row, id in enumerate(made.bodies.ids):
-            owner = self._persons.parts.get(id)
+        self._gestures = {}
+        for id, one in zip(ids, motion, strict=True):
+            owner = self._persons.parts.get(id) if self._social else None
             if owner is not None:
-                motion = made.motion(row)
-                moved = (motion.total - motion.onset) * (1.0 / ratio - 1.0)
+                moved = (one.total - one.onset) * (1.0 / _OWN_MOTION - 1.0)
                 self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
 
     def _rule_shares(
-        self,
-        rule_target: RuleTarget,
-        ids: tuple[int, ...],
-        worth: list[float],
-        attended: int,
-        t_s: float,
+        self, rule_target: RuleTarget, rows: BodyRows, worth: list[float], eye: Vec3, t_s: float
     ) -> list[float]:
         """Return the factor 0..1 of each body that a rule selects, 1 for the strongest."""
-        named = [ids[row] for row in rule_target.rows]
-        moved = self._gestures
-        mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
-        weights = [near * one for near, one in zip(rule_target.nearness, mine, strict=True)]
+        wanted, habituation = rule_target.rows, self._habituation
+        if not wanted:
+            return []
+        named = [rows.ids[row] for row in wanted]
+        mine = [worth[row] * (1.0 + self._gestures.get(rows.ids[row], 0.0)) for row in wanted]
+        weights = mine
+        if self._social:
+            away = [max(dist(rows.p_world_m[row], eye), 1e-3) for row in wanted]
+            nearest = min(away)
+            weights = [
+                (nearest / one) ** _NEARNESS * own for one, own in zip(away, mine, strict=True)
+            ]
         weights = self._favour_speakers(named, weights, t_s)
-        factors = self._habituation.share(named, weights, attended, t_s, self._stay)
+        factors = habituation.share(named, weights, self._identity[1], t_s)
+        stay = _STAY if self._social else 1.0
         shares = [
-            factor * one * (rule_target.stay if id == self._stay.id else 1.0)
+            factor * one * (stay if id == habituation.stays_at else 1.0)
             for id, factor, one in zip(named, factors, mine, strict=True)
         ]
         if t_s - self._turned_s < _TURNS_S and (favoured := self._favoured(named, t_s)[0]):
@@ -357,12 +420,6 @@ class Attention:
             ratio * one if id in speaking else one for id, one in zip(ids, weights, strict=True)
         ]
 
-    def _gaze(self, state: GazeState) -> Vec3:
-        """Return the gaze direction of both eyes, of any length, if the salience depends on it."""
-        if not self._bottom_up.needs_gaze:
-            return _STILL
-        return add(line_of_sight(state, left=True), line_of_sight(state, left=False))
-
     def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
         """Return the velocity of the eyes by the head's motion since the last decision, m/s."""
         before, self._eye = self._eye, (p_eye_m, t_s)
@@ -370,12 +427,18 @@ class Attention:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
-    def _target_row(self, made: TargetComparison) -> int | None:
+    def _target_row(self, made: _Comparison) -> int | None:
         """Return the row of the present target, None if it has disappeared."""
-        if self._identity is not None and self._identity[1] == NO_BODY:
-            there = made.total[-1] > -inf and made.point_kind == self._identity[0]
-            return len(made.bodies) if there else None
-        if self._identity is None or self._identity[1] not in made.bodies.ids:
-            return None
-        row = made.bodies.ids.index(self._identity[1])
-        return row if made.total[row] > -inf else None
+        kind, id = self._identity
+        for row, one in enumerate(made.saliences):
+            if one.id == id and one.total > -inf and (id != NO_BODY or one.kind == kind):
+                return row
+        return None
+
+
+def _terms(salience: Salience) -> str:
+    """Return the largest term of motion and all that are at least a tenth of it, as text."""
+    names = ("translation", "looming", "rotation", "onset")
+    terms = {name: getattr(salience, name) for name in names}
+    most = max(terms.values())
+    return " + ".join(f"{name} {a:.2f}" for name, a in terms.items() if a >= 0.1 * most)

@@ -44,6 +44,17 @@ _NEAREST_M = 0.05
 _SPARE = 16
 """Number of former bodies, beyond twice the present ones, with stored states."""
 
+_ROTATION_RAD_S = 3.0
+"""Angular speed about the line of sight that gives salience 1."""
+_MOST, _MOST_OF_HAND = 0.35, 0.9
+"""Salience that motion alone cannot exceed, and that of a hand raised to the face."""
+_SMOOTHING_S = 0.1
+"""Time constant of the low-pass filter of salience."""
+_ONSET_S, _RECOVERY_S = 0.5, 2.0
+"""Time constants with which an onset decays, and with which the next regains its full salience."""
+_LEAST = 0.05
+"""A thing less salient than this is not a target; it gets only glances, like anything in view."""
+
 
 @dataclass(frozen=True)
 class BottomUpParams:
@@ -51,20 +62,11 @@ class BottomUpParams:
 
     # fmt: off
     form: Annotated[Literal["retinal", "literal", "none"],
-        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights; none: neither motion nor onset "
-        "attracts the gaze"] = "retinal"
-    translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that gives salience 1"] = 0.5
-    looming_reference_1_s: Annotated[float, Bounds(0.01, 20),
-        "speed along the line of sight divided by distance that gives salience 1"] = 0.5
-    rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "angular speed about the line of sight that gives salience 1"] = 3.0
-    saturation: Annotated[float, Bounds(0, 10),
-        "salience that motion alone cannot exceed, except a fast approach; 0: no limit"] = 0.35
-    hand_saturation: Annotated[float, Bounds(0, 10), "the same for a hand raised to the face, such as a waving one; 0: no limit"] = 0.9
-    smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass filter of salience"] = 0.1
+        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights, limit, filter and onset; none: "
+        "neither motion nor onset attracts the gaze"] = "retinal"
+    reference: Annotated[float, Bounds(0.01, 20),
+        "motion that gives salience 1: rad/s across the line of sight, and the part of the distance per second along it"] = 0.5
     onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just entered or begun to move; 0: none"] = 1.0
-    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.5
-    onset_recovery_s: Annotated[float, Bounds(0, 60),
-        "time constant with which the next onset regains its full salience; 0: every onset has it"] = 2.0
     # fmt: on
 
 
@@ -147,13 +149,13 @@ class BottomUp:
         self.reset(0.0)
 
     def retune(self, params: BottomUpParams) -> None:
-        """Change the reference motions; the state of the bodies stays."""
+        """Change the parameters; the state of the bodies stays."""
         self._params = params
 
     @property
-    def needs_gaze(self) -> bool:
-        """Return whether the present form depends on the gaze direction."""
-        return self._params.form == "literal"
+    def least_salience(self) -> float:
+        """Return the least salience of a thing that is a target."""
+        return 0.0 if self._params.form == "literal" else _LEAST
 
     def reset(self, t_s: float) -> None:
         """Forget all bodies."""
@@ -164,9 +166,9 @@ class BottomUp:
 
     def limit(self, hand: bool = False) -> float:
         """Return the limit of motion; inf: no limit, as in the paper's own form."""
-        par = self._params
-        most = par.hand_saturation if hand else par.saturation
-        return most if most > 0.0 and par.form == "retinal" else inf
+        if self._params.form == "literal":
+            return inf
+        return _MOST_OF_HAND if hand else _MOST
 
     def step(
         self,
@@ -197,9 +199,10 @@ class BottomUp:
         if par.form == "none":
             return [_UNSEEN] * len(rows.ids)
         self._shift_times(t_s)
-        fresh = self._onset_share(t_s)
-        tau = par.smoothing_s
-        gain = 1.0 - (exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0)
+        fresh = -expm1((self._onset_s - t_s) / _RECOVERY_S)
+        new, gain = 0.0, 1.0
+        if par.form == "retinal":
+            new, gain = par.onset_salience, 1.0 - exp(min(0.0, self._at_s - t_s) / _SMOOTHING_S)
         found = []
         for i, id in enumerate(rows.ids):
             state = states.get(id)
@@ -211,7 +214,9 @@ class BottomUp:
             slide, loom, spin = self._motion(rows, i, p_world_eye_m, v_world_eye_m_s, gaze_world)
             if state is None or t_s - state.seen_s > _BLINK_S:
                 moves = slide + abs(loom) + spin > _MOVES
-                state = states[id] = _BodyState(self._entry_s(t_s), fresh, moves, t_s)
+                # A body seen in the first moments was there before: it entered long ago.
+                entered_s = t_s if t_s - self._started_s > _BLINK_S else -inf
+                state = states[id] = _BodyState(entered_s, fresh, moves, t_s)
                 self._onset_s = max(self._onset_s, state.entered_s)
             state.seen_s = t_s
             state.slide = slide = state.slide + gain * (slide - state.slide)
@@ -227,7 +232,7 @@ class BottomUp:
                 state.entered_s = self._onset_s = t_s
                 state.onset = fresh
             state.moves = moved > (_STILL_BELOW if state.moves else _MOVES)
-            onset = state.onset * par.onset_salience * exp((state.entered_s - t_s) / par.onset_s)
+            onset = state.onset * new * exp((state.entered_s - t_s) / _ONSET_S)
             total = saturate(slide, loom, spin, most[i], worth[i]) + onset
             found.append(SalienceRow(slide, abs(loom), spin, onset, total))
         self._at_s = t_s
@@ -247,15 +252,10 @@ class BottomUp:
         )
         distance = max(sqrt(x * x + y * y + z * z), _NEAREST_M)
         return (
-            slide / (distance * par.translation_reference_rad_s),
-            loom / (distance * par.looming_reference_1_s),
-            spin / par.rotation_reference_rad_s,
+            slide / (distance * par.reference),
+            loom / (distance * par.reference),
+            spin / _ROTATION_RAD_S,
         )
-
-    def _onset_share(self, t_s: float) -> float:
-        """Return the share of the full salience of an onset at this time."""
-        recovery_s = self._params.onset_recovery_s
-        return -expm1((self._onset_s - t_s) / recovery_s) if recovery_s > 0.0 else 1.0
 
     def _shift_times(self, t_s: float) -> None:
         """Shift all times after a long pause without steps, so that no body counts as gone."""
@@ -266,10 +266,3 @@ class BottomUp:
         if paused_s > 0.0:
             for state in self._states.values():
                 state.seen_s += paused_s
-
-    def _entry_s(self, t_s: float) -> float:
-        """Return the time of entry of a body first seen at ``t_s``.
-
-        A body seen in the first moments was there before: it entered long ago.
-        """
-        return t_s if t_s - self._started_s > _BLINK_S else -inf

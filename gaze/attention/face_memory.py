@@ -12,8 +12,10 @@ from math import inf
 
 import numpy as np
 
-from gazerig.gaze.types import Bodies, Vec3
+from gazerig.gaze.types import Bodies, Vec3, vec
 
+_LASTS_S = 15.0
+"""Time for which a face is remembered."""
 _FOUND_WITHIN_S = 0.7
 """Time from the change of target: movement of eyes and head, and delay of the camera."""
 
@@ -40,12 +42,7 @@ class FaceMemory:
         self._captured_s = -inf
 
     def step(
-        self,
-        bodies: Bodies,
-        attended_id: int,
-        captured_s: float,
-        lasts_s: float,
-        unseen_s: float = -inf,
+        self, bodies: Bodies, attended_id: int, captured_s: float, unseen_s: float = -inf
     ) -> Bodies:
         """Return the bodies of a new frame with the remembered faces behind them.
 
@@ -56,40 +53,24 @@ class FaceMemory:
             bodies: bodies in the frame.
             attended_id: the present target; -1 for none.
             captured_s: capture time of the frame.
-            lasts_s: time for which a face is remembered.
             unseen_s: time before which such a speaker was last visible; -inf without one.
         """
         before, self._captured_s = self._captured_s, captured_s
         seen = frozenset(bodies.ids)
-        gone = []
-        for id, face in self._faces.items():
+        for id, face in [*self._faces.items()]:
             if id in seen:
                 continue
-            if id != attended_id:
-                face.sought_s = inf
-            else:
-                face.sought_s = min(face.sought_s, captured_s)
-            lost = id == attended_id and face.seen_s == before
+            attended = id == attended_id
+            face.sought_s = min(face.sought_s, captured_s) if attended else inf
+            lost = attended and face.seen_s == before
             not_found = captured_s - face.sought_s > _FOUND_WITHIN_S
-            if lost or not_found or captured_s - face.seen_s > lasts_s:
-                gone.append(id)
-        for id in gone:
-            del self._faces[id]
-        if lasts_s > 0.0:
-            self._record(bodies, captured_s)
-        before_s = unseen_s if "face" in bodies.kinds else inf
-        return self._join(bodies, seen, before_s)
-
-    def _record(self, bodies: Bodies, captured_s: float) -> None:
-        """Record the faces in view."""
+            if lost or not_found or captured_s - face.seen_s > _LASTS_S:
+                del self._faces[id]
         for row, kind in enumerate(bodies.kinds):
             if kind == "face":
-                x, y, z = bodies.p_world_m[row].tolist()
-                radius_m = float(bodies.radius_m[row])
-                self._faces[bodies.ids[row]] = _RememberedFace((x, y, z), radius_m, captured_s)
-
-    def _join(self, bodies: Bodies, seen: frozenset[int], before_s: float) -> Bodies:
-        """Return the bodies and the faces that are not visible, last seen before a time."""
+                p, radius_m = vec(bodies.p_world_m[row]), float(bodies.radius_m[row])
+                self._faces[bodies.ids[row]] = _RememberedFace(p, radius_m, captured_s)
+        before_s = unseen_s if "face" in bodies.kinds else inf
         rest = {
             id: face
             for id, face in self._faces.items()

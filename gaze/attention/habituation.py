@@ -1,23 +1,65 @@
-"""Habituation to the attended body, and inhibition of return.
+"""Habituation to the attended body, inhibition of return, and sharing of the gaze.
 
 Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of the
 attended body falls, that of the others recovers, and h times the salience is compared. Without it
 the gaze stares. It is stored per identity and continues while the body is absent: a person who
-returns immediately is not new. Several bodies that one rule selects share the gaze instead
-(gazerig.gaze.attention.shared_attention).
+returns immediately is not new.
 
 Inhibition of return: for a moment the gaze avoids the place it has just left, as in
 Ruesch et al. 2008 (a Gaussian about that place that decays).
+
+Several bodies that one rule selects share the gaze instead. With habituation alone, the two or
+three nearest of several people would alternate permanently, as each recovers within a second, and a
+person who was not looked at for half a minute gains nothing more. So every body has a surplus: its
+viewing time divided by its weight, minus that of the least viewed body (weighted fair queueing, as
+in process schedulers). The larger the surplus, the lower the factor. Looks then last longer for
+heavier bodies, are shorter for more bodies, and total times are in proportion to the weights: the
+matching law (Herrnstein 1961).
 """
 
 from collections.abc import Sequence
-from math import acos, exp, radians
-from typing import NamedTuple
+from dataclasses import dataclass
+from math import acos, exp, log, radians, sqrt
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
 
 from gazerig.gaze.angles import dot, sub, unit
-from gazerig.gaze.attention.params import HabituationParams
-from gazerig.gaze.attention.shared_attention import SharedAttention
 from gazerig.gaze.types import BodyRows, Vec3
+from gazerig.params import Bounds
+
+_RECOVERY_1_S = 1.0
+"""Rate at which the factors of all other bodies recover to 1."""
+_RETURN, _RETURN_RAD, _RETURN_S = 0.5, radians(4.0), 1.5
+"""Inhibition of return: strength, standard deviation around the point, time constant of decay."""
+
+_STAY_S, _STAY_SPREAD = 2.0, 1.2
+"""Mean of the random additional time of each look at one of several people, and its standard
+deviation / mean: many short looks and some long ones.
+"""
+_LONGEST_STAY_S = 6.0  # beyond 15 s on one face a look is a stare
+_FEW = 3
+"""Number of people up to which looks have an additional time; in a larger group everyone gets one.
+"""
+
+_FADES_S = 10.0
+"""Time constant with which a surplus decays: a minute of looks need not be compensated."""
+_LARGEST_S = 8.0
+_KEPT_S = 60.0
+_FIRST_S = 0.1
+"""Initial surplus of a body of weight 0, so that the heaviest of several new bodies comes first."""
+
+
+@dataclass(frozen=True)
+class HabituationParams:
+    """Rate of habituation, and its effect among several targets of a rule."""
+
+    # fmt: off
+    decay_rate_1_s: Annotated[float, Bounds(0, 10),
+        "rate at which the salience factor of the present target decreases from 1; 0: never"] = 0.2
+    rule_floor: Annotated[float, Bounds(0, 1),
+        "lowest salience factor of one of several targets of a rule; lower: the gaze changes sooner between people"] = 0.0
+    # fmt: on
 
 
 class _LeftPoint(NamedTuple):
@@ -27,43 +69,55 @@ class _LeftPoint(NamedTuple):
     at_s: float
 
 
-class Stay(NamedTuple):
-    """A look at one of several bodies: its id, and the additional surplus that it may reach."""
+class _Surplus(NamedTuple):
+    """A surplus in seconds, and the body's last time in the group."""
 
-    id: int
-    extra_s: float
-
-
-NO_STAY = Stay(-1, 0.0)
-_FEW = 3
-"""Number of people up to which looks have an additional time."""
+    surplus_s: float
+    at_s: float
 
 
 class Habituation:
-    """State of habituation of every identity, and the points left."""
+    """State of habituation of every identity, the points left, and the shares of the gaze.
 
-    def __init__(self, params: HabituationParams) -> None:
-        self._params = params
-        self._shared = SharedAttention()
+    Args:
+        params: the rates; "none": neither habituation nor inhibition of return.
+        rng: draws the additional times of looks at one of several bodies.
+    """
+
+    def __init__(
+        self, params: HabituationParams | Literal["none"], rng: np.random.Generator
+    ) -> None:
+        self.params = params
+        self._rng = rng
         self.reset(0.0)
 
-    def retune(self, params: HabituationParams) -> None:
-        """Change the rates; the state stays."""
-        self._params = params
+    @property
+    def is_on(self) -> bool:
+        """Return whether there is habituation."""
+        return self.params != "none"
 
     def reset(self, t_s: float) -> None:
         """Forget all habituation and the points left."""
-        # Only factors below 1 are stored: those of bodies attended in the last 1/recovery_rate_1_s
-        # seconds, which are few.
+        # Only factors below 1 are stored: those of bodies attended in the last second, which are
+        # few.
         self._habituation: dict[int, float] = {}
         self._left: list[_LeftPoint] = []
-        self._shared.reset(t_s)
-        self._at_s = t_s
+        self._surpluses: dict[int, _Surplus] = {}
+        self.stays_at, self._stay_s = -1, 0.0
+        self._at_s = self._shared_s = t_s
 
     def record_left(self, p_world_m: Vec3, t_s: float) -> None:
         """Record a point that the gaze has left."""
-        if self._params.inhibition_of_return_strength > 0.0:
+        if self.is_on:
             self._left.append(_LeftPoint(p_world_m, t_s))
+
+    def start_stay(self, id: int) -> None:
+        """Draw the additional time of a look, if it is at another one of several bodies."""
+        if id != self.stays_at:
+            variance = log(1.0 + _STAY_SPREAD**2)
+            deviation = sqrt(variance) * float(self._rng.standard_normal())
+            self._stay_s = min(_STAY_S * exp(deviation - 0.5 * variance), _LONGEST_STAY_S)
+            self.stays_at = id
 
     def step(
         self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
@@ -72,9 +126,9 @@ class Habituation:
 
         attended_id: id of the gaze target since the previous step; -1 for none
         """
-        self._advance(attended_id, t_s)
-        if not self._left:
-            return [self._habituation.get(id, 1.0) for id in rows.ids]
+        self._habituate(attended_id, max(0.0, t_s - self._at_s))
+        self._at_s = t_s
+        self._left = [one for one in self._left if t_s - one.at_s < 4.0 * _RETURN_S]
         return [
             self._habituation.get(id, 1.0)
             * (1.0 if id == attended_id else self._return_factor(p, p_world_eye_m, t_s))
@@ -82,12 +136,7 @@ class Habituation:
         ]
 
     def share(
-        self,
-        ids: Sequence[int],
-        weights: Sequence[float],
-        attended_id: int,
-        t_s: float,
-        stays: Stay = NO_STAY,
+        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
     ) -> list[float]:
         """Return the factor 0..1 of each of several bodies that a rule selects.
 
@@ -98,49 +147,73 @@ class Habituation:
             weights: weight of each; viewing times are in proportion to them.
             attended_id: id of the gaze target since the previous step; -1 for none.
             t_s: present time, seconds.
-            stays: the present look at one of them, and its additional time.
         """
-        floor, rate = self._params.rule_floor, self._params.decay_rate_1_s
-        if rate == 0.0 or floor == 1.0:
+        par = self.params
+        if isinstance(par, str):
             return [1.0] * len(ids)
-        surpluses = self._shared.step(ids, weights, attended_id, t_s)
-        extra_s = (
-            stays.extra_s if len(ids) <= _FEW else 0.0
-        )  # in a larger group everyone gets a look
-        extra = [extra_s if id == stays.id else 0.0 for id in ids]
+        surpluses = self.surpluses(ids, weights, attended_id, t_s)
+        if len(ids) <= _FEW and self.stays_at in ids:
+            surpluses[ids.index(self.stays_at)] -= self._stay_s
         return [
-            floor + (1.0 - floor) * exp(-rate * max(0.0, one - more))
-            for one, more in zip(surpluses, extra, strict=True)
+            par.rule_floor + (1.0 - par.rule_floor) * exp(-par.decay_rate_1_s * max(0.0, one))
+            for one in surpluses
         ]
 
-    def _advance(self, attended_id: int, t_s: float) -> None:
-        """Update all factors and the points left to the present time."""
-        self._habituate(attended_id, max(0.0, t_s - self._at_s))
-        self._at_s = t_s
-        if self._left:
-            lasts_s = 4.0 * self._params.inhibition_of_return_s
-            self._left = [one for one in self._left if t_s - one.at_s < lasts_s]
+    def surpluses(
+        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
+    ) -> list[float]:
+        """Return the surplus of each body in seconds, 0 for the least viewed one.
+
+        Args:
+            ids: the bodies that share the gaze now. A new one starts without a deficit.
+            weights: weight of each, above 0; only their ratios matter.
+            attended_id: the target since the last step; -1 for none.
+            t_s: present time, seconds.
+        """
+        dt_s, self._shared_s = max(0.0, t_s - self._shared_s), t_s
+        if len(ids) <= 1:
+            return [0.0] * len(ids)
+        most = max(*weights, 1e-9)
+        surpluses = []
+        for id, weight in zip(ids, weights, strict=True):
+            share = max(weight / most, 1e-3)
+            known = self._surpluses.get(id)
+            if known is None:
+                surplus = _FIRST_S * (1.0 - share)
+            else:
+                surplus = known.surplus_s * exp((known.at_s - t_s) / _FADES_S)
+            surpluses.append(surplus + (dt_s / share if id == attended_id else 0.0))
+        least = min(surpluses)
+        surpluses = [min(surplus - least, _LARGEST_S) for surplus in surpluses]
+        self._surpluses.update(
+            (id, _Surplus(surplus, t_s)) for id, surplus in zip(ids, surpluses, strict=True)
+        )
+        if len(self._surpluses) > 2 * len(ids):
+            self._surpluses = {
+                k: one for k, one in self._surpluses.items() if t_s - one.at_s < _KEPT_S
+            }
+        return surpluses
 
     def _habituate(self, attended_id: int, dt_s: float) -> None:
         """Lower the factor of the attended body and raise those of the rest."""
-        risen = self._params.recovery_rate_1_s * dt_s
+        risen = _RECOVERY_1_S * dt_s
         attended = self._habituation.pop(attended_id, 1.0)
         self._habituation = {
             id: left + risen for id, left in self._habituation.items() if left + risen < 1.0
         }
-        attended = max(0.0, attended - self._params.decay_rate_1_s * dt_s)
+        rate = 0.0 if isinstance(self.params, str) else self.params.decay_rate_1_s
+        attended = max(0.0, attended - rate * dt_s)
         if attended_id >= 0 and attended < 1.0:
             self._habituation[attended_id] = attended
 
     def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
         """Return the factor of one body near the points left."""
-        par = self._params
         x, y, z = p_world_m
         way = unit(sub((x, y, z), p_eye))
         factor = 1.0
         for left in self._left:
             cosine = dot(way, unit(sub(left.p_world_m, p_eye)))
-            sigmas = acos(max(-1.0, min(1.0, cosine))) / radians(par.inhibition_of_return_sigma_deg)
-            age = (t_s - left.at_s) / par.inhibition_of_return_s
-            factor *= 1.0 - par.inhibition_of_return_strength * exp(-0.5 * sigmas * sigmas - age)
+            sigmas = acos(max(-1.0, min(1.0, cosine))) / _RETURN_RAD
+            age = (t_s - left.at_s) / _RETURN_S
+            factor *= 1.0 - _RETURN * exp(-0.5 * sigmas * sigmas - age)
         return factor

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from math import dist, exp, hypot, inf
 
 from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.field_of_view import OWN
 from gazerig.gaze.types import Percept, Vec3
 
 NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
@@ -35,8 +36,10 @@ _GESTURES_M_S, _GESTURES_S, _GESTURES = 0.25, 2.0, 0.5
 """
 _SANK_S = 0.3
 """Time for which a hand counts as moving down after its last downward motion."""
-_HAND, _OWN = "hand", "own"
-"""The robot's own body never waves."""
+_KNOWN, _KNOWN_S = 0.5, 2.0
+"""Factor of a hand's salience at each further reversal of its motion near the face, and time
+constant with which that salience recovers.
+"""
 _TOGETHER_S = 0.5
 """People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
@@ -91,13 +94,12 @@ class Persons:
         self._nearest = -1
         self._at_s = -inf
 
-    def update(self, percept: Percept, p_world_eye_m: Vec3, recovery_s: float = 2.0) -> None:
+    def update(self, percept: Percept, p_world_eye_m: Vec3) -> None:
         """Update with a new frame.
 
         Args:
             percept: percept of the frame.
             p_world_eye_m: position of the eye.
-            recovery_s: time constant with which changes of side are forgotten.
         """
         bodies, before_s, self._at_s = percept.bodies, self._at_s, percept.captured_s
         rows = bodies.p_world_m.tolist()
@@ -113,17 +115,18 @@ class Persons:
         self.speaking = frozenset(face.id for face in percept.faces if face.speaks)
         if self.speaking:
             self._spoke_s = self._at_s
-        self._forget_repeats(max(0.0, self._at_s - before_s), recovery_s)
+        for hand in self._hands.values():
+            hand.repeats *= exp(-max(0.0, self._at_s - before_s) / _KNOWN_S)
         self._update_nearest(faces, p_world_eye_m)
         self.parts, self.raised = {}, set()
         moving: set[int] = set()
         for row, id in enumerate(bodies.ids):
-            if faces and id not in faces and bodies.kinds[row] != _OWN:
+            if faces and id not in faces and bodies.kinds[row] != OWN:
                 x, y, z = rows[row]
                 vx, vy, vz = bodies.v_world_m_s[row].tolist()
                 low_of = self._update_part(id, (x, y, z), faces, p_world_eye_m)
                 self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
-                if bodies.kinds[row] == _HAND and hypot(vx, vy, vz) > _GESTURES_M_S:
+                if bodies.kinds[row] == "hand" and hypot(vx, vy, vz) > _GESTURES_M_S:
                     moving.add(low_of)
                     if -vz > max(_GESTURES_M_S, hypot(vx, vy)):
                         self._sank_s[id] = self._at_s
@@ -163,11 +166,8 @@ class Persons:
     def _update_nearest(self, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
         """Update the nearest person; another one must be clearly nearer."""
         away = {id: dist(p, p_eye) for id, p in faces.items()}
-        if not away:
-            self._nearest = -1
-            return
-        id = min(away, key=lambda one: away[one])
-        if away.get(self._nearest, inf) > _CLEARLY_NEARER * away[id]:
+        id = min(away, key=lambda one: away[one], default=-1)
+        if id < 0 or away.get(self._nearest, inf) > _CLEARLY_NEARER * away[id]:
             self._nearest = id
 
     def _update_hand(
@@ -230,31 +230,25 @@ class Persons:
         return len(hand.turned_s) >= _TURNS
 
     def weaken_known(
-        self, factors: list[float], ids: Sequence[int], rhythm_ratio: float, sinking_ratio: float
+        self, factors: list[float], ids: Sequence[int], repeats: bool, sinks: bool
     ) -> None:
         """Lower the factors of hands that repeat their motion or move down.
 
-        The first change of side soon after another is still new.
+        The first change of side soon after another is still new. A hand that moves down has no
+        salience: it is at the end of its gesture.
 
         Args:
             factors: factor of each body, changed in place.
             ids: ids of the bodies.
-            rhythm_ratio: further factor for each repetition.
-            sinking_ratio: further factor for a hand that moves down.
+            repeats: whether repeated motion counts for less.
+            sinks: whether motion down does.
         """
-        if not self._hands:
-            return
         for row, id in enumerate(ids):
-            if id in self.sinking:
-                factors[row] *= sinking_ratio
+            if sinks and id in self.sinking:
+                factors[row] = 0.0
             hand = self._hands.get(id)
-            if hand is not None and hand.repeats > 1.0:
-                factors[row] *= rhythm_ratio ** (hand.repeats - 1.0)
-
-    def _forget_repeats(self, dt_s: float, recovery_s: float) -> None:
-        """Reduce the number of changes of side over time."""
-        for hand in self._hands.values():
-            hand.repeats *= exp(-dt_s / recovery_s)
+            if repeats and hand is not None and hand.repeats > 1.0:
+                factors[row] *= _KNOWN ** (hand.repeats - 1.0)
 
     def _ids_within(self, at_s: Mapping[int, float], lasts_s: float) -> frozenset[int]:
         return frozenset(id for id, one_s in at_s.items() if self._at_s - one_s <= lasts_s)

@@ -14,39 +14,39 @@ from math import exp, inf
 
 import numpy as np
 
-from gazerig.gaze.attention.params import ReactionParams
 from gazerig.gaze.types import Target
+
+_MEDIAN_S, _SPREAD = 0.15, 0.15
+"""Median, and standard deviation of the logarithm."""
+_LOOMING = 0.65
+"""Share of that time for a fast approach."""
+_RETURN, _RETURN_S = 0.8, 5.0
+"""Share of it for a face, and time for which a face counts as just looked at."""
 
 
 class Reaction:
     """The next target, during its reaction time.
 
-    Args:
-        params: the distribution.
-        rng: draws one time for each change of target; None: all changes are immediate.
+    Attributes:
+        immediate: whether there are no reaction times.
     """
 
-    def __init__(self, params: ReactionParams, rng: np.random.Generator | None = None) -> None:
+    def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
-        self._params = params
+        self.immediate = False
         self.reset(0.0)
-
-    def retune(self, params: ReactionParams) -> None:
-        """Change the distribution; a reaction in progress keeps its quantile."""
-        self._params = params
 
     def reset(self, t_s: float) -> None:
         """Forget the pending target and the former ones."""
         self._next: Target | None = None
-        self._deviation = 0.0
+        self._drawn_s = 0.0
         self._won_s = self._free_s = t_s
         self._left_s: dict[int, float] = {}
 
     def record_left(self, kind: str, id: int, t_s: float) -> None:
         """Record a target that the gaze has left."""
         if kind == "face":
-            lasts_s = self._params.return_s
-            self._left_s = {k: at_s for k, at_s in self._left_s.items() if t_s - at_s < lasts_s}
+            self._left_s = {k: at_s for k, at_s in self._left_s.items() if t_s - at_s < _RETURN_S}
             self._left_s[id] = t_s
 
     def start_waiting(self, target: Target, free_s: float) -> None:
@@ -56,7 +56,7 @@ class Reaction:
         """
         if self._next is None:
             self._won_s = target.at_s
-            self._deviation = float(self._rng.standard_normal()) if self._rng is not None else 0.0
+            self._drawn_s = _MEDIAN_S * exp(_SPREAD * float(self._rng.standard_normal()))
         self._next, self._free_s = target, free_s
 
     def drop(self) -> None:
@@ -71,26 +71,20 @@ class Reaction:
     def take_due(self, t_s: float) -> Target | None:
         """Return the target whose reaction time is over, once; None without one."""
         target = self._next
-        if target is None or t_s < max(self._free_s, self._due_s(target)) - 1e-9:
+        if target is None:
+            return None
+        due_s = -inf if self.immediate else self._won_s + self._ratio(target) * self._drawn_s
+        if t_s < max(self._free_s, due_s) - 1e-9:
             return None
         self._next = None
         return target
 
-    def _due_s(self, target: Target) -> float:
-        """Return the end of a target's reaction time."""
-        par = self._params
-        if self._rng is None or par.median_ms <= 0.0:
-            return -inf
-        drawn_s = 1e-3 * par.median_ms * exp(par.spread * self._deviation)
-        return self._won_s + self._ratio(target) * drawn_s
-
     def _ratio(self, target: Target) -> float:
         """Return the share of the drawn time that applies to a target."""
-        par, first = self._params, target.saliences[0]
-        ratio = 1.0
+        first, ratio = target.saliences[0], 1.0
         if first.looming > max(first.translation, first.rotation, first.onset, first.rule):
-            ratio = par.looming_ratio
+            ratio = _LOOMING
         left_s = self._left_s.get(target.id, -inf)
-        if target.kind == "face" and target.at_s - left_s <= par.return_s:
-            ratio = min(ratio, par.return_ratio)
+        if target.kind == "face" and target.at_s - left_s <= _RETURN_S:
+            ratio = min(ratio, _RETURN)
         return ratio

@@ -12,22 +12,14 @@ percept. A user's choice overrides it until they return to the planner (``PLANNE
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import dist
 from typing import Annotated, NamedTuple
 
-from gazerig.gaze.attention.action_planner import (
-    ACTIONS,
-    Action,
-    ActionPlanner,
-    ActionPlannerParams,
-)
+from gazerig.gaze.attention.action_planner import ACTIONS, ActionPlanner
 from gazerig.gaze.attention.persons import TRAITS
 from gazerig.gaze.types import BodyRows, Percept, Vec3
 from gazerig.params import Bounds
 
-_BY_ID = "id:"
-_PERSON = "person:"
-_POINT = "point"
+_ID, _PERSON, _POINT = "id", "person", "point"
 _NO_ONE: frozenset[int] = frozenset()
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 
@@ -50,9 +42,6 @@ class Rule:
     point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
         "position to look at: ahead, left and above of the neck base"] = None
     gesture: Annotated[str, "gesture that is played once when the gaze reaches the rule's target; empty: none"] = ""
-    gesture_at: Annotated[str, 
-        "kind of body at which it is played instead, e.g. hand; empty: that of look_at"] = ""
-    gesture_refractory_s: Annotated[float, Bounds(0, 3600), "shortest time between two gestures of this rule"] = 10.0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -62,37 +51,21 @@ class Rule:
             ValueError: an id is not a number; a person's trait is unknown; a point has no position,
                 or a position is given for another kind.
         """
-        self._check_person()
-        if self.look_at.startswith(_BY_ID) and not self.look_at[len(_BY_ID) :].isdecimal():
-            raise ValueError(f'look_at {self.look_at!r} does not name an id; write e.g. "id:7"')
+        prefix, colon, word = self.look_at.partition(":")
+        known = {_ID: word.isdecimal(), _PERSON: word in TRAITS}
+        if self.look_at in TRAITS or (colon and not known.get(prefix)):
+            traits = ", ".join(f'"{_PERSON}:{trait}"' for trait in TRAITS)
+            raise ValueError(
+                f'look_at {self.look_at!r}: write a kind of body, one by its id, e.g. "id:7", or persons: {traits}'
+            )
         if (self.look_at == _POINT) != (self.point_world_m is not None):
             raise ValueError("look_at: point and point_world_m go together; give both or neither")
-
-    def _check_person(self) -> None:
-        """Check that a rule names persons by a known trait.
-
-        Raises:
-            ValueError: it does not; the message lists the possible words.
-        """
-        prefix, colon, word = self.look_at.partition(":")
-        traits = ", ".join(f'"{_PERSON}{trait}"' for trait in TRAITS)
-        if self.look_at in TRAITS:
-            raise ValueError(f'look_at {self.look_at!r}: write "{_PERSON}{self.look_at}"')
-        if colon and f"{prefix}:" not in (_BY_ID, _PERSON):
-            raise ValueError(
-                f'look_at {self.look_at!r}: the word before ":" must be "id" or "person"; write e.g. "id:7" '
-                f"or one of {traits}"
-            )
-        if f"{prefix}:" == _PERSON and word not in TRAITS:
-            raise ValueError(
-                f"look_at {self.look_at!r} does not name a person; write one of {traits}"
-            )
 
     @property
     def person(self) -> str | None:
         """Return the trait of the persons that it names, None without one."""
-        named = self.look_at.startswith(_PERSON)
-        return self.look_at[len(_PERSON) :] if named else None
+        prefix, _, trait = self.look_at.partition(":")
+        return trait if prefix == _PERSON else None
 
     @property
     def kind(self) -> str:
@@ -102,7 +75,8 @@ class Rule:
     @property
     def body_id(self) -> int | None:
         """Return the id of the single body that it names, None without one."""
-        return int(self.look_at[len(_BY_ID) :]) if self.look_at.startswith(_BY_ID) else None
+        prefix, _, number = self.look_at.partition(":")
+        return int(number) if prefix == _ID else None
 
 
 def _shipped_rules() -> dict[str, Rule]:
@@ -120,11 +94,7 @@ class TopDownParams:
     # fmt: off
     behaviour: Annotated[str, "name of the behaviour that is active at the start"] = "wait"
     rules: Annotated[Mapping[str, Rule], "behaviour -> target and its salience"] = field(default_factory=_shipped_rules)
-    stay_with_person: Annotated[float, Bounds(1, 10),
-        "the person looked at last counts as this many times nearer; larger: the gaze changes less often"] = 1.25
-    nearness: Annotated[float, Bounds(0, 4),
-        "exponent with which salience decreases with distance if several bodies match a rule; 0: distance has no effect"] = 0.5
-    planner: Annotated[ActionPlannerParams, "action planner of a boxing match"] = field(default_factory=ActionPlannerParams)
+    planner: Annotated[bool, "select the behaviours wait, guard and attack from the percept, as in a boxing match"] = False
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -133,7 +103,7 @@ class TopDownParams:
         Raises:
             ValueError: a behaviour has no rule.
         """
-        wanted = (self.behaviour, *ACTIONS) if self.planner.enabled else (self.behaviour,)
+        wanted = (self.behaviour, *ACTIONS) if self.planner else (self.behaviour,)
         for behaviour in wanted:
             if behaviour not in self.rules:
                 known = ", ".join(sorted(self.rules))
@@ -145,22 +115,18 @@ class TopDownParams:
 class RuleTarget(NamedTuple):
     """Targets of the present rule.
 
-    rows:     rows of the selected bodies; none for a place
-    nearness: weight of each, 1 for the nearest
-    stay:     factor by which the last target is preferred
-    point_world_m: the selected place, None for bodies
+    rows: rows of the selected bodies; none for a place
     salience, behaviour: the rule's constant and name
-    point_kind, point_world_m_s: kind of the place, and its velocity
+    p_world_m, v_world_m_s: the selected place and its velocity; None for bodies
+    kind: kind of the place
     """
 
     rows: list[int]
-    nearness: list[float]
-    stay: float
-    point_world_m: Vec3 | None
     salience: float
     behaviour: str
-    point_kind: str = _POINT
-    point_world_m_s: Vec3 = _STILL
+    p_world_m: Vec3 | None = None
+    v_world_m_s: Vec3 = _STILL
+    kind: str = _POINT
 
 
 class TopDown:
@@ -173,19 +139,18 @@ class TopDown:
 
     def __init__(self, params: TopDownParams) -> None:
         self._params = params
-        self._planner = ActionPlanner(params.planner)
+        self._planner = ActionPlanner()
         self.behaviour = params.behaviour
         self.reset(0.0)
 
     def retune(self, params: TopDownParams) -> None:
         """Change the rules; the present behaviour stays unless its rule was removed.
 
-        A changed initial behaviour becomes the present one immediately. The initial behaviour
-        also follows a planner that is switched off.
+        A changed initial behaviour becomes the present one immediately, also when the planner is
+        switched off.
         """
         before, self._params = self._params, params
-        self._planner.retune(params.planner)
-        ends = before.planner.enabled and not params.planner.enabled and not self._by_user
+        ends = before.planner and not params.planner and not self._by_user
         if ends or params.behaviour != before.behaviour or self.behaviour not in params.rules:
             self.behaviour = params.behaviour
 
@@ -197,8 +162,7 @@ class TopDown:
     @property
     def behaviours(self) -> tuple[str, ...]:
         """Return the choices: the behaviours in the order of the rules, and the planner."""
-        rules = tuple(self._params.rules)
-        return (*rules, PLANNED) if self._params.planner.enabled else rules
+        return (*self._params.rules, PLANNED) if self.plans else tuple(self._params.rules)
 
     @property
     def chosen_behaviour(self) -> str:
@@ -208,12 +172,7 @@ class TopDown:
     @property
     def plans(self) -> bool:
         """Return whether there is an action planner."""
-        return self._params.planner.enabled
-
-    @property
-    def counts_every_motion(self) -> bool:
-        """Return whether repeated and sinking motion counts in full, as that of fists does."""
-        return self.plans and self._params.planner.counts_every_motion
+        return self._params.planner
 
     @property
     def plan_text(self) -> str:
@@ -226,12 +185,10 @@ class TopDown:
 
         If the user has chosen one, the planner only finds its target.
         """
-        asked: Action | None = None
-        if self._by_user:
-            asked = next((one for one in ACTIONS if one == self.behaviour), None)
-            if asked is None:  # a behaviour outside the match
-                return
-        self.behaviour = self._planner.step(percept, p_eye, t_s, asked).action
+        if not self._by_user:
+            self.behaviour = self._planner.step(percept, p_eye, t_s).action
+        elif self.behaviour in ACTIONS:  # and not outside the match
+            self._planner.step(percept, p_eye, t_s, self.behaviour)
 
     def reset(self, t_s: float) -> None:
         """Return to the initial behaviour, which the planner may change."""
@@ -253,53 +210,22 @@ class TopDown:
         if self._by_user:
             self.behaviour = behaviour
 
-    def step(
-        self,
-        bodies: BodyRows,
-        seen: list[bool],
-        p_world_eye_m: Vec3,
-    ) -> RuleTarget | None:
+    def step(self, bodies: BodyRows, seen: list[bool]) -> RuleTarget | None:
         """Return the rule's targets among the bodies in view, None without any.
 
         seen: which bodies are in view
         """
-        rule = self._params.rules[self.behaviour]
-        if self.plans and (planned := self._plan_target(rule, bodies.ids, seen)):
-            return planned
+        rule, plan, at = self.rule, self._planner.plan, (self.rule.salience, self.behaviour)
+        if self.plans and rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
+            return RuleTarget([], *at, plan.p_world_m, plan.v_world_m_s, ATTACK_TARGET)
         if rule.point_world_m is not None:
-            point = rule.point_world_m
-            return RuleTarget([], [], self._stay_factor, point, rule.salience, self.behaviour)
-        named: Sequence[object] = bodies.kinds if rule.body_id is None else bodies.ids
-        wanted = rule.kind if rule.body_id is None else rule.body_id
+            return RuleTarget([], *at, rule.point_world_m)
+        number = rule.body_id
+        if self.plans and rule.look_at == GUARD_TARGET:
+            number = plan.body_id
+        named: Sequence[object] = bodies.kinds if number is None else bodies.ids
+        wanted = rule.kind if number is None else number
         rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
-        if not rows:
-            return None
         if self.named_ids:
             rows = [i for i in rows if bodies.ids[i] in self.named_ids] or rows
-        near = [1.0]
-        if len(rows) > 1:
-            away = [max(dist(bodies.p_world_m[i], p_world_eye_m), 1e-3) for i in rows]
-            nearest, power = min(away), self._params.nearness
-            near = [(nearest / one) ** power for one in away]
-        return RuleTarget(rows, near, self._stay_factor, None, rule.salience, self.behaviour)
-
-    def _plan_target(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
-        """Return the plan's target, if the rule uses the planner's target."""
-        plan = self._planner.plan
-        if rule.look_at == GUARD_TARGET and plan.body_id in ids:
-            row = ids.index(plan.body_id)
-            if seen[row]:
-                return RuleTarget(
-                    [row], [1.0], self._stay_factor, None, rule.salience, self.behaviour
-                )
-        if rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
-            return RuleTarget(
-                [], [], self._stay_factor, plan.p_world_m, rule.salience, self.behaviour, ATTACK_TARGET,
-                plan.v_world_m_s,
-            )  # fmt: skip
-        return None
-
-    @property
-    def _stay_factor(self) -> float:
-        """Return the factor by which the present person is preferred, as if nearer."""
-        return float(self._params.stay_with_person**self._params.nearness)
+        return RuleTarget(rows, *at) if rows else None

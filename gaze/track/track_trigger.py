@@ -5,6 +5,9 @@ from math import inf
 from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.types import Target
 
+_REFRACTORY_S = 10.0
+"""Shortest time between two tracks of one rule."""
+
 
 class TrackTrigger:
     """Trigger of the tracks of rules."""
@@ -41,8 +44,7 @@ class TrackTrigger:
         self._named_by = behaviour if named else None
         if not named or before == behaviour:
             return ""
-        ready_s = self._played_s.get(behaviour, -inf) + rule.gesture_refractory_s
-        if t_s < ready_s:
+        if t_s < self._played_s.get(behaviour, -inf) + _REFRACTORY_S:
             return ""
         self._played_s[behaviour] = t_s
         return rule.gesture
@@ -50,8 +52,6 @@ class TrackTrigger:
 
 def _is_named(rule: Rule, target: Target, named_ids: frozenset[int]) -> bool:
     """Return whether a target triggers the rule's track."""
-    if rule.gesture_at:
-        return target.kind == rule.gesture_at
     if rule.person is not None:
         return target.id in named_ids
     if rule.body_id is not None:

@@ -16,12 +16,10 @@ from gazerig.drivers.sound.player import SoundError
 from gazerig.drivers.sound.sound_file import check_sound
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.attention.turn_gaze import TurnGaze
-from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.gaze.track.animation import Animation
@@ -100,7 +98,6 @@ class Assembly(NamedTuple):
             rig.guard.health,
             self.mount,
             radians(self.horizontal_field_deg),
-            rig.gaze.field_of_view,
             shape_of(rig),
         )
 
@@ -252,12 +249,10 @@ def _build_components(
     lids = Lids(rig.gaze.lids, random.lids)
     tracker = Tracker(rig.tracker)
     moves = motion_models(rig, random.head, random.sway)
-    field_of_view, bottom_up = FieldOfView(rig.gaze.field_of_view), BottomUp(rig.gaze.bottom_up)
-    top_down, idle = TopDown(rig.gaze.top_down), Idle(rig.gaze.idle, random.idle)
-    attention = Attention(
-        rig.gaze.attention, field_of_view, bottom_up, top_down, idle, random.reaction, random.stays
-    )
-    aversion = Aversion(rig.gaze.aversion, random.aversion)
+    gaze, bottom_up = rig.gaze, BottomUp(rig.gaze.bottom_up)
+    top_down, idle = TopDown(gaze.top_down), Idle(gaze.idle, random.idle)
+    attention = Attention(gaze.attention, bottom_up, top_down, idle, random.reaction, random.stays)
+    looks_away = gaze.looks_away, gaze.aversion, gaze.conversation
     animation = Animation(further_joints(rig.joints), animation_tables(rig))
     return Components(
         body=body,
@@ -282,13 +277,11 @@ def _build_components(
         ),
         tracker=tracker,
         attention=attention,
-        field_of_view=field_of_view,
         bottom_up=bottom_up,
         top_down=top_down,
         idle=idle,
         scanpath=Scanpath(rig.gaze.scanpath, walk, random.scanpath),
-        aversion=aversion,
-        conversation=TurnGaze(rig.gaze.conversation, aversion, attention, random.turns),
+        conversation=ConversationGaze(*looks_away, attention, random.aversion, random.turns),
         oculomotor=oculomotor(rig, kinematics, moves, lids, random.endpoint),
         saccade=moves.saccade,
         pursuit=moves.pursuit,
@@ -340,7 +333,6 @@ def _build_robot(
         poses,
         substitutes.chooser(chooser),
         parts.scanpath,
-        parts.aversion,
         parts.conversation,
         parts.oculomotor,
         parts.lids,

@@ -15,12 +15,10 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.attention.turn_gaze import TurnGaze
-from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
@@ -66,13 +64,11 @@ class Components(NamedTuple):
     perception: Perception
     tracker: Tracker
     attention: Attention
-    field_of_view: FieldOfView
     bottom_up: BottomUp
     top_down: TopDown
     idle: Idle
     scanpath: Scanpath
-    aversion: Aversion
-    conversation: TurnGaze
+    conversation: ConversationGaze
     oculomotor: Oculomotor
     saccade: SaccadeModel
     pursuit: Pursuit
@@ -104,7 +100,7 @@ class _PreparedChange(NamedTuple):
 
 
 _ALIKE = (
-    "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "conversation", "saccade", "pursuit",
+    "bottom_up", "top_down", "attention", "idle", "saccade", "pursuit",
     "breathing", "sway", "lids",
 )  # fmt: skip
 """Sections of the gaze parameters whose part of the same name needs no other parameters."""
@@ -176,6 +172,9 @@ class LiveParams:
         for name in _ALIKE:
             if getattr(now, name) != getattr(was, name):
                 getattr(parts, name).retune(getattr(now, name))
+        looks_away = now.looks_away, now.aversion, now.conversation
+        if looks_away != (was.looks_away, was.aversion, was.conversation):
+            parts.conversation.retune(*looks_away)
         if now.scanpath != was.scanpath or walk != self._walk:
             parts.scanpath.retune(now.scanpath, walk)
         bounds = (new.joints, new.ranges) != (before.joints, before.ranges)

@@ -108,7 +108,7 @@ def with_surroundings(rig: Rig, options: RunOptions) -> Rig:
     rules = rig.gaze.top_down
     if scene is None or not scene.behaviours or not {*scene.behaviours} <= rules.rules.keys():
         return rig
-    planning = replace(rules, planner=replace(rules.planner, enabled=True))
+    planning = replace(rules, planner=True)
     rig = replace(rig, gaze=replace(rig.gaze, top_down=planning))
     return rig if options.world is None else replace(rig, motion=replace(rig.motion, gloves=True))
 

@@ -3,9 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
 
-from gazerig.gaze.attention.aversion import MODES
+from gazerig.gaze.attention.conversation import MODES, ConversationGaze
 from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.attention.turn_gaze import TurnGaze
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.expression import Expressions
@@ -40,9 +39,9 @@ class Menus:
     """The menus of behaviours, conversation, lids, expressions and tracks."""
 
     def __init__(
-        self, turn_gaze: TurnGaze, lids: Lids, expressions: Expressions, tracks: TrackChoices
+        self, gaze: ConversationGaze, lids: Lids, expressions: Expressions, tracks: TrackChoices
     ) -> None:
-        self._turn_gaze = turn_gaze
+        self._gaze = gaze
         self._lids = lids
         self._expressions = expressions
         self._tracks = tracks
@@ -51,7 +50,7 @@ class Menus:
         """Return menu -> choices, the present one first."""
         menus = {
             "behaviour": _put_first(top_down.chosen_behaviour, top_down.behaviours),
-            "conversation": _put_first(self._turn_gaze.chosen_mode, MODES),
+            "conversation": _put_first(self._gaze.chosen_mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }
         if names := self._expressions.names:
@@ -66,8 +65,7 @@ class Menus:
         if command.menu == "behaviour":
             top_down.behave(command.choice)
         elif command.menu == "conversation":
-            mode = next(mode for mode in MODES if mode == command.choice)
-            self._turn_gaze.choose_mode(mode, t_s)
+            self._gaze.choose_mode(command.choice, t_s)
             self._set_blinks()
         elif command.menu == "expression":
             self._expressions.express(command.choice)
@@ -76,11 +74,11 @@ class Menus:
 
     def converse(self, state: ConversationState, t_s: float) -> None:
         """Let gaze and lids follow a state of conversation; when idle, the chosen mode."""
-        self._turn_gaze.enter(state.state, state.partner, state.ends_s, state.confidence, t_s)
+        self._gaze.enter(state.state, state.partner, state.ends_s, state.confidence, t_s)
         self._set_blinks()
 
     def _set_blinks(self) -> None:
-        self._lids.set_mode("conversation" if self._turn_gaze.converses else "rest")
+        self._lids.set_mode("conversation" if self._gaze.converses else "rest")
 
 
 def refuse_impossible(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from gazerig.gaze.attention.turn_gaze import TurnGaze
+from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.track.animation import Animation
 from gazerig.gaze.track.track import KEEP
@@ -226,9 +226,9 @@ class CommandExecutor:
             self._messages.append(f"track{by}: {reply.text()}")
         return reply
 
-    def follow_turn(self, turn_gaze: TurnGaze, t_s: float) -> None:
+    def follow_turn(self, gaze: ConversationGaze, t_s: float) -> None:
         """Let the gaze follow the present turn, and play a listener's nod or brow flash."""
-        if name := turn_gaze.step(t_s):
+        if name := gaze.step(t_s):
             self._play_by_itself(Play(name, who="conversation"), t_s)
 
     def _play_by_itself(self, command: Play, t_s: float) -> None:

@@ -8,8 +8,7 @@ from typing import NamedTuple
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import Camera
-from gazerig.gaze.attention.aversion import Aversion
-from gazerig.gaze.attention.turn_gaze import TurnGaze
+from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.scanpath.scanpath import Scanpath
@@ -74,8 +73,7 @@ class Robot:
         poses: History of the head's pose.
         attention: Chooses the target.
         scanpath: Chooses the part of a face.
-        aversion: Looks away in a conversation.
-        turn_gaze: Lets the gaze follow reported turns.
+        conversation: Looks away from faces, and follows reported turns.
         oculomotor: Target to eyes, head and lids; reports whether the gaze has arrived.
         lids: Lids, for winks and sleepiness.
         animation: Tracks and expressions on top of the gaze.
@@ -97,8 +95,7 @@ class Robot:
         poses: PoseHistory,
         attention: TargetChooser,
         scanpath: Scanpath,
-        aversion: Aversion,
-        turn_gaze: TurnGaze,
+        conversation: ConversationGaze,
         oculomotor: Oculomotor,
         lids: Lids,
         animation: Animation,
@@ -115,10 +112,9 @@ class Robot:
         self._kinematics = kinematics
         self._poses = poses
         self._scanpath = scanpath
-        self._aversion = aversion
-        self._turn_gaze = turn_gaze
+        self._conversation_gaze = conversation
         self._oculomotor = oculomotor
-        self._menus = Menus(turn_gaze, lids, animation.expressions, tracks)
+        self._menus = Menus(conversation, lids, animation.expressions, tracks)
         self._animation = animation
         self._tracks = tracks
         self._guard = guard
@@ -240,7 +236,7 @@ class Robot:
         self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
         self._looks.newest = LastObservation(pose)
         self.attention.reset(t_s)
-        self._aversion.reset(t_s)
+        self._conversation_gaze.reset(t_s)
         self._scanpath.reset(t_s)
         self._gaze_m = None
         self._oculomotor.reset(t_s, pose)
@@ -282,12 +278,14 @@ class Robot:
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         if self._conversation.active:
-            self._executor.follow_turn(self._turn_gaze, t_s)
+            self._executor.follow_turn(self._conversation_gaze, t_s)
         chosen = self.attention.choose(percept, pose, t_s)
         chosen = self._executor.direct_by_track(chosen, percept, pose, t_s)
         target = self._lead.target(chosen, percept, t_s)
         rests_s = self._scanpath.rests_until_s
-        target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active, rests_s)
+        target = self._conversation_gaze.look(
+            target, pose.p_world_head_m, t_s, self._lead.active, rests_s
+        )
         target = self._scanpath.wander(
             target, percept, t_s, self._oculomotor.has_arrived, pose.p_world_head_m, self._gaze_m
         )

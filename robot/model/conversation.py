@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from gazerig.gaze.attention.turn_state import TurnState
+from gazerig.gaze.types import TurnState
 from gazerig.robot.model.commands import Talk
 from gazerig.robot.model.lease import Lease
 

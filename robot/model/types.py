@@ -321,7 +321,6 @@ class Snapshot:
         frame_age_s: Age of the newest frame, None before the first.
         commanded_pose: Poses of head and eyes at the desired angles.
         camera: Pose and field of view of the camera.
-        field_deg: Field of view of an eye towards temple, nose, above and below.
         servos, timing: Health of the servos and timing of the loop.
         busy: Text if the computer is too busy, otherwise "".
         worst: The guard's worst level since the last snapshot.
@@ -373,7 +372,6 @@ class Snapshot:
     frame_age_s: float | None = None
     commanded_pose: CommandedPose | None = None
     camera: SeenCamera | None = None
-    field_deg: tuple[float, float, float, float] | None = None
     servos: Servos = Servos()
     timing: LoopFigures | None = None
     busy: str = ""

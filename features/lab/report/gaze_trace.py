@@ -22,7 +22,7 @@ from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
 from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.features.lab.report.turns import STATES, TurnTrace
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
-from gazerig.gaze.attention.aversion import face_extent_deg
+from gazerig.gaze.attention.conversation import face_extent_deg
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
 from gazerig.robot.control.feedback_basis import estimated_joints

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.features.lab.report.statistics import MeasuredValue, mean
-from gazerig.gaze.attention.turn_state import TurnState
-from gazerig.gaze.types import Floats
+from gazerig.gaze.types import Floats, TurnState
 
 Role = Literal["speaking", "listening", "dialogue"]
 

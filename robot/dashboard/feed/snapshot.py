@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.angles import angle_between
-from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick, cyclopean_direction
@@ -56,7 +56,6 @@ class ShownRig(NamedTuple):
     health: HealthParams
     mount: CameraMount
     horizontal_rad: float
-    field: FieldOfViewParams
     shape: RigShape | None = None
 
 
@@ -200,7 +199,6 @@ def snapshot(
     pose, percept, target = tick.pose, tick.percept, tick.target
     does, leads = head_activity(tick), tick_control_source(tick)
     joints, measured = joint_names(tick, rig), tick.joints.measured
-    field = rig.field if rig is not None else None
     pivot = None
     if rig is not None:
         pivot = rig.kinematics.body_volumes(pose.R_world_head, pose.p_world_head_m)[0].start_m
@@ -239,9 +237,6 @@ def snapshot(
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,
-        field_deg=(
-            (field.temporal_deg, field.nasal_deg, field.up_deg, field.down_deg) if field else None
-        ),
         servos=_servos(tick, rig),
         worst=tick.guard_result.level,
         trail=(_trail(tick),),

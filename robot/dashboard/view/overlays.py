@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from gazerig.gaze.angles import rotate_back, sub
+from gazerig.gaze.field_of_view import FIELD_DEG
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.view.head_view import LidEdges
@@ -79,44 +80,38 @@ class EyeFields:
     """Edge of each eye's field of attention, which rotates with the eye."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._scene = scene
-        self._field_deg: tuple[float, float, float, float] | None = None
         self._frames = tuple(
             scene.add_frame(f"/field_{side}", show_axes=False, visible=False) for side in _FIELD
         )
+        for side, colour in _FIELD.items():
+            edge = field_edge(left=side == "left")
+            around = np.stack((edge, np.roll(edge, -1, axis=0)), axis=1)
+            spokes = np.stack((np.zeros((4, 3)), edge[:: _AROUND // 4]), axis=1)
+            scene.add_line_segments(
+                f"/field_{side}/edge",
+                np.concatenate((around, spokes)),
+                colour,
+                thickness=1.2,
+                thickness_units="screen",
+            )
 
     def show(self, snapshot: Snapshot | None) -> None:
         """Rotate the fields with the eyes; hide them without a snapshot."""
-        field_deg = snapshot.field_deg if snapshot is not None else None
         for frame in self._frames:
-            frame.visible = field_deg is not None
-        if snapshot is None or field_deg is None:
+            frame.visible = snapshot is not None
+        if snapshot is None:
             return
-        if field_deg != self._field_deg:
-            self._field_deg = field_deg
-            for side, colour in _FIELD.items():
-                edge = field_edge(field_deg, left=side == "left")
-                around = np.stack((edge, np.roll(edge, -1, axis=0)), axis=1)
-                spokes = np.stack((np.zeros((4, 3)), edge[:: _AROUND // 4]), axis=1)
-                self._scene.add_line_segments(
-                    f"/field_{side}/edge",
-                    np.concatenate((around, spokes)),
-                    colour,
-                    thickness=1.2,
-                    thickness_units="screen",
-                )
         sides = zip(self._frames, snapshot.p_world_eyes_m, snapshot.gaze_world, strict=True)
         for frame, p_world_m, gaze_world in sides:
             set_pose(frame, p_world_m, rotation_to(gaze_world))
 
 
-def field_edge(field_deg: tuple[float, float, float, float], *, left: bool) -> Floats:
+def field_edge(*, left: bool) -> Floats:
     """Return points (72, 3) on the edge of an eye's field in the eye's frame, x ahead, in metres.
 
-    field_deg: limits towards temple, nose, up and down; between two of them the edge is a quarter
-        of an ellipse (gaze.field_of_view)
+    Between two of its limits the edge is a quarter of an ellipse (gazerig.gaze.field_of_view).
     """
-    temporal, nasal, up, down = np.radians(field_deg)
+    temporal, nasal, up, down = np.radians(FIELD_DEG)
     turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND  # from the left, towards above
     side, high = np.cos(turn), np.sin(turn)
     to_side = np.where((side > 0.0) == left, temporal, nasal)

@@ -38,6 +38,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     refuse_unwritable,
     write_values,
 )
+from gazerig.gaze.attention.idle import REST_M
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Substitutes, assemble
@@ -142,10 +143,8 @@ def _calibrate(
     options: RunOptions, rig: Rig, lines: Lines, scripted: bool, stopped: Callable[[], str | None]
 ) -> FaceCalibration:
     """Let the user steer the gaze from part to part; the rig ends parked, torque off."""
-    idle = rig.gaze.idle
-    rest_m = (idle.rest_distance_m, 0.0, idle.rest_height_m)
     begin = initial_calibration(rig.face_parts_mm)
-    steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
+    steering = FaceSteering(begin, TopDown(rig.gaze.top_down), REST_M, "eyes_pan" not in rig.joints)
     made = assemble(exact_gaze(rig), options, Substitutes(chooser=lambda own: steering))
     # Input from a pipe is also a script: no user can end it.
     scripted = scripted or not sys.stdin.isatty()

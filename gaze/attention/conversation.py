@@ -1,0 +1,463 @@
+"""Gaze in a conversation: one law of looking away from a face, by role, and the turns that set it.
+
+A gaze that never leaves a face is a stare. Therefore it alternates between a time on the face and
+one beside it, whose durations, angles and directions are those of the present role, a row of the
+table ``ROLES``:
+
+none       Without a conversation two people who face each other prefer periods of mutual gaze of
+           3.3 s (Binetti et al. 2016, n = 498, a median); no measurement of the looks away between
+           them is known, a listener's short ones are used.
+talk       Talking and listening people (Lee, Badler & Badler 2002, Eyes Alive).
+listen
+think      Thinking people look mostly up, for longer (Andrist et al. 2014).
+speaking   In reported turns the numbers are those of 19 people in remote talk (Dembinsky et
+listening  al. 2024, medians): speaking .45 of the time averted, 13.5 times a minute; listening .04,
+thinking   3.2 times; three quarters of the looks go aside, most others up.
+
+A look away starts when the rest on a part of the face is over, instead of the next shift between
+parts, and goes beyond the outline of the face: a near face is wider than the published angles.
+
+A voice agent reports its state. A thinker looks away immediately; most long turns begin averted
+(Kendon 1967: more than 70 %), for the cognitive aversion of Andrist et al. 2014, and the gaze is on
+the face again N(2.3, .5) s before the planned end (their turn yield).
+
+Of several people a listener looks most at the one who speaks, a speaker at the addressee (Vertegaal
+et al. 2001: 88 and 77 %). A side participant, whom the present speaker does not look at, is a
+listener too: when another person begins to speak, the gaze shifts there (Holler & Kendrick 2015).
+
+Nods and brow flashes of a listener are individual (Blomsma 2024): each head has its own rate.
+"""
+
+from dataclasses import dataclass
+from math import atan2, cos, degrees, exp, hypot, inf, log, radians, sin, sqrt
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.angles import add, cross, dot, norm, scale, sub, unit
+from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.types import AWAY, Target, TurnState, Vec3
+from gazerig.params import Bounds
+
+LooksAway = Literal["people", "eyes_alive", "none"]
+MODES = ("none", "talk", "listen", "think")
+"""Roles that a user can choose; the others are those of reported turns."""
+
+
+class Role(NamedTuple):
+    """Numbers of one role.
+
+    face_s, face_sd_s: mean and standard deviation of the time on the face
+    away_s, away_sd_s: of the time away
+    least_deg, most_deg: smallest and largest angle of a look away
+    ways: directions: any, by the sectors of Eyes Alive; up; aside, as in reported turns
+    """
+
+    face_s: float
+    face_sd_s: float
+    away_s: float
+    away_sd_s: float
+    least_deg: float
+    most_deg: float
+    ways: Literal["any", "up", "aside"]
+
+
+ROLES = {
+    "none": Role(3.62, 1.63, 0.60, 0.30, 5.0, 22.7, "any"),
+    "talk": Role(3.13, 3.16, 0.93, 0.80, 5.0, 27.5, "any"),
+    "listen": Role(7.92, 1.57, 0.43, 0.24, 5.0, 22.7, "any"),
+    "think": Role(1.50, 0.80, 3.54, 1.26, 5.0, 27.5, "up"),
+    "speaking": Role(3.20, 1.60, 2.00, 0.90, 7.5, 27.5, "aside"),
+    "listening": Role(14.0, 3.00, 0.65, 0.30, 7.5, 22.7, "aside"),
+    "thinking": Role(1.50, 0.80, 3.54, 1.26, 7.5, 27.5, "aside"),
+}
+"""With a smallest angle of 0, as in the published distribution, half of the looks away would still
+be on the face.
+"""
+_ROLE_OF = {
+    "listening": "listening",
+    "thinking": "thinking",
+    "speaking": "speaking",
+    "interrupted": "listening",
+}
+"""State of a turn -> role."""
+_PUBLISHED = {"listening": "listen", "thinking": "think", "speaking": "talk"}
+"""Role of a reported turn -> that of Eyes Alive."""
+
+_LONGEST_S = 14.5
+"""Longest time on the face; beyond 15 s it is a stare."""
+_SHORTEST_S = 0.2
+"""Shortest time on the face or away, because eyes and servos need time to move."""
+_BESIDE_DEG = 2.0
+"""Smallest angle between a look away and the outline of the face."""
+_DRIFT_DEG = 0.75
+"""Motion of a person during a look away of a reported turn, which must stay beside the face."""
+
+# A = -6.9 ln(P / 15.7) deg, P uniform in 0..15 % (Eyes Alive).
+_SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
+# Share of gaze shifts, percent, to 0, 45, ... 315 deg; 0 is right, 90 up (Eyes Alive).
+DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
+_UP_SECTOR, _THINKS_UP = 2, 0.8
+"""Sector that is up; share of a thinker's looks that go there, the others in any direction."""
+_ASIDE, _UP, _SPREAD_DEG = 0.78, 0.15, 35.0
+"""Reported turns: shares of looks that go aside and up, the rest down; largest angle between
+them and level, or straight up or down.
+"""
+
+_HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
+"""Half axes of the oval of a face, a little larger than an adult's."""
+
+NOD, BROW_FLASH = "listening_nod", "listening_brows"
+"""Tracks of a listener."""
+_INDIVIDUAL = 0.5
+"""Standard deviation of the logarithm of a head's own rate of nods."""
+_LONG_TURN_S, _STARTS_AVERTED = 3.5, 0.95
+"""Shortest planned turn that begins averted; share of the long turns that do."""
+_START_AWAY_S, _START_AWAY_SD_S = 1.2, 0.25
+"""Time into a turn until the gaze returns to the face."""
+_YIELD_S, _YIELD_SD_S = 2.3, 0.5
+"""Time before the planned end at which the gaze is on the face again."""
+_UNSURE_RATIO = 0.2
+"""Share of the remaining time by which the gaze returns earlier if the end is quite uncertain."""
+_LATE_S = 1.5
+"""Time after the planned end for which the gaze still waits on the face."""
+_ADDRESSEE = 0.77
+"""Share of a speaker's looks at several people that the addressee gets."""
+
+
+@dataclass(frozen=True)
+class AversionParams:
+    """Mean times of reported turns on the face and away from it."""
+
+    # fmt: off
+    speaking_s: Annotated[tuple[float, float], Bounds(0.1, 60),
+        "reported speech: mean time on the face, and away"] = (3.2, 2.0)
+    listening_s: Annotated[tuple[float, float], Bounds(0.1, 60),
+        "reported listening: mean time on the face, and away"] = (14.0, 0.65)
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class ConversationParams:
+    """Signs of listening."""
+
+    # fmt: off
+    nods_per_min: Annotated[float, Bounds(0, 30), "nods of a listener, mean over heads; 0: none"] = 0.0
+    brow_flashes_per_min: Annotated[float, Bounds(0, 30), "brow flashes of a listener, mean over heads; 0: none"] = 0.0
+    # fmt: on
+
+
+class ConversationGaze:
+    """Semi-Markov process between face and looks away, which follows the turns of a conversation.
+
+    Args:
+        looks_away: the law; none: the gaze never leaves a face.
+        aversion: mean times of reported turns.
+        signs: signs of listening.
+        attention: chooses among people.
+        rng: draws looks away.
+        turn_rng: draws the times of turns, and the head's own rates.
+    """
+
+    def __init__(
+        self,
+        looks_away: LooksAway,
+        aversion: AversionParams,
+        signs: ConversationParams,
+        attention: Attention,
+        rng: np.random.Generator,
+        turn_rng: np.random.Generator,
+    ) -> None:
+        self._attention, self._rng, self._turn_rng = attention, rng, turn_rng
+        self._own = turn_rng.standard_normal(2).tolist()
+        self.retune(looks_away, aversion, signs)
+        self._state: TurnState = "idle"
+        self.chosen_mode = self._mode = "none"
+        self._yields_s = self._ends_s = self._next_sign_s = inf
+        self.reset(0.0)
+
+    def retune(
+        self, looks_away: LooksAway, aversion: AversionParams, signs: ConversationParams
+    ) -> None:
+        """Change the parameters, from the next look away and the next state on."""
+        self._law, self._signs = looks_away, signs
+        (speaks_s, looks_s), (listens_s, glances_s) = aversion.speaking_s, aversion.listening_s
+        self._roles = {
+            **ROLES,
+            "speaking": ROLES["speaking"]._replace(face_s=speaks_s, away_s=looks_s),
+            "listening": ROLES["listening"]._replace(face_s=listens_s, away_s=glances_s),
+        }
+
+    def reset(self, t_s: float) -> None:
+        """Forget the face; the state of the conversation stays."""
+        self._face: int | None = None
+        self._until_s = self._away_s = t_s
+        self._away: Vec3 | None = None
+        self._averts_s: float | None = None
+        self._shifts = self._away_shift = 0
+
+    @property
+    def converses(self) -> bool:
+        """Return whether a conversation has been reported or chosen, which changes the blinks."""
+        return self._state != "idle" or self.chosen_mode != "none"
+
+    def choose_mode(self, mode: str, t_s: float) -> None:
+        """Choose the role that applies while no state is reported, one of ``MODES``."""
+        self.chosen_mode = mode
+        if self._state == "idle":
+            self._take_role(mode, t_s)
+
+    def enter(
+        self,
+        state: TurnState,
+        partner: int | None,
+        ends_s: float | None,
+        confidence: float,
+        t_s: float,
+    ) -> None:
+        """Enter a state, or correct the plan of the present one.
+
+        Args:
+            state: The state.
+            partner: Id of the partner or addressee, None if unknown.
+            ends_s: Planned end of speech, None if unknown.
+            confidence: Confidence of the planned end, 0..1.
+            t_s: Present time.
+        """
+        before, self._state = self._state, state
+        self._ends_s = inf if ends_s is None else ends_s
+        self._yields_s = inf
+        shares = {"idle": None, "thinking": _ADDRESSEE, "speaking": _ADDRESSEE}
+        self._attention.converse(shares.get(state, 0.0), partner, t_s)
+        if state == "idle":
+            self._take_role(self.chosen_mode, t_s)
+            return
+        role = _ROLE_OF[state]
+        if self._law == "eyes_alive":
+            role = _PUBLISHED[role]
+        if state == "speaking":
+            self._plan_speech(role, confidence, before != state, t_s)
+        elif state != before:
+            self._take_role(role, t_s, averts=state == "thinking")
+            self._next_sign_s = t_s + self._draw_wait_s() if state == "listening" else inf
+
+    def step(self, t_s: float) -> str:
+        """Return to the face before the end of a turn; return a listener's track, "" for none."""
+        if t_s >= self._yields_s:
+            self._yields_s = inf
+            self._return()
+            self._averts_s = None
+            if self._face is not None:
+                self._until_s = max(self._ends_s + _LATE_S, t_s)
+        if self._state != "listening" or t_s < self._next_sign_s:
+            return ""
+        self._next_sign_s = t_s + self._draw_wait_s()
+        nods, brows = self._rates()
+        brow = float(self._turn_rng.random()) * (nods + brows) >= nods
+        return BROW_FLASH if brow else NOD
+
+    def look(
+        self,
+        target: Target,
+        p_world_head_m: Vec3,
+        t_s: float,
+        ordered: bool = False,
+        rests_until_s: float = -inf,
+    ) -> Target:
+        """Return the target itself, or a place next to the face during a look away.
+
+        A place next to a face has kind "away", the id of the face, the face's centre as centre (the
+        head stays with the person) and its own shift number, which increases on leaving and on
+        returning. An unchanged target includes the shifts of earlier looks away in its count.
+
+        A lost face that the gaze is waiting for is not looked away from.
+
+        ordered: a user has chosen the target, from which only a conversation averts the gaze
+        rests_until_s: end of the rest on a part of the face, which the gaze does not leave
+            sooner; inf while it is moving there
+        """
+        kept = (ordered and self._mode == "none") or target.is_lost or self._law == "none"
+        face = target.id if target.kind == "face" and not kept else None
+        if face != self._face:
+            self._face, self._away_s = face, t_s
+            self._return()
+            if face is not None and self._averts_s is None:
+                self._until_s = t_s + self._draw_face_s()
+        leaves = self._away is not None or t_s >= rests_until_s or self._averts_s is not None
+        if self._face is not None and t_s >= self._until_s and leaves:
+            self._turn(target, p_world_head_m, t_s)
+        if self._away is not None:
+            self._away_s = t_s
+            centre = _centre_of_target(target)
+            if self._role.ways == "aside" and _is_on_face(self._away, centre, p_world_head_m):
+                self._avert(target, p_world_head_m)  # the person has moved into the look away
+            return self._away_target(target, self._away, t_s)
+        return target._replace(shift=target.shift + self._shifts) if self._shifts else target
+
+    @property
+    def _role(self) -> Role:
+        return self._roles[self._mode]
+
+    def _take_role(
+        self, mode: str, t_s: float, averts: bool = False, away_s: float | None = None
+    ) -> None:
+        """Take a role, whose looks away begin anew.
+
+        A change returns the gaze to the face. Thinking averts it immediately, as in people.
+
+        mode: name of the role
+        t_s: present time
+        averts: the gaze is averted now, without waiting for the end of a rest on the face; a look
+            away in progress continues
+        away_s: duration of that look away; None: as drawn from the role's distribution
+        """
+        if mode == self._mode and not averts:
+            return
+        self._mode, self._averts_s = mode, None
+        if averts:
+            duration_s = self._draw_away_s() if away_s is None else away_s
+            if self._away is None:
+                self._averts_s, self._until_s = duration_s, t_s
+            else:
+                self._until_s = t_s + duration_s
+            return
+        self._return()
+        if self._face is not None:
+            self._until_s = t_s if mode == "think" else t_s + self._draw_face_s()
+            if self._role.ways == "aside":  # the look began in an earlier turn: both are no stare
+                self._until_s = min(self._until_s, max(t_s, self._away_s + _LONGEST_S))
+
+    def _turn(self, target: Target, p_world_head_m: Vec3, t_s: float) -> None:
+        """Switch between face and look away when the drawn duration is over."""
+        if self._away is not None:
+            self._return()
+            self._until_s = t_s + self._draw_face_s()
+            return
+        self._avert(target, p_world_head_m)
+        away_s, self._averts_s = self._averts_s, None
+        self._until_s = t_s + (self._draw_away_s() if away_s is None else away_s)
+
+    def _avert(self, target: Target, p_world_head_m: Vec3) -> None:
+        """Look at a new place next to the face."""
+        self._away = self._draw_place(_centre_of_target(target), p_world_head_m)
+        self._shifts += 1
+        self._away_shift = target.shift + self._shifts
+
+    def _return(self) -> None:
+        if self._away is not None:
+            self._away = None
+            self._shifts += 1
+
+    def _away_target(self, target: Target, away: Vec3, t_s: float) -> Target:
+        """Return the target of a look away."""
+        role = "no conversation" if self._mode == "none" else self._mode
+        return target._replace(
+            p_world_m=away,
+            v_world_m_s=(0.0, 0.0, 0.0),
+            at_s=t_s,
+            kind=AWAY,
+            top_down=True,
+            part=None,
+            shift=self._away_shift,
+            why=f"looking away from face {target.id} ({role})",
+            centre_world_m=_centre_of_target(target),
+        )
+
+    def _draw_place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
+        """Draw a point next to the face, at the distance of the face."""
+        rel = sub(face, p_world_head_m)
+        ahead, right, up = _axes_to(rel)
+        way = radians(self._draw_direction_deg())
+        angle = radians(self._draw_angle_deg(face_extent_deg(way, norm(rel))))
+        aside = add(scale(right, cos(way)), scale(up, sin(way)))
+        looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
+        return add(p_world_head_m, scale(looking, norm(rel)))
+
+    def _draw_angle_deg(self, edge_deg: float) -> float:
+        """Draw the angle of a look away past the edge of the face, in degrees."""
+        role = self._role
+        drift_deg = _DRIFT_DEG if role.ways == "aside" else 0.0
+        least = max(role.least_deg, edge_deg + _BESIDE_DEG + drift_deg)
+        # The law's P, restricted to amplitudes of at least the required one; never 0.
+        p_most = min(_P_MOST, _P_TOP * exp(-least / _SCALE_DEG))
+        p = (1.0 - float(self._rng.random())) * p_most
+        return min(max(least, role.most_deg), -_SCALE_DEG * log(p / _P_TOP))
+
+    def _draw_direction_deg(self) -> float:
+        """Draw the direction, 0 right and 90 up: a sector of the role, uniform within it."""
+        rng, ways = self._rng, self._role.ways
+        if ways == "aside":
+            draw, spread_deg = float(rng.random()), float(rng.uniform(-_SPREAD_DEG, _SPREAD_DEG))
+            if draw < _ASIDE:
+                return spread_deg + (0.0 if draw < 0.5 * _ASIDE else 180.0)
+            return spread_deg + (90.0 if draw < _ASIDE + _UP else 270.0)
+        sector = _UP_SECTOR
+        if ways == "any" or rng.random() >= _THINKS_UP:
+            sector, draw = 0, float(rng.random()) * sum(DIRECTIONS_PERCENT)
+            while sector < len(DIRECTIONS_PERCENT) - 1 and draw >= DIRECTIONS_PERCENT[sector]:
+                draw -= DIRECTIONS_PERCENT[sector]
+                sector += 1
+        return 45.0 * sector + float(rng.uniform(-22.5, 22.5))
+
+    def _draw_face_s(self) -> float:
+        """Draw a duration on the face."""
+        return min(_LONGEST_S, self._draw_s(self._role.face_s, self._role.face_sd_s))
+
+    def _draw_away_s(self) -> float:
+        return self._draw_s(self._role.away_s, self._role.away_sd_s)
+
+    def _draw_s(self, mean_s: float, sd_s: float) -> float:
+        """Draw from the log-normal distribution with a given mean and standard deviation."""
+        sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
+        drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
+        return max(drawn, _SHORTEST_S)
+
+    def _plan_speech(self, role: str, confidence: float, begins: bool, t_s: float) -> None:
+        """Plan the look away at the beginning of a turn, and the return before its end."""
+        left_s = self._ends_s - t_s
+        if self._ends_s < inf:
+            early_s = max(0.0, self._draw_normal(_YIELD_S, _YIELD_SD_S))
+            early_s += (1.0 - confidence) * _UNSURE_RATIO * left_s
+            self._yields_s = max(t_s, self._ends_s - early_s)
+        if begins:
+            averts = left_s >= _LONG_TURN_S and self._turn_rng.random() < _STARTS_AVERTED
+            away_s = max(0.3, self._draw_normal(_START_AWAY_S, _START_AWAY_SD_S))
+            self._take_role(role, t_s, averts, away_s)
+
+    def _rates(self) -> tuple[float, float]:
+        """Return this head's own rates of nods and brow flashes, per minute."""
+        nods, brows = (exp(_INDIVIDUAL * one) for one in self._own)
+        return self._signs.nods_per_min * nods, self._signs.brow_flashes_per_min * brows
+
+    def _draw_wait_s(self) -> float:
+        """Draw the time to the next sign of listening; inf without signs."""
+        rate = sum(self._rates())
+        return float(self._turn_rng.exponential(60.0 / rate)) + 1.0 if rate > 0.0 else inf
+
+    def _draw_normal(self, mean_s: float, sd_s: float) -> float:
+        return mean_s + sd_s * float(self._turn_rng.standard_normal())
+
+
+def face_extent_deg(way_rad: float, distance_m: float) -> float:
+    """Return the extent of a face from its centre, degrees, in a direction (0 right, pi/2 up)."""
+    across, up = cos(way_rad) / _HALF_WIDE_M, sin(way_rad) / _HALF_HIGH_M
+    return degrees(atan2(1.0 / hypot(across, up), distance_m))
+
+
+def _is_on_face(away: Vec3, face: Vec3, p_world_head_m: Vec3) -> bool:
+    """Return whether a place is closer to the outline of a face than a look away may be."""
+    rel, to_away = sub(face, p_world_head_m), sub(away, p_world_head_m)
+    x, y, z = (dot(to_away, axis) for axis in _axes_to(rel))
+    edge_deg = face_extent_deg(atan2(z, y), norm(rel))
+    return degrees(atan2(hypot(y, z), x)) < edge_deg + _BESIDE_DEG - _DRIFT_DEG
+
+
+def _axes_to(rel: Vec3) -> tuple[Vec3, Vec3, Vec3]:
+    """Return the unit vectors towards a point, to the right of it, and up."""
+    ahead = unit(rel)
+    right = unit(cross(ahead, (0.0, 0.0, 1.0)))
+    return ahead, right, cross(right, ahead)
+
+
+def _centre_of_target(target: Target) -> Vec3:
+    return target.p_world_m if target.centre_world_m is None else target.centre_world_m
