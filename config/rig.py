@@ -22,15 +22,15 @@ from gazerig.gaze.attention.bottom_up import BottomUpParams
 from gazerig.gaze.attention.conversation import AversionParams, ConversationParams, LooksAway
 from gazerig.gaze.attention.idle import IdleParams
 from gazerig.gaze.attention.top_down import TopDownParams
-from gazerig.gaze.lids.lids import LidParams
-from gazerig.gaze.mouth.params import MouthParams
-from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
+from gazerig.gaze.lids.blink import LidParams
+from gazerig.gaze.mouth.mouth_keys import MouthParams
+from gazerig.gaze.oculomotor.drift import DriftLaw
+from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
+from gazerig.gaze.oculomotor.head import HeadParams
+from gazerig.gaze.oculomotor.pursuit import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
-from gazerig.gaze.track.breathing import BreathingParams
 from gazerig.gaze.track.level import LevelParams
-from gazerig.gaze.track.sway import SwayParams
-from gazerig.gaze.track.track import TrackParams
 from gazerig.params import Bounds, Choices, Unit
 from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.model.coupling_params import CouplingParams
@@ -143,10 +143,8 @@ class GazeConfig:
     saccade: Annotated[SaccadeParams, "saccades of the eyes"] = field(default_factory=SaccadeParams)
     pursuit: Annotated[PursuitParams, "smooth pursuit of the eyes"] = field(default_factory=PursuitParams)
     head: Annotated[HeadParams, "head movements in gaze shifts"] = field(default_factory=HeadParams)
-    breathing: Annotated[BreathingParams, "breathing of the head"] = field(default_factory=BreathingParams)
-    sway: Annotated[SwayParams, "random sway of the head"] = field(default_factory=SwayParams)
+    drift: Annotated[DriftLaw, "breathing, and small random sway of a head at rest"] = "people"
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
-    tracks: Annotated[TrackParams, "tracks added to the gaze"] = field(default_factory=TrackParams)
     mouth: Annotated[MouthParams, "motion while the head speaks"] = field(default_factory=MouthParams)
     oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = field(default_factory=OculomotorParams)
     # fmt: on

@@ -470,7 +470,6 @@ def track_rules(rig: Rig) -> Iterable[tuple[str, str]]:
                 1.0,
                 middle,
                 limits,
-                rig.gaze.tracks.limit_share,
             )
         except ConfigError as error:
             for fault in error.faults:

@@ -173,7 +173,7 @@ def hold_steps(times_s: Floats, angles_deg: Floats, limit: JointLimit) -> Series
     A servo cannot step. Each step becomes a curve of least jerk that ends at the step's time and
     uses 80 % of the joint's speed and acceleration.
     """
-    needed = shortest_move_s(np.abs(np.radians(np.diff(angles_deg))), limit, 0.8)
+    needed = shortest_move_s(np.abs(np.radians(np.diff(angles_deg))), limit)
     leave_s = np.maximum(times_s[1:] - np.maximum(needed, SAMPLE_S), times_s[:-1])
     held = leave_s > times_s[:-1] + SAMPLE_S
     times = np.concatenate((times_s, leave_s[held]))

@@ -1,10 +1,15 @@
-"""Lids: spontaneous and gaze-evoked blinks, winks, sleepiness, lids that follow the gaze.
+"""Lids: spontaneous and gaze-evoked blinks, winks, lids that follow the gaze.
 
-Rates and their sources: gaze.lid_params. Nakamoto & Tsuruno 3.6 print the rule of gaze-evoked
-blinks as a level, eye and head more than 20 deg apart, which would blink permanently while the head
-is turned aside; here it is the event that the preceding text describes. Opening 0 is shut, with
-upper and lower lid in contact; 1 is fully open. A blink moves both lids from their present openings
-to 0, so they meet at any gaze direction.
+Eyes that turn down take both lids down. Upper lids follow the gaze with a gain of about 1 (Becker &
+Fuchs 1988), lower lids in the same direction by a quarter of that (Leite 2006: 2.2 mm and 9.1 mm in
+the same saccades of people of 20 to 30; a third at 60 and more), equally up and down. So the middle
+of the fissure follows the eye, and the fissure narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg
+down).
+
+Nakamoto & Tsuruno 3.6 print the rule of gaze-evoked blinks as a level, eye and head more than 20
+deg apart, which would blink permanently while the head is turned aside; here it is the event that
+the preceding text describes. Opening 0 is shut, with upper and lower lid in contact; 1 is fully
+open. A blink moves both lids from their present openings to 0, so they meet at any gaze direction.
 """
 
 from math import degrees, inf, radians, tanh
@@ -13,25 +18,33 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from gazerig.gaze.lids.blink import (
+    EVOKED_BEYOND_DEG,
+    LAWS,
+    SHORTEST_PAUSE_S,
     LidClosure,
+    LidParams,
     blink_depth,
     blink_pause_s,
-    closure,
     evoked_offset_s,
     evokes_blink,
-    is_double_blink,
 )
-from gazerig.gaze.lids.lid_params import LidParams as LidParams
-from gazerig.gaze.lids.lid_rest import LidPair, LidsAtRest
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 from gazerig.gaze.types import Angles2
 
 Side = Literal["left", "right"]
-LidMode = Literal["rest", "conversation"]
 
-_NOT_SHUT: LidPair = (0.0, 0.0)
 _ROUNDING_S = 1e-6
 _MOST_INTERVALS = 3.0
 """Largest delay of a spontaneous blink by gaze-evoked ones, in mean intervals."""
+_EVOKED_PAUSE_S = 0.6
+"""Shortest time from the onset of a blink to one evoked by a gaze shift."""
+_WINK_HOLD_MS = 200.0
+_UP_SHARE = 0.85
+"""Factor on the upper lids' following above level gaze."""
+_LOWER_REST = 0.8
+"""Opening of the lower lids with level gaze."""
+_GLIDE_S = 0.3
+"""Duration of a change of the rest positions."""
 
 
 class LidOpenings(NamedTuple):
@@ -61,14 +74,8 @@ class LidOpenings(NamedTuple):
 
         factors: factors of the left and right upper, then of the left and right lower lid
         """
-        left, right, lower_left, lower_right = factors
-        return LidOpenings(
-            _scale_opening(self.left, left),
-            _scale_opening(self.right, right),
-            self.blink,
-            _scale_opening(self.lower_left, lower_left),
-            _scale_opening(self.lower_right, lower_right),
-        )
+        a, b, c, d = map(_scale_opening, self.openings, factors)
+        return self.replace((a, b, c, d))
 
 
 def _scale_opening(opening: float, factor: float) -> float:
@@ -86,76 +93,56 @@ class Lids:
     """Openings of upper and lower lids as a function of time, with their own random generator."""
 
     def __init__(self, params: LidParams, rng: np.random.Generator) -> None:
-        self._params = params
-        self._rest = LidsAtRest(params)
         self._rng = rng
-        self._mode: LidMode = "rest"
+        self._converses = False
+        self._set_params(params)
+        self._rest = MinimumJerkBlend(self._rest_values(), _GLIDE_S)
         self.reset(0.0)
 
+    def _set_params(self, params: LidParams) -> None:
+        self._params, self._law = params, LAWS[params.law]
+
+    def _rest_values(self) -> tuple[float, ...]:
+        """Return the rest opening of the upper lids, and the following of upper and lower ones."""
+        law = self._law
+        return self._params.rest_opening, law.follow_per_deg, law.lower_follow_per_deg
+
     def reset(self, t_s: float) -> None:
-        """Open the lids and draw the first blink; the mode stays."""
+        """Open the lids and draw the first blink; conversation stays."""
         self.blinks = 0
-        self._t_s = t_s
         self._blink: LidClosure | None = None
         self._sides: tuple[LidClosure, LidClosure] | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
-        self._shut_until_s = -inf
+        self._t_s, self._shut_until_s = t_s, -inf
         self._evoked_s = inf
         self._announced = False
         self._redraw = False
-        self._rest.reset(t_s)
+        self._rest.reset(self._rest_values())
         self._next_s = t_s + self._pause_s(self._length_s())
 
     def retune(self, params: LidParams) -> None:
-        """Change rates and shapes; a blink in progress ends unchanged, without a jump.
-
-        The present pause is scaled like the mean pause.
-        """
+        """Change law, rate and shape; a blink in progress ends unchanged, without a jump."""
         before_per_min = self._per_min()
-        self._params = params
-        per_min = self._per_min()
-        if per_min != before_per_min:
-            if per_min and before_per_min:
-                self._next_s = self._t_s + (self._next_s - self._t_s) * before_per_min / per_min
-            else:
-                self._redraw = True
-        self._rest.retune(params, self._t_s)
+        self._set_params(params)
+        self._redraw = self._redraw or self._per_min() != before_per_min
+        self._rest.move_to(self._rest_values())
 
-    def set_mode(self, name: LidMode) -> None:
-        """Set the blink rate to that at "rest" or in "conversation", from the next step on.
-
-        Raises:
-            ValueError: there is no such mode.
-        """
-        if name not in ("rest", "conversation"):
-            raise ValueError(f"no lid mode {name!r}; modes: rest, conversation")
-        # The present interval was drawn for the other rate, perhaps for "never".
-        self._redraw = self._redraw or name != self._mode
-        self._mode = name
+    def set_conversation(self, converses: bool) -> None:
+        """Blink as often as in conversation, or as at rest, from the next step on."""
+        # The present interval was drawn for the other rate.
+        self._redraw = self._redraw or converses != self._converses
+        self._converses = converses
 
     def wink(self, side: Side, t_s: float) -> None:
         """Shut and open the lids of one eye; a wink in progress continues.
 
         t_s: start, no earlier than the last step
-
-        Raises:
-            ValueError: there is no such side.
         """
-        if side not in self._winks:
-            raise ValueError(f"no lid {side!r}; sides: left, right")
         wink = self._winks[side]
         if wink is None or not wink.is_in_progress(self._t_s):
-            wink = self._full_closure(max(t_s, self._t_s), self._params.wink_hold_ms)
+            wink = self._full_closure(max(t_s, self._t_s), _WINK_HOLD_MS)
             self._winks[side] = wink
             self._record_motion_end(wink)
-
-    def set_sleepiness(self, level: float) -> None:
-        """Set the sleepiness, which lowers the lids and slows blinks: 0 awake .. 1 hardly awake.
-
-        Raises:
-            ValueError: level is not within 0..1.
-        """
-        self._rest.set_sleepiness(level, self._t_s)
 
     def draw_blink_of_shift(self, shift_rad: float, onset_s: float, t_s: float) -> float:
         """Draw the blink of a gaze shift that is about to begin; return the delay of the shift.
@@ -167,14 +154,13 @@ class Lids:
             onset_s: its planned start.
             t_s: present time, seconds.
         """
-        par, blink = self._params, self._blink
-        shift_deg = degrees(shift_rad)
-        self._announced = shift_deg > par.gaze_evoked_blink_least_deg
-        if not self._announced or not evokes_blink(par, shift_deg, self._rng):
+        blink, shift_deg = self._blink, degrees(shift_rad)
+        self._announced = shift_deg > EVOKED_BEYOND_DEG
+        if not self._announced or not evokes_blink(self._law, shift_deg, self._rng):
             return 0.0
         if blink is not None and onset_s - blink.onset_s < self._pause_after_s():
             return 0.0
-        blinks_s = onset_s + evoked_offset_s(par, self._rng)
+        blinks_s = onset_s + evoked_offset_s(self._law, self._rng)
         self._evoked_s = min(self._evoked_s, max(blinks_s, t_s))
         return max(0.0, t_s - blinks_s)
 
@@ -187,51 +173,42 @@ class Lids:
         self._t_s = t_s
         if self._redraw:
             self._redraw, self._next_s = False, t_s + self._pause_s(self._length_s())
-        upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
+        up_deg = degrees(eye_pitch_rad)
+        rest, follow, lower_follow = self._rest.step(t_s)
+        upper = _clip(rest + follow * (_UP_SHARE if up_deg > 0.0 else 1.0) * up_deg)
+        lower = _clip(_LOWER_REST - lower_follow * up_deg)
         if shift_rad is None and self._shut_until_s < t_s < self._next_s and t_s < self._evoked_s:
             return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
         if self._is_blink_due(t_s, shift_rad):
             self._begin_blink(t_s)
-        blinks = [_closures(side, t_s) for side in self._sides or (None, None)]
-        (left, lower_left), (right, lower_right) = (
-            _larger_closure(blink, _closures(wink, t_s))
+        blinks = [_closure(side, t_s) for side in self._sides or (None, None)]
+        # Just before their end, closures exceed 1 by a rounding error.
+        left, right = (
+            max(0.0, 1.0 - max(blink, _closure(wink, t_s)))
             for blink, wink in zip(blinks, self._winks.values(), strict=True)
         )
-        # Just before their end, closures exceed 1 by a rounding error.
-        return LidOpenings(
-            upper * max(0.0, 1.0 - left),
-            upper * max(0.0, 1.0 - right),
-            blinks[0][0] > 0.0 or blinks[1][0] > 0.0,
-            lower * max(0.0, 1.0 - lower_left),
-            lower * max(0.0, 1.0 - lower_right),
-        )
+        return LidOpenings(upper * left, upper * right, any(blinks), lower * left, lower * right)
 
     def eye_turn_rad(self, t_s: float) -> tuple[Angles2, Angles2] | None:
         """Return the turns of left and right eye, (yaw, pitch), with a blink; None without any."""
-        par, blink = self._params, self._blink
-        share = 0.0 if blink is None else blink.eye_turn(t_s)
+        share = 0.0 if self._blink is None else self._blink.eye_turn(t_s)
         if share == 0.0:
             return None
-        nasal, down = radians(share * par.eye_nasal_deg), -radians(share * par.eye_down_deg)
-        return (-nasal, down), (nasal, down)
-
-    def closure(self, since_onset_s: float) -> float:
-        """Return the closure of the upper lid by a full blink, 0..1, at a time after its onset."""
-        _, close_s, hold_s, open_s, *_ = self._full_closure(0.0, self._params.hold_ms)
-        return closure(since_onset_s, close_s, hold_s, open_s)
+        down, nasal = (radians(share * angle) for angle in self._law.eye_turn_deg)
+        return (-nasal, -down), (nasal, -down)
 
     def _is_blink_due(self, t_s: float, shift_rad: float | None) -> bool:
         """Return whether a blink begins now; each gaze shift has one draw."""
-        par, blink = self._params, self._blink
+        blink = self._blink
         if shift_rad is not None:
             announced, self._announced = self._announced, False
-            if not announced and evokes_blink(par, degrees(abs(shift_rad)), self._rng):
-                after_s = abs(evoked_offset_s(par, self._rng))
+            if not announced and evokes_blink(self._law, degrees(abs(shift_rad)), self._rng):
+                after_s = abs(evoked_offset_s(self._law, self._rng))
                 self._evoked_s = min(self._evoked_s, t_s + after_s)
         if any(wink is not None and wink.is_in_progress(t_s) for wink in self._winks.values()):
             # Both eyes would shut, and hide the wink.
             self._evoked_s = inf
-            self._next_s = max(self._next_s, t_s + par.min_interval_ms / 1e3)
+            self._next_s = max(self._next_s, t_s + SHORTEST_PAUSE_S)
             return False
         if t_s >= self._evoked_s:
             since_s = inf if blink is None else t_s - blink.onset_s
@@ -243,23 +220,19 @@ class Lids:
 
     def _begin_blink(self, t_s: float) -> None:
         """Start a blink; draw its depth and the time of the next one."""
-        par = self._params
         self.blinks += 1
-        slow = 1.0 + par.sleepy_slowness * self._rest.sleepiness(t_s)
-        blink = self._full_closure(t_s, par.hold_ms)._replace(
-            depth=blink_depth(par, self._rng), slowness=slow
-        )
-        self._blink = blink = blink.vary_durations(par, self._rng)
-        self._sides = blink.left_and_right(par, self._rng)
+        blink = self._full_closure(t_s, self._params.hold_ms)
+        blink = blink._replace(depth=blink_depth(self._law, self._rng))
+        self._blink = blink = blink.vary_durations(self._law, self._rng)
+        self._sides = blink.left_and_right(self._law, self._rng)
         for side in self._sides:
             self._record_motion_end(side)
-        double = is_double_blink(par, self._rng)
-        pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
-        after_s, ends_s = blink.length_s + pause_s, t_s + blink.length_s
-        if t_s >= self._evoked_s and par.gaze_evoked_blink_replaces and not double:
+        self._rng.random()  # unused; without it every later blink of a seed would differ
+        after_s, ends_s = blink.length_s + self._pause_s(blink.length_s), t_s + blink.length_s
+        if t_s >= self._evoked_s and self._law.evoked_replaces:
             # The next spontaneous blink is skipped, the one after it stays.
             most_s = ends_s + _MOST_INTERVALS * self._mean_s()
-            soonest_s = ends_s + par.min_interval_ms / 1e3
+            soonest_s = ends_s + SHORTEST_PAUSE_S
             self._next_s = max(min(self._next_s + after_s, most_s), soonest_s)
         else:
             self._next_s = t_s + after_s
@@ -271,25 +244,21 @@ class Lids:
         self._shut_until_s = max(self._shut_until_s, ends_s)
 
     def _full_closure(self, onset_s: float, hold_ms: float) -> LidClosure:
-        """Return a complete closure at no sleepiness."""
         par = self._params
-        return LidClosure(
-            onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3, par.lower_close_share
-        )
+        return LidClosure(onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3)
 
     def _pause_after_s(self) -> float:
         """Return the shortest time from the onset of a blink to that of a gaze-evoked one."""
-        return max(self._params.gaze_evoked_blink_pause_ms / 1e3, self._length_s())
+        return max(_EVOKED_PAUSE_S, self._length_s())
 
     def _length_s(self) -> float:
-        """Return the length of the last blink, of an awake one before the first."""
-        if self._blink is not None:
-            return self._blink.length_s
-        return self._full_closure(0.0, self._params.hold_ms).length_s
+        """Return the length of the last blink, of a full one before the first."""
+        blink = self._blink or self._full_closure(0.0, self._params.hold_ms)
+        return blink.length_s
 
     def _per_min(self) -> float:
-        par = self._params
-        return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
+        ratio = self._law.conversation_ratio if self._converses else 1.0
+        return self._params.blinks_per_min * ratio
 
     def _mean_s(self) -> float:
         """Return the mean interval between blinks, inf without any."""
@@ -297,18 +266,14 @@ class Lids:
         return 60.0 / per_min if per_min else inf
 
     def _pause_s(self, length_s: float) -> float:
-        return blink_pause_s(self._params, self._per_min(), length_s, self._rng)
+        return blink_pause_s(self._law, self._per_min(), length_s, self._rng)
 
 
-def _closures(closing: LidClosure | None, t_s: float) -> LidPair:
-    """Return the closure of the upper and the lower lid by a blink or wink, 0..1."""
-    shut = 0.0 if closing is None else closing.closure_at(t_s)
-    if closing is None or shut == 0.0:
-        return _NOT_SHUT
-    return shut, closing.lower_share * shut
+def _clip(opening: float) -> float:
+    """Return an opening clipped to 0..1."""
+    return opening if 0.0 < opening < 1.0 else 1.0 if opening >= 1.0 else 0.0
 
 
-def _larger_closure(one: LidPair, other: LidPair) -> LidPair:
-    if other is _NOT_SHUT:
-        return one
-    return max(one[0], other[0]), max(one[1], other[1])
+def _closure(closing: LidClosure | None, t_s: float) -> float:
+    """Return the closure by a blink or wink, 0..1."""
+    return 0.0 if closing is None else closing.closure_at(t_s)

@@ -18,6 +18,10 @@ EXPONENT = 0.6
 _BAND_HZ = 500.0, 4000.0
 _BLOCK = 2000
 _LOUD = 0.95
+MOUTH_SIZE = 0.9
+"""Opening at the loudest parts."""
+_SHUT = 10.0 ** (-30.0 / 20.0 * EXPONENT)
+"""Loudness at which the mouth is shut: 30 dB below the loudest parts."""
 
 
 def band_pressures(samples: Floats, rate_hz: float, first: int = 0) -> Floats:
@@ -62,16 +66,14 @@ def loud_pressure(pressures: Floats) -> float:
     return float(np.quantile(heard, _LOUD)) if len(heard) else 0.0
 
 
-def openings(pressures: Floats, loud: float, quiet_db: float) -> Floats:
-    """Return openings 0..1 by loudness: 0 at ``quiet_db`` and 1 at the loudest parts.
+def openings(pressures: Floats, loud: float) -> Floats:
+    """Return openings 0..1 by loudness, 1 at the loudest parts.
 
     Args:
         pressures: (n,) from ``band_pressures``.
         loud: Pressure of the loudest parts; 0: all are shut.
-        quiet_db: Level relative to it at which the mouth is shut.
     """
     if loud <= 0.0:
         return np.zeros(len(pressures))
-    shut = 10.0 ** (quiet_db / 20.0 * EXPONENT)
-    opened: Floats = np.clip(((pressures / loud) ** EXPONENT - shut) / (1.0 - shut), 0.0, 1.0)
+    opened: Floats = np.clip(((pressures / loud) ** EXPONENT - _SHUT) / (1.0 - _SHUT), 0.0, 1.0)
     return opened

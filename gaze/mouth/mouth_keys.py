@@ -7,9 +7,10 @@ because a mouth that is open on b, m or p is the first error that people notice.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,15 @@ _LEAST_GAP_S = 0.02
 _P_CLOSED_S = 0.055
 _LONGEST_PHONEME, _LONGEST_LETTER_S = 2, 0.09
 _B_SHARE, _M_SHARE = 0.5, 0.65
+
+
+@dataclass(frozen=True)
+class MouthParams:
+    """Motion while the head speaks."""
+
+    # fmt: off
+    level: Annotated[str, "level of the rig's table that opens the mouth; a rig without it plays only the sound"] = "mouth"
+    # fmt: on
 
 
 class JawLimits(NamedTuple):

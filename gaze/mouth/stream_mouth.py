@@ -26,11 +26,10 @@ class StreamMouth:
 
     Args:
         rate_hz: Rate of the samples.
-        quiet_db: Level relative to the loudest parts at which the mouth is shut.
     """
 
-    def __init__(self, rate_hz: float, quiet_db: float) -> None:
-        self._rate_hz, self._quiet_db = rate_hz, quiet_db
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
         self._rest: Floats = np.zeros(0)
         self._loud = _FIRST_LOUD
         self._values: deque[float] = deque(maxlen=_KEPT)
@@ -45,9 +44,7 @@ class StreamMouth:
         decay = np.exp(-FRAME_S / _LOUD_DECAY_S)
         for pressure in pressures:
             self._loud = max(_FIRST_LOUD, float(pressure), self._loud * decay)
-            self._values.append(
-                float(openings(np.array([pressure]), self._loud, self._quiet_db)[0])
-            )
+            self._values.append(float(openings(np.array([pressure]), self._loud)[0]))
         self._count += len(pressures)
 
     def opening_at(self, t_s: float) -> float:

@@ -35,7 +35,6 @@ from gazerig.gaze.angles import (
     unit,
     yaw_pitch,
 )
-from gazerig.gaze.oculomotor.params import PursuitParams
 from gazerig.gaze.types import Angles2, Mat3, Target, Vec3
 
 Eyes = tuple[Angles2, Angles2]
@@ -43,9 +42,29 @@ Eyes = tuple[Angles2, Angles2]
 
 _STRAIGHT: Vec3 = (1.0, 0.0, 0.0)
 _NONE: Vec3 = (0.0, 0.0, 0.0)
-_FARTHEST_M = 100.0
+NEAREST_M, _FARTHEST_M = 0.2, 100.0
+"""Distances between which the eyes converge; the nearer one is 17.6 deg of vergence."""
 _LOST_S = 0.04
 """A moving target without a frame for this time counts as not visible until the next one."""
+
+GAIN_1_S, VELOCITY_GAIN = 8.0, 0.95
+"""Rate Kc at which the position error is closed, and gain Gp, the share of the target's velocity
+that the eye adopts; people's is .95."""
+VERGENCE_GAIN_1_S, DIVERGENCE_GAIN_1_S = 4.0, 3.0
+"""Rate Kd at which the error in depth is closed, and Kdiv if the target is farther away."""
+MAX_RAD_S, REJECT_RAD_S = radians(58.0), radians(100.0)
+"""Fastest smooth pursuit, people's is 63 deg/s; a target reported as faster than the second is
+taken as a jump and not pursued."""
+MAX_ERROR_RAD = radians(5.0)
+"""The rate of closing applies to at most this error; larger errors are closed no faster."""
+_DELAY_S, _SMOOTH_S, _VERGENCE_DELAY_S = 0.1, 0.04, 0.06
+"""Visual delay tau_c, including the age of a frame, smoothing time Tf of the observed direction,
+and the additional delay of vergence."""
+_WIDEST_RAD = radians(20.0)
+_REFLEX_DELAY_S = 0.01
+"""Delay of the reflex, people's is 7 to 10 ms; its gain is 1."""
+_LOST_FADE_S = 0.3
+"""Decay time of the eyes' speed after the loss of the target."""
 
 
 class MeanGaze(NamedTuple):
@@ -62,19 +81,17 @@ class EyeGeometry(NamedTuple):
     """The head at the time when present commands take effect, and the limits of its eyes.
 
     eyes_on: returns the eye angles that fixate a point from a pose of the head
-    nearest_m: nearest distance on which the eyes converge
     in_range: returns eye angles clipped to their ranges
     """
 
     R_world_head: Mat3
     p_head: Vec3
     eyes_on: Callable[[Vec3, Mat3, Vec3], Eyes]
-    nearest_m: float
     in_range: Callable[[Eyes], Eyes]
 
     def eyes_to(self, point: Vec3) -> Eyes:
         """Return the eye angles that fixate a point."""
-        point = keep_min_distance(point, self.p_head, self.nearest_m)
+        point = keep_min_distance(point, self.p_head, NEAREST_M)
         return self.eyes_on(point, self.R_world_head, self.p_head)
 
 
@@ -136,22 +153,9 @@ class BinocularController:
     version: commanded direction of the eyes; started: whether it has been set since the reset
     """
 
-    def __init__(self, params: PursuitParams) -> None:
+    def __init__(self) -> None:
         self.sight = DelayedSight()
-        self.retune(params)
         self.reset()
-
-    def retune(self, params: PursuitParams) -> None:
-        """Change gains and delays; the state of eyes and target stays."""
-        self._params = params
-        self.delay_s = params.delay_ms / 1e3
-        self._smooth_s, self._fade_s = params.smooth_ms / 1e3, params.lost_fade_ms / 1e3
-        self._reflex_delay_s = params.reflex_delay_ms / 1e3
-        self._vergence_delay_s = params.vergence_delay_ms / 1e3
-        self._max_rad_s = radians(params.max_speed_deg_s)
-        self._reject_rad_s = radians(params.reject_deg_s)
-        self._max_error_rad = radians(params.max_error_deg)
-        self._widest_rad = radians(params.max_vergence_deg)
 
     def reset(self) -> None:
         """Forget target and head; the eyes begin at the angles of ``hold``, or straight ahead."""
@@ -180,7 +184,7 @@ class BinocularController:
         gaze: the point fixated so far, or that a saccade prescribes
         prescribed: eye angles of a saccade; None: no saccade is in flight
         """
-        place = self.sight.position_at(target, t_s - self.delay_s)
+        place = self.sight.position_at(target, t_s - _DELAY_S)
         seen = None if place is None else view.eyes_to(place)
         if prescribed is not None or dt_s <= 0.0 or not self.started:
             eyes = view.eyes_to(gaze) if prescribed is None else prescribed
@@ -192,7 +196,7 @@ class BinocularController:
         p_head, ahead = view.p_head, rotate(view.R_world_head, self.version.ahead)
         one_m = view.eyes_to(add(p_head, ahead))
         distance = self.distance_m(one_m, norm(sub(target.p_world_m, p_head)))
-        return eyes, add(p_head, scale(ahead, max(distance, view.nearest_m)))
+        return eyes, add(p_head, scale(ahead, max(distance, NEAREST_M)))
 
     def adopt(self, eyes: Eyes, target: Eyes | None, R_world_head: Mat3, t_s: float) -> None:
         """Adopt the angles that a saccade prescribes; the target's velocity is kept.
@@ -214,29 +218,28 @@ class BinocularController:
             None: not seen
         closing: whether the error of direction is closed; False leaves it to a saccade
         """
-        par, (ahead, vergence) = self._params, self.version
+        ahead, vergence = self.version
         turned = self._rotations(R_world_head, t_s)
         if turned is not None:
-            held = rotate_back(turned[1], rotate(turned[0], ahead))
-            ahead = unit(add(ahead, scale(sub(held, ahead), par.reflex_gain)))
+            ahead = unit(rotate_back(turned[1], rotate(turned[0], ahead)))
         gaze = rotate(R_world_head, ahead)
         if target is None:
             self._known = False
-            self._velocity = scale(self._velocity, exp(-dt_s / self._fade_s))
-            rate = scale(_clip(self._velocity, self._max_rad_s), par.velocity_gain)
+            self._velocity = scale(self._velocity, exp(-dt_s / _LOST_FADE_S))
         else:
             seen, demand_rad = mean_gaze_of(target)
             self._follow(rotate(R_world_head, seen), dt_s)
-            rate = scale(_clip(self._velocity, self._max_rad_s), par.velocity_gain)
+        rate = scale(_clip(self._velocity, MAX_RAD_S), VELOCITY_GAIN)
+        if target is not None:
             if closing:
-                error = _clip(sub(self._smoothed, gaze), self._max_error_rad)
-                rate = add(rate, scale(error, par.gain_1_s))
+                error = _clip(sub(self._smoothed, gaze), MAX_ERROR_RAD)
+                rate = add(rate, scale(error, GAIN_1_S))
             past_rad = self._delayed_vergence_rad(demand_rad, t_s)
             if past_rad is not None:
                 off = past_rad - vergence
-                gain = par.vergence_gain_1_s if off >= 0.0 else par.divergence_gain_1_s
+                gain = VERGENCE_GAIN_1_S if off >= 0.0 else DIVERGENCE_GAIN_1_S
                 vergence += gain * off * dt_s
-        vergence = min(max(vergence, 0.0), self._widest_rad)
+        vergence = min(max(vergence, 0.0), _WIDEST_RAD)
         ahead = rotate_back(R_world_head, unit(add(gaze, scale(rate, dt_s))))
         self.version = MeanGaze(ahead, vergence)
         yaw, pitch = yaw_pitch(ahead)
@@ -261,7 +264,7 @@ class BinocularController:
         """
         heads, before = self._heads, self._opposed
         heads.append((t_s, R_world_head))
-        while len(heads) > 1 and heads[1][0] <= t_s - self._reflex_delay_s + 1e-9:
+        while len(heads) > 1 and heads[1][0] <= t_s - _REFLEX_DELAY_S + 1e-9:
             heads.popleft()
         then = heads[0][1]
         self._opposed = _mean_rotation(then, heads[1][1]) if len(heads) > 1 else then
@@ -271,7 +274,7 @@ class BinocularController:
         """Return the vergence that the target required a delay ago, None before the first."""
         demands = self._demands
         demands.append((t_s, vergence_rad))
-        due_s = t_s - self._vergence_delay_s + 1e-9
+        due_s = t_s - _VERGENCE_DELAY_S + 1e-9
         while len(demands) > 1 and demands[1][0] <= due_s:
             demands.popleft()
         return demands[0][1] if demands[0][0] <= due_s else None
@@ -285,11 +288,11 @@ class BinocularController:
     def _follow(self, seen: Vec3, dt_s: float) -> None:
         """Low-pass the direction of the target and differentiate it."""
         before = self._seen
-        most = self._reject_rad_s * dt_s
+        most = REJECT_RAD_S * dt_s
         if before is None or not self._known or norm(sub(seen, before)) > most:
             self._adopt_jump(seen)
         self._seen = seen
-        kept = exp(-dt_s / self._smooth_s)
+        kept = exp(-dt_s / _SMOOTH_S)
         smoothed = add(scale(self._smoothed, kept), scale(seen, 1.0 - kept))
         self._velocity = scale(sub(smoothed, self._smoothed), 1.0 / dt_s)
         self._smoothed = smoothed

@@ -10,7 +10,9 @@ gaze moves between points near the middle of a target after rests of .35 to 1.45
 second, and few in the shorter rests of a face or a room that is explored.
 """
 
+from dataclasses import dataclass
 from math import cos, degrees, hypot, inf, pi, radians, sin, sqrt
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -26,7 +28,7 @@ from gazerig.gaze.angles import (
     unit,
     yaw_pitch,
 )
-from gazerig.gaze.oculomotor.params import OculomotorParams
+from gazerig.gaze.oculomotor.binocular import NEAREST_M
 from gazerig.gaze.oculomotor.pursuit import Pursuit, line_of_sight_to
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.oculomotor.saccade_trajectory import (
@@ -37,10 +39,27 @@ from gazerig.gaze.oculomotor.saccade_trajectory import (
 from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
 from gazerig.gaze.types import Angles2, Vec3
+from gazerig.params import Bounds
 
 MOVING_M_S = 0.05
 """A target slower than this is fixated, not pursued."""
 _MIDDLE = (0.0, 0.0)
+_CORRECT_S, _CORRECT_SPREAD_S = 0.155, 0.045
+"""Mean delay from landing to a corrective saccade, people's is 100 to 200 ms, and its largest
+random deviation."""
+
+
+@dataclass(frozen=True)
+class OculomotorParams:
+    """Accuracy of saccades, rests between them, and the eyes' servos."""
+
+    # fmt: off
+    law: Annotated[Literal["people", "exact"],
+        "people: saccades fall short and scatter, are corrected, bend and keep a distance in time, and targets are predicted; "
+        "exact: they land on the target as it was seen, and go on to their ends"] = "people"
+    refixations: Annotated[bool, "with law people: small saccades within the target during a long look"] = True
+    eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
+    # fmt: on
 
 
 class GazePoint:
@@ -50,14 +69,11 @@ class GazePoint:
     saccades, fixations: counts since the reset
 
     Args:
-        params: thresholds and times.
+        params: law of saccades and of rests.
         saccade: the model of saccades.
         pursuit: the model of pursuit.
         prediction: prediction of the target that ``move`` receives.
-        rng: random generator of endpoints and re-fixations; None: without re-fixations.
-
-    Raises:
-        ValueError: endpoints scatter and rng is None.
+        rng: random generator of endpoints and re-fixations.
     """
 
     def __init__(
@@ -66,29 +82,23 @@ class GazePoint:
         saccade: SaccadeModel,
         pursuit: Pursuit,
         prediction: TargetPrediction,
-        rng: np.random.Generator | None,
+        rng: np.random.Generator,
     ) -> None:
         self._rng = rng
         self._saccade, self._pursuit, self._prediction = saccade, pursuit, prediction
-        self._trigger = SaccadeTrigger(params, False)
-        self._refixations = Refixations(params, rng)
+        self._trigger = SaccadeTrigger(True)
+        self._refixations = Refixations(rng)
         self.retune(params)
         self._exact = False
         self.reset(0.0, (1.0, 0.0, 0.0))
 
     def retune(self, params: OculomotorParams) -> None:
-        """Change thresholds and times; a saccade in flight continues to its end.
-
-        Raises:
-            ValueError: endpoints scatter and rng is None.
-        """
-        if params.has_scatter and self._rng is None:
-            raise ValueError(
-                "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
-            )
-        self._params = params
-        self._trigger.retune(params, params.has_errors)
-        self._refixations.retune(params)
+        """Change the law; a saccade in flight continues to its end."""
+        self._people = params.law == "people"
+        self._refixates = self._people and params.refixations
+        self._trigger.retune(self._people)
+        if not self._refixates:
+            self._refixations.reset()
 
     def reset(self, t_s: float, point_m: Vec3) -> None:
         """Rest on a point."""
@@ -119,11 +129,6 @@ class GazePoint:
         return self._trigger.is_correction_due
 
     @property
-    def nearest_m(self) -> float:
-        """Return the nearest distance on which the eyes converge."""
-        return self._params.nearest_m
-
-    @property
     def shift(self) -> int | None:
         """Return the target's count of gaze shifts that was recorded last."""
         return self._trigger.shift
@@ -147,6 +152,10 @@ class GazePoint:
         self._trigger.record_shift(shift, wait_s, lands_s, t_s)
         self._refixations.reset()
 
+    @property
+    def _may_refixate(self) -> bool:
+        return self._refixates and not self._exact
+
     def postpone(self, wait_s: float) -> None:
         """Delay the saccade to a new target further."""
         self._trigger.postpone(wait_s)
@@ -157,7 +166,7 @@ class GazePoint:
         """Move the gaze point along a saccade, or after the target.
 
         Args:
-            point: the target now, not nearer than ``nearest_m``.
+            point: the target now, not nearer than ``NEAREST_M``.
             velocity: velocity of the target, m/s.
             p_head: midpoint between the eyes.
             t_s: present time, seconds.
@@ -176,9 +185,9 @@ class GazePoint:
             if not trigger.is_error_small(sqrt(x * x + y * y + z * z)):
                 self._refixations.interrupt()
                 slip = self._pursuit.slip(self.point_m, point, velocity, p_head)
-                if trigger.is_due(slip, t_s):
-                    shift_rad = self._start_saccade(point, velocity, p_head, t_s)
-            elif not self._exact and self._refixations.is_due(t_s, norm(velocity) <= MOVING_M_S):
+                if trigger.is_due(slip, t_s, self._pursuit.refractory_s):
+                    shift_rad = self._start_saccade(point, p_head, t_s)
+            elif self._may_refixate and self._refixations.is_due(t_s, norm(velocity) <= MOVING_M_S):
                 trigger.refixate(t_s)
             if shift_rad is None:
                 if dt_s > 0.0 and self._pursuit.controller is None:
@@ -189,42 +198,34 @@ class GazePoint:
                     )
                 return None
         elif trigger.may_redirect(t_s):
-            end = self.keep_min_distance(
-                add(point, scale(velocity, trajectory.ends_s - t_s)), p_head
-            )
+            end = add(point, scale(velocity, trajectory.ends_s - t_s))
+            end = keep_min_distance(end, p_head, NEAREST_M)
             self._trajectory = RedirectedTrajectory(trajectory, self._saccade, end, p_head, t_s)
         trajectory = self._trajectory
         assert trajectory is not None
         self.point_m = trajectory.point_at(p_head, t_s)
-        if trajectory.has_landed(t_s):
+        if t_s >= trajectory.ends_s - 1e-9:
             self._trajectory = None
             trigger.record_landing(t_s, self._correction_delay_s())
             self.fixations += 1
         return shift_rad
 
-    def _start_saccade(self, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float) -> float:
+    def _start_saccade(self, point: Vec3, p_head: Vec3, t_s: float) -> float:
         """Start a saccade; return its amplitude in radians."""
         error = angle_between(sub(self.point_m, p_head), sub(point, p_head))
-        after_s = t_s + self._saccade.duration_s(error)
+        after_s = t_s + self._saccade.profile.duration_s(error)
         moved, until = self._prediction.displacement(t_s), self._prediction.displacement(after_s)
-        end = add(point, sub(until, moved))
-        end = self.keep_min_distance(end, p_head)
-        if self._params.has_errors and not self._exact:
-            end = endpoint(end, self.point_m, p_head, self._params, self._rng)
+        end = keep_min_distance(add(point, sub(until, moved)), p_head, NEAREST_M)
+        if self._people and not self._exact:
+            end = endpoint(end, self.point_m, p_head, self._rng)
         self._trajectory = SaccadeTrajectory(self._saccade, self.point_m, end, p_head, t_s)
         self.saccades += 1
         return error
 
     def _correction_delay_s(self) -> float:
         """Draw the delay of a correction of this landing's error."""
-        par, spread = self._params, 0.0
-        if self._rng is not None and par.has_scatter and par.correct_spread_ms > 0.0:
-            spread = par.correct_spread_ms * float(self._rng.uniform(-1.0, 1.0))
-        return (par.correct_after_ms + spread) / 1e3
-
-    def keep_min_distance(self, point: Vec3, p_head: Vec3) -> Vec3:
-        """Return a point, moved away to ``nearest_m`` if it is nearer."""
-        return keep_min_distance(point, p_head, self._params.nearest_m)
+        spread = float(self._rng.uniform(-1.0, 1.0)) if self._people else 0.0
+        return _CORRECT_S + _CORRECT_SPREAD_S * spread
 
 
 def _offset_point(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
@@ -234,27 +235,31 @@ def _offset_point(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
     return add(eye, scale(direction((yaw + offset[0], pitch + offset[1])), norm(way)))
 
 
+_UNDERSHOOT = 0.08
+"""Share of its amplitude by which a saccade of 10 deg or more falls short; people's is .05-.10."""
 _FULL_DEG, _NONE_DEG = 10.0, 5.0
 """Saccades have the full undershoot from the first amplitude on, and none up to the second."""
+_ALONG, _ACROSS = 0.04, 0.02
+"""Scatter of endpoints along and across the path, standard deviation as a share of the amplitude;
+people's are .03-.05 and .02."""
 
 
-def endpoint(
-    end: Vec3, start: Vec3, eye: Vec3, params: OculomotorParams, rng: np.random.Generator | None
-) -> Vec3:
+def endpoint(end: Vec3, start: Vec3, eye: Vec3, rng: np.random.Generator) -> Vec3:
     """Return the landing point of a saccade from a point to another one, all in the world."""
     a, b = sub(start, eye), sub(end, eye)
     amplitude = angle_between(a, b)
     far = (degrees(amplitude) - _NONE_DEG) / (_FULL_DEG - _NONE_DEG)
-    along, across = -params.undershoot * min(1.0, max(0.0, far)), 0.0
-    if rng is not None and params.has_scatter:
-        further, aside = (float(n) for n in rng.standard_normal(2))
-        along += params.endpoint_scatter_along * further
-        across = params.endpoint_scatter_across * aside
-    way = offset_direction(unit(b), unit(a), along * amplitude, across * amplitude)
+    further, across = (float(n) for n in rng.standard_normal(2))
+    along = -_UNDERSHOOT * min(1.0, max(0.0, far)) + _ALONG * further
+    way = offset_direction(unit(b), unit(a), along * amplitude, _ACROSS * across * amplitude)
     return add(eye, scale(way, norm(b)))
 
 
 _TRIES = 12
+_LEAST_RAD, _MOST_RAD = radians(1.15), radians(1.7)
+"""Sizes of re-fixations; smaller ones are hidden by servo steps and play."""
+_AFTER_S, _SPREAD_S = 0.35, 1.1
+"""Shortest rest of the gaze before a re-fixation, and the random time by which it is extended."""
 
 
 class Refixations:
@@ -263,17 +268,9 @@ class Refixations:
     offset_rad: offset of the present point, to the left and up; (0, 0): the middle itself
     """
 
-    def __init__(self, params: OculomotorParams, rng: np.random.Generator | None) -> None:
+    def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
-        self.retune(params)
         self.reset()
-
-    def retune(self, params: OculomotorParams) -> None:
-        """Change sizes and intervals, from the next rest on."""
-        self._least_rad = radians(params.refixation_least_deg)
-        self._most_rad = radians(params.refixation_deg)
-        self._after_s = params.refixation_after_ms / 1e3
-        self._spread_s = params.refixation_spread_ms / 1e3
 
     def reset(self) -> None:
         """Look at the middle of a new target."""
@@ -290,22 +287,20 @@ class Refixations:
         still: whether the target is at rest; a moving one is only followed
         """
         if t_s < self._due_s:
-            if self._due_s == inf and self._rng is not None and self._most_rad > 0.0:
-                self._due_s = t_s + self._after_s + self._spread_s * float(self._rng.random())
+            if self._due_s == inf:
+                self._due_s = t_s + _AFTER_S + _SPREAD_S * float(self._rng.random())
             return False
         self._due_s = inf
         return still and self._choose()
 
     def _choose(self) -> bool:
         """Draw a point near the middle, one step away from the last."""
-        if self._rng is None:
-            return False
         across, up = self.offset_rad
-        radius = 0.75 * self._most_rad
+        radius = 0.75 * _MOST_RAD
         for _ in range(_TRIES):
             r, angle = radius * sqrt(self._rng.random()), 2.0 * pi * self._rng.random()
             x, y = r * cos(angle), r * sin(angle)
-            if self._least_rad <= hypot(x - across, y - up) <= self._most_rad:
+            if _LEAST_RAD <= hypot(x - across, y - up) <= _MOST_RAD:
                 self.offset_rad = (x, y)
                 return True
         return False

@@ -10,6 +10,13 @@ the head stops short of the target as seen from there and never passes it. The p
 describes eq 7 in this form ("30 deg short of the gaze direction"); with an offset measured from
 straight ahead, a head that comes from 60 deg would turn past a target at 25 deg.
 
+Amplitude of the head: 0.77 of the excess over the eye-only range, 35.8 deg wide (Stahl 1999;
+between people the range varies by 31.9 deg, the slope by 0.16), or eq 7 of Mitake et al., or all of
+it (Nakamoto & Tsuruno 3.5). What follows belongs to the first of these laws alone.
+
+People roll their heads by a few degrees when they turn to a person next to them; the direction of
+the roll and its dependence on interest are choices made here.
+
 Equal shifts differ: slope, onset and duration scatter within bounds. The head stays at the position
 that its law determines. When an eye has been eccentric for a random time of some seconds, the head
 turns slowly to recentre it. It comes closer to a face, as people face each other; looks away from
@@ -20,8 +27,9 @@ by .1 to .2 s. When the motion ends, the last plan brings the head to rest.
 During a look away the eyes rest on a place of the room, and the head goes on with the person.
 """
 
+from dataclasses import dataclass
 from math import degrees, exp, hypot, inf, radians
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -36,21 +44,48 @@ from gazerig.gaze.angles import (
     yaw_pitch,
 )
 from gazerig.gaze.minimum_jerk import Quintic
-from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
 from gazerig.gaze.types import AWAY, ORDERED, SEARCH, Angles2, Angles3, Target, Vec3
+from gazerig.params import Bounds
 
 OWN_LOOKS = ("glance", SEARCH, "rest")
 """Kinds of targets that are not caused by anything visible (gazerig.gaze.attention.idle)."""
 _FACES = ("face", AWAY)
 
-_LATERAL_RAD = radians(30.0)
+_MOST_SALIENCE = 1.0
+"""Salience A2 of the highest interest: the head turns and rolls most."""
+_SLOPE, _SLOPE_SD = 0.77, 0.1
+"""Degrees of head for each degree beyond the eye-only range, people's is .61 to .93, and its
+standard deviation from one shift to the next; between people it is .16."""
+_MARGIN_RAD = radians(2.0)
+"""Distance that the eyes keep from their limit."""
+_ROLL_RAD, _LATERAL_RAD = radians(4.0), radians(30.0)
+"""Roll at the highest interest for a target at least so far aside."""
 _LEAST_ROLL = 0.4
 """Share of the roll at the least interest."""
 
 
+@dataclass(frozen=True)
+class HeadParams:
+    """Share and speed of head movements."""
+
+    # fmt: off
+    goal_model: Annotated[Literal["attention", "align", "stahl"],
+        "share of the head in a gaze shift: as people's beyond the eye-only range, with a roll, a scatter and slow recentring (stahl), "
+        "by salience alone (attention, eq 7), or all of it (align)"] = "stahl"
+    eye_only_range_deg: Annotated[float, Bounds(0, 180),
+        "with goal_model stahl: full width of the range of targets, about the head's direction that the eyes reach alone; "
+        "people: 4 to 68"] = 35.8
+    max_offset_deg: Annotated[float, Bounds(0, 90),
+        "with goal_model attention: angle by which the head stops short of the target at min_salience; with this and align: "
+        "eccentricity beyond which it starts to move"] = 30.0
+    min_salience: Annotated[float, Bounds(0, 0.9), "salience A1 of the least interest: the head turns and rolls least"] = 0.2
+    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 70.0
+    # fmt: on
+
+
 def interest(params: HeadParams, salience: float) -> float:
     """Return 0 at the least interest and 1 at the highest: eq 7's logistic, sign corrected."""
-    z = 2.0 * (salience - params.min_salience) / (params.max_salience - params.min_salience) - 1.0
+    z = 2.0 * (salience - params.min_salience) / (_MOST_SALIENCE - params.min_salience) - 1.0
     return 1.0 - 1.0 / (1.0 + exp(min(700.0, 7.0 * z)))
 
 
@@ -63,18 +98,18 @@ class HeadShare:
 
     def __init__(self, params: HeadParams, eye_limit_rad: float) -> None:
         self._params = params
-        printed = radians(params.max_offset_deg)
-        self._margin_rad = radians(params.eye_margin_deg)
-        self._reachable_rad = reachable = max(0.0, eye_limit_rad - self._margin_rad)
         self._half_range_rad = radians(params.eye_only_range_deg) / 2.0
+        printed = radians(params.max_offset_deg)
+        self._margin_rad = _MARGIN_RAD if params.goal_model == "stahl" else 0.0
+        self._reachable_rad = reachable = max(0.0, eye_limit_rad - self._margin_rad)
         # If the head stopped short by more than the eye can cover, the gaze would never reach the
-        # target; and a trigger beyond the eye's limit never fires.
+        # target; and a trigger beyond the eye's limit never fires. Eq 7 is taken as printed.
         if params.goal_model == "stahl":
-            self.trigger_rad = min(self._half_range_rad, reachable)
-            self.reach_rad = reachable
+            self.trigger_rad, self.reach_rad = min(self._half_range_rad, reachable), reachable
+        elif params.goal_model == "align":
+            self.trigger_rad = self.reach_rad = min(printed, reachable)
         else:
-            self.trigger_rad = printed if params.literal_reach else min(printed, reachable)
-            self.reach_rad = self.trigger_rad
+            self.trigger_rad = self.reach_rad = printed
 
     def for_near_target(self, limit_rad: float) -> "HeadShare":
         """Return the share for a target on which both eyes converge up to an eccentricity."""
@@ -84,9 +119,7 @@ class HeadShare:
 
     def offset_rad(self, salience: float) -> float:
         """Return the angle by which the head stops short of the target (eq 7, sign corrected)."""
-        par = self._params
-        full = radians(par.max_offset_deg) * (1.0 - interest(par, salience))
-        return full if par.literal_reach else min(full, self.reach_rad)
+        return self.trigger_rad * (1.0 - interest(self._params, salience))
 
     def undershoot_rad(self, salience: float, arc_rad: float, steeper: float = 0.0) -> float:
         """Return the angle by which the head stops short of a target.
@@ -96,21 +129,21 @@ class HeadShare:
             arc_rad: angle of the target from the head's direction at the start.
             steeper: deviation of the slope in this shift.
         """
-        par = self._params
-        if par.goal_model == "attention":
+        if self._params.goal_model == "attention":
             return self.offset_rad(salience)
-        if par.goal_model == "align":
-            return (1.0 - par.align) * self.trigger_rad
-        slope = min(1.0, max(0.0, par.head_slope + steeper))
+        if self._params.goal_model == "align":
+            return 0.0
+        slope = min(1.0, max(0.0, _SLOPE + steeper))
         short = arc_rad - slope * max(0.0, arc_rad - self._half_range_rad)
         return min(short, self.reach_rad)
 
     def roll_rad(self, salience: float, yaw_rad: float) -> float:
         """Return the roll for a target at a yaw of ``yaw_rad``."""
-        par = self._params
+        if self._params.goal_model != "stahl":
+            return 0.0
         lateral = min(1.0, max(-1.0, yaw_rad / _LATERAL_RAD))
-        share = _LEAST_ROLL + (1.0 - _LEAST_ROLL) * interest(par, salience)
-        return -radians(par.roll_deg) * share * lateral
+        share = _LEAST_ROLL + (1.0 - _LEAST_ROLL) * interest(self._params, salience)
+        return -_ROLL_RAD * share * lateral
 
 
 _NO_ROLL: Angles2 = (0.0, 0.0)
@@ -122,8 +155,18 @@ _ROUNDING_RAD = 1e-6
 _ROLLS_S = 0.5
 _FIRST_S = 0.0065
 """Mean lead of the head in self-initiated looks: by more than 8 ms in 48 % of them."""
+_LATER_S, _LEAD_SD_S = 0.02, 0.03
+"""Delay of the head after the eyes for bottom-up targets, and standard deviation of both onsets."""
+_DURATION_SD = 0.15
+"""Standard deviation over mean of the duration of equal head movements."""
 _MOST_SD, _MOST_DURATION_SD = 2.0, 1.5
 """Bounds of the scatter, in standard deviations."""
+_SHORTEST_S = 0.3
+"""Shortest duration of a head movement; shorter ones would look like twitches."""
+_REPLAN_RAD = radians(1.0)
+"""A moving head plans its movement again when the goal changes by this much."""
+_PURSUES_RAD_S = radians(3.0)
+"""The head pursues a target whose mean velocity is above this."""
 _PURSUES_S, _FORESEES_S = 0.6, 0.2
 """Duration of a planned movement of pursuit, and how far ahead of now its goal is."""
 _NO_DRIFT: Vec3 = (0.0, 0.0, 0.0)
@@ -133,10 +176,19 @@ _FASTEST = 3.0
 """Factor on the threshold to which speeds are clipped, so that it is not reached within .32 s."""
 _GOES_ON = 0.3
 """Share of the threshold at which a pursuit ends."""
+_COMFORT_RAD = radians(10.0)
+"""Eccentricity up to which an eye is not recentred."""
+_RECENTRE_S, _RECENTRE_SPREAD_S = 3.0, 7.0
+"""Least time after which an eccentric eye is recentred, and the mean of an added random time."""
+_RECENTRE_DEG_S = 12.0
+_AT_ONCE_ABOVE = 0.85
+"""Salience of a rule's target, other than a face, above which the head recentres it at once."""
+_SEARCH_RAD = radians(6.0)
+"""Eccentricity at which the head follows the eyes in the search for a lost person."""
 _RELIEF = (0.4, 0.9)
 """Eccentricity to which the head recentres an eye, as a share of the one that is comfortable."""
 _BEFORE_FACE = 0.5
-"""Comfortable eccentricity of a face, as a share of comfort_deg."""
+"""Comfortable eccentricity of a face, as a share of ``_COMFORT_RAD``."""
 _SHORT_LOOK_S = 6.0
 """Duration of looks elsewhere up to which the time to recentre a face continues.
 
@@ -205,11 +257,8 @@ class HeadModel:
         self._params = params
         self._neck, self._roll = neck_limit_rad, roll_limit_rad
         self.share = self._share = HeadShare(params, eye_limit_rad)
-        self._comfort_rad = radians(params.comfort_deg)
-        self._relief_rad = min(self._comfort_rad / 2.0, self.share.trigger_rad)
-        self._search_rad = radians(params.search_deg)
-        self._pursue_rad_s = radians(params.pursue_above_deg_s)
-        self.foresees_s = _FORESEES_S if params.pursue_above_deg_s > 0.0 else 0.0
+        self._people = params.goal_model == "stahl"
+        self.foresees_s = _FORESEES_S if self._people else 0.0
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
         """Start at rest at the present head angles."""
@@ -263,10 +312,10 @@ class HeadModel:
     def _share_for(self, target: Target, both_eyes_rad: float) -> HeadShare:
         """Return the share for a target on which both eyes converge up to an eccentricity.
 
-        Without a margin only an ordered point takes that room: for others the eyes' limit is the
+        With ``align`` only an ordered point takes that room: for others the eyes' limit is the
         paper's trigger (Nakamoto & Tsuruno 3.5).
         """
-        if target.kind != ORDERED and self._params.eye_margin_deg == 0.0:
+        if target.kind != ORDERED and self._params.goal_model == "align":
             return self.share
         return self.share.for_near_target(both_eyes_rad)
 
@@ -281,8 +330,8 @@ class HeadModel:
         share, start = self._share_for(target, both_eyes_rad), self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
         short_rad = share.undershoot_rad(target.salience, arc_rad)
-        if min(short_rad, arc_rad) > self._comfort_rad:
-            short_rad = self._relief_rad
+        if self._people and min(short_rad, arc_rad) > _COMFORT_RAD:
+            short_rad = min(_COMFORT_RAD / 2.0, self.share.trigger_rad)
         return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start, share)
 
     def draw_lead_s(
@@ -295,14 +344,13 @@ class HeadModel:
         both_eyes_rad: eccentricity up to which both eyes converge on the target
         """
         self._share = self._share_for(target, both_eyes_rad)
-        par = self._params
-        self._lead_s = par.lead_ms / 1e3 if target.top_down else -par.start_delay_ms / 1e3
-        if self._rng is not None and par.lead_spread_ms > 0.0:
-            self._lead_s += par.lead_spread_ms / 1e3 * _draw_bounded(self._rng, _MOST_SD)
+        self._lead_s = 0.0 if target.top_down else -_LATER_S
+        if self._people and self._rng is not None:
+            self._lead_s += _LEAD_SD_S * _draw_bounded(self._rng, _MOST_SD)
             if target.kind in OWN_LOOKS:
                 self._lead_s += _FIRST_S
             else:  # a reaction to something visible, whose time is drawn with it
-                self._lead_s = min(self._lead_s, par.lead_ms / 1e3)
+                self._lead_s = min(self._lead_s, 0.0)
         first = target.top_down and eccentricity_rad >= self._trigger_rad(target)
         return max(0.0, self._lead_s) if first else 0.0
 
@@ -354,7 +402,7 @@ class HeadModel:
         t_s: float,
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest."""
-        par, share, trigger_rad = self._params, self._share, self._trigger_rad(target)
+        share, trigger_rad = self._share, self._trigger_rad(target)
         moving, is_face = t_s < self._ends_s, target.kind in _FACES
         if (target.kind, target.id) != self._target:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
@@ -378,16 +426,16 @@ class HeadModel:
             and angle_between(self._goal_direction, direction(facing)) < trigger_rad
         ):
             self._start = self._goal_direction
-        comfort_rad, aside_rad = self._comfort_rad, eccentricity
+        comfort_rad, aside_rad = _COMFORT_RAD, eccentricity
         if is_face:
             comfort_rad *= _BEFORE_FACE
             aside_rad = angle_between(self._goal_direction, direction(facing))
         if aside_rad <= comfort_rad:
             self._aside_since_s = t_s
-        recentre_ms = par.recentre_after_ms + self._later * par.recentre_spread_ms
+        wait_s = _RECENTRE_S + self._later * _RECENTRE_SPREAD_S
         if self._is_urgent(target):
-            recentre_ms = 0.0
-        if t_s - self._aside_since_s >= recentre_ms / 1e3 and not moving:
+            wait_s = 0.0
+        if self._people and not moving and t_s - self._aside_since_s >= wait_s:
             self._follows, self._relieves = False, True
         elif eccentricity >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
             self._follows, self._relieves = True, False
@@ -398,31 +446,31 @@ class HeadModel:
             self._follow(target, facing, gaze, relief_rad, t_s)
         elif self._follows:
             arc_rad = angle_between(self._start, direction(facing))
-            steeper = self._steeper * par.slope_spread
+            steeper = self._steeper * _SLOPE_SD
             short_rad = share.undershoot_rad(target.salience, arc_rad, steeper)
             if target.kind == SEARCH:
-                short_rad = min(short_rad, self._search_rad)
+                short_rad = min(short_rad, _SEARCH_RAD)
             self._follow(target, facing, gaze, short_rad, t_s)
 
     def _is_urgent(self, target: Target) -> bool:
         """Return whether a rule's target matters so much that the head does not wait."""
         is_rule = target.top_down and target.kind != ORDERED and target.kind not in _FACES
-        return is_rule and target.salience > self._params.recentre_now_above
+        return is_rule and target.salience > _AT_ONCE_ABOVE
 
     def _trigger_rad(self, target: Target) -> float:
         """Return the eccentricity of a target from which the head takes part."""
         if target.kind == SEARCH:
-            return min(self._search_rad, self._share.trigger_rad)
+            return min(_SEARCH_RAD, self._share.trigger_rad)
         return self._share.trigger_rad
 
     def _draw_variation(self) -> None:
         """Draw the deviations of this shift from others, and the time and amount of recentring.
 
-        Deviates in standard deviations; the spreads are the present parameters'.
+        Deviates in standard deviations.
         """
         self._steeper = self._longer = self._later = 0.0
         self._relief = 0.5
-        if (rng := self._rng) is not None:
+        if self._people and (rng := self._rng) is not None:
             self._steeper, self._longer = (
                 _draw_bounded(rng, _MOST_SD),
                 _draw_bounded(rng, _MOST_DURATION_SD),
@@ -437,10 +485,9 @@ class HeadModel:
     ) -> bool:
         """Return whether the target is in sustained motion, which the head pursues."""
         dt_s, self._stepped_s = t_s - self._stepped_s, t_s
-        least = self._pursue_rad_s
-        if least <= 0.0:
+        if not self._people:
             return False
-        v = _NO_DRIFT
+        least, v = _PURSUES_RAD_S, _NO_DRIFT
         if soon is not facing:
             v = scale(sub(direction(soon), direction(facing)), 1.0 / _FORESEES_S)
             v = scale(v, min(1.0, _FASTEST * least / max(norm(v), 1e-9)))
@@ -502,7 +549,7 @@ class HeadModel:
         """Return the goal for the centre; for the point itself if the eyes could not reach it."""
         reach_rad = share.reach_rad
         goal = self.goal_rad(facing, offset_rad, start)
-        if facing != gaze and not self._params.literal_reach:
+        if facing != gaze and self._params.goal_model != "attention":
             rest = angle_between(direction(goal), direction(gaze))
             goal = goal if rest <= reach_rad else self.goal_rad(gaze, reach_rad, start)
         low, high = self._roll
@@ -516,9 +563,9 @@ class HeadModel:
         return direction((yaw + ahead_s * yaw_rate, pitch + ahead_s * pitch_rate))
 
     def _plan_to(self, goal: Angles3, t_s: float) -> None:
-        """Plan a new trajectory when the goal has moved by more than ``replan_deg``."""
+        """Plan a new trajectory when the goal has moved by more than ``_REPLAN_RAD``."""
         change = hypot(goal[0] - self._goal[0], goal[1] - self._goal[1])
-        if change < radians(self._params.replan_deg) and self._level:
+        if change < _REPLAN_RAD and self._level:
             return
         starts = [plan.state_at(t_s - self._planned_s) for plan in self._plans]
         (yaw, yaw_rate, _), (pitch, pitch_rate, _), _ = starts
@@ -545,14 +592,13 @@ class HeadModel:
                 towards the goal would pass it.
             pitch_rate: present vertical speed, rad/s.
         """
-        par = self._params
         way = hypot(yaw, pitch)
         amplitude = degrees(way)
-        peak = (4.0 / 3.0 * amplitude / 50.0 + 0.4) * par.base_speed_deg_s
+        peak = (4.0 / 3.0 * amplitude / 50.0 + 0.4) * self._params.base_speed_deg_s
+        longer = 1.0 + _DURATION_SD * self._longer
         if self._relieves:
-            peak = min(peak, par.recentre_speed_deg_s)
-        longer = 1.0 + (0.0 if self._relieves else par.duration_spread * self._longer)
-        duration = max(longer * 1.875 * amplitude / peak, par.min_move_ms / 1e3)
+            peak, longer = min(peak, _RECENTRE_DEG_S), 1.0
+        duration = max(longer * 1.875 * amplitude / peak, _SHORTEST_S)
         closing = yaw * yaw_rate + pitch * pitch_rate
         if closing > 0.0:
             duration = min(duration, max(_SWINGS * way * way / closing, _BRAKES_S))

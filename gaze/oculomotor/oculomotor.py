@@ -13,6 +13,7 @@ import numpy as np
 from gazerig.gaze.angles import (
     add,
     angle_between,
+    keep_min_distance,
     norm,
     scale,
     sub,
@@ -20,16 +21,14 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.lids.lids import Lids
-from gazerig.gaze.oculomotor.binocular import EyeGeometry
-from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint
+from gazerig.gaze.oculomotor.binocular import NEAREST_M, EyeGeometry
+from gazerig.gaze.oculomotor.drift import Drift
+from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint, OculomotorParams
 from gazerig.gaze.oculomotor.head import HeadModel
-from gazerig.gaze.oculomotor.params import OculomotorParams
-from gazerig.gaze.oculomotor.pursuit import Pursuit
+from gazerig.gaze.oculomotor.pursuit import FASTEST_SWING_RAD_S, Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
 from gazerig.gaze.track.animation import NO_OFFSET, PoseOffset
-from gazerig.gaze.track.breathing import Breathing
-from gazerig.gaze.track.sway import Sway
 from gazerig.gaze.types import (
     ORDERED,
     Angles2,
@@ -86,12 +85,8 @@ class Oculomotor:
         pursuit: the model of pursuit.
         head: the model of head movements.
         lids: the model of lids and blinks.
-        breathing: sways the head; None: no breathing.
-        rng: random generator of endpoints and re-fixations; None: without re-fixations.
-        sway: moves the head at random at rest; None: no sway.
-
-    Raises:
-        ValueError: endpoints scatter and rng is None.
+        rng: random generator of endpoints and re-fixations.
+        drift: moves the head a little at rest; None: no drift.
     """
 
     def __init__(
@@ -103,18 +98,17 @@ class Oculomotor:
         pursuit: Pursuit,
         head: HeadModel,
         lids: Lids,
-        breathing: Breathing | None = None,
-        rng: np.random.Generator | None = None,
-        sway: Sway | None = None,
+        rng: np.random.Generator,
+        drift: Drift | None = None,
     ) -> None:
-        self._prediction = TargetPrediction("none", 0.0, 1.0)
+        self._prediction = TargetPrediction()
         self._gaze = GazePoint(params, saccade, pursuit, self._prediction, rng)
         self.retune(params, eye_limits)
         self._geometry = geometry
         self._pursuit = pursuit
         self._head = head
         self._lids = lids
-        self._breathing, self._sway = breathing, sway
+        self._drift = drift
         self._started = False
         self._base_rad: Angles2 = (0.0, 0.0)
 
@@ -123,29 +117,18 @@ class Oculomotor:
         params: OculomotorParams,
         eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
     ) -> None:
-        """Change thresholds, durations and ranges; a saccade in flight continues to its end.
-
-        Raises:
-            ValueError: endpoints scatter and rng is None.
-        """
+        """Change laws and ranges; a saccade in flight continues to its end."""
         self._gaze.retune(params)
         self._eye_limits, self._lag_s = eye_limits, params.eye_lag_ms / 1e3
         self._yaw_limit_rad = min(abs(end) for yaw, _ in eye_limits for end in yaw)
-        self._prediction.retune(
-            params.target_prediction,
-            params.prediction_horizon_ms / 1e3,
-            params.fade_ms / 1e3,
-            self._lag_s,
-        )
+        self._prediction.retune(params.law == "people", self._lag_s)
 
     def reset(self, t_s: float, state: GazeState) -> None:
         """Start from the present angles of head and eyes."""
         self._head.reset(t_s, state.head_rad)
         self._lids.reset(t_s)
-        if self._breathing is not None:
-            self._breathing.reset(t_s)
-        if self._sway is not None:
-            self._sway.reset(t_s)
+        if self._drift is not None:
+            self._drift.reset(t_s)
         self._prediction.reset()
         self._pursuit.reset()
         self._gaze.reset(t_s, _meeting_point(state))
@@ -190,7 +173,7 @@ class Oculomotor:
         wanted = eyes_on(place.point_m, R_world_head, p_head)
         if (controller := self._pursuit.controller) is not None:
             jumps = jumps or shift_rad is not None
-            view = EyeGeometry(R_world_head, p_head, eyes_on, place.nearest_m, self._clip_eyes)
+            view = EyeGeometry(R_world_head, p_head, eyes_on, self._clip_eyes)
             wanted, place.point_m = controller.fixate(
                 target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )
@@ -210,7 +193,7 @@ class Oculomotor:
             )
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scale(offset.lids)
-        head = self._add_sway(head, offset.head_rad, t_s)
+        head = self._add_drift(head, offset.head_rad, t_s)
         if owned is not None:
             head = self._head.clip_to_range(owned.mix_head(head))
             lids = lids.replace(owned.mix_lids(lids.openings))
@@ -233,12 +216,12 @@ class Oculomotor:
         """Return the final position of head and eyes for a fixed point."""
         facing = self._geometry.neck_angles_to(target.p_world_m, self._base_rad)
         p_head = self._geometry.head_pose((*facing, 0.0), self._base_rad)[1]
-        point = self._gaze.keep_min_distance(target.p_world_m, p_head)
+        point = keep_min_distance(target.p_world_m, p_head, NEAREST_M)
         both_rad = self._both_eyes_rad(norm(sub(point, p_head)))
         head = self._head.destination_rad(target, facing, both_rad)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
         exact = self._geometry.eye_angles_to(target.p_world_m, R_world_head, p_head)
-        point = self._gaze.keep_min_distance(target.p_world_m, p_head)
+        point = keep_min_distance(target.p_world_m, p_head, NEAREST_M)
         left, right = self._clip_eyes(self._geometry.eye_angles_to(point, R_world_head, p_head))
         return ReachableGaze(
             (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
@@ -309,19 +292,13 @@ class Oculomotor:
                 found.append(LimitedAngle(f"head {axis}", facing[i], head[i], _AT_END))
         return tuple(found)
 
-    def _add_sway(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
-        """Return the head's angles with breathing, sway and offset, clipped to the neck's range."""
-        if self._breathing is not None:
-            yaw, pitch, roll = self._breathing.step(t_s)
-            head = head[0] + yaw, head[1] + pitch, head[2] + roll
-        if self._sway is not None:
-            yaw, pitch, roll = self._sway.step(t_s)
-            head = head[0] + yaw, head[1] + pitch, head[2] + roll
-        if self._breathing is None and self._sway is None and offset == NO_OFFSET.head_rad:
+    def _add_drift(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
+        """Return the head's angles with drift and offset, clipped to the neck's range."""
+        if self._drift is not None:
+            head = add(head, self._drift.step(t_s))
+        elif offset == NO_OFFSET.head_rad:
             return head
-        return self._head.clip_to_range(
-            (head[0] + offset[0], head[1] + offset[1], head[2] + offset[2])
-        )
+        return self._head.clip_to_range(add(head, offset))
 
     def _predict_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when a present eye command takes effect."""
@@ -337,10 +314,10 @@ class Oculomotor:
     def _predict_target(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
         """Return the target at its predicted present position."""
         prediction = self._prediction
-        prediction.record_target(target, p_head, self._pursuit.fastest_swing_rad_s)
+        prediction.record_target(target, p_head, FASTEST_SWING_RAD_S)
         moved, velocity = prediction.motion(t_s)
         p, centre = target.p_world_m, target.centre_world_m
-        point = self._gaze.keep_min_distance(add(p, moved), p_head)
+        point = keep_min_distance(add(p, moved), p_head, NEAREST_M)
         middle, toward, moves = (
             prediction.to_middle,
             sub(point, p_head),
@@ -348,13 +325,13 @@ class Oculomotor:
         )
         if middle is not None and prediction.size_m <= _SWING_RAD * norm(toward):
             moves = False
-            head_point = self._gaze.keep_min_distance(
-                add(p if centre is None else centre, middle), p_head
+            head_point = keep_min_distance(
+                add(p if centre is None else centre, middle), p_head, NEAREST_M
             )
         elif centre is None:
             head_point = point
         else:
-            head_point = self._gaze.keep_min_distance(add(centre, moved), p_head)
+            head_point = keep_min_distance(add(centre, moved), p_head, NEAREST_M)
         return point, velocity, head_point, toward, moves
 
 

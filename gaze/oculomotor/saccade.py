@@ -1,11 +1,10 @@
 """Saccade profiles: the angle covered as a function of the time since onset.
 
-Four profiles with one interface. ``human`` has the duration, the peak speed and the early peak of
-human saccades. ``main_sequence`` has one ratio of peak to mean speed instead of a measured peak
-speed. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum jerk with a cap on the speed.
+Three profiles with one interface. ``human`` has the duration, the peak speed and the early peak of
+human saccades. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum jerk with a cap on the speed.
 ``literal_frame`` is the rule of Nakamoto & Tsuruno 3.3, 0.8 of the distance in each frame. All are
 closed forms of the time: a late tick lands on the curve instead of stretching it. Radians and
-seconds inside; parameters in degrees and milliseconds.
+seconds inside; parameters in degrees.
 """
 
 from dataclasses import dataclass
@@ -21,31 +20,30 @@ _HURRY = 0.75
 """Shortest rise divided by that in which the servos reach people's peak speed at their
 acceleration.
 """
+_BASE_S, _PER_DEG_S = 0.025, 0.0025
+"""Duration of people's saccades at amplitude 0, and its increase with amplitude."""
+_PEAK_DEG_S, _PEAK_SCALE_DEG = 530.0, 11.0
+"""V and A0 of their peak speed, V (1 - exp(-A / A0))."""
+_SHORTEST_S = 0.05
+"""T of eqs 2-6."""
+_FRAME_SHARE, _FRAME_S = 0.8, 0.0111
+"""Share of the remaining distance per frame (3.3); the authors' display showed 90 a second."""
+_FRAME_RATE_1_S = -log(1.0 - _FRAME_SHARE) / _FRAME_S
 _LITERAL_REST_RAD = radians(0.05)
 """Remaining distance at which a saccade of the 0.8-per-frame rule counts as landed."""
 
 
 @dataclass(frozen=True)
 class SaccadeParams:
-    """Profile, speed cap L, shortest duration T, and the constants of the other profiles."""
+    """Profile, speed cap L, and what the eye servos follow."""
 
     # fmt: off
-    profile: Annotated[Literal["human", "main_sequence", "min_jerk", "literal_frame"],
-        "velocity profile of a saccade: human duration and peak speed, human duration alone, minimum jerk (eqs 2-6), or a "
+    profile: Annotated[Literal["human", "min_jerk", "literal_frame"],
+        "velocity profile of a saccade: human duration and peak speed, minimum jerk (eqs 2-6), or a "
         "fixed share of the distance per frame"] = "human"
     max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
-    min_duration_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
     max_acceleration_deg_s2: Annotated[float, Bounds(100, 200_000),
-        "highest acceleration that the eye servos follow; human and main_sequence saccades that need more take longer"] = 44000.0
-    human_base_ms: Annotated[float, Bounds(1, 200), "human, main_sequence: duration at amplitude 0"] = 25.0
-    human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "human, main_sequence: increase of the duration with amplitude"] = 2.5
-    human_peak_deg_s: Annotated[float, Bounds(10, 1000), "human: peak speed V of large saccades, V (1 - exp(-A / A0))"] = 530.0
-    human_peak_scale_deg: Annotated[float, Bounds(0.5, 90), "human: amplitude A0 in that peak speed"] = 11.0
-    human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "main_sequence: peak over mean speed, below max_speed_deg_s"] = 1.65
-    device_floor_ms: Annotated[float, Bounds(1, 500),
-        "shortest saccade that the servos can make, with the profiles human and main_sequence"] = 20.0
-    frame_share: Annotated[float, Bounds(0.05, 0.99), "share of the remaining distance per frame of the profile literal_frame"] = 0.8
-    frame_ms: Annotated[float, Bounds(1, 200), "length of such a frame; the authors' display showed 90 a second"] = 11.1
+        "highest acceleration that the eye servos follow; human saccades that need more take longer"] = 44000.0
     # fmt: on
 
 
@@ -54,10 +52,6 @@ class SaccadeProfile(Protocol):
 
     def duration_s(self, amplitude_rad: float) -> float:
         """Return the time from onset to landing."""
-        ...
-
-    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Return the highest speed."""
         ...
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
@@ -77,10 +71,6 @@ class MinJerkProfile:
     def duration_s(self, amplitude_rad: float) -> float:
         """Return the time from onset to landing."""
         return self._T + self._cruise_s(amplitude_rad)
-
-    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Return the highest speed, never above L."""
-        return min(PEAK_SPEED * amplitude_rad / self._T, self._L)
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
         """Return the angle covered ``t_s`` after onset (eqs 5 and 6)."""
@@ -103,8 +93,8 @@ class MinJerkProfile:
 class HumanProfile:
     """Duration, peak speed and skew of human saccades; speed and acceleration capped.
 
-    The duration is human_base_ms + human_per_deg_ms A and the peak speed
-    human_peak_deg_s (1 - exp(-A / human_peak_scale_deg)), as one source measured them.
+    The duration is 25 ms + 2.5 ms A and the peak speed 530 deg/s (1 - exp(-A / 11 deg)), as one
+    source measured them.
 
     The speed rises like the first half of a minimum-jerk movement, stays at its peak for a while,
     and falls like the second half. The rise has .25 of the time of rise and fall up to 10 deg and
@@ -115,18 +105,12 @@ class HumanProfile:
     and .14 of that time.
     """
 
-    def __init__(self, params: SaccadeParams) -> None:
-        self._L = radians(params.max_speed_deg_s)
-        self._most_rad_s2 = radians(params.max_acceleration_deg_s2)
-        self._params = params
+    def __init__(self, max_speed_rad_s: float, most_rad_s2: float) -> None:
+        self._L, self._most_rad_s2 = max_speed_rad_s, most_rad_s2
 
     def duration_s(self, amplitude_rad: float) -> float:
         """Return the time from onset to landing, no shorter than the servos allow."""
         return self._shape(amplitude_rad)[0]
-
-    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Return the highest speed, never above L."""
-        return self._shape(amplitude_rad)[1]
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
         """Return the angle covered ``t_s`` after onset."""
@@ -144,16 +128,16 @@ class HumanProfile:
 
     def _shape(self, amplitude_rad: float) -> tuple[float, float, float, float]:
         """Return duration, peak speed, time of the rise, and of rise and fall together."""
-        par, A, most = self._params, amplitude_rad, self._most_rad_s2
-        D = (par.human_base_ms + par.human_per_deg_ms * degrees(A)) / 1e3
-        D = max(D, par.device_floor_ms / 1e3)
+        A, most = amplitude_rad, self._most_rad_s2
+        D = _BASE_S + _PER_DEG_S * degrees(A)
         if A <= 0.0:
             return D, 0.0, 0.5 * D, D
-        share = self._rise_share(A, self._peak_rad_s(A, D), D)
+        peak = radians(_PEAK_DEG_S) * (1.0 - exp(-degrees(A) / _PEAK_SCALE_DEG))
+        share = self._rise_share(A, peak, D)
         # A = V (flanks / 1.875 + cruise), flanks + cruise = D. Without a cruise, the speed at the
         # highest acceleration:
         reached = sqrt(PEAK_SPEED * A * most * share / _FLANK_PEAK_ACCELERATION)
-        V = min(self._peak_rad_s(A, D), self._L, reached)
+        V = min(peak, self._L, reached)
         # Limited speed or acceleration needs more time than people's saccades.
         shortest = _FLANK_PEAK_ACCELERATION * V / (most * share)
         D = max(D, A / V + shortest * (1.0 - 1.0 / PEAK_SPEED))
@@ -170,20 +154,6 @@ class HumanProfile:
         needed = _FLANK_PEAK_ACCELERATION * peak_rad_s * peak_rad_s / (self._most_rad_s2 * flanks)
         return min(0.38 - 0.24 * over, max(0.25 - 0.14 * over, _HURRY * needed))
 
-    def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:
-        """Return the peak speed of people at an amplitude."""
-        par = self._params
-        share = 1.0 - exp(-degrees(amplitude_rad) / par.human_peak_scale_deg)
-        return radians(par.human_peak_deg_s) * share
-
-
-class MainSequenceProfile(HumanProfile):
-    """Saccades like the human ones, with one ratio of peak to mean speed for all amplitudes."""
-
-    def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:
-        """Return the peak speed for an amplitude and a duration."""
-        return self._params.human_peak_over_mean * amplitude_rad / duration_s
-
 
 def _flank(peak_rad_s: float, length_s: float, t_s: float) -> float:
     """Return the angle covered ``t_s`` into half a minimum-jerk movement of that peak speed."""
@@ -197,18 +167,10 @@ class LiteralFrameProfile:
     The covered share is 1 - 0.2^(t / frame), which is the rule at whole frames. It has no cap.
     """
 
-    def __init__(self, share: float, frame_s: float) -> None:
-        self._rate_1_s = -log(1.0 - share) / frame_s
-        self._frame_s = frame_s
-
     def duration_s(self, amplitude_rad: float) -> float:
         """Return the time until 0.05 deg remain, one frame at least."""
         ratio = max(1.0, amplitude_rad / _LITERAL_REST_RAD)
-        return max(self._frame_s, log(ratio) / self._rate_1_s)
-
-    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Return the highest speed, which is the first."""
-        return amplitude_rad * self._rate_1_s
+        return max(_FRAME_S, log(ratio) / _FRAME_RATE_1_S)
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
         """Return the angle covered ``t_s`` after onset."""
@@ -216,11 +178,11 @@ class LiteralFrameProfile:
             return 0.0
         if t_s >= self.duration_s(amplitude_rad):
             return amplitude_rad
-        return amplitude_rad * (1.0 - exp(-self._rate_1_s * t_s))
+        return amplitude_rad * (1.0 - exp(-_FRAME_RATE_1_S * t_s))
 
 
 class SaccadeModel:
-    """Displacement of the eye along the great circle as a function of time.
+    """The present profile; a saccade in flight keeps its own to its end.
 
     max_speed_rad_s, max_acceleration_rad_s2: limits of a saccade that is bent in flight
     """
@@ -229,35 +191,13 @@ class SaccadeModel:
         self.retune(params)
 
     def retune(self, params: SaccadeParams) -> None:
-        """Change the profile or its constants, from the next saccade on."""
-        self._profile = _profile(params)
+        """Change the profile or its limits, from the next saccade on."""
         self.max_speed_rad_s = radians(params.max_speed_deg_s)
         self.max_acceleration_rad_s2 = radians(params.max_acceleration_deg_s2)
-
-    @property
-    def profile(self) -> SaccadeProfile:
-        """Return the present profile; a saccade in flight keeps its own to its end."""
-        return self._profile
-
-    def duration_s(self, amplitude_rad: float) -> float:
-        """Return the time from onset to landing."""
-        return self._profile.duration_s(amplitude_rad)
-
-    def peak_speed_rad_s(self, amplitude_rad: float) -> float:
-        """Return the highest speed."""
-        return self._profile.peak_speed_rad_s(amplitude_rad)
-
-    def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
-        """Return the angle covered ``t_s`` after onset."""
-        return self._profile.displacement_rad(amplitude_rad, t_s)
-
-
-def _profile(params: SaccadeParams) -> SaccadeProfile:
-    """Return the profile that the parameters name."""
-    if params.profile == "human":
-        return HumanProfile(params)
-    if params.profile == "main_sequence":
-        return MainSequenceProfile(params)
-    if params.profile == "literal_frame":
-        return LiteralFrameProfile(params.frame_share, params.frame_ms / 1e3)
-    return MinJerkProfile(radians(params.max_speed_deg_s), params.min_duration_ms / 1e3)
+        self.profile: SaccadeProfile
+        if params.profile == "human":
+            self.profile = HumanProfile(self.max_speed_rad_s, self.max_acceleration_rad_s2)
+        elif params.profile == "min_jerk":
+            self.profile = MinJerkProfile(self.max_speed_rad_s, _SHORTEST_S)
+        else:
+            self.profile = LiteralFrameProfile()

@@ -59,10 +59,6 @@ class SaccadeTrajectory:
         way = add(way, scale(sub(scale(b, near_b), self._end_way), share))
         return add(eye, scale(unit(way), 1.0 / ((1.0 - share) * near_a + share * near_b)))
 
-    def has_landed(self, t_s: float) -> bool:
-        """Return whether it is over."""
-        return t_s >= self.ends_s - 1e-9
-
 
 class RedirectedTrajectory:
     """A saccade whose target has jumped: a second one is added to the remainder of the first.
@@ -130,10 +126,6 @@ class RedirectedTrajectory:
         if norm(pole) > 1e-9:
             way = rotate_about_axis(way, unit(pole), share * angle_between(first, then))
         return add(eye, scale(unit(way), 1.0 / max(near, _FARTHEST_1_M)))
-
-    def has_landed(self, t_s: float) -> bool:
-        """Return whether it is over."""
-        return t_s >= self.ends_s - 1e-9
 
 
 Trajectory = SaccadeTrajectory | RedirectedTrajectory

@@ -1,20 +1,29 @@
 """Saccade trigger: choice between a saccade and smooth pursuit to close an error.
 
-A new object or part of it (the target's event flag) triggers a saccade after the latency. Without
-that, an error beyond ``saccade_deg`` does, unless the eye is about to cross the target anyway: with
-the error PE and the retinal slip RV the crossing is T = -PE / RV away, and between 40 and 180 ms
-smooth pursuit closes it (de Brouwer et al. 2002). If landings scatter, another saccade some 150 ms
-later corrects an error beyond ``correct_deg``; an exact landing has an error only if the target was
-misjudged, and pursuit closes that. No error triggers a saccade within the refractory time after the
-last, and no event within ``min_interval_ms`` after its landing. A new target early in a saccade
-redirects it; a later one is delayed by that interval.
+A new object or part of it (the target's event flag) triggers a saccade at once. Without that, an
+error beyond 2 deg does, unless the eye is about to cross the target anyway: with the error PE and
+the retinal slip RV the crossing is T = -PE / RV away, and between 40 and 180 ms smooth pursuit
+closes it (de Brouwer et al. 2002). If landings scatter, another saccade some 150 ms later corrects
+an error beyond 1.2 deg; an exact landing has an error only if the target was misjudged, and pursuit
+closes that. No error triggers a saccade within the refractory time after the last, and no event
+within ``_INTERVAL_S`` after its landing. A new target early in a saccade redirects it; a later one
+is delayed by that interval. The papers' saccades have none of these: they go on to their ends, and
+the next may follow at once.
 """
 
 from math import inf, radians
 
 from gazerig.gaze.angles import dot, norm
-from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Slip
+
+_SMALLEST_RAD = radians(0.3)
+"""A new target closer to the gaze than this gets no saccade."""
+_SACCADE_RAD = radians(2.0)
+_CORRECT_RAD = radians(1.2)
+_INTERVAL_S = 0.1
+_REDIRECT_S = 0.07
+"""A new target bends the saccade in flight if it appears at least this long before its end."""
+_CROSSING_S = (0.04, 0.18)
 
 
 class SaccadeTrigger:
@@ -22,28 +31,20 @@ class SaccadeTrigger:
 
     shift: the target's count of gaze shifts recorded last, None before the first
     onset_s: start of the last saccade, or planned start of the next
+
+    Args:
+        people: whether saccades are people's, which miss their targets, or the papers'.
     """
 
-    def __init__(self, params: OculomotorParams, errs: bool) -> None:
-        self.retune(params, errs)
+    def __init__(self, people: bool) -> None:
+        self.retune(people)
         self.reset(0.0)
 
-    def retune(self, params: OculomotorParams, errs: bool) -> None:
-        """Change thresholds and times; a pending event stays pending.
-
-        errs: whether saccades miss their targets
-        """
-        self._errs = errs
-        self._smallest_rad = radians(params.smallest_shift_deg)
-        self._saccade_rad = radians(params.saccade_deg)
-        self._correct_rad = radians(params.correct_deg)
-        self._latency_s = params.latency_ms / 1e3
-        self._refractory_s = params.refractory_ms / 1e3
-        self._interval_s, self._redirect_s = (
-            params.min_interval_ms / 1e3,
-            params.redirect_before_ms / 1e3,
-        )
-        self._smooth_s = (params.crossing_least_ms / 1e3, params.crossing_most_ms / 1e3)
+    def retune(self, people: bool) -> None:
+        """Change the law; a pending event stays pending."""
+        self._people = people
+        self._interval_s = _INTERVAL_S if people else 0.0
+        self._redirect_s = _REDIRECT_S if people else inf
 
     def reset(self, t_s: float) -> None:
         """Start with no event and no refractory time."""
@@ -57,7 +58,7 @@ class SaccadeTrigger:
     def record_shift(self, shift: int, wait_s: float, lands_s: float | None, t_s: float) -> None:
         """Record the target's count of gaze shifts.
 
-        wait_s: wait of the eyes beyond the latency, because the head goes first
+        wait_s: wait of the eyes, because the head goes first
         lands_s: landing time of the saccade in flight, None without one
         """
         if shift == self.shift:
@@ -65,9 +66,8 @@ class SaccadeTrigger:
         self.shift = shift
         self._erred = False
         if self._due_s is None:
-            # The latency counts from the first pending event; a later one changes the saccade's
-            # goal.
-            due_s, after_s = t_s + self._latency_s + wait_s, self._landed_s
+            # A later event only changes the saccade's goal.
+            due_s, after_s = t_s + wait_s, self._landed_s
             if lands_s is not None:
                 after_s = -inf if due_s <= lands_s - self._redirect_s else lands_s
             self._due_s = self.onset_s = max(due_s, after_s + self._interval_s)
@@ -89,35 +89,38 @@ class SaccadeTrigger:
         if self._due_s is None:
             self._due_s = t_s
 
-    def record_landing(self, t_s: float, correct_after_s: float = 0.0) -> None:
+    def record_landing(self, t_s: float, correct_after_s: float) -> None:
         """Record the end of a saccade, and the delay of a correction of its error."""
-        self._landed_s, self._correct_s = t_s, max(correct_after_s, self._interval_s)
-        self._erred = None if self._errs else False
+        self._landed_s, self._correct_s = t_s, correct_after_s
+        self._erred = None if self._people else False
 
     def is_error_small(self, error_rad: float) -> bool:
         """Return whether no event is pending and no error requires one: ``is_due`` is False."""
-        return self._due_s is None and self._erred is False and error_rad <= self._saccade_rad
+        return self._due_s is None and self._erred is False and error_rad <= _SACCADE_RAD
 
-    def is_due(self, slip: Slip, t_s: float) -> bool:
-        """Return whether a saccade starts now; called only between saccades."""
+    def is_due(self, slip: Slip, t_s: float, refractory_s: float) -> bool:
+        """Return whether a saccade starts now; called only between saccades.
+
+        refractory_s: shortest time after a saccade before an error alone triggers the next
+        """
         error = norm(slip.error_rad)
         if self._erred is None:
-            self._erred = error > self._correct_rad
+            self._erred = error > _CORRECT_RAD
         if self._due_s is not None:
             if t_s < self._due_s - 1e-9:
                 return False
             self._due_s = None
-            if error > self._smallest_rad:
+            if error > _SMALLEST_RAD:
                 return self._go(t_s)
         rested_s = t_s - self._landed_s
         if self._erred:
-            if error <= self._correct_rad:
+            if error <= _CORRECT_RAD:
                 self._erred = False
             elif rested_s >= self._correct_s - 1e-9:
                 return self._go(t_s)
-        if error <= self._saccade_rad or rested_s < self._refractory_s:
+        if error <= _SACCADE_RAD or rested_s < refractory_s:
             return False
-        return self._go(t_s) if not self._crosses(slip, error) else False
+        return not (self._people and _crosses(slip, error)) and self._go(t_s)
 
     @property
     def is_saccade_due(self) -> bool:
@@ -134,8 +137,9 @@ class SaccadeTrigger:
         self._erred = False
         return True
 
-    def _crosses(self, slip: Slip, error_rad: float) -> bool:
-        """Return whether the target meets the line of sight soon by its own motion."""
-        closing = -dot(slip.error_rad, slip.slip_rad_s) / error_rad
-        least, most = self._smooth_s
-        return closing > 0.0 and least < error_rad / closing < most
+
+def _crosses(slip: Slip, error_rad: float) -> bool:
+    """Return whether the target meets the line of sight soon by its own motion."""
+    closing = -dot(slip.error_rad, slip.slip_rad_s) / error_rad
+    least, most = _CROSSING_S
+    return closing > 0.0 and least < error_rad / closing < most

@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.angles import add, norm, scale, sub
-from gazerig.gaze.oculomotor.params import PredictionModel
 from gazerig.gaze.types import Floats, Target, Vec3
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
+_HORIZON_S, _FADE_S = 0.12, 0.3
+"""Longest time over which motion is extrapolated, and time constant of its decay after that."""
 _SLOPE_FRAMES = 4
 """Frames over which a change of velocity is measured."""
 _BENDS_S = 0.12
@@ -79,30 +80,22 @@ class Sine(NamedTuple):
 
 
 class TargetPrediction:
-    """Prediction of the present target.
-
-    Args:
-        model: "none" uses the target's state in its frame, "velocity" extrapolates its velocity,
-            "periodic" also extrapolates the change of velocity and recognises swings.
-        horizon_s: longest time over which motion is extrapolated.
-        fade_s: time constant with which the motion decays after that.
-        lag_s: delay of the eyes, by which a swing is anticipated: its future is known.
+    """Prediction of the present target: from its velocity, its change, and its swing.
 
     sine: the recognised swing, None without one
     """
 
-    def __init__(
-        self, model: PredictionModel, horizon_s: float, fade_s: float, lag_s: float = 0.0
-    ) -> None:
-        self.retune(model, horizon_s, fade_s, lag_s)
+    def __init__(self) -> None:
+        self.retune(True, 0.0)
         self.reset()
 
-    def retune(
-        self, model: PredictionModel, horizon_s: float, fade_s: float, lag_s: float = 0.0
-    ) -> None:
-        """Use other parameters; the past frames are kept."""
-        self._model, self._horizon_s, self._fade_s = model, horizon_s, fade_s
-        self._lag_s = lag_s
+    def retune(self, predicts: bool, lag_s: float) -> None:
+        """Use other parameters; the past frames are kept.
+
+        predicts: False: a target is where it was in its frame
+        lag_s: delay of the eyes, by which a swing is anticipated: its future is known
+        """
+        self._predicts, self._lag_s = predicts, lag_s
 
     def reset(self) -> None:
         """Forget the past frames."""
@@ -145,7 +138,7 @@ class TargetPrediction:
         self._share = 1.0
         self._fastest_m_s = fastest_rad_s * norm(sub(p, eye))
         self._most_m_s = norm(v)
-        if self._model != "periodic" or target.id < 0:
+        if not self._predicts or target.id < 0:
             self._bend, self.sine = _STILL, None
             return
         past = self._past
@@ -171,14 +164,14 @@ class TargetPrediction:
 
     def motion(self, t_s: float) -> tuple[Vec3, Vec3]:
         """Return the displacement of the target since its frame, and its velocity."""
-        if self._model == "none":
+        if not self._predicts:
             return _STILL, self._v
-        age_s, known_s = max(0.0, t_s - self._at_s), self._horizon_s
-        if age_s <= known_s:
+        age_s = max(0.0, t_s - self._at_s)
+        if age_s <= _HORIZON_S:
             return self._displacement_at(age_s), self._speed(age_s)
-        left, speed = exp(-(age_s - known_s) / self._fade_s), self._speed(known_s)
-        beyond = scale(speed, self._fade_s * (1.0 - left))
-        return add(self._displacement_at(known_s), beyond), scale(speed, left)
+        left, speed = exp(-(age_s - _HORIZON_S) / _FADE_S), self._speed(_HORIZON_S)
+        beyond = scale(speed, _FADE_S * (1.0 - left))
+        return add(self._displacement_at(_HORIZON_S), beyond), scale(speed, left)
 
     @property
     def to_middle(self) -> Vec3 | None:

@@ -13,18 +13,17 @@ are one look.
 """
 
 from dataclasses import dataclass
-from math import inf, radians
-from typing import Annotated, Literal, NamedTuple
+from math import inf
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gazerig.gaze.angles import add, angle_between, sub
-from gazerig.gaze.scanpath.dwell import LAWS, Draw, rests_s, shift_dwell, stationary, visits_s
+from gazerig.gaze.scanpath.dwell import Draw, lognormal_dwell, rest_dwell
 from gazerig.gaze.scanpath.models import (
     FaceTracking,
     MarkovWalk,
-    Observer,
     RandomAngles,
     ScanpathModel,
     ScanpathStep,
@@ -33,9 +32,10 @@ from gazerig.gaze.scanpath.models import (
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
 from gazerig.params import Bounds, Choices
 
-_OTHER_SIDE = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
 # A measured and rounded row may differ from a sum of 1 by this much.
 _ROUNDING = 0.005
+_SHORTEST_S = 0.14
+"""Shortest rest on a part, from landing to departure; longer ones are distributed above it."""
 
 
 @dataclass(frozen=True)
@@ -89,45 +89,13 @@ class ScanpathParams:
     model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
         "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
     transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "people"
-    start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
-        "first face part, named as in the matrix; nearest: eye or nose nearest to the gaze; as_walk: that of the matrix file"] = "nearest"
-    viewers_left: Annotated[bool,
-        "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
-    diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
-        "meaning of the matrix's diagonal, the same part again: another dwell (refixation), included in the dwell of the visit "
-        "(whole_visit), or another dwell that forms one rest with the last, with the spread rest_spread (one_rest)"] = "whole_visit"
-    dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
-    min_dwell_ms: Annotated[float, Bounds(0, 2000),
-        "shortest dwell, from landing to departure; longer ones are distributed above it, with the same mean"] = 140.0
-    rest_spread: Annotated[float, Bounds(0.05, 3),
-        "with diagonal one_rest: standard deviation divided by mean of a rest's time beyond min_dwell_ms"] = 0.6
-    shift_ms: Annotated[float, Bounds(0, 500),
-        "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 44.0
+    law: Annotated[Literal["people", "literal"],
+        "people: an observer who enters a face at the nearest eye or the nose, has a preferred spot, looks at the mouth that speaks, rests "
+        "for .14 s or more, and takes parts of a far face as one; literal: the walk as printed"] = "people"
     spot_height_mm: Annotated[float, Bounds(-100, 100),
         "height of the observer's preferred spot on a face above that of most people, which is just below the eyes"] = 0.0
-    spot_left_mm: Annotated[float, Bounds(-80, 80), "distance of that spot from it towards the face's left"] = 0.0
-    spot_width_mm: Annotated[float, Bounds(0, 1000),
-        "standard deviation of the looks about that spot; smaller: the spot has more effect; 0: none"] = 60.0
-    speech_mouth_ratio: Annotated[float, Bounds(0.1, 20), "factor on the looks at the mouth of a person who speaks"] = 6.0
-    least_shift_deg: Annotated[float, Bounds(0, 10),
-        "smallest angle between two parts of a face for which the gaze shifts; the fovea covers less; 0: any"] = 1.5
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
-    simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "order of the parts in the simple model"] = ("N", "RE", "LE")
-    simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000), "dwell on each part of simple_order"] = (459.42, 408.21, 408.21)
-    random_angle_deg: Annotated[float, Bounds(0, 60), "largest yaw and pitch of the random model about the direction to the face"] = 20.0
-    random_longest_ms: Annotated[float, Bounds(10, 60000), "longest interval between jumps of the random model"] = 3000.0
     # fmt: on
-
-    def __post_init__(self) -> None:
-        """Check the simple model's cycle.
-
-        Raises:
-            ValueError: it is empty, or its parts and times differ in number.
-        """
-        if not self.simple_order or len(self.simple_order) != len(self.simple_dwell_ms):
-            raise ValueError(
-                "simple_order and simple_dwell_ms must contain the same number of items, at least one"
-            )
 
 
 def normalise(matrix: ArrayLike) -> Floats:
@@ -145,25 +113,6 @@ def merge_refixations(matrix: ArrayLike) -> Floats:
     rows = np.asarray(matrix, dtype=float)
     away = rows * (1.0 - np.eye(len(rows)))
     return normalise(np.where(away.sum(axis=1, keepdims=True) > 0.0, away, rows))
-
-
-class _Replacement(NamedTuple):
-    """A replaced target, and the values from which it was made."""
-
-    target: Target
-    face: Face | None
-    point: Vec3 | None
-    shift: int
-    result: Target
-
-    def of(self, target: Target, face: Face | None, point: Vec3 | None, shift: int) -> bool:
-        """Return whether these values would give the same target."""
-        return (
-            point is self.point
-            and face is self.face
-            and shift == self.shift
-            and target == self.target
-        )
 
 
 def _replace_target(
@@ -190,24 +139,20 @@ class Scanpath:
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
         self.looks = _model(params, walk, rng)
-        self._last: _Replacement | None = None
         self.reset(0.0)
 
     def retune(self, params: ScanpathParams, walk: Walk) -> None:
-        """Change the model, walk or rate; the present part and its dwell continue.
-
-        A model without that part begins with its own first look.
-        """
+        """Change the model, walk or rate; a walk continues, another model begins anew."""
         before, self.looks = self.looks, _model(params, walk, self._rng)
-        self._last = None
-        if not self.looks.continue_walk(before):
+        if isinstance(before, MarkovWalk) and isinstance(self.looks, MarkovWalk):
+            self.looks.continue_walk(before)
+        else:
             self._shift += 1
 
     def reset(self, t_s: float) -> None:
         """Forget the face; the next one is entered again."""
         self._face: Face | None = None
         self._searched: Percept | None = None
-        self._last = None
         self._shift = 0
         self._rests_until_s = -inf
         self.looks.enter()
@@ -238,13 +183,7 @@ class Scanpath:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
             self._shift += look.has_moved
         self._rests_until_s = self._until_s(look, settled)
-        point = look.p_world_m if look is not None else None
-        last = self._last
-        if last is not None and last.of(target, face, point, self._shift):
-            return last.result
-        result = _replace_target(target, face, look, self._shift)
-        self._last = _Replacement(target, face, point, self._shift, result)
-        return result
+        return _replace_target(target, face, look, self._shift)
 
     @property
     def rests_until_s(self) -> float:
@@ -258,9 +197,8 @@ class Scanpath:
     def _until_s(self, look: ScanpathStep | None, settled: bool) -> float:
         if look is None:
             return -inf
-        _, until_s = self.looks.dwell
-        if until_s is not None:
-            return until_s
+        if self.looks.until_s is not None:
+            return self.looks.until_s
         return -inf if settled and not look.has_moved else inf
 
     def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
@@ -304,57 +242,32 @@ def _model(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> Scan
     """Return the model that the parameters name."""
     match params.model:
         case "simple":
-            dwells_s = [ms / 1e3 / params.rate_scale for ms in params.simple_dwell_ms]
-            return SimpleCycle(_part_owners(params, params.simple_order), dwells_s)
+            return SimpleCycle(params.rate_scale)
         case "face_tracking":
             return FaceTracking()
         case "random":
-            longest_s = params.random_longest_ms / 1e3 / params.rate_scale
-            return RandomAngles(params.random_angle_deg, longest_s, rng)
+            return RandomAngles(params.rate_scale, rng)
     return markov_walk(params, walk, rng)
 
 
 def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> MarkovWalk:
-    """Return the walk with the chosen reading of its diagonal, sides and start."""
+    """Return the walk of an observer, or as printed."""
     matrix, dwells = steps_and_dwells(params, walk)
-    start = walk.start if params.start in ("nearest", "as_walk") else params.start
-    return MarkovWalk(
-        _part_owners(params, walk.order), matrix, dwells, walk.order.index(start), rng,
-        params.start == "nearest", observer_of(params),
-    )  # fmt: skip
-
-
-def observer_of(params: ScanpathParams) -> Observer:
-    """Return the properties of one observer, which change the average walk."""
-    return Observer(
-        (params.spot_left_mm / 1e3, params.spot_height_mm / 1e3),
-        params.spot_width_mm / 1e3,
-        params.speech_mouth_ratio,
-        radians(params.least_shift_deg),
-    )
+    spot_m = params.spot_height_mm / 1e3 if params.law == "people" else None
+    start = walk.order.index(walk.start)
+    return MarkovWalk(walk.order, matrix, dwells, start, rng, spot_m)
 
 
 def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[Draw]]:
     """Return the matrix of the steps that are drawn and the dwell law of each part.
 
-    Parts are in the walk's order; the matrix is normalised, rows from.
+    Parts are in the walk's order; the matrix is normalised, rows from. The diagonal, the same part
+    again, is another dwell (Nakamoto & Tsuruno 3.2.1); people's dwell is that of the whole visit.
     """
-    steps = normalise(walk.matrix)
-    if params.diagonal != "refixation":
-        steps = merge_refixations(walk.matrix)
-    law, floor_s = params.dwell_distribution, params.min_dwell_ms / 1e3
-    mean_s = np.array(walk.dwell_mean_s) / params.rate_scale
-    sd_s = np.array(walk.dwell_sd_s) / params.rate_scale
-    if params.diagonal == "one_rest":
-        visit_s = visits_s(normalise(walk.matrix), mean_s)
-        mean_s = rests_s(stationary(steps), visit_s, params.shift_ms / 1e3, floor_s)
-        sd_s = params.rest_spread * (mean_s - floor_s)
-    pairs = zip(mean_s.tolist(), sd_s.tolist(), strict=True)
-    return steps, [shift_dwell(law, mean, sd, floor_s) for mean, sd in pairs]
-
-
-def _part_owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
-    """Name the parts by the owner's left and right."""
-    if not params.viewers_left:
-        return parts
-    return tuple(_OTHER_SIDE.get(part, part) for part in parts)
+    mean_s = (np.array(walk.dwell_mean_s) / params.rate_scale).tolist()
+    sd_s = (np.array(walk.dwell_sd_s) / params.rate_scale).tolist()
+    pairs = zip(mean_s, sd_s, strict=True)
+    if params.law == "literal":
+        return normalise(walk.matrix), [lognormal_dwell(mean, sd) for mean, sd in pairs]
+    rests = [rest_dwell(mean, sd, _SHORTEST_S) for mean, sd in pairs]
+    return merge_refixations(walk.matrix), rests

@@ -24,6 +24,10 @@ MAX_DURATION_S = 4 * 3600.0
 """Longest track."""
 MAX_TRACKS = 8
 """Largest number of tracks that play at once."""
+LIMIT_SHARE = 0.8
+"""Share of the joints' speed and acceleration limits that a track may use; the rest is for gaze."""
+BLEND_OUT_S = 0.25
+"""Shortest time in which a track that is interrupted returns to rest."""
 HEAD_CHANNELS = ("head_yaw", "head_pitch", "head_roll")
 EYE_CHANNELS = ("eyes_yaw", "eyes_pitch")
 LID_CHANNELS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
@@ -141,7 +145,7 @@ class Track:
     loop: Annotated[bool, "repeat the track until it is ended"] = False
     blend_in_s: Annotated[float, Bounds(0.05, 10), "shortest time in which the track takes over the joints that it owns"] = 0.4
     blend_out_s: Annotated[float | None, Bounds(0.05, 10),
-        "shortest time in which it returns them to gaze, or ends early; null: gaze.tracks.blend_out_ms"] = None
+        "shortest time in which it returns them to gaze, or ends early; null: 0.25"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -174,18 +178,6 @@ class Track:
             if frame.express:
                 found["expression"] = None
         return tuple(found)
-
-
-@dataclass(frozen=True)
-class TrackParams:
-    """Interaction of tracks with other motion of the joints."""
-
-    # fmt: off
-    limit_share: Annotated[float, Bounds(0.1, 1),
-        "share of the joints' speed and acceleration limits that a track may use; the rest is left to gaze"] = 0.8
-    blend_out_ms: Annotated[float, Bounds(100, 5000),
-        "shortest time in which a track that is interrupted returns to rest"] = 250.0
-    # fmt: on
 
 
 class ChannelKeys(NamedTuple):

@@ -230,7 +230,7 @@ class _Generators(NamedTuple):
     endpoint: np.random.Generator
     reaction: np.random.Generator
     head: np.random.Generator
-    sway: np.random.Generator
+    drift: np.random.Generator
     stays: np.random.Generator
     turns: np.random.Generator
 
@@ -248,7 +248,7 @@ def _build_components(
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
     tracker = Tracker(rig.tracker)
-    moves = motion_models(rig, random.head, random.sway)
+    moves = motion_models(rig, random.head, random.drift)
     gaze, bottom_up = rig.gaze, BottomUp(rig.gaze.bottom_up)
     top_down, idle = TopDown(gaze.top_down), Idle(gaze.idle, random.idle)
     attention = Attention(gaze.attention, bottom_up, top_down, idle, random.reaction, random.stays)
@@ -286,14 +286,12 @@ def _build_components(
         saccade=moves.saccade,
         pursuit=moves.pursuit,
         head=moves.head,
-        breathing=moves.breathing,
-        sway=moves.sway,
+        drift=moves.drift,
         lids=lids,
         animation=animation,
         tracks=TrackChoices(
             tracks_of(rig.track_files),
             animation.tracks,
-            rig.gaze.tracks,
             rig.names,
             lid_spans(rig),
             animation_tables(rig),

@@ -8,12 +8,11 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, create, find, is_ours, load
 from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.drift import Drift
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
-from gazerig.gaze.track.breathing import Breathing
-from gazerig.gaze.track.sway import Sway
 from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
 from gazerig.robot.control.chooser import RuleChooser, TargetChooser
 from gazerig.robot.model.kinematics import Kinematics
@@ -21,12 +20,12 @@ from gazerig.robot.model.kinematics import Kinematics
 
 def kinematics_and_oculomotor(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
     """Return a rig's geometry and its oculomotor model, for gaze without a camera."""
-    lid_rng, landing_rng, head_rng, sway_rng = (
+    lid_rng, landing_rng, head_rng, drift_rng = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
     )
     kinematics = rig_kinematics(rig)
     lids = Lids(rig.gaze.lids, lid_rng)
-    moves = motion_models(rig, head_rng, sway_rng)
+    moves = motion_models(rig, head_rng, drift_rng)
     return kinematics, oculomotor(rig, kinematics, moves, lids, landing_rng)
 
 
@@ -41,12 +40,11 @@ class MotionModels(NamedTuple):
     saccade: SaccadeModel
     pursuit: Pursuit
     head: HeadModel
-    breathing: Breathing
-    sway: Sway
+    drift: Drift
 
 
 def motion_models(
-    rig: Rig, head_rng: np.random.Generator, sway_rng: np.random.Generator
+    rig: Rig, head_rng: np.random.Generator, drift_rng: np.random.Generator
 ) -> MotionModels:
     """Return the models of eye and head movements."""
     gaze = rig.gaze
@@ -54,8 +52,7 @@ def motion_models(
         SaccadeModel(gaze.saccade),
         Pursuit(gaze.pursuit),
         HeadModel(gaze.head, *head_limits(rig), head_rng),
-        Breathing(gaze.breathing),
-        Sway(gaze.sway, sway_rng),
+        Drift(gaze.drift, drift_rng),
     )
 
 
@@ -75,9 +72,8 @@ def oculomotor(
         moves.pursuit,
         moves.head,
         lids,
-        moves.breathing,
         landing_rng,
-        moves.sway,
+        moves.drift,
     )
 
 

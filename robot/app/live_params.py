@@ -20,14 +20,13 @@ from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.drift import Drift
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk
 from gazerig.gaze.track.animation import Animation
-from gazerig.gaze.track.breathing import Breathing
-from gazerig.gaze.track.sway import Sway
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
     animation_tables,
@@ -73,8 +72,7 @@ class Components(NamedTuple):
     saccade: SaccadeModel
     pursuit: Pursuit
     head: HeadModel
-    breathing: Breathing
-    sway: Sway
+    drift: Drift
     lids: Lids
     animation: Animation
     tracks: TrackChoices
@@ -100,8 +98,7 @@ class _PreparedChange(NamedTuple):
 
 
 _ALIKE = (
-    "bottom_up", "top_down", "attention", "idle", "saccade", "pursuit",
-    "breathing", "sway", "lids",
+    "bottom_up", "top_down", "attention", "idle", "saccade", "pursuit", "drift", "lids",
 )  # fmt: skip
 """Sections of the gaze parameters whose part of the same name needs no other parameters."""
 
@@ -185,7 +182,7 @@ class LiveParams:
         tables = animation_tables(new)
         if tables != animation_tables(before):
             parts.animation.retune(tables)
-        parts.tracks.retune(now.tracks, lid_spans(new), tables, now.oculomotor.eye_lag_ms / 1e3)
+        parts.tracks.retune(lid_spans(new), tables, now.oculomotor.eye_lag_ms / 1e3)
         self._walk = walk
         said = self._apply_to_machine(before, new)
         return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)

@@ -163,14 +163,14 @@ def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
     """Return a track on a rig."""
     bounds = limits(rig.joints)
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
-    fit, share = TrackFit(rig.names, lid_spans(rig)), rig.gaze.tracks.limit_share
+    fit = TrackFit(rig.names, lid_spans(rig))
     try:
         made = track_motions(track, rig.names, 0, animation_tables(rig))
     except TrackRefused as refused:
         return RigTrack(None, str(refused), ())
-    excesses = fit.key_excesses(made, middle, bounds, share) if track.frames else ()
+    excesses = fit.key_excesses(made, middle, bounds) if track.frames else ()
     try:
-        return RigTrack(fit.fit("", made, 1.0, middle, bounds, share), "", excesses)
+        return RigTrack(fit.fit("", made, 1.0, middle, bounds), "", excesses)
     except TrackRefused as refused:
         return RigTrack(None, str(refused), excesses)
 
@@ -267,8 +267,7 @@ def _channel_value(rig: Rig, joint: str, angle: float, first: float, owned: bool
 def _move_s(rig: Rig, joint: str, size_deg: float) -> float:
     """Return the shortest time in which tracks may move a joint of the rig so far."""
     known = [name for name in rig.names if channel_of_joint(name) == channel_of_joint(joint)]
-    limit, share = rig.joints[known[0]].limit(), rig.gaze.tracks.limit_share
-    return float(shortest_move_s(radians(abs(size_deg)), limit, share))
+    return float(shortest_move_s(radians(abs(size_deg)), rig.joints[known[0]].limit()))
 
 
 def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:

@@ -24,7 +24,7 @@ from gazerig.drivers.sound.playback import SoundEvent
 from gazerig.drivers.sound.player import SoundError, SoundPlayer, check_format
 from gazerig.drivers.sound.sound_file import check_sound, read_samples, write_wav
 from gazerig.drivers.sound.speech import speak
-from gazerig.gaze.mouth.loudness import band_pressures, loud_pressure, openings
+from gazerig.gaze.mouth.loudness import MOUTH_SIZE, band_pressures, loud_pressure, openings
 from gazerig.gaze.mouth.mouth_keys import (
     JawLimits,
     MouthKey,
@@ -32,8 +32,9 @@ from gazerig.gaze.mouth.mouth_keys import (
     mouth_keys,
     phoneme_closures,
 )
-from gazerig.gaze.mouth.speech_track import SPEECH
+from gazerig.gaze.mouth.speech_track import SPEECH, SWAY_DEG
 from gazerig.gaze.mouth.stream_mouth import StreamMouth
+from gazerig.gaze.track.track import LIMIT_SHARE
 from gazerig.gaze.types import Floats
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
@@ -169,24 +170,22 @@ class RunVoice:
 
     def _speak(self, path: str, duration_s: float, keys: tuple[MouthKey, ...] = ()) -> Speak:
         rig = self._rig()
-        params = rig.gaze.mouth
-        level = params.level if params.level in rig.levels else ""
-        return Speak(path, duration_s, level, keys, params.sway_deg)
+        level = rig.gaze.mouth.level if rig.gaze.mouth.level in rig.levels else ""
+        return Speak(path, duration_s, level, keys, SWAY_DEG)
 
     def _mouth(
         self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]]
     ) -> tuple[MouthKey, ...]:
         """Return the keys of the mouth, () if the rig has none."""
         rig = self._rig()
-        params = rig.gaze.mouth
-        level = rig.levels.get(params.level)
+        level = rig.levels.get(rig.gaze.mouth.level)
         if level is None:
             return ()
         pressures = band_pressures(samples, rate_hz)
-        opening = params.size * openings(pressures, loud_pressure(pressures), params.quiet_db)
+        opening = MOUTH_SIZE * openings(pressures, loud_pressure(pressures))
         end_s = len(samples) / rate_hz
         closures = phoneme_closures(spoken, end_s) if spoken else estimated_closures(opening)
-        span_deg = abs(level.high_deg - level.low_deg) / rig.gaze.tracks.limit_share
+        span_deg = abs(level.high_deg - level.low_deg) / LIMIT_SHARE
         joint = rig.joints[level.joint]
         limits = JawLimits(joint.max_speed_deg_s / span_deg, joint.max_accel_deg_s2 / span_deg)
         return mouth_keys(opening, closures, limits)
@@ -321,7 +320,7 @@ class RunVoice:
         now_s = self._clock.now_s()
         self._played = None  # the stream replaces it; to stop it later would stop the stream
         player.open_stream(rate_hz, channels, now_s + STREAM_DELAY_S, volume * rig.sound.volume)
-        mouth = StreamMouth(rate_hz, rig.gaze.mouth.quiet_db)
+        mouth = StreamMouth(rate_hz)
         level = rig.levels.get(rig.gaze.mouth.level)
         lead_s = self._latencies_s()[rig.names.index(level.joint)] if level else 0.0
         self._stream = _Stream(mouth, rate_hz, channels, reply.track.number, lead_s)
@@ -471,7 +470,7 @@ class RunVoice:
         opening = 0.0
         if heard_s is not None:
             ahead_s = stream_ahead_s(rig, stream.lead_s) - self._latency_s
-            opening = rig.gaze.mouth.size * stream.mouth.opening_at(heard_s + ahead_s)
+            opening = MOUTH_SIZE * stream.mouth.opening_at(heard_s + ahead_s)
         self._try(SetLevel(rig.gaze.mouth.level, opening))
 
     def _end_stream(self, tick: Tick | None) -> None:

@@ -27,8 +27,6 @@ _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""
 
 LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
-    "awake": lambda lids, t_s: lids.set_sleepiness(0.0),
-    "sleepy": lambda lids, t_s: lids.set_sleepiness(0.7),
     "wink left": lambda lids, t_s: lids.wink("left", t_s),
     "wink right": lambda lids, t_s: lids.wink("right", t_s),
 }
@@ -78,7 +76,7 @@ class Menus:
         self._set_blinks()
 
     def _set_blinks(self) -> None:
-        self._lids.set_mode("conversation" if self._gaze.converses else "rest")
+        self._lids.set_conversation(self._gaze.converses)
 
 
 def refuse_impossible(

@@ -9,7 +9,7 @@ from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.mouth.mouth_keys import MouthKey
 from gazerig.gaze.mouth.speech_track import SPEECH, SPEECH_SWAY, speech_track, sway_track
 from gazerig.gaze.track.animation import NO_TABLES, AnimationTables
-from gazerig.gaze.track.track import KEEP, MAX_TRACKS, Track, TrackParams
+from gazerig.gaze.track.track import BLEND_OUT_S, KEEP, MAX_TRACKS, Track
 from gazerig.gaze.track.track_player import TrackPlayer, Voice
 from gazerig.gaze.types import ORDERED, Percept, Target, Vec3
 from gazerig.robot.control.joint_latency import JointLatency
@@ -70,7 +70,6 @@ class TrackChoices:
     Args:
         tracks: All known tracks by name.
         player: Plays them.
-        params: Share of the joints' limits that they may use.
         joints: Joints of the rig, in the order of all sequences of joints.
         lid_spans_rad: Range of each lid from shut to open, by joint.
         tables: Expressions and levels of the rig.
@@ -83,7 +82,6 @@ class TrackChoices:
         self,
         tracks: Mapping[str, Track],
         player: TrackPlayer,
-        params: TrackParams,
         joints: tuple[str, ...],
         lid_spans_rad: Mapping[str, float],
         tables: AnimationTables = NO_TABLES,
@@ -103,21 +101,17 @@ class TrackChoices:
         self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
         self._speeches: dict[Speak, dict[str, TrackMotions]] = {}
-        self.retune(params, lid_spans_rad, tables, latency_s)
+        self.retune(lid_spans_rad, tables, latency_s)
         for name in tracks:
             self._motions(name, 0)
 
     def retune(
-        self,
-        params: TrackParams,
-        lid_spans_rad: Mapping[str, float],
-        tables: AnimationTables,
-        latency_s: float,
+        self, lid_spans_rad: Mapping[str, float], tables: AnimationTables, latency_s: float
     ) -> None:
         """Change the parameters of the next track."""
         if tables != self._tables:
             self._tables, self._cache, self._speeches = tables, {}, {}
-        self._params, self._latency_s = params, latency_s
+        self._latency_s = latency_s
         self._fit = TrackFit(self._joints, lid_spans_rad)
 
     @property
@@ -295,8 +289,8 @@ class TrackChoices:
         replaced = self._player.overlapping(made.motion)
         if len(self._player.voices) - len(replaced) >= MAX_TRACKS:
             return CommandReply(f"{MAX_TRACKS} tracks are playing: end one of them first")
-        share, state = self._params.limit_share, self._player.state(t_s, replaced)
-        fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
+        state = self._player.state(t_s, replaced)
+        fade_s = self._fit.fade_s(state, limits, BLEND_OUT_S)
         base = self._fit.subtract_offset(commanded_rad, self._player.state(t_s))
         beside = [voice for voice in self._player.voices if voice not in replaced]
         limits = self._remaining(limits, beside)
@@ -304,7 +298,7 @@ class TrackChoices:
             fitted = self._fit_track(command, base, limits)
         except TrackRefused as refused:
             return CommandReply(f"{command.track}: {refused}")
-        wait_s = self._fit.wait_s(state, fade_s, fitted.track, limits, share)
+        wait_s = self._fit.wait_s(state, fade_s, fitted.track, limits)
         self._number += 1
         track, loop = self._tracks[command.track], command.loop or made.track.loop
         for voice in replaced:
@@ -334,7 +328,7 @@ class TrackChoices:
     ) -> Sequence[JointLimit]:
         """Return the limits less the motion of other tracks, which may share a joint: an eye."""
         played = [voice.played for voice in others]
-        return self._fit.remaining_limits(limits, self._params.limit_share, played)
+        return self._fit.remaining_limits(limits, played)
 
     def ends_show(self, command: Play) -> bool:
         """Return whether a track would replace one that owns joints."""
@@ -373,10 +367,7 @@ class TrackChoices:
                 if voice in ended or voice.played.name == SPEECH_SWAY
             ]
         least_s = max([voice.played.blend_s[1] for voice in ended], default=0.0)
-        fade_s = self._fit.fade_s(
-            self._player.state(t_s, ended), limits, self._params.limit_share,
-            least_s or self._params.blend_out_ms / 1e3,
-        )  # fmt: skip
+        fade_s = self._fit.fade_s(self._player.state(t_s, ended), limits, least_s or BLEND_OUT_S)
         for voice in ended:
             self._end_state(voice.number, f"{who or 'a user'} has ended it", t_s)
         self._player.end(ended, t_s, fade_s)
@@ -434,7 +425,7 @@ class TrackChoices:
         limits: Sequence[JointLimit],
     ) -> FittedTrack:
         name, made = command.track, self._require_motions(command.track, command.times)
-        out_s = made.track.blend_out_s or self._params.blend_out_ms / 1e3
+        out_s = made.track.blend_out_s or BLEND_OUT_S
         lead_s = 0.0
         if command.lead_s and made.motion.channels:
             # Faster joints begin later than the slowest one.
@@ -443,7 +434,7 @@ class TrackChoices:
             delays = [max(0.0, lead_s - one) for one in leads]
             made = made._replace(motion=made.motion.delay(delays))
         return self._fit.fit(
-            name, made, command.speed, base_rad, limits, self._params.limit_share,
+            name, made, command.speed, base_rad, limits,
             (made.track.blend_in_s, out_s), lead_s, command.sound_s,
         )  # fmt: skip
 

@@ -15,6 +15,7 @@ from gazerig.gaze.track.track import (
     HEAD_CHANNELS,
     KEEP,
     LID_CHANNELS,
+    LIMIT_SHARE,
     POSE_CHANNELS,
     ChannelKeys,
     KeyFrame,
@@ -296,7 +297,6 @@ class TrackFit:
         speed: float,
         base_rad: Floats,
         limits: Sequence[JointLimit],
-        share: float,
         blend_s: tuple[float, float] = (0.4, 0.25),
         lead_s: float = 0.0,
         sound_s: float = 0.0,
@@ -309,7 +309,6 @@ class TrackFit:
             speed: Factor on its defined speed.
             base_rad: Joint angles to which it is added.
             limits: Limits of the joints.
-            share: Share of speed and acceleration limits for tracks; the rest is for gaze.
             blend_s: Shortest times in which it takes over its joints, and returns them.
             lead_s: Time by which its motion is early.
             sound_s: Duration of its sound.
@@ -324,7 +323,7 @@ class TrackFit:
             base_rad[[self.joints.index(name) for name in made.owns]] = 0.0
 
         def refusal(otherwise: str) -> TrackRefused:
-            keys = self.key_excesses(made, base_rad, limits, share, speed)
+            keys = self.key_excesses(made, base_rad, limits, speed)
             return TrackRefused(*[one.text() for one in keys] or [otherwise])
 
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
@@ -334,10 +333,10 @@ class TrackFit:
             joint = min(smaller, key=lambda one: one[1])[0]
             raise TrackRefused(f"{joint} is at the end of its range")
         samples = motion.samples.scale(sizes, speed)
-        factor, joint, text = self._too_fast(samples, limits, share, matrix)
+        factor, joint, text = self._too_fast(samples, limits, matrix)
         if factor > 1.0 + _ROUNDING and not slow:
             raise refusal(text)
-        stretch = _stretch(matrix, limits, share)
+        stretch = _stretch(matrix, limits)
         played = PlayedTrack(
             name,
             motion,
@@ -368,7 +367,7 @@ class TrackFit:
         return sizes, tuple(smaller.items())
 
     def key_excesses(
-        self, made: TrackMotions, base_rad: Floats, limits: Sequence[JointLimit], share: float,
+        self, made: TrackMotions, base_rad: Floats, limits: Sequence[JointLimit],
         rate: float = 1.0,
     ) -> tuple[KeyExcess, ...]:  # fmt: skip
         """Return every key that the rig cannot reach or follow, in the order of times.
@@ -377,14 +376,13 @@ class TrackFit:
             made: The track's curves on this rig.
             base_rad: Joint angles to which it is added.
             limits: Limits of the joints.
-            share: Share of speed and acceleration limits for tracks.
             rate: Factor on its defined speed.
         """
         motion, matrix = made.motion, self._matrix_of(made.motion)
         owned = [name in made.owns for name in self.joints]
         base = np.where(owned, 0.0, base_rad)
         low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
-        most = _track_limits(limits, share)
+        most = _track_limits(limits)
         reach_of = self._own  # without eyes that compensate for the head as far as they can
         if made.track.space == "joint":
             reach_of = matrix * (self._own != 0.0).any(axis=1, keepdims=True)
@@ -429,18 +427,17 @@ class TrackFit:
         return tuple(sorted(found))
 
     def remaining_limits(
-        self, limits: Sequence[JointLimit], share: float, others: Iterable[PlayedTrack]
+        self, limits: Sequence[JointLimit], others: Iterable[PlayedTrack]
     ) -> list[JointLimit]:
         """Return the limits less the fastest motion of tracks that move other channels of a joint.
 
-        Their positions may change at any time, so their largest values count. A part is always
-        left; the guard limits the rest.
+        Their largest values count. A part is always left; the guard limits the rest.
         """
         left = list(limits)
         for played in others:
             samples = played.motion.samples.scale(np.array(played.sizes), played.speed)
             matrix = self._matrix_of(played.motion)
-            used = [np.abs(column @ matrix).max(axis=0) / share for column in samples[2:]]
+            used = [np.abs(column @ matrix).max(axis=0) / LIMIT_SHARE for column in samples[2:]]
             for j, limit in enumerate(limits):
                 left[j] = left[j]._replace(
                     speed_rad_s=max(left[j].speed_rad_s - used[0][j], _LEFT * limit.speed_rad_s),
@@ -469,11 +466,11 @@ class TrackFit:
         )
 
     def _too_fast(
-        self, samples: MotionSamples, limits: Sequence[JointLimit], share: float, matrix: Floats
+        self, samples: MotionSamples, limits: Sequence[JointLimit], matrix: Floats
     ) -> tuple[float, str, str]:
         """Return the time factor that keeps all limits, its joint and a text with the reason."""
         found = (1.0, "", "")
-        speeds, accelerations = _track_limits(limits, share)
+        speeds, accelerations = _track_limits(limits)
         for column, power, most, unit in (
             (samples.speed, 1.0, speeds, "deg/s"),
             (samples.acceleration, 0.5, accelerations, "deg/s2"),
@@ -485,15 +482,13 @@ class TrackFit:
                 asked = degrees(ratio[row, j] * most[j])
                 found = factor, self.joints[j], (
                     f"{self.joints[j]} at {samples.times_s[row]:.2f} s: needs {asked:.0f} {unit}, but "
-                    f"tracks may use {degrees(most[j]):.0f} ({share:g} of the joint's limit)"
+                    f"tracks may use {degrees(most[j]):.0f} ({LIMIT_SHARE:g} of the joint's limit)"
                 )  # fmt: skip
         return found
 
-    def fade_s(
-        self, state: OffsetState, limits: Sequence[JointLimit], share: float, least_s: float
-    ) -> float:
+    def fade_s(self, state: OffsetState, limits: Sequence[JointLimit], least_s: float) -> float:
         """Return the time in which a moving offset can return to rest within limits."""
-        most = self._transition_limits(state, limits, share)
+        most = self._transition_limits(state, limits)
         for factor in _LONGER:
             if self._keeps_limits(_fade_samples(state, factor * least_s), most):
                 return factor * least_s
@@ -505,13 +500,12 @@ class TrackFit:
         fade_s: float,
         played: PlayedTrack,
         limits: Sequence[JointLimit],
-        share: float,
     ) -> float:
         """Return the time for which a track must wait for the present one to fade."""
         if not any(map(np.any, state)):
             return 0.0
         fade = _fade_samples(state, fade_s)
-        most = self._transition_limits(state, limits, share)
+        most = self._transition_limits(state, limits)
         for wait in _WAITS:
             since = np.maximum(0.0, fade.times_s - wait * fade_s) * played.speed
             also = played.motion.sample_at(since).scale(np.array(played.sizes), played.speed)
@@ -522,14 +516,12 @@ class TrackFit:
                 return wait * fade_s
         return fade_s
 
-    def _transition_limits(
-        self, state: OffsetState, limits: Sequence[JointLimit], share: float
-    ) -> list[Floats]:
+    def _transition_limits(self, state: OffsetState, limits: Sequence[JointLimit]) -> list[Floats]:
         """Return the joints' speeds and accelerations that a transition from a state may have."""
         begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
         return [
             np.maximum(most, np.abs(now)) + _ROUNDING
-            for most, now in zip(_track_limits(limits, share), begins, strict=True)
+            for most, now in zip(_track_limits(limits), begins, strict=True)
         ]
 
     def _keeps_limits(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
@@ -540,19 +532,17 @@ class TrackFit:
         )
 
 
-def _track_limits(limits: Sequence[JointLimit], share: float) -> tuple[Floats, Floats]:
+def _track_limits(limits: Sequence[JointLimit]) -> tuple[Floats, Floats]:
     """Return the speeds and accelerations of the joints that tracks may use."""
     return (
-        share * np.array([limit.speed_rad_s for limit in limits]),
-        share * np.array([limit.accel_rad_s2 for limit in limits]),
+        LIMIT_SHARE * np.array([limit.speed_rad_s for limit in limits]),
+        LIMIT_SHARE * np.array([limit.accel_rad_s2 for limit in limits]),
     )
 
 
-def _stretch(
-    matrix: Floats, limits: Sequence[JointLimit], share: float
-) -> Callable[[Floats, Floats], float]:
+def _stretch(matrix: Floats, limits: Sequence[JointLimit]) -> Callable[[Floats, Floats], float]:
     """Return the function ``PlayedTrack.stretch`` for limits."""
-    speeds, accelerations = _track_limits(limits, share)
+    speeds, accelerations = _track_limits(limits)
 
     def stretch(speed: Floats, acceleration: Floats) -> float:
         fastest = float((np.abs(speed @ matrix) / speeds).max())
@@ -579,10 +569,10 @@ def _fade_samples(state: OffsetState, time_s: float) -> MotionSamples:
     )
 
 
-def shortest_move_s(size_rad: Floats | float, limit: JointLimit, share: float) -> Floats:
-    """Return the times of moves with least jerk that use a share of a joint's limits."""
-    by_speed = PEAK_SPEED * np.asarray(size_rad) / (share * limit.speed_rad_s)
+def shortest_move_s(size_rad: Floats | float, limit: JointLimit) -> Floats:
+    """Return the times of moves with least jerk that use a track's share of a joint's limits."""
+    by_speed = PEAK_SPEED * np.asarray(size_rad) / (LIMIT_SHARE * limit.speed_rad_s)
     by_acceleration = np.sqrt(
-        PEAK_ACCELERATION * np.asarray(size_rad) / (share * limit.accel_rad_s2)
+        PEAK_ACCELERATION * np.asarray(size_rad) / (LIMIT_SHARE * limit.accel_rad_s2)
     )
     return np.maximum(by_speed, by_acceleration)

@@ -10,14 +10,9 @@ from numpy.typing import NDArray
 from gazerig.features.lab.analysis import human_norms as human
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
-from gazerig.gaze.scanpath.dwell import Draw, dwell_distribution
-from gazerig.gaze.scanpath.scanpath import (
-    ScanpathParams,
-    Walk,
-    normalise,
-    observer_of,
-    steps_and_dwells,
-)
+from gazerig.gaze.scanpath.dwell import Draw, lognormal_dwell
+from gazerig.gaze.scanpath.models import spot_factor
+from gazerig.gaze.scanpath.scanpath import ScanpathParams, Walk, normalise, steps_and_dwells
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
@@ -249,7 +244,7 @@ def published_walk() -> ReferenceWalk:
     """Return the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
     table = zip(human.DWELL_MEAN_S, human.DWELL_SD_S, strict=True)
     return ReferenceWalk(
-        human.transition_matrix(), [dwell_distribution("lognormal", mean, sd) for mean, sd in table]
+        human.transition_matrix(), [lognormal_dwell(mean, sd) for mean, sd in table]
     )
 
 
@@ -258,11 +253,9 @@ def rig_walk(params: ScanpathParams, walk: Walk) -> ReferenceWalk | None:
     if params.model != "markov":
         return None
     steps, dwells = steps_and_dwells(params, walk)
-    order = [walk.order.index(_OTHER.get(p, p) if params.viewers_left else p) for p in PARTS]
-    observer = observer_of(params)
-    spot = [observer.spot_factor(*PARTS_FACE_M[part][1:]) for part in PARTS]
-    steps = normalise(steps[np.ix_(order, order)] * np.array(spot))
+    order = [walk.order.index(part) for part in PARTS]
+    steps = steps[np.ix_(order, order)]
+    if params.law == "people":
+        spot_m = params.spot_height_mm / 1e3
+        steps = normalise(steps * [spot_factor(spot_m, PARTS_FACE_M[part][2]) for part in PARTS])
     return ReferenceWalk(steps, [dwells[i] for i in order])
-
-
-_OTHER = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}

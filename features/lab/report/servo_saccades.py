@@ -87,7 +87,7 @@ def _times(rig: Rig, joint: str, amplitude_deg: float) -> SaccadeTimes:
     began = clock.now_s() + _HOLD_S
     while clock.now_s() < began + _LONGEST_S:
         since = clock.now_s() - began
-        moved = model.displacement_rad(size, since) if since > 0.0 else 0.0
+        moved = model.profile.displacement_rad(size, since) if since > 0.0 else 0.0
         run.bus.write([round(linkage.steps(start + moved))])
         run.bus.read(clock.now_s())
         until = clock.now_s() + period_s
@@ -96,7 +96,9 @@ def _times(rig: Rig, joint: str, amplitude_deg: float) -> SaccadeTimes:
             if clock.now_s() > began:
                 at = (run.true_steps or dict)()[joint]
                 servo.append(degrees(start + size - linkage.angle_rad(at)))
-                planned.append(degrees(size - model.displacement_rad(size, clock.now_s() - began)))
+                planned.append(
+                    degrees(size - model.profile.displacement_rad(size, clock.now_s() - began))
+                )
     run.bus.close()
     return SaccadeTimes(amplitude_deg, _settled_ms(planned) or 0, _settled_ms(servo))
 

@@ -129,13 +129,7 @@ def exact_gaze(rig: Rig) -> Rig:
 
     Refixations deviate by up to 1.1 deg, which is as much as ``AIMED_DEG``.
     """
-    exact = replace(
-        rig.gaze.oculomotor,
-        refixation_deg=0.0,
-        undershoot=0.0,
-        endpoint_scatter_along=0.0,
-        endpoint_scatter_across=0.0,
-    )
+    exact = replace(rig.gaze.oculomotor, law="exact")
     return replace(rig, gaze=replace(rig.gaze, oculomotor=exact))
 
 

@@ -1,0 +1,104 @@
+"""Drift of a head that is held still: breathing, and small random sway.
+
+People judge heads that breathe slowly while idle as more alive. A breath is a slow swing of the
+head's pitch; people at rest breathe at 0.2 to 0.3 Hz.
+
+A head at rest wanders by some tenths of a degree, more the slower: its power falls with frequency.
+Each axis is a sum of octaves, as in Perlin's noise for figures (Perlin 1995): an octave moves by
+minimum jerk from one random value to the next, in about its period. Octaves of equal size have the
+spectrum 1/f between the fastest and the slowest. Values are bounded, position, speed and
+acceleration are continuous, and the draws do not depend on the rate of the ticks.
+
+The drift is added to the head model's angles, and the eyes compensate it, so the gaze stays on its
+target. The goal of a neck servo moves by about a tenth of an encoder step (.088 deg) in a tick of
+5 ms.
+"""
+
+from math import pi, radians, sin, sqrt
+from typing import Literal
+
+import numpy as np
+
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend, min_jerk
+from gazerig.gaze.types import Angles3
+
+DriftLaw = Literal["people", "none"]
+
+_STILL: Angles3 = (0.0, 0.0, 0.0)
+_GLIDE_S = 1.0
+"""Time in which the drift begins or ends during a run."""
+_BREATH_RAD, _BREATH_HZ = radians(0.6), 0.25
+"""Amplitude of the head's pitch, people's is 0.5 to 1.5 deg; and breaths per second."""
+_SWAY_RAD = radians(0.6), radians(0.4), radians(0.6)
+"""Standard deviations of yaw, pitch and roll; people's are .2 to 1.5 deg."""
+_PERIODS_S = 1.5, 3.0, 6.0, 12.0, 24.0
+"""Mean times of the octaves' movements; shorter ones make servos audible."""
+_VARIANCE = 0.264
+"""Mean variance of an octave of size 1: uniform values -1..1, joined by minimum jerk."""
+_SIZES_RAD = tuple(sd * (1.0 / sqrt(_VARIANCE * len(_PERIODS_S))) for sd in _SWAY_RAD)
+
+
+class Drift:
+    """Breathing and random sway of yaw, pitch and roll.
+
+    Args:
+        law: "people", or "none".
+        rng: random generator of the sway's values and times.
+    """
+
+    def __init__(self, law: DriftLaw, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._law = law
+        self._share = MinimumJerkBlend((float(law == "people"),), _GLIDE_S)
+        self.reset(0.0)
+
+    def reset(self, t_s: float) -> None:
+        """Start at the centre; the depth of a breath grows from 0 within the first one."""
+        self._start_s = t_s
+        self._share.reset((float(self._law == "people"),))
+        self._axes = [[_Octave(period_s, t_s) for period_s in _PERIODS_S] for _ in _STILL]
+
+    def retune(self, law: DriftLaw) -> None:
+        """Begin or end gradually."""
+        self._law = law
+        self._share.move_to((float(law == "people"),))
+
+    def step(self, t_s: float) -> Angles3:
+        """Return the (yaw, pitch, roll) to add to the head's."""
+        (share,) = self._share.step(t_s)
+        if share == 0.0:
+            return _STILL
+        breaths = max(0.0, (t_s - self._start_s) * _BREATH_HZ)
+        breath_rad = min_jerk(breaths) * _BREATH_RAD * sin(2.0 * pi * breaths)
+        yaw, pitch, roll = self._wander(t_s)
+        return (share * yaw, share * (breath_rad + pitch), share * roll)
+
+    def _wander(self, t_s: float) -> list[float]:
+        """Return the sum of all octaves; in one loop, as it is computed in every tick."""
+        angles = []
+        for size, octaves in zip(_SIZES_RAD, self._axes, strict=True):
+            total = 0.0
+            for octave in octaves:
+                if t_s >= octave.end_s:
+                    octave.move_on(t_s, self._rng)
+                s = (t_s - octave.begin_s) / (octave.end_s - octave.begin_s)
+                share = s * s * s * (10.0 + s * (6.0 * s - 15.0))  # eq 2, as in min_jerk
+                total += octave.start + share * (octave.goal - octave.start)
+            angles.append(size * total)
+        return angles
+
+
+class _Octave:
+    """Movements between random values -1..1, each within half to one and a half of a period."""
+
+    def __init__(self, period_s: float, t_s: float) -> None:
+        self._period_s = period_s
+        self.start = self.goal = 0.0
+        self.begin_s = self.end_s = t_s
+
+    def move_on(self, t_s: float, rng: np.random.Generator) -> None:
+        """Begin the movement at a time; times must not decrease."""
+        while t_s >= self.end_s:
+            self.start, self.goal = self.goal, float(rng.uniform(-1.0, 1.0))
+            self.begin_s = self.end_s
+            self.end_s += self._period_s * float(rng.uniform(0.5, 1.5))
