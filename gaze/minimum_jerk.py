@@ -60,16 +60,8 @@ class Quintic:
             2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
         )
 
-    def integral(self, t_s: float) -> float:
-        """Return the integral of the position from the start to a time within the move."""
-        c0, c1, c2, c3, c4, c5 = self._c
-        t = t_s
-        return t * (
-            c0 + t * (c1 / 2.0 + t * (c2 / 3.0 + t * (c3 / 4.0 + t * (c4 / 5.0 + t * c5 / 6.0))))
-        )
-
     def position(self, t_s: float) -> float:
-        """Return the position alone, the first value of ``at``."""
+        """Return the position alone, the first value of ``state_at``."""
         if t_s >= self._T:
             return self._goal
         c0, c1, c2, c3, c4, c5 = self._c

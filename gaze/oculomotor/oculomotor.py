@@ -28,7 +28,7 @@ from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.pursuit import FASTEST_SWING_RAD_S, Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
-from gazerig.gaze.track.animation import NO_OFFSET, PoseOffset
+from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import (
     ORDERED,
     Angles2,

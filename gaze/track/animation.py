@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.track.expression import Expressions
 from gazerig.gaze.track.level import LevelRange, Levels
-from gazerig.gaze.track.pose_offset import NO_OFFSET as NO_OFFSET
-from gazerig.gaze.track.pose_offset import PoseOffset as PoseOffset
+from gazerig.gaze.track.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.track.track import POSE_CHANNELS
 from gazerig.gaze.track.track_player import TrackPlayer
 
@@ -54,11 +53,6 @@ class Animation:
         self.expressions.reset()
         self.levels.reset()
         self.tracks.reset()
-
-    def retune(self, tables: AnimationTables) -> None:
-        """Change the tables; motions continue without a jump."""
-        self.expressions.retune(tables.expressions, tables.blend_s)
-        self.levels.retune(tables.levels)
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset of the pose in this tick."""

@@ -23,7 +23,7 @@ class Expressions:
 
     def __init__(self, offsets: Mapping[str, PoseOffset], blend_s: float, joints: int) -> None:
         self._rest = NO_OFFSET._replace(joints_rad=(0.0,) * joints)
-        self._offsets = self._with_neutral(offsets)
+        self._offsets = {NEUTRAL: self._rest, **offsets}
         self._blend = MinimumJerkBlend(self._rest.to_flat(), blend_s)
         self.reset()
 
@@ -39,15 +39,6 @@ class Expressions:
         self._blend.reset(self._goal())
         self._flat = self._goal()
         self._offset = PoseOffset.from_flat(self._flat)
-        self.moves = True
-
-    def retune(self, offsets: Mapping[str, PoseOffset], blend_s: float) -> None:
-        """Change the table; the face moves to its changed expression without a jump."""
-        self._offsets = self._with_neutral(offsets)
-        self._blend.duration_s = blend_s
-        if self.name not in self._offsets:
-            self.name, self.strength = NEUTRAL, 1.0
-        self._blend.move_to(self._goal())
         self.moves = True
 
     def express(self, name: str, strength: float = 1.0) -> None:
@@ -74,9 +65,6 @@ class Expressions:
             self._flat, self._offset = flat, PoseOffset.from_flat(flat)
         self.moves = not self._blend.is_at_rest
         return self._offset
-
-    def _with_neutral(self, offsets: Mapping[str, PoseOffset]) -> dict[str, PoseOffset]:
-        return {NEUTRAL: self._rest, **offsets}
 
     def _goal(self) -> tuple[float, ...]:
         rest, full = self._rest.to_flat(), self._offsets[self.name].to_flat()

@@ -41,20 +41,14 @@ class LevelRange(NamedTuple):
 class _Level:
     """Motion of one level to its value."""
 
-    def __init__(self, span: LevelRange, start: tuple[float, ...]) -> None:
-        self.value = 0.0
-        self.until_s = inf
+    def __init__(self, span: LevelRange) -> None:
         self.span = span
-        self.blend = MinimumJerkBlend(start, span.smoothing_s)
-        self.set(0.0, inf)
+        self.value, self.until_s = 0.0, inf
+        self.blend = MinimumJerkBlend((0.0,), span.smoothing_s)
 
     def set(self, value: float, until_s: float) -> None:
         self.value, self.until_s = value, until_s
-        self.blend.move_to(self.span.offset_at(value))
-
-    def retune(self, span: LevelRange) -> None:
-        self.span, self.blend.duration_s = span, span.smoothing_s
-        self.blend.move_to(span.offset_at(self.value))
+        self.blend.move_to((value,))
 
 
 class Levels:
@@ -70,7 +64,7 @@ class Levels:
 
     def __init__(self, ranges: Mapping[str, LevelRange], joints: int) -> None:
         self._rest = NO_OFFSET._replace(joints_rad=(0.0,) * joints)
-        self._ranges = dict(ranges)
+        self._ranges = ranges
         self.reset()
 
     @property
@@ -80,29 +74,10 @@ class Levels:
 
     def reset(self) -> None:
         """Set all levels to 0 immediately."""
-        self._levels = {
-            name: _Level(span, span.offset_at(0.0)) for name, span in self._ranges.items()
-        }
-        self._gone: list[_Level] = []
-        self._flats: tuple[tuple[float, ...], ...] = ()
+        self._levels = {name: _Level(span) for name, span in self._ranges.items()}
         self._offset = self._rest
         self.moves = True
         self.lapses_s = inf
-
-    def retune(self, ranges: Mapping[str, LevelRange]) -> None:
-        """Change the offsets of the levels; joints move there without a jump."""
-        rest = LevelRange(self._rest, self._rest, 0.0)
-        for name in self._levels.keys() - ranges.keys():
-            level = self._levels.pop(name)
-            level.retune(rest._replace(smoothing_s=level.span.smoothing_s))
-            self._gone.append(level)
-        for name, span in ranges.items():
-            if name not in self._levels:
-                self._levels[name] = _Level(span, self._rest.to_flat())
-            elif span != self._levels[name].span:
-                self._levels[name].retune(span)
-        self._ranges = dict(ranges)
-        self.moves = True
 
     def set(self, name: str, value: float, t_s: float) -> None:
         """Set a level to a value 0..1, from the next step on.
@@ -137,14 +112,10 @@ class Levels:
         """Return the offset of all levels at a time; at rest it is the same object."""
         if not self.moves:
             return self._offset
-        if self._gone:
-            self._gone = [one for one in self._gone if one.blend.step(t_s) != self._rest.to_flat()]
-        levels = (*self._levels.values(), *self._gone)
-        flats = tuple([level.blend.step(t_s) for level in levels])
-        if flats != self._flats:
-            offset = self._rest
-            for flat in flats:
-                offset = offset.combine(PoseOffset.from_flat(flat))
-            self._flats, self._offset = flats, offset
-        self.moves = not all([level.blend.is_at_rest for level in levels])
-        return self._offset
+        offset = self._rest
+        for level in self._levels.values():
+            (value,) = level.blend.step(t_s)
+            offset = offset.combine(PoseOffset.from_flat(level.span.offset_at(value)))
+        self._offset = offset
+        self.moves = not all([level.blend.is_at_rest for level in self._levels.values()])
+        return offset

@@ -57,19 +57,6 @@ class MinimumJerkCurve:
         t = max(0.0, t_s - self._starts[i])
         return float(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))))
 
-    def state_at(self, t_s: float) -> tuple[float, float, float]:
-        """Return value, speed and acceleration at a time since the start."""
-        if t_s >= self.duration_s:
-            return self._last, 0.0, 0.0
-        i = max(0, bisect_right(self._starts, t_s) - 1)
-        c0, c1, c2, c3, c4, c5 = self._rows[i]
-        t = max(0.0, t_s - self._starts[i])
-        return (
-            c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
-            c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
-            2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
-        )
-
     def sample_at(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (n,) values, speeds and accelerations at (n,) times."""
         times = np.clip(times_s, 0.0, None)

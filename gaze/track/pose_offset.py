@@ -1,9 +1,48 @@
-"""Offset that is added to the pose by gaze, as one value."""
+"""Offset that is added to the pose by gaze, and angles that tracks give instead of it."""
 
 from typing import NamedTuple
 
-from gazerig.gaze.track.owned_pose import OwnedPose
+from gazerig.gaze.track.track import LID_CHANNELS, POSE_CHANNELS
 from gazerig.gaze.types import Angles2, Angles3
+
+Layers = dict[int, list[tuple[float, float]]]
+"""Channel -> (value, weight) of each track that owns it, the newest last."""
+_EYES, _LIDS = POSE_CHANNELS.index("eyes_yaw"), POSE_CHANNELS.index(LID_CHANNELS[0])
+
+
+class OwnedPose:
+    """Values of the channels that tracks own in one tick, and what gaze would have given.
+
+    layers: replaced in every tick
+    gaze: the last value by gaze of each channel, from which a track blends out
+    """
+
+    def __init__(self) -> None:
+        self.layers: Layers = {}
+        self.gaze: dict[int, float] = {}
+
+    def mix(self, channel: int, value: float) -> float:
+        """Return the value of a channel for the value by gaze."""
+        self.gaze[channel] = value
+        for owned, weight in self.layers.get(channel, ()):
+            value += weight * (owned - value)
+        return value
+
+    def mix_head(self, head: Angles3) -> Angles3:
+        """Return the head's angles."""
+        return self.mix(0, head[0]), self.mix(1, head[1]), self.mix(2, head[2])
+
+    def mix_eye(self, eye: Angles2) -> Angles2:
+        """Return the angles of an eye in the head."""
+        return self.mix(_EYES, eye[0]), self.mix(_EYES + 1, eye[1])
+
+    def mix_lids(
+        self, openings: tuple[float, float, float, float]
+    ) -> tuple[float, float, float, float]:
+        """Return the openings of the lids, 0 shut .. 1 open."""
+        mixed = [self.mix(_LIDS + i, opening) for i, opening in enumerate(openings)]
+        a, b, c, d = [min(max(one, 0.0), 1.0) for one in mixed]
+        return a, b, c, d
 
 
 class PoseOffset(NamedTuple):

@@ -180,20 +180,6 @@ class TrackMotion:
                 column[:, first : first + 2] += column[:, :2]
         return MotionSamples(times_s, *columns)
 
-    def state_at(self, t_s: float) -> tuple[list[float], list[float], list[float]]:
-        """Return value, speed and acceleration of every channel at a time, relative to rest."""
-        value, speed, acceleration = ([0.0] * len(self._rests) for _ in range(3))
-        for i, curve, rest, gain, delay_s in self._curves:
-            at, rate, change = curve.state_at(max(0.0, t_s - delay_s))
-            value[i] += gain * (at - rest)
-            speed[i] += gain * rate
-            acceleration[i] += gain * change
-        if self._follow:
-            for column in (value, speed, acceleration):
-                for axis in (0, 1):
-                    column[_FIRST_EYE + axis] += column[axis]
-        return value, speed, acceleration
-
     def add_to(self, flat: list[float], t_s: float, sizes: tuple[float, ...]) -> None:
         """Add the motion at one time to a flat PoseOffset.
 

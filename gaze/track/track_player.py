@@ -1,40 +1,35 @@
-"""Player of several tracks, without steps at a start, an end, a seek or an interruption.
+"""Player of several tracks, without steps at a start, an end or an interruption.
 
 The offsets of a track begin from rest and return to rest. When another one replaces it, or it ends
 early, its offset returns to rest on a fifth-order polynomial that begins with the present offset,
-speed and acceleration, and the next track is added to that. A seek continues from the present
-motion in the same manner; a small error against another clock changes the speed of the track's own.
-Channels that a track owns blend from gaze to the track and back. Each of these transitions takes as
-long as the limits of the joints require.
+speed and acceleration, and the next track is added to that. A track that begins in its middle grows
+from rest. An error against another clock changes the speed of the track's own. Channels that a
+track owns blend from gaze to the track and back. Each of these transitions takes as long as the
+limits of the joints require.
 """
 
-import contextlib
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from gazerig.gaze.minimum_jerk import Quintic, min_jerk
+from gazerig.gaze.minimum_jerk import PEAK_SPEED, Quintic, min_jerk
 from gazerig.gaze.track.expression import Expressions
-from gazerig.gaze.track.owned_pose import OwnedPose
-from gazerig.gaze.track.pose_offset import PoseOffset
+from gazerig.gaze.track.pose_offset import OwnedPose, PoseOffset
 from gazerig.gaze.track.track import HEAD_CHANNELS, KEEP, POSE_CHANNELS, rest_value
-from gazerig.gaze.track.track_clock import TrackClock
 from gazerig.gaze.track.track_motion import TrackMotion
 from gazerig.gaze.types import Floats
 
-SYNC_S = 0.25
-"""A larger error of the position is corrected by a seek."""
 _SYNC_SHARE = 0.05
-"""Largest change of the speed that corrects a smaller one."""
+"""Largest change of the speed that corrects the position by another clock."""
 _SYNCED_S = 0.005
-_CORRECTED_IN_S = 1.0
-_CHANGE_S = 0.2
-"""Shortest time of a change of speed."""
 _ATTEMPTS, _LONGEST_S = 8, 8.0
 _SAMPLES = 41
 _HEAD = len(HEAD_CHANNELS)
 _LONGER = 1.25
+
+
+Share = TypeVar("Share", float, Floats)
 
 
 def _unlimited(speed: Floats, acceleration: Floats) -> float:
@@ -47,7 +42,7 @@ class PlayedTrack(NamedTuple):
     speed: factor on its original speed; sizes: factor of every channel
     stretch: returns for (n, channels) speeds and accelerations the factor by which the motion must
         take longer to keep the limits, at most 1 if it keeps them
-    blend_s: shortest times in which it takes over owned channels, and returns them or seeks
+    blend_s: shortest times in which it takes over owned channels, and returns them
     present: values of the channels before it, from which owned channels begin
     lead_s: time by which its motion is ahead of its position, because servos are late
     sound_s: duration of its sound, 0 without one
@@ -108,19 +103,31 @@ class Fade:
 class Voice:
     """One track that plays.
 
-    clock: position by the time of the loop; wanted: speed without correction
     ends: whether it has ended and only blends out
     passed: names of the cues that it has passed since they were taken
+
+    Args:
+        number: its number.
+        played: the track.
+        begins_s: time of the loop at which it begins.
+        from_s: position at which it begins.
+        loop: whether it repeats.
     """
 
-    def __init__(self, number: int, played: PlayedTrack, clock: TrackClock, loop: bool) -> None:
-        self.number, self.played, self.clock, self.loop = number, played, clock, loop
-        self.wanted, self.ends = played.speed, False
+    def __init__(
+        self, number: int, played: PlayedTrack, begins_s: float, from_s: float, loop: bool
+    ) -> None:
+        self.number, self.played, self.loop = number, played, loop
+        self.ends = False
         self.passed: list[str] = []
-        self._fade: Fade | None = None
-        self._corrected_s: float | None = None
-        self._cue = 0
-        self._entry_s = self._in_s = 0.0
+        self._begins_s = begins_s
+        self._base_s = from_s + self.ahead_s if from_s > 0.0 else 0.0
+        self._correction: tuple[float, float, Quintic] | None = None
+        self._cue = sum([time < from_s for time, _ in self.motion.events.cues])
+        owned = np.zeros(len(self.motion.rest), bool)
+        owned[list(self.motion.owned)] = True
+        self._owned, self._grows = owned, ~owned & (from_s > 0.0)
+        self.entry_s = self._find_entry_s() if (owned | self._grows).any() else 0.0
         self._exits: dict[int, tuple[float, float]] = {}
 
     @property
@@ -130,162 +137,105 @@ class Voice:
 
     def position_s(self, t_s: float) -> float:
         """Return the position of the motion in the track."""
-        return self.clock.state_at(t_s)[0]
+        return self._clock(t_s)[0]
 
-    @property
-    def _settled_s(self) -> float:
-        """Return the end of the present change of speed and of the present seek."""
-        ends_s = self.clock.from_s + self.clock.change_s
-        return ends_s if self._fade is None else max(ends_s, self._fade.until_s)
+    def _clock(self, t_s: float) -> tuple[float, float, float]:
+        """Return the position, its speed and acceleration at a time of the loop."""
+        speed = self.played.speed
+        position_s = self._base_s + max(0.0, t_s - self._begins_s) * speed
+        if self._correction is None:
+            return position_s, speed, 0.0
+        off_s, rate, change = self._correction[2].state_at(t_s - self._correction[0])
+        return position_s + off_s, speed + rate, change
 
     @property
     def ahead_s(self) -> float:
         """Return the distance of the motion from the position of the sound, in the track."""
-        return self.played.lead_s * self.wanted
+        return self.played.lead_s * self.played.speed
 
     def advance(self, t_s: float) -> bool:
-        """Pass cues, repeat and end corrections; return whether its end is reached."""
-        if self._corrected_s is not None and t_s >= self._corrected_s:
-            self._corrected_s = None
-            self.clock = self.clock.change_speed(t_s, self.wanted, _CHANGE_S)
+        """Pass cues and repeat; return whether its end is reached."""
         position_s, duration_s = self.position_s(t_s), self.played.length_s
         cues = self.motion.events.cues
         while self._cue < len(cues) and cues[self._cue][0] <= position_s - self.ahead_s:
             self.passed.append(cues[self._cue][1])
             self._cue += 1
-        if self.ends or not self.clock.has_reached(duration_s + self.ahead_s, t_s):
+        if self.ends or position_s < duration_s + self.ahead_s:
             return False
         if self.loop and duration_s > 0.0:
-            self.clock = self.clock._replace(position_s=self.clock.position_s - duration_s)
+            self._base_s -= duration_s
             self._cue = 0
             return False
         return True
 
     def add_to(self, flat: list[float], t_s: float) -> None:
         """Add the motion at a time to a flat PoseOffset."""
-        if self._fade is not None:
-            if t_s < self._fade.until_s:
-                self._fade.add_to(flat, t_s)
-            else:
-                self._fade = None
-        self.motion.add_to(flat, self.position_s(t_s), self.played.sizes)
+        sizes = self.played.sizes
+        if t_s < self._begins_s + self.entry_s and self._grows.any():
+            share = min_jerk((t_s - self._begins_s) / self.entry_s)
+            sizes = tuple(
+                [share * a if grows else a for a, grows in zip(sizes, self._grows, strict=True)]
+            )
+        self.motion.add_to(flat, self.position_s(t_s), sizes)
 
     def state(self, t_s: float) -> OffsetState:
         """Return the offset at a time, with its speed and acceleration."""
-        return self._state_of(self.clock, self._fade, t_s)
+        position, rate, change = self._clock(t_s)
+        value, speed, acceleration = self._motion_at(np.array([position]), rate, change)
+        if self._grows.any():
+            s = (t_s - self._begins_s) / self.entry_s
+            share, rate, change = _blend(min(max(s, 0.0), 1.0), self.entry_s)
+            w = np.where(self._grows, share, 1.0)
+            dw, ddw = rate * self._grows, change * self._grows
+            value, speed, acceleration = (
+                w * value,
+                w * speed + dw * value,
+                w * acceleration + 2.0 * dw * speed + ddw * value,
+            )
+        return OffsetState(value[0], speed[0], acceleration[0])
 
-    def _state_of(self, clock: TrackClock, fade: Fade | None, t_s: float) -> OffsetState:
-        position_s, rate, change = clock.state_at(t_s)
-        value, speed, acceleration = map(np.array, self.motion.state_at(max(0.0, position_s)))
+    def _motion_at(self, positions: Floats, rate: float, change: float = 0.0) -> OffsetState:
+        """Return (n, channels) states at positions that move with a speed and an acceleration."""
+        found = self.motion.sample_at(np.maximum(positions, 0.0))
         size = np.array(self.played.sizes)
-        total = OffsetState(
-            value * size,
-            speed * size * rate,
-            acceleration * (size * rate * rate) + speed * (size * change),
-        )
-        if fade is not None:
-            fade.add_state(total, t_s)
-        return total
-
-    def _sample(
-        self, clock: TrackClock, fade: Fade | None, t_s: float, time_s: float
-    ) -> OffsetState:
-        """Return (n, channels) states over a time to come."""
-        times = t_s + np.linspace(0.0, time_s, _SAMPLES)
-        position, rate, change = (column[:, None] for column in clock.sample_at(times))
-        found = self.motion.sample_at(np.maximum(position[:, 0], 0.0))
-        size = np.array(self.played.sizes)
-        total = OffsetState(
+        return OffsetState(
             found.value * size,
             found.speed * size * rate,
             found.acceleration * size * rate * rate + found.speed * size * change,
         )
-        if fade is not None:
-            for row, time in enumerate(times.tolist()):
-                fade.add_state([column[row] for column in total], time)
-        return total
-
-    def _excess(self, clock: TrackClock, fade: Fade | None, t_s: float, time_s: float) -> float:
-        _, speed, acceleration = self._sample(clock, fade, t_s, time_s)
-        return self.played.stretch(speed, acceleration)
-
-    def seek(self, t_s: float, position_s: float, catches_up: bool = False) -> None:
-        """Continue at another position, from the present motion.
-
-        The track runs on meanwhile; if the sum would be too fast, it starts from rest: there, or
-        further on if it ``catches_up`` with a clock.
-        """
-        now = self.state(t_s)
-        position_s = min(position_s, self.played.length_s) + self.ahead_s
-        self._corrected_s = None
-        rate = self.wanted
-        runs = TrackClock(t_s, position_s, rate)
-        least_s = self.played.blend_s[1]
-        rests = TrackClock(t_s, position_s, 0.0)
-        least_s *= max(1.0, self._excess(rests, self._away(rests, now, t_s, least_s), t_s, least_s))
-        for from_rest in (False, True):
-            time_s = least_s
-            for _ in range(_ATTEMPTS if from_rest else 2):
-                clock = runs
-                if from_rest:
-                    clock = rests.change_speed(t_s, rate, time_s)
-                    behind_s = 0.5 * rate * time_s * catches_up
-                    clock = clock._replace(position_s=position_s + behind_s)
-                fade = self._away(clock, now, t_s, time_s)
-                excess = self._excess(clock, fade, t_s, time_s)
-                if excess <= 1.0:
-                    self._begin(clock, fade, position_s)
-                    return
-                time_s = min(time_s * max(_LONGER, excess), _LONGEST_S)
-        self._begin(clock, fade, position_s)
-
-    def _away(self, clock: TrackClock, now: OffsetState, t_s: float, time_s: float) -> Fade:
-        """Return the fade from the present motion to that of a clock."""
-        there = self._state_of(clock, None, t_s)
-        gap = OffsetState(*(a - b for a, b in zip(now, there, strict=True)))
-        return Fade(gap, t_s, time_s)
-
-    def _begin(self, clock: TrackClock, fade: Fade, position_s: float) -> None:
-        self.clock, self._fade = clock, fade if fade.channels else None
-        self._skip_cues(position_s)
-
-    def _skip_cues(self, position_s: float) -> None:
-        """Let the cues before a position count as passed; one at the position is still to come."""
-        cues = self.motion.events.cues
-        self._cue = sum([time < position_s - self.ahead_s for time, _ in cues])
 
     def sync(self, t_s: float, position_s: float) -> None:
-        """Correct the position by another clock, slowly, or by a seek; not during a transition."""
-        if self._corrected_s is None and t_s < self._settled_s:
-            return
+        """Correct the position by another clock, slowly; not during a correction."""
+        if self._correction is not None:
+            begin_s, time_s, move = self._correction
+            if t_s < begin_s + time_s:
+                return
+            self._base_s += move.position(time_s)
+            self._correction = None
         off_s = position_s + self.ahead_s - self.position_s(t_s)
         if self.loop:  # the clock may have begun the next round before
             half_s = 0.5 * self.played.length_s
             off_s = (off_s + half_s) % (2.0 * half_s) - half_s
-        if abs(off_s) >= SYNC_S:
-            self.seek(t_s, max(0.0, position_s), catches_up=True)
-        elif abs(off_s) >= _SYNCED_S:
-            share = min(max(off_s / _CORRECTED_IN_S, -_SYNC_SHARE), _SYNC_SHARE)
-            self.clock = self.clock.change_speed(t_s, self.wanted * (1.0 + share), _CHANGE_S)
-            self._corrected_s = t_s + off_s / (share * self.wanted)
+        if abs(off_s) >= _SYNCED_S:
+            time_s = PEAK_SPEED * abs(off_s) / (_SYNC_SHARE * self.played.speed)
+            self._correction = t_s, time_s, Quintic((0.0, 0.0, 0.0), off_s, time_s)
 
-    def enter(self, t_s: float) -> float:
-        """Begin to take over the owned channels; return the time that it takes."""
+    def _find_entry_s(self) -> float:
+        """Return the time in which it takes over the owned channels, or grows from rest."""
         time_s, present = self.played.blend_s[0], np.array(self.played.present or 0.0)
-        owned = np.zeros(len(self.motion.rest))
-        owned[list(self.motion.owned)] = 1.0
+        enters, s = self._owned | self._grows, np.linspace(0.0, 1.0, _SAMPLES)[:, None]
         for _ in range(_ATTEMPTS):
-            w, dw, ddw = _blend_rates(time_s)
-            value, speed, acceleration = self._sample(self.clock, self._fade, t_s, time_s)
-            gap = value - present
+            w, dw, ddw = _blend(s, time_s)
+            positions = self._base_s + s[:, 0] * time_s * self.played.speed
+            value, speed, acceleration = self._motion_at(positions, self.played.speed)
+            gap = value - np.where(self._owned, present, 0.0)
             excess = self.played.stretch(
-                owned * (w * speed + dw * gap),
-                owned * (w * acceleration + 2.0 * dw * speed + ddw * gap),
+                enters * (w * speed + dw * gap),
+                enters * (w * acceleration + 2.0 * dw * speed + ddw * gap),
             )
             if excess <= 1.0:
                 break
             time_s = min(time_s * max(_LONGER, excess), _LONGEST_S)
-        self._entry_s, self._in_s = t_s, time_s
         return time_s
 
     def leave(self, t_s: float, gaze: OwnedPose, covered: frozenset[int], covered_s: float) -> None:
@@ -303,7 +253,7 @@ class Voice:
         for i in self.motion.owned - covered:
             gap[i] = value[i] - gaze.gaze.get(i, 0.0)
         time_s = self.played.blend_s[1]
-        _, dw, ddw = _blend_rates(time_s)
+        _, dw, ddw = _blend(np.linspace(0.0, 1.0, _SAMPLES)[:, None], time_s)
         time_s *= max(1.0, self.played.stretch(dw * gap, ddw * gap))
         for i in self.motion.owned:
             self._exits[i] = (t_s + covered_s, 0.0) if i in covered else (t_s, time_s)
@@ -314,7 +264,7 @@ class Voice:
 
     def weight(self, channel: int, t_s: float) -> float:
         """Return the share of the track in a channel that it owns, 0..1."""
-        entered = min_jerk((t_s - self._entry_s) / self._in_s) if self._in_s else 1.0
+        entered = min_jerk((t_s - self._begins_s) / self.entry_s)
         if channel not in self._exits:
             return entered
         begin_s, time_s = self._exits[channel]
@@ -409,10 +359,8 @@ class TrackPlayer:
             from_s: position at which it begins.
             loop: whether it repeats until it is ended.
         """
-        voice = Voice(number, played, TrackClock(t_s + wait_s, 0.0, played.speed), loop)
-        if from_s > 0.0:
-            voice.seek(t_s + wait_s, from_s)
-        taken_s = voice.enter(t_s) if played.motion.owned else 0.0
+        voice = Voice(number, played, t_s + wait_s, min(from_s, played.length_s), loop)
+        taken_s = wait_s + voice.entry_s
         self.end(self.overlapping(played.motion), t_s, fade_s, played.motion, taken_s)
         self.voices.append(voice)
         return voice
@@ -493,13 +441,11 @@ class TrackPlayer:
 
     def _express(self, expression: tuple[str, float]) -> None:
         if self._expressions is not None:
-            with contextlib.suppress(ValueError):  # the table has changed since the check
-                self._expressions.express(*expression)
+            self._expressions.express(*expression)
 
 
-def _blend_rates(time_s: float) -> tuple[Floats, Floats, Floats]:
-    """Return (n, 1) samples of a blend 0..1 in a time, with its rate and acceleration."""
-    s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
+def _blend(s: Share, time_s: float) -> tuple[Share, Share, Share]:
+    """Return a blend 0..1 at a share of a time, or at several, with its rate and acceleration."""
     return (
         s**3 * (10.0 + s * (6.0 * s - 15.0)),
         30.0 * (s * (1.0 - s)) ** 2 / time_s,

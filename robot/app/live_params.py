@@ -29,7 +29,6 @@ from gazerig.gaze.scanpath.scanpath import Scanpath, Walk
 from gazerig.gaze.track.animation import Animation
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
-    animation_tables,
     eye_limits,
     face_parts_m,
     head_limits,
@@ -179,10 +178,7 @@ class LiveParams:
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
         if now.head != was.head or (bounds and head_limits(new) != head_limits(before)):
             parts.head.retune(now.head, *head_limits(new))
-        tables = animation_tables(new)
-        if tables != animation_tables(before):
-            parts.animation.retune(tables)
-        parts.tracks.retune(lid_spans(new), tables, now.oculomotor.eye_lag_ms / 1e3)
+        parts.tracks.retune(lid_spans(new), now.oculomotor.eye_lag_ms / 1e3)
         self._walk = walk
         said = self._apply_to_machine(before, new)
         return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)

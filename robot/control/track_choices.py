@@ -101,16 +101,12 @@ class TrackChoices:
         self._nearest: int | None = None
         self._cache: dict[tuple[str, int], TrackMotions | TrackRefused] = {}
         self._speeches: dict[Speak, dict[str, TrackMotions]] = {}
-        self.retune(lid_spans_rad, tables, latency_s)
+        self.retune(lid_spans_rad, latency_s)
         for name in tracks:
             self._motions(name, 0)
 
-    def retune(
-        self, lid_spans_rad: Mapping[str, float], tables: AnimationTables, latency_s: float
-    ) -> None:
+    def retune(self, lid_spans_rad: Mapping[str, float], latency_s: float) -> None:
         """Change the parameters of the next track."""
-        if tables != self._tables:
-            self._tables, self._cache, self._speeches = tables, {}, {}
         self._latency_s = latency_s
         self._fit = TrackFit(self._joints, lid_spans_rad)
 
