@@ -18,7 +18,6 @@ _KIND_OF_KEY = {
     "track_files": "",
     "sound.folders": "",
     "detector.model_file": "",
-    "oak.face_model": "",
 }
 """Keys of a rig that contain a shipped name or a file, and the kind of the names; "" for none."""
 _LOCAL_KEYS = re.compile(r"(doors|bus\.port|buses\..+\.port|sound\.voice)(\..+)?")

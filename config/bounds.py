@@ -24,11 +24,13 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from gazerig.params import Declaration, declarations
+from gazerig.params import Bounds, Declaration, declarations
 
 T = TypeVar("T")
 Step = str | int
-Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "params", "value"]
+Form = Literal[
+    "number", "whole", "bool", "text", "choice", "list", "row", "mapping", "params", "value"
+]
 
 _PLAIN: dict[object, Form] = {
     **{float: "number", int: "whole", bool: "bool", str: "text"},
@@ -45,6 +47,7 @@ class Shape:
     """The allowed values at one position in a file.
 
     inner: shape of the items of a list or mapping
+    items: shape of each item of a row, which is a list of different values
     params: the dataclass, for form "params"
     optional: null is allowed
     low, high, choices, unit, description: values of the declaration
@@ -53,6 +56,7 @@ class Shape:
 
     form: Form
     inner: "Shape | None" = None
+    items: "tuple[Shape, ...]" = ()
     params: type | None = None
     optional: bool = False
     choices: tuple[object, ...] = ()
@@ -156,6 +160,9 @@ def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
     """Read one type annotation of a declaration, or that of its items."""
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     inner = partial(_shape, declared, place=place)
+    if origin is Annotated:  # an item with bounds of its own
+        own = next((note for note in args[1:] if isinstance(note, Bounds)), None)
+        return _of_type(dataclasses.replace(declared, bounds=own), args[0], place)
     if origin in (typing.Union, types.UnionType) and len(args) == 2 and type(None) in args:
         kept = args[0] if args[1] is type(None) else args[1]
         return dataclasses.replace(inner(kept), optional=True)
@@ -165,6 +172,8 @@ def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
         return Shape("params", params=kind)
     if origin is tuple and (len(set(args)) == 1 or args[1:] == (...,)):
         return Shape("list", inner=inner(args[0]), length=None if args[-1] is ... else len(args))
+    if origin is tuple:
+        return Shape("row", items=tuple(map(inner, args)))
     if origin in (dict, Mapping) and args[0] is str:
         return Shape("mapping", inner=inner(args[1]))
     if origin is Literal or (declared.choices and kind in _PLAIN):
@@ -202,6 +211,8 @@ def _annotation(shape: Shape) -> Any:
         case Shape(form="list", inner=Shape() as inner):
             length = Field(min_length=shape.length, max_length=shape.length)
             kind = Annotated[types.GenericAlias(tuple, (_annotation(inner), ...)), length]
+        case Shape(form="row"):
+            kind = types.GenericAlias(tuple, tuple(map(_annotation, shape.items)))
         case Shape(form="mapping", inner=Shape() as inner):
             kind = types.GenericAlias(
                 dict, (Annotated[str, AfterValidator(_printable)], _annotation(inner))
@@ -290,6 +301,11 @@ def _fill(
                 ):  # an unknown key may be a misspelling of this one
                     parts[name] = _stand_in(field, high)
             return _without_post_init(params, parts)
+        case Shape(form="row"):
+            rows = enumerate(zip(shape.items, data, strict=False))
+            return tuple(
+                _fill(s, item, (*path, k), faulty, high, misspelt) for k, (s, item) in rows
+            )
         case Shape(inner=Shape() as inner):
             steps = data.items() if isinstance(data, dict) else enumerate(data)
             parts = {k: _fill(inner, item, (*path, k), faulty, high, misspelt) for k, item in steps}

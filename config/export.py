@@ -65,6 +65,8 @@ def expected_text(shape: Shape) -> str:
         case Shape(form="list", inner=Shape() as inner):
             count = f" of {shape.length}" if shape.length is not None else ""
             text = f"a list{count}, each {expected_text(inner)}"
+        case Shape(form="row"):
+            text = f"a list of {', '.join(map(expected_text, shape.items))}"
         case Shape(form="mapping", inner=Shape() as inner):
             text = f"a mapping, each key with {expected_text(inner)}"
         case Shape(params=type() as params):
@@ -137,6 +139,8 @@ def _nested_shape(shape: Shape, path: tuple[Step, ...]) -> Shape:
     for step in path:
         if shape.params is not None:
             shape = shapes_of(shape.params)[str(step)]
+        elif shape.items:
+            shape = shape.items[int(step)]
         elif shape.inner is not None:
             shape = shape.inner
     return shape

@@ -192,14 +192,11 @@ def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
     """Return the shut and open angles of the lids, and the pose before torque is switched off."""
     lids = [name for name in joints if name in (*_UPPER, *_LOWER)]
     if lids:
-        yield "lid_joints:  # deg, each lid shut and fully open"
-        ends = []
+        yield "lid_joints:  # each lid shut and fully open"
         for name in lids:
             shut, wide = _lid_ends_deg(name)
             key = name.removesuffix("_lid").removesuffix("_upper")
-            ends.append(f"{key}_shut_deg: {shut}, {key}_open_deg: {wide}")
-        rows = [", ".join(ends[i : i + 2]) for i in range(0, len(ends), 2)]
-        yield "  {" + ",\n   ".join(rows) + "}"
+            yield f"  {key}_deg: [{shut}, {wide}]"
     park = [f"{name}: {_lid_ends_deg(name)[0]}" for name in lids]
     if "neck_pitch" in joints:
         park = ["neck_pitch: -12", *park]

@@ -27,44 +27,13 @@ from gazerig.robot.model.types import order_joints
 NEXT_TICK = "next tick"
 NEXT_START = "next start"
 
-_AT_OPENING = "the camera is opened with it"
-_MASSES = "the model of the head's weight is made with it"
-_CHOOSER = "the chooser of gaze targets is created with it"
-_AT_START: dict[str, str] = {
-    "name": "it only names the rig",
-    "profile": "its file is merged over the rig's when the rig is read",
-    "bus.*": "the servo bus is opened with it",
-    "joints.*.id": "servos are searched with it when the bus is opened",
-    "joints.*.model": "servos are searched with it when the bus is opened",
-    "joints.*.firmware_min": "servos are searched with it when the bus is opened",
-    "joints.*.bus": "servos are searched with it when the bus is opened",
-    "joints.*.transmission_points": "positions of a push rod are applied while its servo has no torque",
-    "joints.*.servo_speed_deg_s": "positions of the servos are estimated with it from the first goal on",
-    "sound.device": "the process that plays sounds is started with it",
-    "track_files": "tracks are read and checked when the rig is read",
-    "expressions.*": "faces and levels are made with it",
-    "expression_blend_s": "faces and levels are made with it",
-    "levels.*": "faces and levels are made with it",
-    "doors": "their processes are started with the run",
-    "couplings.*": "positions of the servos are converted to angles with it from the first reading on",
-    "mass.*": _MASSES,
-    "joints.*.friction_nm": _MASSES,
-    "joints.*.play_deg": _MASSES,
-    "joints.*.spring_nm_deg": _MASSES,
-    "joints.*.spring_rest_deg": _MASSES,
-    "meshes.*": "meshes are read when the rig is drawn for the first time",
-    "buses.*": "the servo buses are opened with it",
-    "joints.*.gains": "servos are set up while their torque is off; a stop and a resume are sufficient",
-    "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume are sufficient",
-    "camera.mount": "detectors need the rotation of the frames from the first frame on",
-    "camera.rotation": _AT_OPENING,
-    "camera.mirrored": _AT_OPENING,
-    "gaze.chooser": _CHOOSER,
-    "webcam.*": _AT_OPENING,
-    "oak.*": _AT_OPENING,
-    "camera_recovery.*": _AT_OPENING,
-}
-_SECTIONS = frozenset(field.name for field in dataclasses.fields(Rig))
+LIVE_LIMITS = ("min_deg", "max_deg", "max_speed_deg_s", "max_accel_deg_s2")
+"""Keys of a joint that a running rig applies."""
+_LIVE = (
+    "gaze.*", "ranges", "ranges.*", "character", "expression*", "levels.*", "park_deg.*", "guard.*",
+    "tracker.*", "loop.rate_hz", "sound.volume", *(f"joints.*.{name}" for name in LIVE_LIMITS),
+)  # fmt: skip
+"""Keys that a running rig applies."""
 _GAZE = frozenset(field.name for field in dataclasses.fields(GazeConfig))
 _UNLISTED = ("park_deg", "face_parts_mm")
 """Mappings with entries that a file may omit."""
@@ -261,22 +230,16 @@ def _parameter(key: str, shape: Shape, default: Value) -> Parameter:
 
 @lru_cache(maxsize=1024)
 def effect_time(key: str) -> str:
-    """Return when a change of a key takes effect, and the reason for a delay."""
-    for pattern, reason in _AT_START.items():
-        if fnmatchcase(key, pattern):
-            return f"{NEXT_START}: {reason}"
+    """Return when a change of a key takes effect."""
     first, _, rest = key.partition(".")
-    if first not in _SECTIONS:  # a package's camera
-        return f"{NEXT_START}: {_AT_OPENING}"
-    if first == "gaze" and rest.partition(".")[0] not in _GAZE:  # a package's rule
-        return f"{NEXT_START}: {_CHOOSER}"
-    return NEXT_TICK
+    package = first == "gaze" and rest.partition(".")[0] not in _GAZE - {"chooser"}
+    live = any(fnmatchcase(key, pattern) for pattern in _LIVE) and not package
+    return NEXT_TICK if live else NEXT_START
 
 
 def start_note(key: str) -> str:
-    """Return " (next start: ...)" if a running rig cannot apply a key, with the reason; else ""."""
-    when = effect_time(key)
-    return f" ({when})" if when.startswith(NEXT_START) else ""
+    """Return " (next start)" if a running rig cannot apply a key, else ""."""
+    return f" ({NEXT_START})" if effect_time(key) == NEXT_START else ""
 
 
 def _at(rig: Rig, key: str) -> Value:

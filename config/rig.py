@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.params import CameraRecoveryParams, WebcamParams
+from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.params import MaestroParams
@@ -33,7 +33,7 @@ from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.gaze.track.level import LevelParams
 from gazerig.params import Bounds, Choices, Unit
 from gazerig.robot.description.mesh_params import MeshParams
-from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
@@ -81,47 +81,42 @@ class BusConfig:
         return int(self.section.baud)
 
 
+_Degrees = Annotated[float, Bounds(-180, 180)]
+_Millimetres = Annotated[float, Bounds(-300, 300)]
+_LidPair = tuple[_Degrees, _Degrees]
+
+
 @dataclass(frozen=True)
 class LidJoints:
     """Lid joint angles at which the lids are shut and fully open."""
 
     # fmt: off
-    left_shut_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left upper lid is shut; null: no upper lid"] = None
-    left_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left upper lid is fully open"] = None
-    right_shut_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the right upper lid is shut; null: no upper lid"] = None
-    right_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the right upper lid is fully open"] = None
-    left_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
-        "angle at which the left lower lid meets the upper one; null: there is no lower lid"] = None
-    left_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left lower lid is fully open"] = None
-    right_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
-        "angle at which the right lower lid meets the upper one; null: there is no lower lid"] = None
-    right_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the right lower lid is fully open"] = None
+    left_deg: Annotated[_LidPair | None, "left upper lid: [shut, open]; null: no upper lid"] = None
+    right_deg: Annotated[_LidPair | None, "right upper lid: [shut, open]; null: no upper lid"] = None
+    left_lower_deg: Annotated[_LidPair | None, "left lower lid: [meets the upper one, open]; null: no lower lid"] = None
+    right_lower_deg: Annotated[_LidPair | None, "right lower lid: [meets the upper one, open]; null: no lower lid"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
         """Check that the lids can move.
 
         Raises:
-            ValueError: shut and open are the same angle, or one of them is missing.
+            ValueError: shut and open are the same angle.
         """
         for name in LIDS:
-            shut, wide = self.ends_deg(name)
-            if (shut is None) != (wide is None):
-                raise ValueError(f"one end of the {name.replace('_', ' ')} is missing; give both")
-            if shut is not None and shut == wide:
+            ends = self.ends_deg(name)
+            if ends is not None and ends[0] == ends[1]:
                 raise ValueError("a lid's shut and open angles must differ")
 
-    def ends_deg(self, name: str) -> tuple[float | None, float | None]:
+    def ends_deg(self, name: str) -> tuple[float, float] | None:
         """Return the angles of a joint's lid, shut and open; None if they are not given."""
-        shut, wide = (getattr(self, key) for key in self.keys(name))
-        return shut, wide
+        ends: tuple[float, float] | None = getattr(self, self.key(name))
+        return ends
 
     @staticmethod
-    def keys(name: str) -> tuple[str, str]:
-        """Return the keys of a lid joint's shut and open angle."""
-        # "left_upper_lid" is written as left_shut_deg, "left_lower_lid" as left_lower_shut_deg.
-        lid = name.removesuffix("_lid").removesuffix("_upper")
-        return f"{lid}_shut_deg", f"{lid}_open_deg"
+    def key(name: str) -> str:
+        """Return the key of a lid joint, e.g. left_deg of left_upper_lid."""
+        return f"{name.removesuffix('_lid').removesuffix('_upper')}_deg"
 
 
 @dataclass(frozen=True)
@@ -171,15 +166,14 @@ class Rig:
     meshes: Annotated[Mapping[str, MeshParams],
         "mesh files that replace the generated shapes, by the name of the link"] = field(default_factory=dict, kw_only=True)
     mass: Annotated[MassParams, "masses and their balance"] = field(default_factory=MassParams, kw_only=True)
-    park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
+    park_deg: Annotated[Mapping[str, _Degrees],
         "pose to which the joints move before torque is switched off; omitted joints go to 0"] = field(default_factory=dict)
     camera: Annotated[CameraParams, "mount of the camera"] = field(default_factory=CameraParams)
     webcam: Annotated[WebcamParams, "settings requested from a webcam"] = field(default_factory=WebcamParams)
     oak: Annotated[OakParams, "settings requested from an OAK-D"] = field(default_factory=OakParams)
-    camera_recovery: Annotated[CameraRecoveryParams, "recovery of a lost camera"] = field(default_factory=CameraRecoveryParams)
     motion: Annotated[MotionParams, "detection of moving things"] = field(default_factory=MotionParams)
     detector: Annotated[FaceDetectorParams, "detection of faces"] = field(default_factory=FaceDetectorParams)
-    face_parts_mm: Annotated[Mapping[str, tuple[float, float, float]], Bounds(-300, 300),
+    face_parts_mm: Annotated[Mapping[str, tuple[_Millimetres, _Millimetres, _Millimetres]],
         "measured positions of one person's face parts (DN FL LE M N FR RE UP) relative to the nose tip: "
         "out of the face, to that person's left, up; omitted parts have an average adult's position"] = field(default_factory=dict)
     tracker: Annotated[TrackerParams, "tracking of identities"] = field(default_factory=TrackerParams)
@@ -188,7 +182,7 @@ class Rig:
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
     track_files: Annotated[tuple[str, ...], "YAML files with further tracks, relative to this file; file names are track names"] = ()
     sound: Annotated[SoundParams, "loudspeaker and voice"] = field(default_factory=SoundParams, kw_only=True)
-    expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
+    expressions: Annotated[Mapping[str, Mapping[str, _Degrees]], Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; for a lid, to the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
     levels: Annotated[Mapping[str, LevelParams],

@@ -27,7 +27,7 @@ from gazerig.gaze.track.animation import AnimationTables
 from gazerig.gaze.track.level import LevelRange
 from gazerig.gaze.track.pose_offset import NO_OFFSET
 from gazerig.gaze.types import PARTS
-from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable_text
+from gazerig.robot.model.coupling import pair_setups, unreachable_text
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.mass_params import MassParams
@@ -200,7 +200,7 @@ _LIMPABLE = ("dynamixel", "feetech", "maestro", "pca9685")
 def _limp_joints(rig: Rig) -> Iterable[tuple[str, str]]:
     """Find joints that must not or cannot be limp while the others have torque."""
     coupled = {one for pair in rig.couplings.values() for one in (pair.first, pair.second)}
-    near = {one for pair in rig.guard.collisions for one in (pair.first, pair.second)}
+    near = {one[0] for pair in rig.guard.collisions for one in (pair.first, pair.second)}
     for name, joint in rig.joints.items():
         if joint.limp_when_idle_s is None:
             continue
@@ -236,12 +236,11 @@ def _channel_fault(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
 def _servo_setup(name: str, rig: Rig) -> ServoConfig:
     """Return the configuration of a joint's servo, as far as the rig is valid."""
     for one in rig.couplings.values():
-        known = {one.first, one.second} <= rig.joints.keys() and all(
-            rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
+        known = {*one.joints} <= rig.joints.keys() and all(
+            rig.joints[joint].model in SERVOS for joint in one.joints
         )
-        pair = CoupledPair(one.first, one.second, one.make_coupling())
-        if known and name in pair[:2] and not unreachable_text(pair, rig.joints):
-            return pair_setups(pair, rig.joints, {})[name]
+        if known and name in one.joints and not unreachable_text(one, rig.joints):
+            return pair_setups(one, rig.joints, {})[name]
     return rig.joints[name].setup(name)
 
 
@@ -261,15 +260,15 @@ def _byte_order_faults(rig: Rig) -> Iterable[tuple[str, str]]:
 def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
     for name in LIDS:
         joint = rig.joints.get(name)
-        ends = zip(rig.lid_joints.keys(name), rig.lid_joints.ends_deg(name), strict=True)
-        for key, angle in ends:
-            if joint is not None and angle is None:
-                yield f"lid_joints.{key}", f"missing; the joint {name} needs it"
-            elif joint is not None and not joint.min_deg <= (angle or 0.0) <= joint.max_deg:
-                yield (
-                    f"lid_joints.{key}",
-                    f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
-                )
+        if joint is None:
+            continue
+        ends, key = rig.lid_joints.ends_deg(name), f"lid_joints.{rig.lid_joints.key(name)}"
+        if ends is None:
+            yield key, f"missing; the joint {name} needs it: [shut, open]"
+        for angle in ends or ():
+            if not joint.min_deg <= angle <= joint.max_deg:
+                outside = f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}"
+                yield key, outside
 
 
 def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
@@ -278,7 +277,7 @@ def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
         return
     try:
         limits = tuple(rig.joints[name].limit() for name in rig.names)
-        forbidden_pairs(rig.guard.collisions, rig.guard.collision_margin_deg, limits, rig.names)
+        forbidden_pairs(rig.guard.collisions, limits, rig.names)
     except ValueError as error:
         yield "guard.collisions", str(error)
 
@@ -302,10 +301,9 @@ def _masses(rig: Rig) -> Iterable[tuple[str, str]]:
     from gazerig.robot.description.build import RigShape, rig_mass_faults  # few rigs need it
 
     lids = {
-        name: (radians(shut), radians(wide))
+        name: (radians(ends[0]), radians(ends[1]))
         for name in LIDS
-        for shut, wide in [rig.lid_joints.ends_deg(name)]
-        if name in rig.joints and shut is not None and wide is not None
+        if name in rig.joints and (ends := rig.lid_joints.ends_deg(name)) is not None
     }
     yield from rig_mass_faults(
         RigShape(rig.name, rig.geometry, rig.joints, lids, rig.couplings, rig.camera, rig.mass)
@@ -324,17 +322,13 @@ def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
         for key, joint in absent:
             there = ", ".join(rig.names)
             yield f"couplings.{name}.{key}", f"no joint {joint!r}; available: {there}"
-        for joint in (coupling.first, coupling.second):
+        for joint in coupling.joints:
             if joint in owner:
                 yield f"couplings.{name}", f"{joint} is already in {owner[joint]}"
             owner.setdefault(joint, name)
-        known = not absent and all(
-            rig.joints[joint].model in SERVOS for joint in (coupling.first, coupling.second)
-        )
-        if known:
-            pair = CoupledPair(coupling.first, coupling.second, coupling.make_coupling())
-            if fault := unreachable_text(pair, rig.joints):
-                yield f"couplings.{name}", fault
+        known = not absent and all(rig.joints[joint].model in SERVOS for joint in coupling.joints)
+        if known and (fault := unreachable_text(coupling, rig.joints)):
+            yield f"couplings.{name}", fault
 
 
 def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
@@ -401,9 +395,10 @@ def _range_fault(rig: Rig, joint: str, angle: float) -> str:
     """Return why an angle cannot be added to a joint, "" if it can."""
     params = rig.joints[joint]
     if joint in LIDS:
-        shut, wide = rig.lid_joints.ends_deg(joint)
-        if shut is None or wide is None:
-            return ""  # reported elsewhere if the ends are missing
+        ends = rig.lid_joints.ends_deg(joint)
+        if ends is None:
+            return ""  # reported elsewhere
+        shut, wide = ends
         if abs(angle) <= abs(wide - shut):
             return ""
         return (
@@ -461,9 +456,9 @@ def track_rules(rig: Rig) -> Iterable[tuple[str, str]]:
             middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
             spans = {}
             for name in LIDS:
-                shut, wide = rig.lid_joints.ends_deg(name)
-                if name in rig.joints and shut is not None and wide is not None:
-                    spans[name] = radians(wide - shut)
+                ends = rig.lid_joints.ends_deg(name)
+                if name in rig.joints and ends is not None:
+                    spans[name] = radians(ends[1] - ends[0])
             TrackFit(rig.names, spans).fit(
                 "",
                 track_motions(track, rig.names, 0, tables),

@@ -95,7 +95,6 @@ class ServoConfig(NamedTuple):
     min_steps, max_steps: limits; no goal outside is ever sent
     max_speed_steps_s: top speed, written to the servo's own profile
     name: its joint, e.g. "neck_yaw", for messages; "" for none
-    firmware_min: oldest supported firmware
     gains: the servo's P, I and D of position (Dynamixel: registers 84, 82, 80; STS: 21, 23, 22);
         None leaves them unchanged
     strength: largest share of full drive (Dynamixel: PWM Limit (36); STS: Torque Limit (48)); None
@@ -116,7 +115,6 @@ class ServoConfig(NamedTuple):
     max_steps: int
     max_speed_steps_s: float
     name: str = ""
-    firmware_min: int = 0
     gains: tuple[int, int, int] | None = None
     strength: float | None = None
     max_accel_steps_s2: float | None = None

@@ -13,7 +13,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.types import Floats, GazeState
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_ends
-from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import JointState
@@ -110,15 +110,15 @@ def rigs(draw: st.DrawFn) -> Rig:
         kind = draw(st.sampled_from(("each", "both", "none")), turn)
         names = [f"{side}_eye_{turn}" for side in ("left", "right")] if kind == "each" else []
         joints |= {name: model for name in names or ([f"eyes_{turn}"] if kind == "both" else [])}
-    lids: dict[str, float] = {}
+    lids: dict[str, tuple[float, float]] = {}
     for name in LIDS:
         if draw(st.booleans(), name):
             joints[name] = model
             ends = draw(st.sampled_from(((-25.0, 20.0), (30.0, -30.0), (-5.0, 60.0))))
-            lids |= dict(zip(LidJoints.keys(name), ends, strict=True))
+            lids[LidJoints.key(name)] = ends
     couplings = {}
     if {"neck_pitch", "neck_roll"} <= joints.keys() and draw(st.booleans(), "differential"):
-        couplings["neck"] = CouplingParams("differential", "neck_pitch", "neck_roll")
+        couplings["neck"] = CouplingParams("neck_pitch", "neck_roll")
     size = st.floats(0.0, 300.0)
     geometry = replace(
         desk.geometry,

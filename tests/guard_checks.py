@@ -10,6 +10,7 @@ from guard_bench import ACCEL, DT, HIGH, JOINT, LOW, TOP, Bench
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
+from gazerig.robot.safety.guard import LATE_RAD_S2, SOFT_START_RAD_S2
 
 
 def range_and_braking(m: ModuleType) -> None:
@@ -85,11 +86,10 @@ def stopped_loop(m: ModuleType) -> None:
 
 def late(m: ModuleType) -> None:
     """A joint at full speed, ticks that do not come: it goes on from its goal, softly."""
-    limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-    soft = radians(500.0)
-    params = GuardParams(late_ms=50.0, late_accel_deg_s2=500.0)
+    accel = 3.0 * LATE_RAD_S2
+    limit = JointLimit(LOW, HIGH, radians(900.0), accel, 70.0, 3.5, 7.0)
     for missed in (2, 10, 400):
-        guard = m.Guard(params, (limit,) * 9, GAZE_JOINTS, period_s=DT)
+        guard = m.Guard(GuardParams(), (limit,) * 9, GAZE_JOINTS, period_s=DT)
         guard.reset(0.0, (LOW,) * 9)
         guard._gentle = [False] * 9
         t_s, before, speed = 0.0, LOW, 0.0
@@ -98,15 +98,15 @@ def late(m: ModuleType) -> None:
             joints = JointState((before,) * 9, (0.0,) * 9, (t_s,) * 9, ())
             now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
             if k >= 8:
-                braked = max(0.0, speed - ACCEL * (missed - 1) * DT) if k == 8 else speed
-                assert (now - before) / DT <= braked + soft * DT + 1e-9
+                braked = max(0.0, speed - accel * (missed - 1) * DT) if k == 8 else speed
+                assert (now - before) / DT <= braked + LATE_RAD_S2 * DT + 1e-9
             before, speed = now, (now - before) / DT
 
 
 def late_while_gentle(m: ModuleType) -> None:
     """Every third tick misses two slots: a slow joint regains its speed, and no more than that."""
     limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-    params = GuardParams(soft_start_speed_deg_s=20.0, soft_start_accel_deg_s2=50.0)
+    params = GuardParams(soft_start_speed_deg_s=20.0)
     for missed in (2, 60):
         guard = m.Guard(params, (limit,) * 9, GAZE_JOINTS, period_s=DT)
         guard.reset(0.0, (LOW,) * 9)
@@ -117,11 +117,11 @@ def late_while_gentle(m: ModuleType) -> None:
             joints = JointState((before,) * 9, (0.0,) * 9, (t_s,) * 9, ())
             now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
             speed, before = (now - before) / DT, now
-            assert speed <= min(radians(20.0), fastest + radians(50.0) * DT) + 1e-9
+            assert speed <= min(radians(20.0), fastest + SOFT_START_RAD_S2 * DT) + 1e-9
             braked = max(0.0, last - ACCEL * gap * DT)
             assert abs(speed - braked) <= ACCEL * DT + 1e-9
             if gap > 50:  # longer than that it begins as from rest
-                assert speed <= braked + radians(50.0) * DT + 1e-9
+                assert speed <= braked + SOFT_START_RAD_S2 * DT + 1e-9
             fastest, last = max(fastest, speed), speed
         assert (now > LOW + 0.05) == (missed == 2)
 

@@ -15,7 +15,7 @@ from gazerig.robot.model.types import JointState
 
 
 def collision(m: ModuleType) -> None:
-    pair = CollisionParams("neck_pitch", -20.0, -10.0, "left_upper_lid", 10.0, 20.0)
+    pair = CollisionParams(("neck_pitch", -20.0, -10.0), ("left_upper_lid", 10.0, 20.0))
 
     def desired(pitch: float, lid: float) -> tuple[float, ...]:
         angles = {PITCH: radians(pitch), LID: radians(lid)}
@@ -23,7 +23,7 @@ def collision(m: ModuleType) -> None:
 
     for swap in (False, True):
         if swap:
-            pair = CollisionParams("left_upper_lid", 10.0, 20.0, "neck_pitch", -20.0, -10.0)
+            pair = CollisionParams(("left_upper_lid", 10.0, 20.0), ("neck_pitch", -20.0, -10.0))
         bench = Bench(m, collisions=(pair,))
         rng = np.random.default_rng(9)
         places = []
@@ -47,7 +47,7 @@ def collision(m: ModuleType) -> None:
 def collision_braking(m: ModuleType) -> None:
     for way in (1.0, -1.0):
         ends = sorted((way * 10.0, way * 20.0))
-        pair = CollisionParams("left_upper_lid", 10.0, 20.0, "neck_yaw", *ends)
+        pair = CollisionParams(("left_upper_lid", 10.0, 20.0), ("neck_yaw", ends[0], ends[1]))
         for k in range(40, 54):  # the neck turns round too late not to enter its range
             bench = Bench(m, start_deg=-way * 30.0, collisions=(pair,))
             for tick in range(150):
@@ -57,7 +57,7 @@ def collision_braking(m: ModuleType) -> None:
 
 
 def collision_lag(m: ModuleType) -> None:
-    pair = CollisionParams("left_upper_lid", 10.0, 20.0, "neck_yaw", -20.0, -10.0)
+    pair = CollisionParams(("left_upper_lid", 10.0, 20.0), ("neck_yaw", -20.0, -10.0))
     for start_deg in (-15.0, 0.0):
         bench = Bench(m, collisions=(pair,))
         for _ in range(150):
@@ -73,7 +73,7 @@ def collision_lag(m: ModuleType) -> None:
 
 def slow_joint(m: ModuleType) -> None:
     limit = JointLimit(LOW, HIGH, radians(20.0), radians(100.0))  # below the gentle ones
-    pair = CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
+    pair = CollisionParams(("neck_pitch", -20.0, 5.0), ("left_upper_lid", -20.0, 15.0))
     guard = m.Guard(GuardParams(collisions=(pair,)), (limit,) * 9, GAZE_JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     path, speed = [(0.0,) * 9], np.zeros(9)
@@ -86,7 +86,7 @@ def slow_joint(m: ModuleType) -> None:
 
 
 def collision_start(m: ModuleType) -> None:
-    pair = CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
+    pair = CollisionParams(("neck_pitch", -20.0, 5.0), ("left_upper_lid", -20.0, 15.0))
     bench = Bench(m, collisions=(pair,))
     while bench.path[-1][PITCH] < radians(5.9):
         assert bench.t_s < 1.0

@@ -4,7 +4,6 @@ from datetime import timedelta
 from types import SimpleNamespace
 
 import numpy as np
-from oak_packets import calibrated
 
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
@@ -46,10 +45,8 @@ class Device:
         sockets = real().CameraBoardSocket
         self.sockets = [sockets.CAM_A, sockets.CAM_B, sockets.CAM_C]
         self.platform = real().Platform.RVC2
-        self.calibration = calibrated(real())
         self.closed = 0
         self.reconnections: int | None = None
-        self.dots = 0.0
 
     def getUsbSpeed(self):  # noqa: N802
         return self.speed
@@ -63,14 +60,8 @@ class Device:
     def getPlatform(self):  # noqa: N802
         return self.platform
 
-    def readCalibration(self):  # noqa: N802
-        return self.calibration
-
     def setMaxReconnectionAttempts(self, count):  # noqa: N802
         self.reconnections = count
-
-    def setIrLaserDotProjectorIntensity(self, share):  # noqa: N802
-        self.dots = share
 
     def close(self):
         self.closed += 1
@@ -161,8 +152,6 @@ class Rig:
             **vars(sdk([info()])),
             UsbSpeed=real().UsbSpeed,
             CameraBoardSocket=real().CameraBoardSocket,
-            CameraModel=real().CameraModel,
-            NNArchive=real().NNArchive,
             Pipeline=Pipeline,
             MessageQueue=real().MessageQueue,
             CameraExposureOffset=real().CameraExposureOffset,

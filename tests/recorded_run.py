@@ -105,7 +105,7 @@ def ordered(number: int, made: Assembly) -> None:
         100: Jog(()),
         110: Stop("look at this"),
         140: Resume(),
-        160: Tune((("gaze.saccade.profile", "min_jerk"), ("loop.park_s", 3.5))),
+        160: Tune((("gaze.saccade.profile", "min_jerk"), ("guard.soft_start_speed_deg_s", 50.0))),
     }
     if number in orders:
         made.robot.command(orders[number])

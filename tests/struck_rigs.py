@@ -95,7 +95,6 @@ FEW = ("left_eye_pan", "left_eye_tilt", "neck_yaw")
 
 
 def quick(rig: Rig) -> Rig:
-    """Return the rig with an eye and a turn of the neck alone, and short slow passages."""
+    """Return the rig with an eye and a turn of the neck alone."""
     few = {name: joint for name, joint in rig.joints.items() if name in FEW}
-    guard = replace(rig.guard, soft_start_ms=200.0)
-    return replace(rig, guard=guard, joints=few if len(few) == len(FEW) else rig.joints)
+    return replace(rig, joints=few if len(few) == len(FEW) else rig.joints)

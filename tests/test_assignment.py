@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.data_association import (
     FORBIDDEN,
     DetectionRow,
@@ -51,7 +50,7 @@ def test_a_pair_among_many_costs_what_it_costs_alone() -> None:
     # The detector has followed one of them.
     tracks[2] = tracks[2]._replace(mark=3)
     found[4] = found[4]._replace(mark=3)
-    many = pair_costs(tracks, found, TrackerParams())
-    alone = [[pair_costs([t], [d], TrackerParams())[0][0] for d in found] for t in tracks]
+    many = pair_costs(tracks, found)
+    alone = [[pair_costs([t], [d])[0][0] for d in found] for t in tracks]
     np.testing.assert_allclose(many, alone, rtol=1e-12)
     assert 9 < sum(cost < FORBIDDEN for row in alone for cost in row) < 81

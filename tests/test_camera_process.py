@@ -12,7 +12,7 @@ from fakes.films import write_film
 from fakes.waiting import wait_for
 from present import present
 
-from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.process import (
@@ -50,8 +50,8 @@ def recording(tmp_path):
     return tmp_path / "r.mcap"
 
 
-def process(source, care=None) -> CameraProcess:
-    return CameraProcess(CameraParts(source, DETECTOR), time.monotonic, care)
+def process(source, care=RECOVERY) -> CameraProcess:
+    return CameraProcess(CameraParts(source, DETECTOR, locate=LOCATOR), time.monotonic, care)
 
 
 def whole(camera):
@@ -90,15 +90,14 @@ def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     camera.close()
 
 
-QUICK = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
+QUICK = CameraRecovery(0.001, 0.02, silent_s=60.0, restart_s=60.0)
 
 
 def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
-    assert camera.retune(DETECTOR, None, LOCATOR)
-    wait_for(lambda: present(camera.latest(0.0)).located is not None)
+    assert present(camera.latest(0.0)).located is not None
     first, before = present(camera._process).pid, camera.latest(0.0)
     os.kill(present(first), signal.SIGKILL)
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
@@ -115,7 +114,7 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
 
 
 def test_a_process_that_hangs_is_told_of_and_started_again(recording):
-    care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
+    care = CameraRecovery(silent_s=1.0, restart_s=2.0)
     camera = process(partial(CameraReplay, recording), care)
     camera.open()
     wait_for(lambda: camera.frames > 20)
@@ -137,7 +136,7 @@ def test_a_process_is_busy_that_wants_to_run_for_most_of_its_silence():
 
 
 def test_silence_is_judged_by_what_is_usual():
-    care = CameraRecoveryParams(silent_s=1.0, restart_s=3.0)
+    care = CameraRecovery()
     for period_s, lost_s, hung_s in ((0.03, 1.0, 3.0), (0.5, 2.5, 7.5), (2.0, 10.0, 30.0)):
         silence, now_s = FrameWatchdog(care, 0.0), 0.0
         assert not silence.verdict(FIRST_FRAME_S - 0.01)
@@ -152,7 +151,7 @@ def test_silence_is_judged_by_what_is_usual():
 
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path = write_film(tmp_path / "film.avi", 3)
-    care = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=5.0, give_up_s=0.1)
+    care = CameraRecovery(0.001, 0.005, give_up_s=0.1)
     camera = process(partial(VideoFile, path), care)
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)

@@ -21,7 +21,6 @@ from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.types import DetectedFace
 from gazerig.robot.app.options import RunOptions
 
 GO_ON = threading.Event()
@@ -39,9 +38,7 @@ def shot(k: int, whole: bool = True) -> Shot:
     mm = rng.integers(0, 65536, (48, 64)).astype(np.float32)
     depth = np.where(mm == 0, np.float32(np.nan), mm / np.float32(1000.0)).astype(np.float32)
     depth[:5] = np.nan
-    landmarks = rng.uniform(0.0, 48.0, (5, 2))
-    faces = (DetectedFace((1.25, 2.5, 30.0, 40.0), landmarks, 0.875),) if k % 2 else ()
-    return Shot(TIMES_S[k], k + 1, picture, depth, LENS, faces)
+    return Shot(TIMES_S[k], k + 1, picture, depth, LENS)
 
 
 def write(path: Path, shots, **how) -> Path:
@@ -62,13 +59,9 @@ def assert_same(found: Shot, wanted: Shot) -> None:
     assert np.array_equal(present(found.depth_m), present(wanted.depth_m), equal_nan=True)
     assert present(found.depth_m).dtype == np.float32
     assert found.lens == wanted.lens
-    assert len(present(found.faces)) == len(present(wanted.faces))
-    for face, other in zip(present(found.faces), present(wanted.faces), strict=True):
-        assert (face.box_px, face.confidence) == (other.box_px, other.confidence)
-        assert np.array_equal(face.landmarks_px, other.landmarks_px)
 
 
-def test_pictures_depth_lens_faces_and_times_come_out_exactly(file):
+def test_pictures_depth_lens_and_times_come_out_exactly(file):
     recording = Recording(file)
     assert recording.note == ""
     assert recording.times_s == pytest.approx([t - TIMES_S[0] for t in TIMES_S], abs=1e-9)
@@ -82,7 +75,7 @@ def test_standard_tools_read_the_file(file):
     with file.open("rb") as stream:
         reader = make_reader(stream)
         summary = present(reader.get_summary())
-        assert present(summary.statistics).message_count == 4 * len(TIMES_S)
+        assert present(summary.statistics).message_count == 3 * len(TIMES_S)
         names = {schema.name for schema in summary.schemas.values()}
         assert {"foxglove.CompressedImage", "foxglove.CameraCalibration"} <= names
         _, _, message = next(iter(reader.iter_messages(topics=[fmt.LENS])))
@@ -95,7 +88,7 @@ def test_standard_tools_read_the_file(file):
 def test_what_the_camera_does_not_give_is_not_there(tmp_path):
     recording = Recording(write(tmp_path / "plain.mcap", [shot(0, whole=False)]))
     found = recording.shot(0)
-    assert (found.depth_m, found.lens, found.faces) == (None, None, None)
+    assert (found.depth_m, found.lens) == (None, None)
 
 
 def test_existing_file_is_kept_unless_told_otherwise(file):

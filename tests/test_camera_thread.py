@@ -9,7 +9,7 @@ from fakes.films import write_film
 from fakes.waiting import wait_for
 from present import present
 
-from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile
@@ -18,7 +18,7 @@ from gazerig.drivers.types import DetectedFace
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 
-AT_ONCE = CameraRecoveryParams(give_up_s=0.0)
+AT_ONCE = CameraRecovery(give_up_s=0.0)
 
 FACE = DetectedFace((1.0, 2.0, 3.0, 4.0), np.zeros((5, 2)), 0.9)
 
@@ -146,7 +146,7 @@ def lose(source: Source) -> None:
 
 def test_waits_between_tries_double_up_to_the_longest(source):
     waits: list[float] = []
-    care = CameraRecoveryParams(retry_ms=100.0, longest_retry_ms=350.0, give_up_s=1.0)
+    care = CameraRecovery(0.1, 0.35, give_up_s=1.0)
     clock = [0.0]
     camera = CameraThread(source, EveryOther(), lambda: clock[0], care)
 
@@ -167,7 +167,7 @@ def test_waits_between_tries_double_up_to_the_longest(source):
 
 
 def test_close_does_not_wait_for_a_lost_camera(source):
-    care = CameraRecoveryParams(retry_ms=60_000.0, longest_retry_ms=60_000.0, give_up_s=86_400.0)
+    care = CameraRecovery(60.0, 60.0, give_up_s=86_400.0)
     camera = CameraThread(source, EveryOther(), time.monotonic, care)
     camera.open()
     lose(source)

@@ -80,8 +80,6 @@ def test_get_shows_all_and_marks_what_is_not_saved() -> None:
     table = gazerig("ctl", "get", "loop").stdout.splitlines()
     (row,) = (line for line in table if RATE in line)
     assert row.split() == ["*", RATE, "150.0", "Hz", "200.0"]
-    (other,) = (line for line in table if "loop.park_s" in line)
-    assert not other.startswith("*")
     alone = gazerig("ctl", "get", RATE).stdout
     assert "control rate; 20 .. 1000 Hz; changes at the next tick" in alone
 
@@ -99,7 +97,7 @@ def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None
 
 def test_what_takes_effect_later_is_said() -> None:
     done = gazerig("ctl", "set", "bus.port", "/dev/ttyUSB7")
-    assert "bus.port = /dev/ttyUSB7 (next start: " in done.stdout
+    assert "bus.port = /dev/ttyUSB7 (next start)" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,15 @@
 """A drawn scene in real time: the camera's process draws and detects, the loop sends the pose."""
 
 import threading
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.double_buffer import PoseSlot
 from gazerig.drivers.camera.source import Shot
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
-from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, scene_pixels
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
@@ -60,24 +57,12 @@ def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
     assert apart[1] > 3.0 * apart[0]
 
 
-def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_a_drawn_scene_in_real_time_has_a_process() -> None:
     rig = load_rig("desk")
     made = assemble(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
     try:
         lent = made.robot.camera
         assert isinstance(lent, BorrowedCamera)
-        camera = lent.own
-        assert isinstance(camera, DrawnCamera)
-        asked: list[object] = []
-
-        def retune(*given: object) -> bool:
-            asked.append(given)
-            return True
-
-        monkeypatch.setattr(camera.process, "retune", retune)
-        changed = load_rig("desk", character="shy")
-        assert retune_camera(lent, rig, changed, rig.camera) == "" and not asked
-        slower = replace(rig, motion=replace(rig.motion, enabled=not rig.motion.enabled))
-        assert retune_camera(lent, rig, slower, rig.camera) == "" and len(asked) == 1
+        assert isinstance(lent.own, DrawnCamera)
     finally:
         made.close()

@@ -7,7 +7,7 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.model.mass_params import MassParams
+from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -37,9 +37,8 @@ def test_a_device_travels_as_json(line):
 
 
 def test_the_servos_of_a_rig_travel_as_json():
-    (line,) = emulated_lines(
-        replace(load_rig("desk"), mass=MassParams(density_kg_m3=900.0))
-    ).values()
+    heavy = MassParams(head=LinkMassParams(mass_kg=0.9))
+    (line,) = emulated_lines(replace(load_rig("desk"), mass=heavy)).values()
     assert device_of_data(json.loads(json.dumps(device_data(line)))) == line
 
 

@@ -77,10 +77,7 @@ def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
 def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
     """A forbidden pair with a jaw in it holds the jaw back while the chin is on the chest."""
     rig = load_rig("expressive")
-    pair: Value = {
-        "first": "neck_pitch", "first_min_deg": -35.0, "first_max_deg": -5.0,
-        "second": "jaw", "second_min_deg": 4.0, "second_max_deg": 25.0,
-    }  # fmt: skip
+    pair: Value = {"first": ("neck_pitch", -35.0, -5.0), "second": ("jaw", 4.0, 25.0)}
     low: dict[str, Value] = {"expressions.sulky": {"neck_pitch": -20.0, "jaw": 15.0}}
     made: Assembly = started(apply_changes(rig, {"guard.collisions": (pair,), **low}))
     made.robot.command(Express("sulky"))

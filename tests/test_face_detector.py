@@ -114,12 +114,6 @@ def test_no_face_is_seen_where_there_is_none(mtcnn):
         assert mtcnn.find(picture) == ()
 
 
-def test_smallest_face_and_confidence_are_limits(astronaut):
-    picture, _ = scene(astronaut, (320, 240), 15)  # a face about 40 pixels high
-    assert face_detector(FaceDetectorParams(kind="mtcnn", min_face_px=90)).find(picture) == ()
-    assert face_detector(FaceDetectorParams(kind="mtcnn", min_confidence=1.0)).find(picture) == ()
-
-
 def test_same_picture_same_numbers_whatever_came_before(mtcnn, astronaut):
     picture, _ = scene(astronaut, (320, 240), 40)
     fresh = face_detector(FaceDetectorParams(kind="mtcnn"))

@@ -12,8 +12,6 @@ from seeing.material import portrait
 from test_face_pose import CAMERA, angle_between, turned
 from test_gaze_at_head import AT_EYES, standing
 
-from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
 from gazerig.drivers.vision.face import mesh as networks
@@ -21,7 +19,6 @@ from gazerig.drivers.vision.face.mesh import MeshedDetector, MeshNetworks
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE
 from gazerig.gaze.types import Face
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception import mesh_reading
 from gazerig.robot.perception.mesh_reading import EYES_SHUT, MeshReading, read_mesh
 from gazerig.robot.perception.perception import Perception
@@ -129,7 +126,7 @@ def test_speech_is_a_mouth_that_opens_and_closes_again_and_again() -> None:
 
 
 def seen_faces(meshes: list[FaceMesh]) -> list[Face]:
-    perception = Perception(AT_EYES, 65.0, Tracker(TrackerParams()))
+    perception = Perception(AT_EYES, 65.0, Tracker())
     out = []
     for k, mesh in enumerate(meshes):
         marks = mesh.points[[33, 263, 4, 61, 291], :2].astype(np.float64)
@@ -198,12 +195,8 @@ def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
         def find(self, image: object) -> tuple[DetectedFace, ...]:
             return face, face
 
-    first, second = MeshedDetector(Two(), 1).find(shown.image)
+    first, second = MeshedDetector(Two()).find(shown.image)
     assert first.mesh is not None and second.mesh is None
     assert first.mesh.irises_px is not None
-    # Those that a camera itself has found get theirs too.
-    analyzer = FrameAnalyzer(MeshedDetector(Two(), 1))
-    (own,) = analyzer.analyze(Shot(0.1, 1, shown.image, faces=(face,))).faces
-    assert own.mesh is not None
     wall = np.full((300, 300, 3), 128, np.uint8)
     assert MeshNetworks().mesh(wall, shown.landmarks_px) is None

@@ -19,7 +19,7 @@ from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.body import Body
-from gazerig.robot.model.coupling_params import CouplingParams, coupled_pairs
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.safety.guard import Guard
 from gazerig.robot.safety.start_range import far_outside, find_far_outside
@@ -62,7 +62,7 @@ class Bench:
             rig.joints,
             park_rad(rig),
             rig.guard.soft_start_speed_deg_s,
-            coupled_pairs(rig.couplings),
+            rig.couplings.values(),
             recover=self.said.append if recover else None,
         )
         self.names = self.body.names
@@ -254,7 +254,7 @@ def test_the_text_of_one_joint() -> None:
     assert far_outside(nan, limit)
 
 
-DIFFERENTIAL = CouplingParams("differential", "neck_pitch", "neck_roll")
+DIFFERENTIAL = CouplingParams("neck_pitch", "neck_roll")
 
 
 @pytest.mark.parametrize(
@@ -265,12 +265,9 @@ def test_joints_of_two_servos_are_judged_by_their_own_angles(
     pitch_deg: float, roll_deg: float, far: tuple[str, ...]
 ) -> None:
     rig = replace(load_rig("desk"), couplings={"neck": DIFFERENTIAL})
-    ((first, second, coupling),) = pairs = coupled_pairs(rig.couplings)
-    shafts = coupling.servo_rad((radians(pitch_deg), radians(roll_deg)))
+    shafts = DIFFERENTIAL.servo_rad((radians(pitch_deg), radians(roll_deg)))
     steps = {
         name: rig.joints[name].steps(shaft)
-        for name, shaft in zip((first, second), shafts, strict=True)
+        for name, shaft in zip(DIFFERENTIAL.joints, shafts, strict=True)
     }
-    assert tuple(find_far_outside(rig.joints, pairs, steps)) == far
-    one_alone = {first: steps[first]}
-    assert not find_far_outside(rig.joints, pairs, one_alone) or far
+    assert tuple(find_far_outside(rig.joints, [DIFFERENTIAL], steps)) == far

@@ -1,12 +1,11 @@
 """Faces and things are located next to the detector; the tick only places and associates them."""
 
 from dataclasses import replace
-from math import radians, tan
+from math import radians
 
 import numpy as np
 import pytest
 from present import present
-from retuned_run import started
 from test_perception import STILL, face_at, picture, standing
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
@@ -15,7 +14,6 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception import frame_locator
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
@@ -25,7 +23,7 @@ FIELD_DEG = 69.0
 FACE = face_at((0.1, 0.05, 1.0))
 LOCATOR = FrameLocator(None, radians(FIELD_DEG))
 BALL = MovingBlob(3, "ball", (0.2, 0.1, 1.5), 0.1, v_camera_m_s=(0.1, 0.0, 0.0))
-LENS = LensParams(640, 400, 520.0, 520.0, 319.5, 199.5)
+LENS = LensParams((640, 400), (520.0, 520.0), (319.5, 199.5))
 
 
 class OneFace:
@@ -36,7 +34,7 @@ class OneFace:
 
 
 def perception(lens: LensParams | None = None) -> Perception:
-    return Perception(STILL, FIELD_DEG, Tracker(TrackerParams()), lens=lens)
+    return Perception(STILL, FIELD_DEG, Tracker(), lens=lens)
 
 
 def percept_of(seeing: Perception, found: Detections) -> Percept:
@@ -76,9 +74,7 @@ def test_a_face_printed_on_a_shirt_is_no_second_face(
 def test_places_of_another_calibration_are_not_used() -> None:
     under_way = located(picture(1, faces=(FACE,)))
     wanted = percept_of(perception(LENS), replace(under_way, located=None))
-    seeing = perception()
-    seeing.retune(FIELD_DEG, None, LENS)
-    assert percept_of(seeing, under_way).faces == wanted.faces
+    assert percept_of(perception(LENS), under_way).faces == wanted.faces
 
 
 def test_a_frame_comes_with_what_it_shows_located() -> None:
@@ -86,25 +82,7 @@ def test_a_frame_comes_with_what_it_shows_located() -> None:
     found = frames.analyze(shot(1))
     assert found.located == LOCATOR(found)
     assert [len(of) for of in present(found.located)[1:3]] == [1, 1]
-    other = FrameLocator(LENS, 1.0)
-    frames.retune(None, None, other)
-    assert frames.analyze(shot(2)).located == other(found)
     assert FrameAnalyzer(OneFace()).analyze(shot(3)).located is None
-
-
-def test_a_lens_tuned_while_running_reaches_the_camera() -> None:
-    running = started("visitor")
-
-    def used_px() -> float:
-        return present(present(running.go(20).detections).located).intrinsics.fx_px
-
-    before_px = used_px()
-    running.tune({"camera.horizontal_field_deg": 50.0})
-    running.go(1)
-    assert used_px() == pytest.approx(320.0 / tan(radians(25.0)))
-    running.tune({"camera.horizontal_field_deg": FIELD_DEG})
-    running.go(1)
-    assert used_px() == before_px
 
 
 def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:

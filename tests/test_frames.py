@@ -77,7 +77,7 @@ def test_a_camera_is_mounted_where_its_pose_says(
 _LENS = """
 camera:
   roll_deg: 1.5
-  lens: {width_px: 640, height_px: 400, fx_px: 478.5, fy_px: 480.0, cx_px: 327.0, cy_px: 189.5,
+  lens: {size_px: [640, 400], focal_px: [478.5, 480.0], centre_px: [327.0, 189.5],
     distortion: [-0.11, 0.06, 0.0, 0.0, 0.0]}
 """
 
@@ -86,7 +86,7 @@ def _rig_with(tmp_path: Path, camera: str) -> str:
     """Write the desk rig with another camera section."""
     shipped = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
     before, _, after = shipped.read_text(encoding="utf-8").partition("\ncamera:")
-    rest = after[after.index("\ndetector:") :]
+    rest = after[after.index("\nloop:") :]
     rig = tmp_path / "rig.yaml"
     rig.write_text(f"{before}{camera}{rest}", encoding="utf-8")
     return str(rig)
@@ -96,7 +96,7 @@ def test_a_measured_lens_is_read_from_the_rig_file(tmp_path: Path) -> None:
     camera = load_rig(_rig_with(tmp_path, _LENS)).camera
     assert camera.roll_deg == 1.5
     assert camera.lens == LensParams(
-        640, 400, 478.5, 480.0, 327.0, 189.5, (-0.11, 0.06, 0.0, 0.0, 0.0)
+        (640, 400), (478.5, 480.0), (327.0, 189.5), (-0.11, 0.06, 0.0, 0.0, 0.0)
     )
     assert load_rig("desk").camera.lens is None
 
@@ -110,7 +110,7 @@ def test_a_film_sees_from_where_the_head_camera_rests() -> None:
         expected[1]
     )
     assert fixed_mount(still, KINEMATICS) is still
-    rolled = CameraParams(roll_deg=3.0, lens=LensParams(640, 400, 480.0, 480.0, 320.0, 200.0))
+    rolled = CameraParams(roll_deg=3.0, lens=LensParams((640, 400), (480.0, 480.0), (320.0, 200.0)))
     kept = fixed_mount(rolled, KINEMATICS)
     assert (kept.roll_deg, kept.lens) == (3.0, rolled.lens)
 

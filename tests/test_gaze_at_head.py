@@ -13,7 +13,6 @@ from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import looks_at_head
@@ -60,7 +59,7 @@ def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:
         np.random.default_rng(seed),
     )
     camera.open()
-    perception = Perception(AT_EYES, 69.0, Tracker(TrackerParams()))
+    perception = Perception(AT_EYES, 69.0, Tracker())
     out, number = [], 0
     for k in range(round(30 * seconds)):
         seen = camera.latest(k / 30 + 0.001)
@@ -94,16 +93,16 @@ def test_e77_on_the_edge_the_answer_does_not_flicker(off_deg: float) -> None:
 
 
 def test_what_was_found_before_stays_between_the_edges() -> None:
-    params, sd = TrackerParams(face_at_head_deg=10.0), radians(4.0)
+    sd = radians(4.0)
     for off_deg, before, looks in [
         (7.9, None, True), (7.9, False, True), (8.1, False, False), (8.1, None, False),
         (8.1, True, True), (11.9, True, True), (12.1, True, False),
     ]:  # fmt: skip
-        assert looks_at_head(params, radians(off_deg), sd, False, before) is looks
+        assert looks_at_head(radians(off_deg), sd, False, before) is looks
     # A less certain turn needs more to change the answer; an unknown one has no effect.
-    assert looks_at_head(params, radians(7.9), radians(14.0), False, False) is False
-    assert looks_at_head(params, radians(12.1), radians(14.0), False, True) is True
-    assert looks_at_head(params, 0.0, radians(16.8), False, True) is None
+    assert looks_at_head(radians(7.9), radians(14.0), False, False) is False
+    assert looks_at_head(radians(12.1), radians(14.0), False, True) is True
+    assert looks_at_head(0.0, radians(16.8), False, True) is None
 
 
 @pytest.mark.parametrize("away_m", [0.7, 1.5, 3.0])
@@ -134,7 +133,7 @@ def detection(gaze: Vec3 | None) -> Detections:
     ("gaze", "looks"), [(None, False), ((0.0, 0.0, -1.0), True), ((0.3, 0.0, -0.95), False)]
 )
 def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
-    percept = Perception(AT_EYES, 65.0, Tracker(TrackerParams())).see(detection(gaze), standing())
+    percept = Perception(AT_EYES, 65.0, Tracker()).see(detection(gaze), standing())
     assert percept is not None
     (face,) = percept.faces
     assert face.looks_at_head is looks

@@ -14,7 +14,7 @@ from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fits, project, rays
 
 BENT = Intrinsics(480.0, 482.0, 327.0, 190.0, (-0.25, 0.09, 0.002, -0.001, -0.01))
-LENS = LensParams(640, 400, 480.0, 482.0, 327.0, 190.0, BENT.distortion)
+LENS = LensParams((640, 400), (480.0, 482.0), (327.0, 190.0), BENT.distortion)
 
 
 @settings(max_examples=60, deadline=None)

@@ -25,7 +25,6 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import LocalisedDetection
@@ -185,7 +184,7 @@ def seen_from(head_yaw: float, t_s: float, number: int) -> Detections:
 
 
 def test_a_picture_is_placed_where_the_head_was_when_it_was_taken() -> None:
-    perception = Perception(MOUNT, 69.0, Tracker(TrackerParams()))
+    perception = Perception(MOUNT, 69.0, Tracker())
     poses = PoseHistory(KINEMATICS)
     errors, speeds = [], []
     for k in range(200):
@@ -211,10 +210,10 @@ def test_a_picture_is_placed_where_the_head_was_when_it_was_taken() -> None:
 @pytest.mark.parametrize("aside_m", [-0.25, 0.25])
 def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: float) -> None:
     own = {code: (-0.03, 0.02 * i - 0.07, 0.05 - 0.015 * i) for i, code in enumerate(PARTS)}
-    perception = Perception(MOUNT, 69.0, Tracker(TrackerParams()), own)
+    perception = Perception(MOUNT, 69.0, Tracker(), own)
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
     detection = LocalisedDetection("face", nose, R, 0.1, 0.0, 0.9)
-    (track,) = Tracker(TrackerParams()).step([detection], (0.0, 0.0, 0.2), 0.0)
+    (track,) = Tracker().step([detection], (0.0, 0.0, 0.2), 0.0)
     face = perception._face(track)
     eye = (0.0, 0.0, 0.2)
     for code, seen in zip(PARTS, face.parts_world_m, strict=True):
@@ -229,7 +228,7 @@ def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: flo
 
 
 def test_the_same_picture_is_seen_once() -> None:
-    perception = Perception(MOUNT, 69.0, Tracker(TrackerParams()))
+    perception = Perception(MOUNT, 69.0, Tracker())
     poses = PoseHistory(KINEMATICS)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     assert perception.see(None, poses) is None

@@ -22,7 +22,7 @@ from gazerig.robot.app.rig_weight import rest_park_deg, weight_findings
 from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.body import Body
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
 from gazerig.sim_mock.devices import build
 
@@ -60,7 +60,6 @@ def test_torques_are_those_of_mujoco(name: str) -> None:
     rng = np.random.default_rng(4)
     weights = {"back": CounterweightParams(0.2, (-60.0, 5.0, 20.0))}
     rig = heavy(name, replace(REAL, counterweights=weights))
-    rig = with_joint(rig, "neck_pitch", spring_nm_deg=0.01, spring_rest_deg=12.0)
     statics = statics_of(rig)
     for _ in range(5):
         angles = {
@@ -80,8 +79,7 @@ def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
     statics = statics_of(heavy("desk"))
     assert statics.rest_pose({})["neck_pitch"] == radians(-35.0)
     assert statics.limp_rad("neck_pitch", {"neck_pitch": radians(-12.0)}) == radians(-35.0)
-    sprung = with_joint(heavy("desk"), "neck_pitch", spring_nm_deg=0.02, spring_rest_deg=12.0)
-    loads = statics_of(sprung).load_nm(statics_of(sprung).rest_pose({}))
+    loads = statics_of(shipped("desk")).load_nm(rest)
     assert loads["neck_pitch"] == pytest.approx(0.0, abs=2e-3)
 
 
@@ -91,10 +89,6 @@ def test_a_head_rests_where_its_weight_has_no_lever_or_on_its_stop() -> None:
         ("head: {mass_kg: -1}", "mass.head.mass_kg", "below"),
         ("head: {mass_kg: 0.02}", "mass.head.mass_kg", "weigh 0.029"),
         ("head: {com_mm: [200, 0, 30]}", "mass.head.com_mm", "outside the head"),
-        ("head: {inertia_kg_mm2: [1, 1, 3, 0, 0, 0]}", "mass.head", "exceed the sum of the other two"),
-        ("head: {inertia_kg_mm2: [-1, 1, 1, 0, 0, 0]}", "mass.head", "must be above 0"),
-        ("head: {inertia_kg_mm2: [2, 2, 2, 0, 0, 0]}", "mass.head.inertia_kg_mm2", "less than"),
-        ("head: {inertia_kg_mm2: [9e4, 9e4, 9e4, 0, 0, 0]}", "mass.head.inertia_kg_mm2", "at most"),
         ("links: {lefteye: {mass_kg: 1}}", "mass.links.lefteye", "did you mean left_eye"),
         ("links: {head: {mass_kg: 1}}", "mass.links.head", "under mass.head"),
         ("counterweights: {a: {mass_kg: 1, position_mm: [0, 0, 0], link: x}}",
@@ -116,13 +110,13 @@ def test_impossible_masses_are_refused(lines: str, key: str, rule: str, tmp_path
 def test_emulated_servos_carry_the_weight_of_the_whole_pose(coupled: bool) -> None:
     """A head that is tilted ahead and aside loads all servos of its neck."""
     rig = heavy("desk", MassParams(head=LinkMassParams(com_mm=(40.0, 8.0, 30.0))))
-    pair = CouplingParams("differential", "neck_pitch", "neck_roll")
+    pair = CouplingParams("neck_pitch", "neck_roll")
     if coupled:
         rig = replace(rig, couplings={"neck": pair})
     angles = {"neck_yaw": 0.3, "neck_pitch": -0.5, "neck_roll": 0.2}
     turned = dict(angles)
     if coupled:
-        both = pair.make_coupling().servo_rad((angles["neck_pitch"], angles["neck_roll"]))
+        both = pair.servo_rad((angles["neck_pitch"], angles["neck_roll"]))
         turned |= dict(zip(("neck_pitch", "neck_roll"), both, strict=True))
     (line,) = emulated_lines(rig).values()
     now_s = 0.0
@@ -142,9 +136,9 @@ def test_emulated_servos_carry_the_weight_of_the_whole_pose(coupled: bool) -> No
 class Neck:
     """A neck's pitch on emulated servos, with all other joints at 0."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, compensated: bool = True) -> None:
         self.emulated = EmulatedRig(rig)
-        sag = sag_compensation(rig)
+        sag = sag_compensation(rig) if compensated else None
         bus = rig_bus(rig, self.emulated.ports)
         self.body = Body(bus, rig.joints, park_rad(rig), sag=sag)
         self.at = self.body.names.index("neck_pitch")
@@ -169,7 +163,7 @@ class Neck:
 @pytest.mark.parametrize("name", ["desk", "feetech", "expressive", "nine_xl330"])
 def test_a_heavy_head_does_not_sag(name: str) -> None:
     rig = heavy(name)
-    plain = Neck(replace(rig, mass=replace(REAL, sag_share=0.0)))
+    plain = Neck(rig, compensated=False)
     made_up = Neck(rig)
     for angle in (0.0, 20.0, -20.0):
         before, after = plain.hold(angle, 3.0)[-1], made_up.hold(angle, 3.0)[-1]

@@ -120,7 +120,7 @@ def test_noise_alone_is_nothing() -> None:
 
 @pytest.mark.parametrize("times", [(0.0, 0.0), (1.0, 0.5), (0.0, 5.0), (0.0, float("nan"))])
 def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -> None:
-    detector = MotionDetector(MotionParams(confirm_frames=1))
+    detector = MotionDetector(MotionParams())
     assert detector.before_s is None
     look(detector, scene(0), times[0])
     assert detector.before_s == times[0]

@@ -1,68 +1,13 @@
-"""The lens of an OAK camera: its distortion from memory, and gazerig calibrate camera --oak."""
+"""The lens of an OAK camera: gazerig calibrate camera --oak."""
 
-import threading
-from dataclasses import replace
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 from command_line import invoked
-from oak_packets import DISTORTION, calibrated
-from oak_stand_in import Group, Message, Rig, real
+from oak_stand_in import Group, Message, Rig
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.oak.calibration import raw_distortion
-from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.source import OakSource
-from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.errors import CameraError
-from gazerig.robot.model.intrinsics import project
-
-
-def test_e98_five_numbers_place_points_as_the_fourteen_of_the_factory_do():
-    stored = calibrated(real())
-    K = np.array(stored.getCameraIntrinsics(real().CameraBoardSocket.CAM_A, 640, 400))
-    plain = Intrinsics(K[0, 0], K[1, 1], K[0, 2], K[1, 2])
-    bent = replace(plain, distortion=raw_distortion(real(), stored, OakParams(undistort=False)))
-    rng = np.random.default_rng(0)
-    points = np.column_stack(
-        (rng.uniform(-0.5, 0.5, 200), rng.uniform(-0.3, 0.3, 200), np.ones(200))
-    )
-    true = cv2.projectPoints(points, np.zeros(3), np.zeros(3), K, np.array(DISTORTION))[0][:, 0]
-    assert np.hypot(*(project(points, bent) - true).T).max() < 0.4
-    assert np.hypot(*(project(points, plain) - true).T).max() > 2.0
-
-
-def test_a_memory_without_a_lens_is_told():
-    with pytest.raises(CameraError, match=r"does not contain its lens.*undistort: true"):
-        raw_distortion(real(), calibrated(real(), colour=False), OakParams(undistort=False))
-
-
-def test_a_fisheye_is_refused_where_frames_are_not_straightened():
-    stored, dai = calibrated(real()), real()
-    stored.setCameraType(dai.CameraBoardSocket.CAM_A, dai.CameraModel.Fisheye)
-    stored.setDistortionCoefficients(
-        dai.CameraBoardSocket.CAM_A, [0.9, -2.0, 3.0, 5.0] + [0.0] * 10
-    )
-    wide = [[900.0, 0.0, 1915.0], [0.0, 900.0, 1072.0], [0.0, 0.0, 1.0]]
-    stored.setCameraIntrinsics(dai.CameraBoardSocket.CAM_A, wide, 3840, 2160)
-    with pytest.raises(CameraError, match=r"set oak\.undistort: true"):
-        raw_distortion(dai, stored, OakParams(undistort=False))
-
-
-def test_frames_that_are_not_straightened_carry_the_distortion():
-    rig = Rig()
-    K = [[570.0, 0.0, 319.0], [0.0, 571.0, 199.0], [0.0, 0.0, 1.0]]
-    for undistort in (True, False):
-        source = rig.source(undistort=undistort)
-        source.open()
-        rig.queue.fed.append(Message(5.0, 100.0, K))
-        shot = source.take(lambda: 100.0, threading.Event())
-        assert shot is not None and shot.lens is not None
-        assert shot.lens.has_distortion is not undistort
-        assert shot.lens.fx_px == 570.0
-        source.close()
 
 
 @pytest.fixture
@@ -98,7 +43,7 @@ def test_camera_that_is_there_goes_into_the_rig_with_its_frames_own_lens(rig_fil
     assert done.code == 0, done.err
     assert "the camera's own lens: focal length 560.0, 561.0 px" in done.err
     lens = load_rig(str(rig_file)).camera.lens
-    assert lens is not None and (lens.fx_px, lens.cy_px) == (560.0, 198.0)
+    assert lens is not None and (lens.focal_px[0], lens.centre_px[1]) == (560.0, 198.0)
     assert camera.device.closed
 
 

@@ -13,26 +13,20 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 from fakes.films import write_film
-from oak_packets import face_archive
 from present import present
 
-from gazerig.config.load import ConfigError, shipped_path
-from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     PipelineOutputs,
     device_nodes,
-    set_controls,
 )
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.errors import CameraError, install_command
 
 GO_ON = threading.Event()
-PARAMS = OakParams(width_px=320, height_px=240, rate_hz=60.0, silence_ms=3000.0)
+PARAMS = OakParams(rate_hz=60.0)
 LENGTH = 30
-# Eyes, nose, corners of the mouth, in shares of the picture.
-POINTS = ((0.45, 0.4), (0.55, 0.4), (0.5, 0.5), (0.46, 0.6), (0.54, 0.6))
 
 
 @pytest.fixture(scope="module")
@@ -66,22 +60,6 @@ def depth_mm(dai, frame):
     return stamped(found, frame)
 
 
-def found_faces(dai, frame):
-    """Return a message with two faces and one without landmarks."""
-    detections = []
-    for scale, confidence, points in ((0.1, 0.99, POINTS), (0.3, 0.8, POINTS)):
-        box = dai.RotatedRect(dai.Point2f(0.5, 0.5), dai.Size2f(scale, scale), 0.0)
-        face = dai.ImgDetection(box, confidence, 0)
-        face.setKeypoints([dai.Keypoint(x, y, 0.0) for x, y in points])
-        detections.append(face)
-    box = dai.RotatedRect(dai.Point2f(0.2, 0.2), dai.Size2f(0.1, 0.1), 0.0)
-    detections.append(dai.ImgDetection(box, 0.95, 0))  # without landmarks
-    message = dai.ImgDetections()
-    message.detections = detections
-    message.setTransformation(frame.getTransformation())
-    return stamped(message, frame)
-
-
 def answering(dai, pipeline, make, source) -> Any:
     """Return the output of a node that sends what ``make`` makes of every frame."""
 
@@ -100,7 +78,7 @@ def answering(dai, pipeline, make, source) -> Any:
     return node.out
 
 
-def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock=None):
+def host_nodes(film, loop=True, lens=None, device_clock=None):
     """Make a substitute for device_nodes: a replayed film and nodes that answer each picture."""
 
     def looked_through(frame):
@@ -121,8 +99,7 @@ def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock
         colour = answering(dai, pipeline, looked_through, replay.out)
         return PipelineOutputs(
             colour,
-            answering(dai, pipeline, partial(depth_mm, dai), colour) if depth else None,
-            answering(dai, pipeline, partial(found_faces, dai), colour) if faces else None,
+            answering(dai, pipeline, partial(depth_mm, dai), colour),
         )
 
     return nodes
@@ -152,16 +129,7 @@ def test_colour_depth_and_times_of_one_instant(film):
         number = round(float(shot.depth_m[0, 319]) * 1000.0) - 1000
         shade = round(float(shot.image.mean()) / 8.0)
         assert abs(shade - number % LENGTH) <= 1
-        assert shot.lens is None and shot.faces is None
-
-
-def test_faces_found_on_the_camera_come_in_pixels_the_largest_first(film):
-    (shot,) = take(opened(host_nodes(film, depth=False, faces=True)), 1)
-    big, small = shot.faces
-    assert big.confidence == pytest.approx(0.8) and small.confidence == pytest.approx(0.99)
-    assert big.box_px == pytest.approx((111.5, 83.5, 96.0, 72.0), abs=0.01)
-    expected = np.array(POINTS) * (320.0, 240.0) - 0.5
-    assert big.landmarks_px == pytest.approx(expected, abs=0.01)
+        assert shot.lens is None
 
 
 def test_stream_that_ends_is_a_lost_camera(film):
@@ -196,44 +164,6 @@ def test_depthai_that_is_not_there_is_named_with_its_extra(monkeypatch):
     assert str(told.value) == f"depthai is not installed: {install_command('oak')}"
 
 
-# Exposure, flicker and focus from the rig's file to the camera, and what is refused
-
-
-def commands(dai, **wanted):
-    """Return the text of what is sent to a camera; untouched commands are not in it."""
-    control = dai.CameraControl()
-    set_controls(dai, control, OakParams(**wanted))
-    return control
-
-
-def test_nothing_is_sent_where_nothing_is_asked(dai):
-    assert str(commands(dai).getData()) == str(dai.CameraControl().getData())
-    assert commands(dai).aeMaxExposureTimeUs == dai.CameraControl().aeMaxExposureTimeUs
-
-
-def test_exposure_limit_flicker_and_focus_are_sent(dai):
-    control = commands(dai, exposure_limit_ms=8.5, anti_flicker="60hz", focus=130)
-    assert control.aeMaxExposureTimeUs == 8500
-    assert control.antiBandingMode == dai.CameraControl.AntiBandingMode.MAINS_60_HZ
-    assert control.getLensPosition() == 130
-
-
-@pytest.mark.parametrize(
-    ("keys", "told"),
-    [
-        ("exposure_limit_ms: 20\n  rate_hz: 60", "longer than a frame lasts"),
-        ("width_px: 650", "width_px must be a multiple of 16"),
-    ],
-)
-def test_keys_are_checked(tmp_path, keys, told):
-    file = tmp_path / "rig.yaml"
-    maker = shipped_path("rigs", "maker").read_text(encoding="utf-8")
-    file.write_text(maker + f"\noak:\n  {keys}\n")
-    with pytest.raises(ConfigError) as caught:
-        load_rig(str(file))
-    assert told in str(caught.value)
-
-
 # Requested nodes of a camera and their settings; the nodes themselves are substitutes
 
 
@@ -258,40 +188,12 @@ def asked(dai, platform="RVC4", **wanted):
     return device_nodes(dai, pipeline, OakParams(**wanted)), pipeline.made
 
 
-def test_colour_is_straightened_unless_it_is_not_wanted(dai):
-    for undistort in (True, False):
-        _, made = asked(dai, depth=False, undistort=undistort, rate_hz=20.0)
-        request = made["Camera"][0].requestOutput
-        assert request.call_args.args == ((640, 400),)
-        assert request.call_args.kwargs["enableUndistortion"] is undistort
-        assert request.call_args.kwargs["fps"] == 20.0
-
-
-def test_exposure_and_focus_are_set_before_the_start(dai):
-    _, made = asked(dai, depth=False, exposure_limit_ms=5.0, focus=120)
-    control = made["Camera"][0].initialControl
-    control.setAutoExposureLimit.assert_called_once_with(5000)
-    control.setManualFocus.assert_called_once_with(120)
-    control.setAntiBandingMode.assert_not_called()
-
-
-def test_yunet_gets_the_frame_in_whole_and_is_decoded_on_the_host(dai, tmp_path):
-    file = face_archive(tmp_path / "faces.tar.xz")
-    outputs, made = asked(dai, depth=False, face_model=str(file))
-    (network,) = made["NeuralNetwork"]
-    assert network.build.call_args.kwargs["resizeMode"] == dai.ImgResizeMode.LETTERBOX
-    (decoder,) = made["YunetDecoder"]
-    decoder.link_args.assert_called_once_with(network.out)
-    assert outputs.faces is decoder.out and outputs.face_fault() == ""
-    assert "DetectionNetwork" not in made
-
-
-def test_yolo_is_decoded_by_the_camera(dai, tmp_path):
-    file = face_archive(tmp_path / "faces.tar.xz", parser="YOLO", points=5)
-    outputs, made = asked(dai, depth=False, face_model=str(file), min_confidence=0.4)
-    (network,) = made["DetectionNetwork"]
-    network.setConfidenceThreshold.assert_called_once_with(0.4)
-    assert outputs.faces is network.out and outputs.face_fault() == ""
+def test_colour_is_straightened(dai):
+    _, made = asked(dai, rate_hz=20.0)
+    request = made["Camera"][0].requestOutput
+    assert request.call_args.args == ((640, 400),)
+    assert request.call_args.kwargs["enableUndistortion"] is True
+    assert request.call_args.kwargs["fps"] == 20.0
 
 
 @pytest.mark.parametrize("platform", ["RVC2", "RVC4"])

@@ -10,7 +10,6 @@ from test_gaze_at_head import AT_EYES, standing
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer, is_off_frame
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -38,7 +37,7 @@ def test_one_point_far_outside_is_no_face() -> None:
 
 
 def test_the_others_are_looked_at() -> None:
-    perception = Perception(AT_EYES, 65.0, Tracker(TrackerParams()))
+    perception = Perception(AT_EYES, 65.0, Tracker())
     percept = perception.see(Detections(1.0, 1, 640, 480, (OFF, FACE), lens=CAMERA), standing())
     assert percept is not None and len(percept.faces) == 1
     none = perception.see(Detections(9.0, 2, 640, 480, (OFF,), lens=CAMERA), standing())

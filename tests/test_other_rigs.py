@@ -75,9 +75,9 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
     assert len(shut) > 3  # some blink shuts fully
     at = shut[len(shut) // 2]
-    shut_deg, _ = rig.lid_joints.ends_deg("left_upper_lid")
-    assert shut_deg is not None
-    assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(shut_deg))
+    ends_deg = rig.lid_joints.ends_deg("left_upper_lid")
+    assert ends_deg is not None
+    assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(ends_deg[0]))
     assert ticks[at].gaze.lower_left == 0.0
     # Between blinks the lids follow the eyes: upper and lower in the same direction.
     open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 600]

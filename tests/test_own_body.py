@@ -10,7 +10,6 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -31,7 +30,7 @@ def kind_of(
     mm = tuple(1e3 * x for x in camera_m)
     placed = CameraMount(CameraParams(mount=mount, position_mm=mm))  # type: ignore[arg-type]
     own = neck().body_volumes
-    perception = Perception(placed, 69.0, Tracker(TrackerParams()), own_parts=own)
+    perception = Perception(placed, 69.0, Tracker(), own_parts=own)
     poses = PoseHistory(neck())
     poses.remember(0.0, (radians(yaw_deg), 0.0, 0.0))
     R, p = placed.pose(*poses.head_pose(0.0))

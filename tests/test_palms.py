@@ -24,7 +24,6 @@ from gazerig.drivers.vision.people import anchors
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.frame_locator import FrameLocator, Reading
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -125,7 +124,7 @@ P_PALM: Vec3 = (0.35, 0.2, 1.1)
 def hands(*palms: DetectedPalm, frames: int = 30, depth: Reading | None = None) -> list[Percept]:
     """See a face, and palms in every sixth frame."""
     depth_at = None if depth is None else (lambda image, box: depth)
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=depth_at)
+    perception = Perception(STILL, 69.0, Tracker(), depth_at=depth_at)
     more = {} if depth is None else {"depth_m": np.ones((HEIGHT, WIDTH), np.float32)}
     return [
         percept_at(
@@ -167,7 +166,7 @@ def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm) -> 
 
 
 def test_a_hand_that_the_searches_no_longer_show_is_gone_soon() -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
+    perception = Perception(STILL, 69.0, Tracker())
     there = []
     for number in range(1, 60):
         palms = None if number % 6 != 1 else (palm_at(P_PALM),) * (number < 30)

@@ -29,7 +29,6 @@ from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.frame_locator import FrameLocator, Reading
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -186,7 +185,7 @@ def person_at(p_camera_m: Vec3) -> DetectedPerson:
 
 def seeing(depth: Reading | None = None) -> Perception:
     depth_at = None if depth is None else (lambda image, box: depth)
-    return Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=depth_at)
+    return Perception(STILL, 69.0, Tracker(), depth_at=depth_at)
 
 
 def at_30_hz(perception: Perception, first: int, count: int, **found: object) -> Percept:

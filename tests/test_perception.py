@@ -16,7 +16,6 @@ from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.frame_locator import Box, Reading
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -75,7 +74,7 @@ def depth_of(face_m: float, wall_m: float = 3.0) -> NDArray[np.float32]:
 
 def test_a_face_is_as_far_as_the_camera_measures_and_says_so() -> None:
     """A child's face of 0.8 at 0.8 m has the picture of an adult's at 1 m."""
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=middle_of)
+    perception = Perception(STILL, 69.0, Tracker(), depth_at=middle_of)
     child = face_at((0.0, 0.0, 0.8), size=0.8)
     (face,) = seen(perception, 1, faces=(child,), depth_m=depth_of(0.8)).faces
     assert face.distance_from == "camera"
@@ -87,7 +86,7 @@ def test_a_face_is_as_far_as_the_camera_measures_and_says_so() -> None:
 
 
 def test_without_depth_its_size_tells_and_the_doubt_is_shown() -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=middle_of)
+    perception = Perception(STILL, 69.0, Tracker(), depth_at=middle_of)
     (face,) = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),)).faces
     assert face.distance_from == "face size"
     assert face.p_world_m[0] == pytest.approx(1.0, abs=0.02)
@@ -103,7 +102,7 @@ def test_without_depth_its_size_tells_and_the_doubt_is_shown() -> None:
     ids=["something far behind", "two surfaces"],
 )
 def test_depth_that_is_not_the_faces_is_not_taken(depth_m: NDArray[Any]) -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()), depth_at=middle_of)
+    perception = Perception(STILL, 69.0, Tracker(), depth_at=middle_of)
     found = seen(perception, 1, faces=(face_at((0.0, 0.0, 1.0)),), depth_m=depth_m)
     assert found.faces[0].distance_from == "face size"
     assert found.faces[0].p_world_m[0] == pytest.approx(1.0, abs=0.02)
@@ -118,7 +117,7 @@ def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
 
 def walking(blob: MovingBlob, v_m_s: float = 0.5) -> Percept:
     """Return what is seen of a face that has been walking to the right for a second."""
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
+    perception = Perception(STILL, 69.0, Tracker())
     for number in range(1, 31):
         x = -0.25 + v_m_s * number / 30
         blobs = (blob,) if number == 30 else ()
@@ -155,7 +154,7 @@ def test_a_head_that_rolls_spins_as_a_body() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
+    perception = Perception(STILL, 69.0, Tracker())
     blobs = (
         MovingBlob(1, "thing", (bad, 0.0, 1.0), 0.1),
         MovingBlob(2, "thing", (0.0, 0.0, 1.0), bad),
@@ -173,7 +172,7 @@ def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
 def test_perception_tells_by_how_much_times_are_wrong(late_s: float) -> None:
     """A head that turns before a still face, with the true times of the pictures or later ones."""
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-    perception, poses = Perception(mount, 69.0, Tracker(TrackerParams())), PoseHistory(Neck())
+    perception, poses = Perception(mount, 69.0, Tracker()), PoseHistory(Neck())
     taken: list[Any] = []
     for tick in range(800):
         t = tick / 200
@@ -193,7 +192,7 @@ def test_perception_tells_by_how_much_times_are_wrong(late_s: float) -> None:
 
 def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered() -> None:
     """A body without a visible face is reported for a second after it was found, inside."""
-    perception, outside = Perception(STILL, 69.0, Tracker(TrackerParams())), 0
+    perception, outside = Perception(STILL, 69.0, Tracker()), 0
     ids: set[int] = set()
     for k in range(1, 90):
         x = -0.6 + 2.0 * k / 30  # the picture ends at 1.37 m
@@ -209,7 +208,7 @@ def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered() -> None
 
 
 def test_who_has_the_head_above_the_picture_is_where_the_body_is_seen() -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
+    perception = Perception(STILL, 69.0, Tracker())
     body = body_at(0.4)
     above = replace(body, head_px=(body.head_px[0], -60.0))
     for k in range(1, 12):
@@ -223,7 +222,7 @@ def test_who_has_the_head_above_the_picture_is_where_the_body_is_seen() -> None:
 def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(
     frames: int, waited: bool
 ) -> None:
-    perception = Perception(STILL, 69.0, Tracker(TrackerParams()))
+    perception = Perception(STILL, 69.0, Tracker())
     for k in range(1, 25):
         found = seen(perception, k, people=(body_at(0.4),) if k <= frames else ())
     assert bool(found.bodies.ids) is waited

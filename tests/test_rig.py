@@ -79,11 +79,11 @@ def test_a_rig_names_its_profile_and_character(
 @pytest.mark.parametrize(
     ("old", "new", "place", "rule"),
     [
-        (r"^    id: 9 ", "    id: 1 ", "joints.neck_roll.id", "id 1 is already used by"),
+        (r"^    id: 9$", "    id: 1", "joints.neck_roll.id", "id 1 is already used by"),
         (r"model: xc330-m288", "model: xc330", "joints.neck_yaw.model", "unknown servo model"),
         (r"model: xc330-m288", "model: XC330-M288", "joints.neck_yaw.model", "mean 'xc330-m288'?"),
         (r"^  neck_roll:", "  neck_rol:", "joints", "neck_roll"),
-        (r"left_shut_deg: -25.0", "left_shut_deg: -80.0", "lid_joints.left_shut_deg", "outside"),
+        (r"left_deg: \[-25.0", "left_deg: [-80.0", "lid_joints.left_deg", "outside"),
         (r"neck_pitch: -12.0", "neck_pitch: -90.0", "park_deg.neck_pitch", "outside"),
         (r"min_deg: -35.0", "min_deg: 40.0", "joints.left_eye_pan", "below max_deg"),
         (r"rate_hz: 200.0", "rate_hz: .nan", "loop.rate_hz", "number"),
@@ -92,13 +92,8 @@ def test_a_rig_names_its_profile_and_character(
         (r"interocular_mm", "interocular", "geometry", "interocular_mm"),
         (r"^    zero_step: 2048", "    zero_step: 20", "joints.left_eye_pan", "0..4095"),
         (r"max_salience: 1.0", "max_salience: 0.1", "gaze.head", "above min_salience"),
-        (r"^lid_joints:(.*\n  .*)*", "", "lid_joints.left_shut_deg", "left_upper_lid needs it"),
-        (
-            r"^  left_open_deg.*\n",
-            "",
-            "lid_joints",
-            "one end of the left upper lid is missing; give both",
-        ),
+        (r"^lid_joints:(.*\n  .*)*", "", "lid_joints.left_deg", "left_upper_lid needs it"),
+        (r"left_deg: .*", "left_deg: [-25.0]", "lid_joints.left_deg", "length 1, wanted 2"),
     ],
 )
 def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path) -> None:
@@ -156,9 +151,9 @@ def test_joints_stand_in_their_order_whatever_bus_they_are_on(mixed: Rig) -> Non
         (", bus: tilt", "", "joints.neck_pitch.model: a sts3215 needs a bus of kind feetech"),
         ("id: 4\n", "id: 3\n", "joints.left_lower_lid.id: id 3 is already used by right_upper_lid"),
         (
-            "left_lower_shut_deg: -8.0",
-            "left_lower_shut_deg: null",
-            "one end of the left lower lid is missing",
+            "left_lower_deg: [-8.0, 22.0]",
+            "left_lower_deg: [22.0, 22.0]",
+            "a lid's shut and open angles must differ",
         ),
         ("eyes_tilt:", "left_eye_tilt:", "nothing turns an eye in tilt"),
         ("kind: maestro", "kind: maestra", "bus.kind"),
@@ -182,10 +177,9 @@ def test_an_eye_has_one_master(tmp_path: Path) -> None:
 
 
 def test_a_lid_needs_its_ends(tmp_path: Path) -> None:
-    text = re.sub(r"  left_lower_(shut|open)_deg.*\n", "", mixed_text())
-    assert "lid_joints.left_lower_shut_deg: missing; the joint left_lower_lid needs it" in faults(
-        tmp_path, text
-    )
+    text = re.sub(r"  left_lower_deg.*\n", "", mixed_text())
+    rule = "lid_joints.left_lower_deg: missing; the joint left_lower_lid needs it"
+    assert rule in faults(tmp_path, text)
 
 
 def test_ports_are_named_by_their_bus(mixed: Rig) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 
-from gazerig.robot.model.guard_params import GuardParams, HealthParams
+from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
@@ -24,7 +24,7 @@ class World:
     """Joints that follow their commands one tick later, with given feedback of servos."""
 
     def __init__(self) -> None:
-        self.guard = Guard(GuardParams(soft_start_ms=0.0), LIMITS, GAZE_JOINTS)
+        self.guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.guard._gentle = [False] * 9
         self.t_s = 0.0
@@ -255,8 +255,3 @@ def test_a_rearmed_joint_begins_where_it_is(world: World) -> None:
     world.tick(0.4, stray=3.0, rearmed=True)
     assert NECK.high_rad - 1e-3 <= world.path[-1] <= NECK.high_rad
     assert np.isfinite(world.tick(0.4, stray=nan, rearmed=True).command_rad).all()
-
-
-def test_params_that_contradict_each_other_are_refused() -> None:
-    with pytest.raises(ValueError, match="hot_c 15.0 must be below warm_c 15.0"):
-        HealthParams(hot_c=15.0)

@@ -28,11 +28,11 @@ SLOW = JointLimit(radians(-5), radians(170), radians(3), radians(10), 80.0, 9.5,
 RIGS = ((EYE,) * 4 + (LID,) * 2 + (NECK,) * 3, (SLOW, LID, NECK) * 3)
 BOXES = (
     (),
-    (CollisionParams("neck_pitch", -30.0, -18.0, "left_upper_lid", 10.0, 20.0),),
+    (CollisionParams(("neck_pitch", -30.0, -18.0), ("left_upper_lid", 10.0, 20.0)),),
     (
-        CollisionParams("neck_pitch", -4.0, 12.0, "left_upper_lid", -10.0, 20.0),
-        CollisionParams("right_upper_lid", -3.0, 50.0, "neck_pitch", -60.0, -20.0),
-        CollisionParams("neck_yaw", -3.0, 4.0, "left_eye_pan", 10.0, 20.0),
+        CollisionParams(("neck_pitch", -4.0, 12.0), ("left_upper_lid", -10.0, 20.0)),
+        CollisionParams(("right_upper_lid", -3.0, 50.0), ("neck_pitch", -60.0, -20.0)),
+        CollisionParams(("neck_yaw", -3.0, 4.0), ("left_eye_pan", 10.0, 20.0)),
     ),
 )
 ODD = np.array([nan, inf, -inf, 1e300, -1e300, 1e-300, -0.0])
@@ -44,7 +44,7 @@ class Trial:
     def __init__(self, limits: tuple[JointLimit, ...], boxes: tuple[CollisionParams, ...]) -> None:
         self.limits = np.array(limits)
         self.boxes = boxes
-        self.guard = Guard(GuardParams(collisions=boxes, soft_start_ms=100.0), limits, GAZE_JOINTS)
+        self.guard = Guard(GuardParams(collisions=boxes), limits, GAZE_JOINTS)
         self.low, self.high = self.limits[:, 0], self.limits[:, 1]
         self.begin_p: list[Row] = []
         self.begin_v: list[Row] = []
@@ -89,9 +89,9 @@ class Trial:
 
     def _judge_box(self, box: CollisionParams, p0: Array, v0: Array, p1: Array, v1: Array) -> None:
         """Once a joint of the pair can stay out of its range, one always can, and does."""
-        i, j = GAZE_JOINTS.index(box.first), GAZE_JOINTS.index(box.second)
-        first = (radians(box.first_min_deg), radians(box.first_max_deg))
-        second = (radians(box.second_min_deg), radians(box.second_max_deg))
+        i, j = GAZE_JOINTS.index(box.first[0]), GAZE_JOINTS.index(box.second[0])
+        first = (radians(box.first[1]), radians(box.first[2]))
+        second = (radians(box.second[1]), radians(box.second[2]))
         margin = radians(1.0)
 
         def stays_out(k: int, span: tuple[float, float], p: Array, v: Array, off: float) -> Array:
@@ -212,8 +212,7 @@ def test_any_shape_of_wishes_keeps_the_limits(
 
 
 DT_S = 0.005
-GENTLE = GuardParams(soft_start_ms=50.0)
-BOX = CollisionParams("neck_pitch", -60.0, -30.0, "left_upper_lid", 40.0, 70.0)
+BOX = CollisionParams(("neck_pitch", -60.0, -30.0), ("left_upper_lid", 40.0, 70.0))
 
 
 def limits(dice: np.random.Generator) -> tuple[JointLimit, ...]:
@@ -231,9 +230,9 @@ def limits(dice: np.random.Generator) -> tuple[JointLimit, ...]:
 class Watched:
     """A guard whose every command is judged."""
 
-    def __init__(self, dice: np.random.Generator, params: GuardParams = GENTLE) -> None:
+    def __init__(self, dice: np.random.Generator) -> None:
         self.dice = dice
-        self.guard = Guard(params, limits(dice), GAZE_JOINTS)
+        self.guard = Guard(GuardParams(), limits(dice), GAZE_JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.p, self.v, self.t_s = np.zeros(9), np.zeros(9), 0.0
         self.desired = np.zeros(9)
@@ -270,7 +269,7 @@ def test_every_command_keeps_the_limits_in_force(seed: int) -> None:
         watched.wander(int(dice.integers(2, 40)))
         boxes = (BOX,) if dice.random() < 0.3 else ()
         try:
-            watched.guard.retune(GuardParams(soft_start_ms=50.0, collisions=boxes), limits(dice))
+            watched.guard.retune(GuardParams(collisions=boxes), limits(dice))
         except ValueError:  # no pose is left
             continue
 
@@ -281,7 +280,7 @@ def test_new_limits_come_into_force_and_every_joint_gets_inside(seed: int) -> No
     watched = Watched(dice)
     watched.wander(200)
     wanted = limits(dice)
-    watched.guard.retune(GENTLE, wanted)
+    watched.guard.retune(GuardParams(), wanted)
     watched.wander(1000)
     assert watched.guard.limits == wanted
     low, high = np.array(wanted).T[:2]
@@ -291,7 +290,7 @@ def test_new_limits_come_into_force_and_every_joint_gets_inside(seed: int) -> No
 def test_a_collision_that_leaves_no_pose_changes_nothing() -> None:
     watched = Watched(np.random.default_rng(0))
     before = watched.guard.limits
-    all_of_it = CollisionParams("neck_pitch", -179.0, 179.0, "left_upper_lid", -179.0, 179.0)
+    all_of_it = CollisionParams(("neck_pitch", -179.0, 179.0), ("left_upper_lid", -179.0, 179.0))
     with pytest.raises(ValueError, match="allows no pose"):
         watched.guard.retune(GuardParams(collisions=(all_of_it,)), limits(watched.dice))
     watched.wander(20)

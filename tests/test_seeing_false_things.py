@@ -34,7 +34,7 @@ def test_two_thousand_specks_cost_no_more_than_may_be_reported(
     measured = counted(monkeypatch, detector, "patch_motion")
     compared = counted(monkeypatch, clustering, "affine_residual")
     rng, source = np.random.default_rng(0), MotionSource(MotionParams(), None, 1.2, None)
-    most = MotionParams().max_blobs
+    most = clustering.MOST_BLOBS
     x, y = rng.uniform(0, 640, 2000), rng.uniform(0, 400, 2000)
     way = rng.uniform(-4.0, 4.0, (2, 2000))
     for k in range(4):

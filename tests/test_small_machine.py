@@ -13,6 +13,7 @@ from papers import ROOT
 
 from gazerig.config.load import shipped_names
 from gazerig.config.schema import load_rig
+from gazerig.robot.control.loop import PARK_S
 
 PAPER = (ROOT / "docs/raspberry-pi.md").read_text(encoding="utf-8")
 UNIT = ROOT / "docs/gazerig.service"
@@ -53,8 +54,7 @@ def test_the_service_parks_before_anything_is_killed() -> None:
     assert service["KillSignal"] == "SIGTERM"  # as gazerig.robot.control.interrupts heeds it
     # With any other the guardian would be killed before it has switched the servos off.
     assert service["KillMode"] == "control-group"
-    slowest = max(load_rig(name).loop.park_s for name in shipped_names("rigs"))
-    assert float(service["TimeoutStopSec"]) >= 2 * slowest + 10
+    assert float(service["TimeoutStopSec"]) >= 2 * PARK_S + 10
     assert "20 s" in PAPER and service["TimeoutStopSec"] == "20"
 
 

@@ -21,6 +21,7 @@ from gazerig.robot.dashboard.feed.page_process import (
 )
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot
+from gazerig.robot.safety.health import HOT_C
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -44,7 +45,6 @@ def shown_rig() -> ShownRig:
     return ShownRig(
         kinematics_and_oculomotor(rig, 0)[0],
         limits,
-        rig.guard.health,
         made.mount,
         radians(made.horizontal_field_deg),
         rig.gaze.field_of_view,
@@ -118,7 +118,7 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
     assert shot is not None and shot.servos.limits is not None
     assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in GAZE_JOINTS)
     hottest = rig.joints["neck_yaw"].limit().hottest_c
-    assert shot.servos.limits.hot_c[6] == hottest - rig.guard.health.hot_c
+    assert shot.servos.limits.hot_c[6] == hottest - HOT_C
     assert shot.servos.limits.warm_c[6] < shot.servos.limits.hot_c[6]
 
 

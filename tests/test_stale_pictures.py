@@ -18,6 +18,7 @@ from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.safety.guard import FRAME_TIMEOUT_S
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -150,7 +151,7 @@ def test_the_neck_does_not_move_on_a_stale_picture(
 ) -> None:
     """From the guard's age on it stands, whatever search and rest wish."""
     rig, ticks = request.getfixturevalue(name)
-    blind_s = last_picture_s(ticks) + rig.guard.frame_timeout_ms / 1e3
+    blind_s = last_picture_s(ticks) + FRAME_TIMEOUT_S
     blind = between(ticks, blind_s + 0.02, BACK_S)
     commands = {tick.guard_result.command_rad[NECK] for tick in blind}
     assert len(commands) == 1

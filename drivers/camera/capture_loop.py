@@ -5,7 +5,7 @@ from collections.abc import Callable
 from math import degrees, isnan
 from time import perf_counter
 
-from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG, CameraRecoveryParams
+from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG, CameraRecovery
 from gazerig.drivers.camera.source import FrameSource, Shot, to_bgr
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.plugins import describe_error, plugin_error
@@ -73,7 +73,7 @@ one line why its calibration is not used for a frame, "" if it is used. Each lin
 
 
 class FrameAnalyzer:
-    """Runner of the detectors, which may be changed between frames.
+    """Runner of the detectors.
 
     Args:
         detector: Finds faces.
@@ -104,14 +104,10 @@ class FrameAnalyzer:
         self._off_frame = OffFrameReport()
 
     def analyze(self, shot: Shot) -> Detections:
-        """Find and locate faces (unless the camera has found them), people, palms and motion."""
+        """Find and locate faces, people, palms and motion."""
         began_s = perf_counter()
         height, width = shot.image.shape[:2]
-        if shot.faces is None:
-            faces = self._detector.find(shot.image)
-        else:
-            add_meshes = getattr(self._detector, "add_meshes", None)
-            faces = shot.faces if add_meshes is None else add_meshes(shot.image, shot.faces)
+        faces = self._detector.find(shot.image)
         for line in self._off_frame.report(faces, width, height):
             self._faults.setdefault(line, False)
         faces = tuple([face for face in faces if not is_off_frame(face, width, height)])
@@ -164,29 +160,6 @@ class FrameAnalyzer:
         told = events() if events is not None else ()
         return (*faults, *self._health.events(), *told)
 
-    def retune(
-        self,
-        detector: Callable[[], FaceDetector] | None,
-        motion: Callable[[Motion | None], Motion | None] | None,
-        locate: Locate | None = None,
-    ) -> None:
-        """Change the detectors and the calibration from the next frame on.
-
-        Args:
-            detector: Creates another detector; None: no change.
-            motion: Returns a motion detector from the present one; None: no change.
-            locate: Locates by another calibration; None: no change.
-
-        Raises:
-            SetupError: the detector cannot be created; the old one stays.
-        """
-        if locate is not None:
-            self._locate, self._faults = locate, {}
-        if motion is not None:
-            self._motion = motion(self._motion)
-        if detector is not None:
-            self._detector = detector()
-
 
 LOST, BACK = "camera lost", "camera back"
 """First words of events about the loss of a source, and about its reconnection."""
@@ -202,7 +175,7 @@ class CaptureLoop:
         source: Source of frames.
         detector: Finds faces.
         now_s: The host's monotonic clock, seconds.
-        recovery: Parameters of reopening a lost source.
+        recovery: Times of reopening a lost source.
         motion: Finds motion, None for none.
         report: Called with each event as one line, immediately.
         locate: Locates detections in the camera's axes, None for none.
@@ -213,7 +186,7 @@ class CaptureLoop:
         source: FrameSource,
         detector: FaceDetector,
         now_s: Callable[[], float],
-        recovery: CameraRecoveryParams,
+        recovery: CameraRecovery,
         motion: Motion | None,
         report: Callable[[str], None],
         locate: Locate | None = None,
@@ -259,15 +232,6 @@ class CaptureLoop:
             self._report(line)
         return found
 
-    def retune(
-        self,
-        detector: Callable[[], FaceDetector] | None,
-        motion: Callable[[Motion | None], Motion | None] | None,
-        locate: Locate | None = None,
-    ) -> None:
-        """Change detectors and calibration from the next frame on, as in FrameAnalyzer."""
-        self._frames.retune(detector, motion, locate)
-
     def close(self) -> None:
         """Free the source; safe to call twice. An error is reported: nothing can be done."""
         try:
@@ -279,7 +243,7 @@ class CaptureLoop:
     def _take(self, stop: threading.Event) -> Shot | None:
         """Return the next frame, reopening a lost source; None if ``stop`` was set."""
         lost_s: float | None = None
-        wait_s = self._recovery.retry_ms / 1e3
+        wait_s = self._recovery.retry_s
         while True:
             try:
                 if lost_s is not None:
@@ -296,7 +260,7 @@ class CaptureLoop:
                     raise
                 if stop.wait(wait_s):
                     return None
-                wait_s = min(2.0 * wait_s, self._recovery.longest_retry_ms / 1e3)
+                wait_s = min(2.0 * wait_s, self._recovery.longest_retry_s)
                 continue
             if shot is not None and lost_s is not None:
                 self._report(f"{BACK} after {self._now_s() - lost_s:.1f} s")

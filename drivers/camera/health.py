@@ -54,7 +54,7 @@ _OVER = {
     "slow": "camera: frames are analysed in time again",
 }
 _REMEDIES = {
-    "faces": "lower detector.work_width_px or detector.far_width_px",
+    "faces": "lower detector.work_width_px",
     "people and hands": "lower detector.people_hz and detector.hands_hz",
     "motion": "lower motion.work_px, or set motion.enabled: false",
     "reading": "lower the camera's rate_hz or width_px, or free the computer",
@@ -152,10 +152,7 @@ class HealthModel:
             return ""
         if brightness < _BLACK:
             return "the picture is black: uncover the lens, switch on a light"
-        return (
-            "the picture is too dark: switch on a light in front of the person, "
-            "or set webcam.exposure_ms and webcam.gain higher"
-        )
+        return "the picture is too dark: switch on a light in front of the person"
 
     def _roll_condition(self, seen: CameraObservation) -> str | None:
         self._upright.append(seen.has_upright_face)

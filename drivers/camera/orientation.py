@@ -7,7 +7,7 @@ camera itself. So no other code depends on the mount of the camera. Turning take
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
-from gazerig.drivers.types import DetectedFace
 
 Floats = NDArray[np.float64]
 Rotation = Literal[0, 90, 180, 270]
@@ -57,9 +56,6 @@ class FrameOrientation:
             image=self.turn_image(shot.image),
             depth_m=None if shot.depth_m is None else self.turn_image(shot.depth_m),
             lens=None if shot.lens is None else self.turn_lens(shot.lens, width, height),
-            faces=None
-            if shot.faces is None
-            else tuple(self.turn_face(face, width, height) for face in shot.faces),
         )
 
     def turn_image(self, image: NDArray[Any]) -> NDArray[Any]:
@@ -96,23 +92,6 @@ class FrameOrientation:
         # The tangential part is r2 t + 2 (t . x) x with t = (p2, p1), so t turns like a point.
         p2, p1 = across @ (p2, p1)
         return Intrinsics(fx, fy, float(cx), float(cy), (k1, k2, float(p1), float(p2), k3))
-
-    def turn_face(self, face: DetectedFace, width_px: int, height_px: int) -> DetectedFace:
-        """Return a face of a frame of this size in the coordinates of the upright frame."""
-        x, y, width, height = face.box_px
-        ends = self.turn_points(np.array([(x, y), (x + width, y + height)]), width_px, height_px)
-        (left, top), (right, bottom) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
-        marks = self.turn_points(face.landmarks_px, width_px, height_px)
-        gaze = face.gaze_camera
-        if gaze is not None:
-            gx, gy = (self._image_rotation() @ gaze[:2]).tolist()
-            gaze = gx, gy, gaze[2]
-        return replace(
-            face,
-            box_px=(left, top, right - left, bottom - top),
-            landmarks_px=marks[_OTHER_SIDE] if self.mirrored else marks,
-            gaze_camera=gaze,
-        )
 
     def _image_rotation(self) -> Floats:
         """Return the matrix (2, 2) that turns directions in the image."""

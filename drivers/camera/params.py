@@ -1,7 +1,7 @@
-"""Parameters of reopening a lost camera, and of a webcam."""
+"""Times of reopening a lost camera, and parameters of a webcam."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, NamedTuple
 
 from gazerig.params import Bounds
 
@@ -9,20 +9,24 @@ ASSUMED_FIELD_DEG = 69.0
 """Assumed horizontal field of view of an unmeasured lens, that of an OAK-D."""
 
 
-@dataclass(frozen=True)
-class CameraRecoveryParams:
-    """Parameters of reopening a lost camera."""
+class CameraRecovery(NamedTuple):
+    """Times of reopening a lost camera, seconds.
 
-    # fmt: off
-    retry_ms: Annotated[float, Bounds(1, 60000), "delay before a lost camera is opened again; it doubles with each attempt"] = 250.0
-    longest_retry_ms: Annotated[float, Bounds(1, 60000), "longest delay between two attempts"] = 2000.0
-    give_up_s: Annotated[float, Bounds(0, 86400),
-        "a run ends when a lost camera has not reconnected for this long; 0: immediately"] = 60.0
-    silent_s: Annotated[float, Bounds(0.1, 60),
-        "a camera is considered lost after this long without a new frame (or 5 frame periods, if longer)"] = 1.0
-    restart_s: Annotated[float, Bounds(0.1, 600),
-        "the camera's process is restarted after this long without a new frame (or 15 frame periods, if longer)"] = 3.0
-    # fmt: on
+    retry_s, longest_retry_s: delay before it is opened again, doubled with each attempt up to the
+        longest
+    give_up_s: a run ends when it has not reconnected for this long
+    silent_s: it is lost after this long without a new frame (or 5 frame periods, if longer)
+    restart_s: its process is restarted after this long (or 15 frame periods, if longer)
+    """
+
+    retry_s: float = 0.25
+    longest_retry_s: float = 2.0
+    give_up_s: float = 60.0
+    silent_s: float = 1.0
+    restart_s: float = 3.0
+
+
+RECOVERY = CameraRecovery()
 
 
 @dataclass(frozen=True)
@@ -35,13 +39,4 @@ class WebcamParams:
     rate_hz: Annotated[float, Bounds(1, 1000), "frame rate requested from the camera"] = 30.0
     latency_ms: Annotated[float, Bounds(0, 1000),
         "delay from the middle of the exposure to the frame's time stamp; measure it by filming a running clock"] = 0.0
-    format: Annotated[Literal["mjpg", "yuyv"],
-        "mjpg: compressed, which USB 2 carries at full size and rate; yuyv: not compressed"] = "mjpg"
-    exposure_ms: Annotated[float | None, Bounds(0.1, 1000),
-        "exposure time: shorter ones blur less while the head turns but need more light; null: automatic"] = None
-    gain: Annotated[int | None, Bounds(0, 65535), "gain in the camera's own units; null: automatic"] = None
-    anti_flicker: Annotated[Literal["default", "off", "50hz", "60hz", "auto"],
-        "exposure times that are whole periods of the mains, to avoid stripes under lamps; default: chosen by the camera"] = "default"
-    focus: Annotated[int | None, Bounds(0, 65535),
-        "fixed position of the lens in the camera's own units; null: autofocus"] = None
     # fmt: on

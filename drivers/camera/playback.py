@@ -87,7 +87,6 @@ class Recording:
                 fmt.decode_image(self._data(places[fmt.PICTURE])),
                 fmt.decode_depth(self._data(places[fmt.DEPTH])) if fmt.DEPTH in places else None,
                 fmt.decode_lens(self._data(places[fmt.LENS])) if fmt.LENS in places else None,
-                fmt.decode_faces(self._data(places[fmt.FACES])) if fmt.FACES in places else None,
             )
         except (fmt.BadMessage, McapError, OSError, KeyError, ValueError) as error:
             raise CameraError(

@@ -17,23 +17,21 @@ from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from select import select
 from typing import Literal, NamedTuple
 
-from gazerig.drivers.camera.capture_loop import BACK, LOST, Locate, Motion
-from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.capture_loop import BACK, LOST
+from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
 from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader
 from gazerig.drivers.camera.worker import (
     LONGEST_END_S,
     CameraParts,
     DetectionMessage,
     ProcessEnd,
-    Retune,
     run,
 )
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.process.child_process import hide_script
-from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, FaceDetector
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 
 FIRST_FRAME_S = 15.0
 """Longest time to the first frame: exposure settles, networks are loaded."""
@@ -64,7 +62,7 @@ class FrameWatchdog:
         now_s: Start of the wait for the first frame, monotonic seconds.
     """
 
-    def __init__(self, recovery: CameraRecoveryParams, now_s: float) -> None:
+    def __init__(self, recovery: CameraRecovery, now_s: float) -> None:
         self._recovery = recovery
         self._last_s = now_s
         self._period_s: float | None = None
@@ -169,7 +167,7 @@ class CameraProcess:
     Args:
         parts: Factories of source and detectors; nothing starts yet.
         now_s: The host's monotonic clock, picklable; all processes share its zero.
-        recovery: Parameters of reopening a lost camera.
+        recovery: Times of reopening a lost camera.
         before: Number of earlier camera processes of the same loop; the scenes of this one differ
             from theirs.
 
@@ -180,12 +178,12 @@ class CameraProcess:
         self,
         parts: CameraParts,
         now_s: Callable[[], float],
-        recovery: CameraRecoveryParams | None = None,
+        recovery: CameraRecovery = RECOVERY,
         before: int = 0,
     ) -> None:
         self._parts = parts
         self._now_s, self._before = now_s, before
-        self._recovery = recovery or CameraRecoveryParams()
+        self._recovery = recovery
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._thread: threading.Thread | None = None
@@ -193,7 +191,6 @@ class CameraProcess:
         self._failure = ""
         self._closing = threading.Event()
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
-        self._motion: Callable[[Motion | None], Motion | None] | None = None
         self._forget()
 
     def _forget(self) -> None:
@@ -218,7 +215,7 @@ class CameraProcess:
             raise CameraError(
                 "the camera process is already running: close() it before opening it again"
             )
-        self._newest, self._failure, self._motion = None, "", None
+        self._newest, self._failure = None, ""
         self._closing.clear()
         self._events.clear()
         self._forget()
@@ -238,39 +235,6 @@ class CameraProcess:
         if self._failure:
             raise CameraError(self._failure)
         return self._newest
-
-    def retune(
-        self,
-        detector: Callable[[], FaceDetector] | None,
-        motion: Callable[[Motion | None], Motion | None] | None,
-        locate: Locate | None = None,
-    ) -> bool:
-        """Change detectors and calibration of the process, from one of the next frames on.
-
-        It never waits. A detector that cannot be created there is reported as an event, and the old
-        one stays.
-
-        Args:
-            detector: Creates another detector; None: no change.
-            motion: Returns a motion detector from the present one; None: no change.
-            locate: Locates by another calibration; None: no change.
-
-        Returns:
-            Whether the process accepts the request.
-        """
-        pipe = self._pipe
-        try:
-            if pipe is None or not select([], [pipe], [], 0.0)[1]:
-                return False
-            pipe.send(Retune(detector, motion, locate))
-        except (OSError, ValueError):  # it has ended, and the next one is starting
-            return False
-        # Kept for the process that follows this one.
-        self._parts = self._parts._replace(
-            detector=detector or self._parts.detector, locate=locate or self._parts.locate
-        )
-        self._motion = motion or self._motion
-        return True
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -333,14 +297,14 @@ class CameraProcess:
 
     def _supervise(self) -> None:
         """Receive results of a process and restart it when it ends, until the time limit."""
-        wait_s = self._recovery.retry_ms / 1e3
+        wait_s = self._recovery.retry_s
         while not self._closing.is_set():
             began_s = self._now_s()
             end = self._receive()
             if self._closing.is_set():
                 return
             if self._now_s() - began_s >= _STABLE_S:
-                wait_s = self._recovery.retry_ms / 1e3
+                wait_s = self._recovery.retry_s
             while not self._closing.is_set():
                 if self._lost_s is None:
                     self._lose(f"({end.reason})", "starting its process again")
@@ -351,14 +315,11 @@ class CameraProcess:
                 self._end(0.0)
                 if self._closing.wait(wait_s):
                     return
-                wait_s = min(2.0 * wait_s, self._recovery.longest_retry_ms / 1e3)
+                wait_s = min(2.0 * wait_s, self._recovery.longest_retry_s)
                 error = self._start()
                 if error is None:
                     break
                 end = _End(str(error))
-            if self._pipe is not None and self._motion is not None:
-                with suppress(OSError):
-                    self._pipe.send(Retune(None, self._motion))
 
     def _lose(self, reason: str, remedy: str, fault: str = LOST, over: str = BACK) -> None:
         """Record that no frames arrive; losses in quick succession are reported once.

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.depth_roi import to_metres, to_millimetres
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot, to_bgr
-from gazerig.drivers.types import Depth, DetectedFace, ImageArray
+from gazerig.drivers.types import Depth, ImageArray
 
-PICTURE, DEPTH, LENS, FACES = "/camera/picture", "/camera/depth", "/camera/lens", "/camera/faces"
+PICTURE, DEPTH, LENS = "/camera/picture", "/camera/depth", "/camera/lens"
 """Topics."""
 PROFILE = "gazerig-camera-1"
 _FRAME = "camera"
@@ -52,25 +52,6 @@ SCHEMAS: dict[str, tuple[str, dict[str, Any]]] = {
                 "K": _MATRIX,
                 "R": _MATRIX,
                 "P": _MATRIX,
-            },
-        },
-    ),
-    FACES: (
-        "gazerig.Faces",
-        {
-            "type": "object",
-            "properties": {
-                "faces": {
-                    "type": "array",
-                    "items": {
-                        "type": "object",
-                        "properties": {
-                            "box_px": _MATRIX,
-                            "landmarks_px": {"type": "array", "items": _MATRIX},
-                            "confidence": _NUMBER,
-                        },
-                    },
-                }
             },
         },
     ),
@@ -111,8 +92,6 @@ def encode_shot(shot: Shot) -> list[tuple[str, bytes]]:
     if shot.depth_m is not None:
         file = _encode_file(".png", to_millimetres(shot.depth_m), _DEPTH_PNG)
         found.append((DEPTH, _dump(_image_message("png", file, stamp))))
-    if shot.faces is not None:
-        found.append((FACES, _dump({"faces": [_face(face) for face in shot.faces]})))
     file = _encode_file(".png", shot.image, _COLOUR_PNG)
     found.append((PICTURE, _dump(_image_message("png", file, stamp))))
     return found
@@ -156,36 +135,6 @@ def decode_lens(data: bytes) -> Intrinsics:
         raise BadMessage("no five numbers of distortion in it")
     k1, k2, p1, p2, k3 = D.tolist()
     return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]), (k1, k2, p1, p2, k3))
-
-
-def decode_faces(data: bytes) -> tuple[DetectedFace, ...]:
-    """Read a message of faces.
-
-    Raises:
-        BadMessage: it contains no list of faces.
-    """
-    found = []
-    for face in _load(data, "faces"):
-        landmarks = np.asarray(face["landmarks_px"], dtype=np.float64)
-        box = tuple(map(float, face["box_px"]))
-        gaze = face.get("gaze_camera")
-        gaze = None if gaze is None else tuple(map(float, gaze))
-        if landmarks.shape != (5, 2) or len(box) != 4 or (gaze is not None and len(gaze) != 3):
-            raise BadMessage("no faces in it")
-        landmarks.setflags(write=False)
-        found.append(DetectedFace(box, landmarks, float(face["confidence"]), gaze))
-    return tuple(found)
-
-
-def _face(face: DetectedFace) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "box_px": list(face.box_px),
-        "landmarks_px": face.landmarks_px.tolist(),
-        "confidence": face.confidence,
-    }
-    if face.gaze_camera is not None:
-        data["gaze_camera"] = list(face.gaze_camera)
-    return data
 
 
 def _image_message(kind: str, file: bytes, stamp: int) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Depth, DetectedFace, ImageArray
+from gazerig.drivers.types import Depth, ImageArray
 
 
 class Shot(NamedTuple):
@@ -20,7 +20,6 @@ class Shot(NamedTuple):
 
     depth_m: distances, aligned with the frame and of its size, NaN where unknown
     lens: the lens of this frame
-    faces: faces that the camera itself has found; no detector runs in that case
     """
 
     captured_s: float
@@ -28,7 +27,6 @@ class Shot(NamedTuple):
     image: ImageArray
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
-    faces: tuple[DetectedFace, ...] | None = None
 
 
 class FrameSource(Protocol):

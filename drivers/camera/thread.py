@@ -9,10 +9,9 @@ from collections import deque
 from collections.abc import Callable
 
 from gazerig.drivers.camera.capture_loop import CaptureLoop, Locate, Motion, detection_error
-from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.params import RECOVERY, CameraRecovery
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.camera.worker import Retune
-from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections, FaceDetector
 
 # OpenCV stops waiting for a camera after 10 s; a film stops immediately.
@@ -29,7 +28,7 @@ class CameraThread:
         source: Source of frames.
         detector: Finds faces.
         now_s: The host's monotonic clock, seconds.
-        recovery: Parameters of reopening a lost source.
+        recovery: Times of reopening a lost source.
         motion: Called in the camera's thread with every frame, None for none.
         locate: Locates detections in the camera's axes, None for none.
 
@@ -41,7 +40,7 @@ class CameraThread:
         source: FrameSource,
         detector: FaceDetector,
         now_s: Callable[[], float],
-        recovery: CameraRecoveryParams | None = None,
+        recovery: CameraRecovery = RECOVERY,
         motion: Motion | None = None,
         locate: Locate | None = None,
     ) -> None:
@@ -50,12 +49,11 @@ class CameraThread:
             source,
             detector,
             now_s,
-            recovery or CameraRecoveryParams(),
+            recovery,
             motion,
             self._events.append,
             locate,
         )
-        self._requests: deque[Retune] = deque()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
@@ -91,24 +89,6 @@ class CameraThread:
             raise detection_error(self._failure) from self._failure
         return self._newest
 
-    def retune(
-        self,
-        detector: Callable[[], FaceDetector] | None,
-        motion: Callable[[Motion | None], Motion | None] | None,
-        locate: Locate | None = None,
-    ) -> bool:
-        """Change detectors and calibration from one of the next frames on; always returns True.
-
-        A detector that cannot be created is reported as an event, and the old one stays.
-
-        Args:
-            detector: Creates another detector; None: no change.
-            motion: Returns a motion detector from the present one; None: no change.
-            locate: Locates by another calibration; None: no change.
-        """
-        self._requests.append(Retune(detector, motion, locate))
-        return True
-
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
         messages = []
@@ -131,11 +111,6 @@ class CameraThread:
                 self.frames += 1
                 self.frames_with_face += bool(found.faces)
                 self._newest = found
-                while self._requests:
-                    try:
-                        self._camera.retune(*self._requests.popleft())
-                    except SetupError as error:
-                        self._events.append(f"the detector is unchanged: {error}")
         except BaseException as failure:  # raised to the loop by latest()
             self._failure = failure
         finally:

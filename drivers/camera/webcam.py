@@ -1,11 +1,8 @@
 """A Video4Linux camera, read through OpenCV."""
 
-import errno
-import fcntl
 import os
-import struct
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 
@@ -22,7 +19,8 @@ from gazerig.drivers.errors import CameraError
 _MOST_FAILURES = 5
 # The kernel's stamp is used if it is at most this old on the same clock.
 _OLDEST_STAMP_S = 1.0
-_FOURCC = {"mjpg": "MJPG", "yuyv": "YUYV"}
+# Compressed, which USB 2 carries at full size and rate.
+_FOURCC = "MJPG"
 # Time-out for a frame; OpenCV's default is 10 s, and it reads this once.
 _SELECT_TIMEOUT = ("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
 
@@ -55,7 +53,7 @@ class Webcam:
         self._params = params = params or WebcamParams()
         self._requested = {
             # Set first, as sizes and rates depend on it.
-            cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*_FOURCC[params.format]),
+            cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*_FOURCC),
             cv2.CAP_PROP_FRAME_WIDTH: params.width_px,
             cv2.CAP_PROP_FRAME_HEIGHT: params.height_px,
             cv2.CAP_PROP_FPS: params.rate_hz,
@@ -105,14 +103,10 @@ class Webcam:
         self._left_s = None
         given = int(capture.get(cv2.CAP_PROP_FOURCC))
         name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
-        wanted = _FOURCC[self._params.format]
-        if name and name != wanted:
+        if name and name != _FOURCC:
             self._report_once(
-                f"camera {self._file} uses {name} instead of {wanted} (webcam.format): large frames "
-                "may arrive slowly"
+                f"camera {self._file} uses {name} instead of {_FOURCC}: large frames may arrive slowly"
             )
-        for line in apply_controls(self._file, self._params):
-            self._report_once(f"camera {self._file} {line}")
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the kernel's stamp or its time of arrival.
@@ -148,7 +142,7 @@ class Webcam:
         )
 
     def events(self) -> tuple[str, ...]:
-        """Return rejected settings, and a line if the rate is not the stated one."""
+        """Return a line about another format, and one if the rate is not the stated one."""
         messages, self._events = tuple(self._events), []
         return messages
 
@@ -167,72 +161,3 @@ class Webcam:
         """Store a line once, even if the camera is reopened."""
         self._report(line)
         self._reported.add(line)
-
-
-# From linux/v4l2-controls.h and videodev2.h.
-AUTO_GAIN, GAIN = 0x00980912, 0x00980913
-MAINS = 0x00980918
-AUTO_EXPOSURE, EXPOSURE = 0x009A0901, 0x009A0902
-FOCUS, AUTO_FOCUS = 0x009A090A, 0x009A090C
-SET_CONTROL = 0xC008561C
-"""Request VIDIOC_S_CTRL; its argument is the number of a control and a value."""
-
-_EXPOSURE_MANUAL, _EXPOSURE_AUTO, _EXPOSURE_BY_APERTURE = 1, 0, 3
-_EXPOSURE_UNIT_MS = 0.1
-_MAINS = {"off": 0, "50hz": 1, "60hz": 2, "auto": 3}
-
-
-def apply_controls(device: Path, params: WebcamParams) -> Iterator[str]:
-    """Set the controls; yield one line for each setting that the camera rejects.
-
-    OpenCV supports only some of them and does not report why one was refused, so they are set on
-    the device file. A camera keeps its settings after the program ends, so automatic modes are set
-    as well.
-
-    Settings without a value become automatic; a camera without automatic modes is not reported.
-    """
-    try:
-        file = os.open(device, os.O_RDWR | os.O_NONBLOCK)
-    except OSError:
-        return  # the camera itself is rejected with another message
-    try:
-        if params.exposure_ms is None:
-            if _set_control(file, AUTO_EXPOSURE, _EXPOSURE_BY_APERTURE):
-                _set_control(file, AUTO_EXPOSURE, _EXPOSURE_AUTO)
-        else:
-            _set_control(file, AUTO_EXPOSURE, _EXPOSURE_MANUAL)
-            units = max(1, round(params.exposure_ms / _EXPOSURE_UNIT_MS))
-            yield from _report(
-                "exposure_ms", params.exposure_ms, _set_control(file, EXPOSURE, units)
-            )
-        if params.gain is None:
-            _set_control(file, AUTO_GAIN, 1)
-        else:
-            _set_control(file, AUTO_GAIN, 0)
-            yield from _report("gain", params.gain, _set_control(file, GAIN, params.gain))
-        if params.anti_flicker != "default":
-            why = _set_control(file, MAINS, _MAINS[params.anti_flicker])
-            yield from _report("anti_flicker", params.anti_flicker, why)
-        if params.focus is None:
-            _set_control(file, AUTO_FOCUS, 1)
-        else:
-            _set_control(file, AUTO_FOCUS, 0)
-            yield from _report("focus", params.focus, _set_control(file, FOCUS, params.focus))
-    finally:
-        os.close(file)
-
-
-def _report(name: str, value: object, why: str) -> Iterator[str]:
-    if why:
-        yield f"does not accept webcam.{name}: {value} ({why}): omit it or give another value"
-
-
-def _set_control(file: int, control: int, value: int) -> str:
-    """Set a control; return why it failed, "" on success."""
-    try:
-        fcntl.ioctl(file, SET_CONTROL, struct.pack("=Ii", control, value))
-    except OSError as error:
-        if error.errno in (errno.EINVAL, errno.ENOTTY):
-            return "it has no such control"
-        return "out of its range" if error.errno == errno.ERANGE else str(error.strerror)
-    return ""

@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -11,7 +10,7 @@ from multiprocessing.connection import Connection
 from typing import NamedTuple
 
 from gazerig.drivers.camera.capture_loop import CaptureLoop, Locate, Motion, detection_error
-from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError, SetupError
@@ -45,14 +44,6 @@ class DetectionMessage(NamedTuple):
     depth: SlotAddress | None
 
 
-class Retune(NamedTuple):
-    """Request to change detectors or calibration; None: no change. All must be picklable."""
-
-    detector: Callable[[], FaceDetector] | None
-    motion: Callable[[Motion | None], Motion | None] | None
-    locate: Locate | None = None
-
-
 class ProcessEnd(NamedTuple):
     """Reason for the end of the process.
 
@@ -65,7 +56,7 @@ class ProcessEnd(NamedTuple):
 
 
 def run(
-    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecoveryParams
+    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecovery
 ) -> None:
     """Run the process: open, detect and report, until it is stopped or the other side has ended."""
     import cv2  # the control loop's process imports this module too, without OpenCV
@@ -87,9 +78,8 @@ def run(
         pipe.send(error)
         return
     stop = threading.Event()
-    requests: deque[Retune] = deque()
     pipe.send(None)
-    threading.Thread(target=_receive_requests, args=(pipe, stop, requests), daemon=True).start()
+    threading.Thread(target=_await_end, args=(pipe, stop), daemon=True).start()
     slots = SlotWriter(), SlotWriter()
     try:
         while (found := camera.next_detections(stop)) is not None:
@@ -101,17 +91,6 @@ def run(
                     slots[1].put(depth) if depth is not None else None,
                 )
             )
-            # Of several detectors only the last is created.
-            detector: Callable[[], FaceDetector] | None = None
-            while requests:
-                message = requests.popleft()
-                detector = message.detector or detector
-                camera.retune(None, message.motion, message.locate)
-            if detector is not None:
-                try:
-                    camera.retune(detector, None)
-                except SetupError as error:
-                    pipe.send(f"the detector is unchanged: {error}")
     except OSError:  # the parent has ended
         pass
     except Exception as failure:
@@ -122,11 +101,10 @@ def run(
             slot.close()
 
 
-def _receive_requests(pipe: Connection, stop: threading.Event, requests: deque[Retune]) -> None:
-    """Queue requests until a stop request arrives or the other side has ended."""
+def _await_end(pipe: Connection, stop: threading.Event) -> None:
+    """Wait for a stop request, or until the other side has ended."""
     with suppress(EOFError, OSError):
-        while isinstance(message := pipe.recv(), Retune):
-            requests.append(message)
+        pipe.recv()
     stop.set()
     # A thread that is blocked in a camera's driver would keep that camera busy forever.
     threading.Event().wait(LONGEST_END_S)

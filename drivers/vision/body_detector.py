@@ -1,8 +1,5 @@
 """Detection of faces, people without a visible face, and palms, depending on the model files."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from gazerig.drivers.camera.quiet_opencv import quiet_stderr
@@ -53,13 +50,6 @@ class BodyDetector:
     ) -> tuple[DetectedPalm, ...] | None:
         """Find palms; see ``PalmDetector.find``."""
         return None if self._palms is None else self._palms.find(image, captured_s, faces, people)
-
-    def add_meshes(
-        self, image: ImageArray, faces: tuple[DetectedFace, ...]
-    ) -> tuple[DetectedFace, ...]:
-        """Return faces that a camera itself has found, with meshes if wanted."""
-        add_meshes: Callable[..., Any] | None = getattr(self._detector, "add_meshes", None)
-        return faces if add_meshes is None else tuple(add_meshes(image, faces))
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""

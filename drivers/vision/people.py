@@ -34,6 +34,8 @@ _STEP = 0.5
 _BOTH = 0.05
 # Heads nearer to each other than this share of the trunk belong to one person.
 _SAME = 0.35
+# People detected with a lower confidence are discarded.
+_CONFIDENCE = 0.6
 # Half the width of a body as a share of the trunk, from head to hips.
 _HALF_WIDTH = 0.35
 
@@ -103,7 +105,7 @@ class PeopleDetector:
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
         boxes, scores = self._network(rgb / np.float32(127.5) - np.float32(1.0))
         sure = confidences(scores)
-        rows = np.flatnonzero(sure >= self._params.people_confidence)
+        rows = np.flatnonzero(sure >= _CONFIDENCE)
         # Face centre, hips and the top of the body's circle, from the anchor.
         points = boxes[rows][:, (0, 1, 4, 5, 6, 7)].reshape(-1, 3, 2) / _SIDE_PX
         points = (points + self._anchors[rows][:, None]) * (where[2] - where[0]) + where[:2] - 0.5

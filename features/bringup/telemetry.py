@@ -5,9 +5,9 @@ never its errors: reading clears them, and the program that moves the servos wou
 Opening a bus for motion sets its servos up, which is a write; a monitor only reads.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from math import degrees, radians
+from math import degrees
 from typing import NamedTuple, Protocol
 
 from gazerig.drivers.hobby_board.params import US_STEPS
@@ -19,8 +19,7 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.servo_kinds import ServoKind
-from gazerig.robot.model.coupling import joint_rates
-from gazerig.robot.model.coupling_params import CoupledPair
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
 
 LIVE = (
@@ -187,7 +186,7 @@ class Monitor:
         readers: Mapping[str, TelemetryReader],
         joints: Mapping[str, JointParams],
         now_s: Callable[[], float],
-        pairs: Sequence[CoupledPair] = (),
+        pairs: Collection[CouplingParams] = (),
     ) -> None:
         self._pairs = tuple(pairs)
         self._readers = dict(readers)
@@ -213,7 +212,7 @@ class Monitor:
 
 
 def joint_telemetry(
-    pair: CoupledPair, one: Telemetry | None, other: Telemetry | None
+    pair: CouplingParams, one: Telemetry | None, other: Telemetry | None
 ) -> tuple[Telemetry | None, Telemetry | None]:
     """Return the telemetry of two coupled servos with the angles of their joints.
 
@@ -221,11 +220,7 @@ def joint_telemetry(
     """
     goals = _joint_deg(pair, one and one.goal_deg, other and other.goal_deg)
     at = _joint_deg(pair, one and one.position_deg, other and other.position_deg)
-    speeds: tuple[float | None, float | None] = (None, None)
-    if one and other and None not in (*at, one.velocity_deg_s, other.velocity_deg_s):
-        turning = one.velocity_deg_s or 0.0, other.velocity_deg_s or 0.0
-        slopes = pair.coupling.rates((radians(at[0] or 0.0), radians(at[1] or 0.0)))
-        speeds = joint_rates(slopes, turning)
+    speeds = _joint_deg(pair, one and one.velocity_deg_s, other and other.velocity_deg_s)
     return (
         one and one._replace(goal_deg=goals[0], position_deg=at[0], velocity_deg_s=speeds[0]),
         other and other._replace(goal_deg=goals[1], position_deg=at[1], velocity_deg_s=speeds[1]),
@@ -233,12 +228,11 @@ def joint_telemetry(
 
 
 def _joint_deg(
-    pair: CoupledPair, one: float | None, other: float | None
+    pair: CouplingParams, one: float | None, other: float | None
 ) -> tuple[float | None, float | None]:
     if one is None or other is None:
         return None, None
-    first, second = pair.coupling.joint_rad((radians(one), radians(other)))
-    return degrees(first), degrees(second)
+    return pair.joint_rad((one, other))
 
 
 def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:

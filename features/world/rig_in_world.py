@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from gazerig.robot.model.coupling import Coupling, Unreachable
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import LinearLinkage, Linkage
 
 RELINEARISE_RAD = 0.003
@@ -35,7 +35,7 @@ class PairTransmission:
         linkage: between the servo's steps and its angle in the coupling.
     """
 
-    def __init__(self, coupling: Coupling, index: int, linkage: Linkage) -> None:
+    def __init__(self, coupling: CouplingParams, index: int, linkage: Linkage) -> None:
         self._coupling, self._index, self._linkage = coupling, index, linkage
         self.line: LinearLinkage | None = None
         self._at_rad: tuple[float, float] | None = None
@@ -43,10 +43,7 @@ class PairTransmission:
         self._slopes = (0.0, 0.0)
 
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        """Return the servo's position in steps, and the steps per radian of each joint.
-
-        A little beyond the joints' range the rods cannot follow; then their last slope is used.
-        """
+        """Return the servo's position in steps, and the steps per radian of each joint."""
         first, second = joints_rad
         before = self._at_rad
         if before is None or max(abs(first - before[0]), abs(second - before[1])) > RELINEARISE_RAD:
@@ -56,11 +53,8 @@ class PairTransmission:
         return self._steps + a * (first - before[0]) + b * (second - before[1]), self._slopes
 
     def _linearise(self, joints_rad: tuple[float, float]) -> None:
-        try:
-            shaft_rad = self._coupling.servo_rad(joints_rad)[self._index]
-            rates = self._coupling.rates(joints_rad)[self._index]
-        except Unreachable:
-            return
+        shaft_rad = self._coupling.servo_rad(joints_rad)[self._index]
+        rates = self._coupling.rates[self._index]
         self._steps = self._linkage.steps(shaft_rad)
         slope = 1.0 / self._linkage.rate_rad(self._steps)
         self._slopes = slope * rates[0], slope * rates[1]

@@ -16,7 +16,7 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.errors import CameraError
@@ -25,7 +25,7 @@ from gazerig.drivers.types import Camera, DetectedFace, Detections, ImageArray
 LONGEST_S = 60.0
 """A camera that takes longer hangs; a working camera needs a thousandth of this time."""
 
-QUICKLY = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=5.0, give_up_s=LONGEST_S)
+QUICKLY = CameraRecovery(0.001, 0.005, LONGEST_S)
 
 
 def _wait() -> None:

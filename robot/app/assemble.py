@@ -31,7 +31,7 @@ from gazerig.robot.app.camera_factory import (
     run_camera,
 )
 from gazerig.robot.app.gaze_models import motion_models, oculomotor, rig_kinematics, target_chooser
-from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
+from gazerig.robot.app.live_params import Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_description import sag_compensation, shape_of
@@ -47,7 +47,6 @@ from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
@@ -95,7 +94,6 @@ class Assembly(NamedTuple):
         return ShownRig(
             parts.kinematics,
             limits(rig.joints),
-            rig.guard.health,
             self.mount,
             radians(self.horizontal_field_deg),
             shape_of(rig),
@@ -107,7 +105,7 @@ class Assembly(NamedTuple):
 
     @property
     def loop(self) -> LoopParams:
-        """Return the present rate and time for parking."""
+        """Return the present rate of the loop."""
         return self.live_params.loop
 
     @property
@@ -181,24 +179,19 @@ def assemble(
                 rig, options, scene, sight, opened, random.camera, camera, clock, program,
             )  # fmt: skip
         if options.mock and not options.fast:
-            seen = make_borrowed_camera(
-                seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
-            )
+            seen = make_borrowed_camera(seen, rig, clock, lambda: sight.mount.retune(live.camera))
         gentle_deg_s = rig.guard.soft_start_speed_deg_s
         body = Body(
             opened.bus,
             rig.joints,
             park_rad(rig),
             gentle_deg_s,
-            coupled_pairs(rig.couplings),
+            rig.couplings.values(),
             None if options.bus == "ideal" else sag_compensation(rig),
             messages.append if options.recover else None,
         )
         parts = _build_components(rig, body, kinematics, seen, sight.mount, camera, walk, random)
-        placement = CameraPlacement(
-            lambda rig: camera_placement(rig, options, kinematics, seen)[0], camera.mount
-        )
-        live = LiveParams(parts, rig, placement)
+        live = LiveParams(parts, rig, lambda: camera_placement(rig, options, kinematics, seen)[0])
         robot = _build_robot(parts, sight.poses, live, substitutes, rig, messages)
         if room is not None and isinstance(scene, BoxingScene) and scene.opponent is not None:
             robot.set_opponent(TickClockOpponent(scene.opponent, room.start_s))

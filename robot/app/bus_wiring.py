@@ -13,7 +13,6 @@ from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import servo_setups
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, pickle_params
-from gazerig.robot.model.coupling_params import coupled_pairs
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -51,7 +50,7 @@ def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:
 def servo_configs(rig: Rig) -> tuple[ServoConfig, ...]:
     """Return the configuration of a rig's servos for the buses, in the order of its joints."""
     gentle_deg_s = rig.guard.soft_start_speed_deg_s
-    return servo_setups(rig.joints, park_rad(rig), gentle_deg_s, coupled_pairs(rig.couplings))
+    return servo_setups(rig.joints, park_rad(rig), gentle_deg_s, rig.couplings.values())
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:

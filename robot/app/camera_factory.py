@@ -25,7 +25,7 @@ from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
-from gazerig.drivers.types import Camera, FaceDetector
+from gazerig.drivers.types import Camera
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
@@ -36,7 +36,6 @@ from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, part_label, 
 from gazerig.robot.app.run_bus import CameraPoses, RunBus, TrueSteps
 from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
@@ -46,7 +45,7 @@ from gazerig.robot.model.frames import (
 )
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
-from gazerig.robot.perception.motion_source import motion_finder, retune_finder
+from gazerig.robot.perception.motion_source import motion_finder
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -106,10 +105,10 @@ def true_head_pose(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -
     if true_steps is None:
         return poses.head_pose
     kinematics = rig_kinematics(rig)
-    pairs = coupled_pairs(rig.couplings)
+    pairs = rig.couplings.values()
     linkages = {
         name: rig.joints[name].make_linkage()
-        for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}
+        for name in {*NECK, *LOWER_NECK, *(joint for pair in pairs for joint in pair.joints)}
         & rig.joints.keys()
     }
 
@@ -120,8 +119,9 @@ def true_head_pose(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -
         steps, angles = true_steps(), absent.copy()
         for name, linkage in linkages.items():
             angles[name] = linkage.angle_rad(steps[name])
-        for first, second, coupling in pairs:
-            angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
+        for pair in pairs:
+            first, second = pair.joints
+            angles[first], angles[second] = pair.joint_rad((angles[first], angles[second]))
         yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
         return kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
 
@@ -175,7 +175,7 @@ def drawn_camera(
     """Return a camera on a drawn scene in real time.
 
     Args:
-        rig: Defines its field of view, and the recovery of a lost camera.
+        rig: Defines its field of view.
         scene: Scene in front of it.
         mount: Placement on the head.
         where: Rotation and position of the head in the world at a time.
@@ -193,7 +193,7 @@ def drawn_camera(
             supervise_source(rig, own, source(), clock, motion, locate), poses, where
         )
     parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-    return DrawnCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), poses, where)
+    return DrawnCamera(CameraProcess(parts, clock.now_s), poses, where)
 
 
 def scene_start_s(camera: Camera) -> float | None:
@@ -232,7 +232,7 @@ def make_borrowed_camera(
 
     def process(source: Callable[[], FrameSource], before: int) -> CameraProcess:
         parts = CameraParts(source, detector, motion, locate)
-        return CameraProcess(parts, clock.now_s, rig.camera_recovery, before)
+        return CameraProcess(parts, clock.now_s, before=before)
 
     return BorrowedCamera(own, process, clock.now_s, place)
 
@@ -271,13 +271,13 @@ def real_camera(
         return supervise_source(rig, own, _source_factory(rig, options)(), clock, motion, locate)
     if name is None or is_ours(CAMERA, name):
         parts = CameraParts(_source_factory(rig, options), detector, motion, locate)
-        return CameraProcess(parts, clock.now_s, rig.camera_recovery)
+        return CameraProcess(parts, clock.now_s)
     params = _package_camera_params(rig, name)
     camera = create_camera_part(name, params)
     if is_source(camera):
         source = upright(partial(create_plugin_source, name, params), frame_orientation(placed))
         parts = CameraParts(source, detector, motion, locate)
-        return CameraProcess(parts, clock.now_s, rig.camera_recovery)
+        return CameraProcess(parts, clock.now_s)
     return cast(Camera, camera)
 
 
@@ -317,7 +317,7 @@ def supervise_source(
 ) -> CameraThread:
     """Return a source of frames with the detector in a thread of this program."""
     detector = parts.make_detector(rig.detector)
-    return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
+    return CameraThread(source, detector, clock.now_s, motion=motion(), locate=locate)
 
 
 def frame_locator(placed: CameraParams) -> FrameLocator:
@@ -341,66 +341,6 @@ def _package_camera_params(rig: Rig, name: str) -> object:
         raise PluginError(
             f"{find(CAMERA, name).label} needs a section {name} in the rig"
         ) from error
-
-
-def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:
-    """Change the parameters of a running camera; return what cannot be changed while it runs.
-
-    placed: its placement, with the new lens
-    """
-    detector = partial(face_detector, after.detector) if after.detector != before.detector else None
-    seen_through = after.camera.lens, after.camera.horizontal_field_deg
-    before_through = before.camera.lens, before.camera.horizontal_field_deg
-    locate = frame_locator(placed) if seen_through != before_through else None
-    moves = after.motion != before.motion or locate is not None
-    if detector is None and not moves:
-        return ""
-    field_rad = radians(placed.horizontal_field_deg)
-    finder = partial(retune_finder, after.motion, placed.lens, field_rad)
-    motion = finder if moves else None
-    try:
-        match camera:
-            case BorrowedCamera():
-                return retune_camera(camera.own, before, after, placed)
-            case DrawnCamera():
-                return retune_camera(camera.process, before, after, placed)
-            case RoomCamera():
-                return (
-                    retune_camera(camera.wrapped_camera, before, after, placed)
-                    if camera.wrapped_camera
-                    else ""
-                )
-            case CameraProcess():
-                done = camera.retune(detector, motion, locate)
-            case CameraThread():  # it uses the program's own detector
-                done = camera.retune(None, motion, locate)
-            case SceneCamera():  # it computes ideal detections
-                done = locate is None or camera.retune(locate)
-            case _:
-                done = _retune_simulated_camera(camera, after, detector, motion, locate)
-    except SetupError as error:
-        return f"the detector is unchanged: {error}"
-    return "" if done else "the camera's process is busy and keeps its parameters: set them again"
-
-
-def _retune_simulated_camera(
-    camera: Camera,
-    after: Rig,
-    detector: Callable[[], FaceDetector] | None,
-    motion: Callable[[Motion | None], Motion | None] | None,
-    locate: FrameLocator | None,
-) -> bool:
-    """Change a camera that detects faces in simulated time; others have nothing to change."""
-    from gazerig.robot.app.drawn_motion import retune_synthetic
-    from gazerig.sim_mock.cameras.rendered import PixelCamera
-    from gazerig.sim_mock.cameras.video import FilmCamera
-
-    if isinstance(camera, FilmCamera):
-        return camera.retune(detector, motion, locate)
-    if isinstance(camera, PixelCamera):
-        drawn = partial(retune_synthetic, after.motion) if motion is not None else None
-        return camera.retune(detector, drawn, locate)
-    return True
 
 
 def _film_source(options: RunOptions) -> "VideoFile | CameraReplay":

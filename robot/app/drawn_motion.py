@@ -1,7 +1,5 @@
 """Motion detection in drawn frames of a simulated scene."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -20,13 +18,6 @@ class SyntheticMotionDetector:
         self._detector = MotionDetector(params)
         self._before: Mat3 | None = None
 
-    def retune(self, params: MotionParams) -> None:
-        """Use new parameters from the next frame on; tracked faces are kept."""
-        self._enabled = params.enabled
-        self._detector.retune(params)
-        if not params.enabled:
-            self._detector.forget()
-
     def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
         """Find motion since the previous frame; empty if disabled."""
         before, self._before = self._before, shot.R_world_camera
@@ -38,13 +29,3 @@ class SyntheticMotionDetector:
             else None
         )
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
-
-
-FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
-
-
-def retune_synthetic(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
-    """Change the parameters of the motion detector of drawn frames."""
-    if isinstance(find, SyntheticMotionDetector):
-        find.retune(params)
-    return find

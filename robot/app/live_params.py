@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from gazerig.config.faults import ConfigError, ConfigFault
-from gazerig.config.parameters import apply_changes, differences, start_note
+from gazerig.config.parameters import LIVE_LIMITS, apply_changes, differences, start_note
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.drivers.types import Camera
@@ -27,12 +27,9 @@ from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk
 from gazerig.gaze.track.animation import Animation
-from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
     eye_limits,
-    face_parts_m,
     head_limits,
-    lid_ends,
     lid_spans,
     limits,
 )
@@ -40,8 +37,7 @@ from gazerig.robot.app.rig_weight import rest_park_pose
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import Tune, Value
-from gazerig.robot.model.coupling_params import coupled_pairs, joint_partners
-from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
+from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
@@ -77,13 +73,6 @@ class Components(NamedTuple):
     tracks: TrackChoices
 
 
-class CameraPlacement(NamedTuple):
-    """Assumed placement of the camera, which may be fixed although the rig's moves."""
-
-    camera: Callable[[Rig], CameraParams]
-    mount: MountedOn
-
-
 class _PreparedChange(NamedTuple):
     """A rig that was checked before it is applied.
 
@@ -108,18 +97,21 @@ class LiveParams:
     rig: the present rig
     """
 
-    def __init__(self, parts: Components, rig: Rig, placed: CameraPlacement) -> None:
+    def __init__(self, parts: Components, rig: Rig, placed: Callable[[], CameraParams]) -> None:
+        """Remember the parts.
+
+        placed: returns the present lens and placement of the camera
+        """
         self.rig = rig
         self.parts = parts
         self._placed = placed
         self._started = rig
-        self._coupled = joint_partners(coupled_pairs(rig.couplings))
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _PreparedChange] = {}
 
     @property
     def loop(self) -> LoopParams:
-        """Return the present rate and time for parking."""
+        """Return the present rate of the loop."""
         return self.rig.loop
 
     @property
@@ -130,7 +122,7 @@ class LiveParams:
     @property
     def camera(self) -> CameraParams:
         """Return the present lens and placement of the camera."""
-        return self._placed.camera(self.rig)
+        return self._placed()
 
     @property
     def horizontal_field_deg(self) -> float:
@@ -185,37 +177,26 @@ class LiveParams:
 
     def _apply_to_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
         parts = self.parts
-        bends = (new.geometry, new.lid_joints) != (old.geometry, old.lid_joints)
-        if bends:
-            parts.kinematics.retune(new.geometry, lid_ends(new))
         said: tuple[str, ...] = ()
         if (new.joints, new.guard) != (old.joints, old.guard):
             said = self._apply_joints(old, new)
-        if bends or new.ranges != old.ranges:
+        if new.ranges != old.ranges:
             parts.guard.start_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
             parts.guard.set_period(1.0 / new.loop.rate_hz)
-        if new.tracker != old.tracker:
-            parts.tracker.retune(new.tracker)
-        placed, was_placed = self._placed.camera(new), self._placed.camera(old)
-        if placed != was_placed:
-            parts.mount.retune(replace(placed, mount=self._placed.mount))
-        if (placed, new.face_parts_mm) != (was_placed, old.face_parts_mm):
-            parts.perception.retune(placed.horizontal_field_deg, face_parts_m(new), placed.lens)
-        camera = retune_camera(parts.camera, old, new, placed)
-        return (*said, camera) if camera else said
+        parts.tracker.params = new.tracker
+        return said
 
     def _apply_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
-        """Apply joint limits to body and guard; the guard gets the present angles of the joints.
+        """Apply joint limits to body and guard.
 
         Returns the changes that are applied at the next setup of the servos.
         """
-        parts, joints, before = self.parts, self._keep_servos(new), self._keep_servos(old)
+        parts, joints, before = self.parts, self._with_limits(new), self._with_limits(old)
         gentle_deg_s = new.guard.soft_start_speed_deg_s
         others = (joints, gentle_deg_s) != (before, old.guard.soft_start_speed_deg_s)
         if others:
-            for i, (factor, offset_rad) in parts.body.retune(joints, gentle_deg_s).items():
-                parts.guard.rescale_joint(i, factor, offset_rad)
+            parts.body.retune(joints, gentle_deg_s)
         if new.guard != old.guard or limits(joints) != limits(before):
             parts.guard.retune(new.guard, limits(joints))
         if not others:
@@ -233,29 +214,12 @@ class LiveParams:
             return ()
         return (f"{', '.join(more)}: the full range and speed apply after a stop and a resume",)
 
-    def _keep_servos(self, rig: Rig) -> dict[str, JointParams]:
-        """Return the joints with the servos for which the bus was opened."""
+    def _with_limits(self, rig: Rig) -> dict[str, JointParams]:
+        """Return the joints of the start with the limits of a rig."""
         return {
-            name: _keep_servo_of(rig.joints[name], first, name in self._coupled)
+            name: replace(first, **{key: getattr(rig.joints[name], key) for key in LIVE_LIMITS})
             for name, first in self._started.joints.items()
         }
-
-
-_OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "transmission_points", "servo_speed_deg_s")
-"""Fields of a joint that cannot change after the bus was opened."""
-
-
-_OF_A_PAIR = ("sign", "ratio", "zero_step")
-"""Further fields that cannot change if two servos move two joints together."""
-
-
-def _keep_servo_of(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
-    """Return a joint with the servo of another; the same object if it is unchanged."""
-    keys = (*_OF_THE_SERVO, *_OF_A_PAIR) if coupled else _OF_THE_SERVO
-    kept = {key: getattr(first, key) for key in keys}
-    if all(getattr(joint, key) == value for key, value in kept.items()):
-        return joint
-    return replace(joint, **kept)
 
 
 def _prepare_change(command: Tune, base: Rig, rig: Rig) -> _PreparedChange:

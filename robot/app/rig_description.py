@@ -11,7 +11,6 @@ from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.links import Description
 from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
 from gazerig.robot.description.statics import NECK_JOINTS, Statics, moving_bodies
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.types import order_joints
 
 
@@ -73,17 +72,15 @@ def statics_of(rig: Rig, *, of_neck: bool = False) -> Statics:
         of_neck: only for the joints of the neck, with all others at 0, which is faster.
     """
     joints = {n: one for n, one in rig.joints.items() if not of_neck or n in NECK_JOINTS}
-    pairs = [one for one in coupled_pairs(rig.couplings) if {one.first, one.second} <= {*joints}]
+    pairs = [one for one in rig.couplings.values() if {*one.joints} <= {*joints}]
     return Statics(moving_bodies(description_of(rig, looks=False), joints), joints, pairs)
 
 
 def sag_compensation(rig: Rig) -> SagCompensation | None:
-    """Return what makes up for the sag of a rig's neck; None without a neck or by its file."""
-    if not rig.mass.sag_share or not any(name in rig.joints for name in NECK_JOINTS):
+    """Return what makes up for the sag of a rig's neck; None without a neck."""
+    if not any(name in rig.joints for name in NECK_JOINTS):
         return None
-    return SagCompensation(
-        statics_of(rig, of_neck=True), order_joints(rig.joints), rig.mass.sag_share
-    )
+    return SagCompensation(statics_of(rig, of_neck=True), order_joints(rig.joints))
 
 
 def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:

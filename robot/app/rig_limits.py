@@ -30,9 +30,9 @@ def lid_ends(rig: Rig) -> dict[str, LidEnds]:
     """Return the joint angles of the rig's shut and open lids."""
     ends = {}
     for name in LIDS:
-        shut, wide = rig.lid_joints.ends_deg(name)
-        if name in rig.joints and shut is not None and wide is not None:
-            ends[name] = (radians(shut), radians(wide))
+        pair = rig.lid_joints.ends_deg(name)
+        if name in rig.joints and pair is not None:
+            ends[name] = (radians(pair[0]), radians(pair[1]))
     return ends
 
 

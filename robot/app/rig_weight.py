@@ -19,10 +19,7 @@ _POSES = 9
 """Number of angles per joint of the neck at which its load is computed."""
 _STAYS_DEG = 1.0
 
-_LIGHTEN = (
-    "balance the head with mass.counterweights or joints.{name}.spring_nm_deg, or use a stronger "
-    "servo"
-)
+_LIGHTEN = "balance the head with mass.counterweights, or use a stronger servo"
 
 
 class WeightFinding(NamedTuple):
@@ -106,7 +103,7 @@ def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
             f"{pose} deg: {worst.temperature_c:.0f} degC in the long run"
         )
         strong = worst.share > STRONG_SHARE
-        cure = f"above one third it gets hot: {_LIGHTEN.format(name=name)}" if strong else ""
+        cure = f"above one third it gets hot: {_LIGHTEN}" if strong else ""
         yield WeightFinding("warn" if strong else "note", name, what, cure)
     park = {name: angle for name, angle in park_rad(rig).items() if name in statics.joints}
     rest = statics.rest_pose(park)
@@ -132,11 +129,10 @@ def weight_findings(rig: Rig) -> Iterator[WeightFinding]:
 def rest_park_deg(rig: Rig) -> dict[str, float]:
     """Return the rig's pose for parking; a head that would sink there is parked at its rest pose.
 
-    Only masses and springs in the rig's file change it, because masses from shapes are estimates.
+    Only masses in the rig's file change it, because masses from shapes are estimates.
     """
     park = dict(rig.park_deg)
-    sprung = any(joint.spring_nm_deg for joint in rig.joints.values())
-    if (rig.mass == MassParams() and not sprung) or not rig.joints.keys() & set(NECK_JOINTS):
+    if rig.mass == MassParams() or not rig.joints.keys() & set(NECK_JOINTS):
         return park
     statics = statics_of(rig, of_neck=True)
     pose = {name: radians(park.get(name, 0.0)) for name in statics.joints}

@@ -5,7 +5,7 @@ The emulated servos are mounted in the rig's joints as its YAML defines.
 
 import hashlib
 from collections.abc import Callable, Mapping
-from math import degrees, pi, radians
+from math import pi, radians
 from typing import NamedTuple
 
 from gazerig.config.rig import BusConfig, Rig
@@ -26,7 +26,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.description.statics import Weight, joint_weights, moving_bodies
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.coupling_params import coupled_pairs, pair_setups
+from gazerig.robot.model.coupling import pair_setups
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.mass_params import MassParams
@@ -74,6 +74,8 @@ class CameraPoses(NamedTuple):
     turns: PoseBuffer | None
 
 
+JOINT_PLAY_DEG = 0.25
+"""Play between servo and joint, from stop to stop, as in the data sheets of the X430."""
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
 """Start angles of emulated joints: slightly off, like those of a head moved by hand."""
 
@@ -115,12 +117,9 @@ def _emulated_servo(rig: Rig, name: str, weight: Weight, has_own_weight: bool) -
         gravity_nm=weight.nm / turns if has_own_weight else 0.0,
         upright_steps=joint.steps(weight.upright_rad),
         gravity_turns=1.0 / turns,
-        spring_nm_rad=degrees(joint.spring_nm_deg) / turns**2,
-        spring_rest_steps=joint.steps(radians(joint.spring_rest_deg)),
-        friction_nm=joint.friction_nm / turns,
         stop_low_steps=low,
         stop_high_steps=high,
-        play_deg=joint.play_deg * turns,
+        play_deg=JOINT_PLAY_DEG * turns,
     )
     return ServoSpec(joint.id, joint.model, start, physics=physics)
 
@@ -131,19 +130,16 @@ def _steepest_turns(joint: JointParams) -> float:
 
 def _turned_joints(rig: Rig, name: str) -> TurnedJoints:
     """Return the joints that a servo turns, near angle 0."""
-    joint, level = rig.joints[name], 0.0
+    joint = rig.joints[name]
     shares: tuple[tuple[str, float], ...] = ((name, 1.0),)
-    for first, second, coupling in coupled_pairs(rig.couplings):
-        if name in (first, second):
-            (a, b), (c, d) = coupling.rates((0.0, 0.0))
-            level = coupling.servo_rad((0.0, 0.0))[name == second]
-            own = (d, -c) if name == first else (-b, a)
-            det = a * d - b * c
-            shares = ((first, own[0] / det), (second, own[1] / det))
+    for pair in rig.couplings.values():
+        if name in pair.joints:
+            turn = (1.0, 0.0) if name == pair.first else (0.0, 1.0)
+            shares = tuple(zip(pair.joints, pair.joint_rad(turn), strict=True))
     per_rad = _steepest_turns(joint) * STEPS_PER_RAD
     if not joint.make_linkage().rising:
         per_rad = -per_rad
-    zero = joint.steps(level) * STEPS_PER_TURN / joint.model_facts.steps_per_turn
+    zero = joint.steps(0.0) * STEPS_PER_TURN / joint.model_facts.steps_per_turn
     return TurnedJoints(zero, tuple((turned, share / per_rad) for turned, share in shares))
 
 
@@ -218,32 +214,27 @@ def _hobby_spec(rig: Rig, name: str) -> HobbySpec:
 
 def start_angles_rad(rig: Rig) -> dict[str, float]:
     """Return the start angles of a rig's emulated joints."""
-    crooked = {
+    return {
         # No farther than the mechanical stops of a joint with a small range.
         name: radians(min(max(_CROOKED_DEG.get(name, 0.0), joint.min_deg - STOP_BEYOND_DEG),
                           joint.max_deg + STOP_BEYOND_DEG))
         for name, joint in rig.joints.items()
     }  # fmt: skip
-    for first, second, _ in coupled_pairs(rig.couplings):
-        # Push rods have no angles far outside their range.
-        for name in (first, second):
-            limit = rig.joints[name].limit()
-            crooked[name] = min(max(crooked[name], limit.low_rad), limit.high_rad)
-    return crooked
 
 
 def _start_step(rig: Rig, name: str) -> int:
     crooked = start_angles_rad(rig)
-    for first, second, coupling in coupled_pairs(rig.couplings):
-        crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
+    for pair in rig.couplings.values():
+        first, second = pair.joints
+        crooked[first], crooked[second] = pair.servo_rad((crooked[first], crooked[second]))
     return round(rig.joints[name].steps(crooked[name]))
 
 
 def _mechanical_stops(rig: Rig, name: str) -> tuple[float, float]:
     """Return the first and last step of the servo that its mechanics allow."""
     joint = rig.joints[name]
-    for pair in coupled_pairs(rig.couplings):
-        if name in pair[:2]:
+    for pair in rig.couplings.values():
+        if name in pair.joints:
             own = pair_setups(pair, rig.joints, {})[name]
             beyond = joint.make_linkage().steepest * radians(STOP_BEYOND_DEG)
             return own.min_steps - beyond, own.max_steps + beyond

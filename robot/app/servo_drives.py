@@ -16,7 +16,6 @@ from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.feetech.memory_table import REGISTERS, SCS_MODELS, FeetechModel
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.description.links import ServoDrive
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import MaestroLine, Pca9685Line
 from gazerig.sim_mock.dynamixel.drive import POSITION, control_loop
@@ -50,13 +49,12 @@ def servo_drives(rig: Rig) -> dict[str, ServoDrive]:
             motor, loop = hobby_motor(hobby[joint.bus, joint.id], steps_per_turn)
             shafts[name] = _shaft_drive(motor, HOBBY_PHYSICS, loop)
     turns = {name: [(name, _turns(rig.joints[name]))] for name in shafts}
-    for first, second, coupling in coupled_pairs(rig.couplings):
-        pair, rates = (first, second), coupling.rates((0.0, 0.0))
-        if shafts.keys() >= {*pair}:
-            for j, name in enumerate(pair):
+    for pair in rig.couplings.values():
+        if shafts.keys() >= {*pair.joints}:
+            for j, name in enumerate(pair.joints):
                 turns[name] = [
                     (one, _turns(rig.joints[one]) * rate[j])
-                    for one, rate in zip(pair, rates, strict=True)
+                    for one, rate in zip(pair.joints, pair.rates, strict=True)
                 ]
     return {name: _at_joint(shafts, of) for name, of in turns.items()}
 

@@ -221,10 +221,10 @@ def _joint_keys(
 
 def _lid_ends(rig: Rig, joint: str) -> tuple[float, float]:
     """Return the shut and the open angle of a lid in degrees."""
-    shut, wide = rig.lid_joints.ends_deg(joint)
-    if shut is None or wide is None:
+    ends = rig.lid_joints.ends_deg(joint)
+    if ends is None:
         raise SetupError(f"{joint}: the rig does not define its shut and open angles")
-    return shut, wide
+    return ends
 
 
 def _lid_note(rig: Rig, joint: str, times_s: Floats, angles_deg: Floats) -> str:

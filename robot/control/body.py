@@ -1,7 +1,7 @@
 """Conversion between joints and servos; the only place that converts steps to joint angles."""
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import isfinite, radians
 from operator import add, mul, sub
 
@@ -12,7 +12,7 @@ from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.control.limp_joints import LimpJoints
 from gazerig.robot.control.sag import SagCompensation
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
+from gazerig.robot.model.coupling import CouplingParams, pair_setups
 from gazerig.robot.model.joint import JointLimit, JointParams, LinearLinkage
 from gazerig.robot.model.types import JointAngles, JointState, order_joints
 from gazerig.robot.safety.start_range import find_far_outside
@@ -28,7 +28,7 @@ def servo_setups(
     joints: Mapping[str, JointParams],
     park_rad: Mapping[str, float],
     gentle_deg_s: float = ENTRY_DEG_S,
-    pairs: Sequence[CoupledPair] = (),
+    pairs: Collection[CouplingParams] = (),
 ) -> tuple[ServoConfig, ...]:
     """Return the configuration of all servos for a bus.
 
@@ -70,7 +70,7 @@ class Body:
         joints: Mapping[str, JointParams],
         park_rad: Mapping[str, float] | None = None,
         gentle_deg_s: float = ENTRY_DEG_S,
-        pairs: Sequence[CoupledPair] = (),
+        pairs: Collection[CouplingParams] = (),
         sag: SagCompensation | None = None,
         recover: Callable[[str], object] | None = None,
     ) -> None:
@@ -81,11 +81,16 @@ class Body:
         self._pairs = tuple(pairs)
         self._coupled = CoupledServos(pairs, self.names) if pairs else None
         self._park_rad = dict(park_rad or {})
-        self._limp = LimpJoints()
         self._torque_off = False
         self._gentle_deg_s = gentle_deg_s
-        self._set_up = tuple(joints[name] for name in self.names)
-        self._set_joints(self._set_up)
+        self._joints = self._set_up = tuple(joints[name] for name in self.names)
+        self._limp = LimpJoints([joint.limp_when_idle_s for joint in self._joints])
+        linkages = [joint.make_linkage() for joint in self._joints]
+        # All joints are computed as if every linkage were straight; the other joints are then
+        # corrected.
+        lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
+        self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
+        self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
         # Before the first answer: the centre, infinitely old.
         self._nothing = Feedback.create_missing(len(self.names))
         self._last = self._nothing._replace(
@@ -96,42 +101,15 @@ class Body:
             measured=tuple([joint.model_facts.measures_position for joint in self._joints]),
         )
 
-    def _set_joints(self, joints: tuple[JointParams, ...]) -> None:
-        self._joints = joints
-        self._limp.retune([joint.limp_when_idle_s for joint in joints])
-        linkages = [joint.make_linkage() for joint in joints]
-        # All joints are computed as if every linkage were straight; the other joints are then
-        # corrected.
-        lines = [linkage.line or LinearLinkage(0.0, 0.0, 0.0) for linkage in linkages]
-        self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
-        self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
-
-    def retune(
-        self, joints: Mapping[str, JointParams], gentle_deg_s: float
-    ) -> dict[int, tuple[float, float]]:
-        """Apply new joint parameters; the servos are set up again when torque is switched on.
-
-        Returns:
-            (factor, offset in rad) by number of each joint whose angles change: x becomes
-            factor * x + offset.
-        """
-        before, self._gentle_deg_s = self._joints, gentle_deg_s
-        self._set_joints(tuple(joints[name] for name in self.names))
-        if self._sag is not None:
-            self._sag.retune(joints)
-        self.bus.retune(servo_setups(joints, self._park_rad, self._gentle_deg_s, self._pairs))
-        return {
-            i: (
-                now.angle_rad(old.steps(1.0)) - now.angle_rad(old.steps(0.0)),
-                now.angle_rad(old.steps(0.0)),
-            )
-            for i, (old, now) in enumerate(zip(before, self._joints, strict=True))
-            if not _same_conversion(old, now)
-        }
+    def retune(self, joints: Mapping[str, JointParams], gentle_deg_s: float) -> None:
+        """Apply new limits of joints; the servos are set up again when torque is switched on."""
+        self._gentle_deg_s = gentle_deg_s
+        self._joints = tuple(joints[name] for name in self.names)
+        self.bus.retune(servo_setups(joints, self._park_rad, gentle_deg_s, self._pairs))
 
     def configured_limits(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds of the servos' configuration, in present joint angles."""
-        return tuple(map(_configured_limit, self._set_up, self._joints))
+        """Return the ranges and speeds of the servos' configuration."""
+        return tuple([joint.limit() for joint in self._set_up])
 
     def start(self, clock: Clock) -> JointAngles:
         """Open the bus and switch the torque on at the present angles; return the goals.
@@ -199,7 +177,7 @@ class Body:
             right = list(rates)
             for i, linkage in self._bent:
                 right[i] = speeds[i] * linkage.rate_rad(steps[i])
-            rates = tuple(right if self._coupled is None else self._coupled.speeds(angles, right))
+            rates = tuple(right if self._coupled is None else self._coupled.joints(right))
         else:
             angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
         if self._recovering:
@@ -308,8 +286,6 @@ class Body:
         self._torque_off = False
         # A servo that has not answered since then has torque.
         self._last = self._last._replace(torque=(True,) * len(self.names))
-        if self._coupled is not None:
-            self._coupled.set_goals(self._shafts(goals))
         self._set_up = self._joints
         return self.angles(goals)
 
@@ -375,24 +351,3 @@ class Body:
         except BaseException:
             self.bus.disable_torque()
             raise
-
-
-def _same_conversion(one: JointParams, other: JointParams) -> bool:
-    """Return whether both convert each step to the same angle."""
-    return (one.sign, one.ratio, one.zero, one.transmission_points) == (
-        other.sign,
-        other.ratio,
-        other.zero,
-        other.transmission_points,
-    )
-
-
-def _configured_limit(set_up: JointParams, now: JointParams) -> JointLimit:
-    """Return a servo's configured limits in the joint angles of the present parameters."""
-    limit = set_up.limit()
-    if _same_conversion(set_up, now):
-        return limit
-    was, made = set_up.make_linkage(), now.make_linkage()
-    ends = sorted(made.angle_rad(was.steps(end)) for end in (limit.low_rad, limit.high_rad))
-    speed = limit.speed_rad_s * was.steepest / made.steepest
-    return limit._replace(low_rad=ends[0], high_rad=ends[1], speed_rad_s=speed)

@@ -4,8 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 from gazerig.drivers.types import Feedback
-from gazerig.robot.model.coupling import Pair, Unreachable, joint_rates
-from gazerig.robot.model.coupling_params import CoupledPair
+from gazerig.robot.model.coupling import CouplingParams
 
 
 class CoupledServos:
@@ -16,53 +15,24 @@ class CoupledServos:
         names: Names of all joints in their order.
     """
 
-    def __init__(self, pairs: Iterable[CoupledPair], names: Sequence[str]) -> None:
+    def __init__(self, pairs: Iterable[CouplingParams], names: Sequence[str]) -> None:
         # The positions of both joints in every sequence, and their coupling.
-        self._pairs = tuple(
-            (names.index(one.first), names.index(one.second), one.coupling) for one in pairs
-        )
-        self._goals: dict[int, Pair] = {}
+        self._pairs = tuple((names.index(one.first), names.index(one.second), one) for one in pairs)
         self._last: dict[int, Feedback] = {}
 
     def joints(self, shafts_rad: Sequence[float]) -> list[float]:
-        """Return the joint angles of servo angles."""
+        """Return the joint angles of servo angles, or the joint speeds of servo speeds."""
         angles = list(shafts_rad)
         for i, j, coupling in self._pairs:
             angles[i], angles[j] = coupling.joint_rad((shafts_rad[i], shafts_rad[j]))
         return angles
 
     def shafts(self, joints_rad: Sequence[float]) -> list[float]:
-        """Return the servo angles of joint angles.
-
-        For unreachable joint angles, which occur only before joints are inside their range, the
-        servos keep their last goals.
-        """
+        """Return the servo angles of joint angles."""
         angles = list(joints_rad)
         for i, j, coupling in self._pairs:
-            at = joints_rad[i], joints_rad[j]
-            try:
-                self._goals[i] = coupling.servo_rad(at)
-            except Unreachable:
-                self._goals.setdefault(i, coupling.servo_rad((0.0, 0.0)))
-            angles[i], angles[j] = self._goals[i]
+            angles[i], angles[j] = coupling.servo_rad((joints_rad[i], joints_rad[j]))
         return angles
-
-    def set_goals(self, shafts_rad: Sequence[float]) -> None:
-        """Record the servo angles at which torque was switched on."""
-        for i, j, _ in self._pairs:
-            self._goals[i] = shafts_rad[i], shafts_rad[j]
-
-    def speeds(self, joints_rad: Sequence[float], shaft_rates: Sequence[float]) -> list[float]:
-        """Return the joint speeds of servo speeds at given joint angles."""
-        rates = list(shaft_rates)
-        for i, j, coupling in self._pairs:
-            try:
-                slopes = coupling.rates((joints_rad[i], joints_rad[j]))
-            except Unreachable:
-                rates[i] = rates[j] = 0.0
-                continue
-            rates[i], rates[j] = joint_rates(slopes, (shaft_rates[i], shaft_rates[j]))
-        return rates
 
     def share_feedback(self, feedback: Feedback, released: bool) -> Feedback:
         """Return feedback in which both servos of a pair share the values for both joints.

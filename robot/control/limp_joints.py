@@ -14,14 +14,13 @@ class LimpJoints:
 
     Attributes:
         limp: Numbers of the joints that must have no torque.
+
+    Args:
+        after_s: Time at rest after which each joint becomes limp; None: never.
     """
 
-    def __init__(self) -> None:
-        self._after_s: dict[int, float] = {}
+    def __init__(self, after_s: Sequence[float | None]) -> None:
         self.reset()
-
-    def retune(self, after_s: Sequence[float | None]) -> None:
-        """Set the time at rest after which each joint becomes limp; None: never."""
         self._after_s = {i: one for i, one in enumerate(after_s) if one is not None}
 
     def reset(self) -> None:

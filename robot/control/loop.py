@@ -53,6 +53,9 @@ from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.safety.guard import Guard
 
+PARK_S = 4.0
+"""Longest time for parking before torque is switched off."""
+
 
 class LoopCount(NamedTuple):
     """Counts of a loop: ticks, overrun slots, and the reason for the end."""
@@ -332,7 +335,7 @@ class Robot:
         Args:
             pose_rad: Joint angles of the parking pose.
             clock: Clock of the loop.
-            params: Rate and time for parking.
+            params: Rate of the loop.
             again: Returns whether to skip the rest; called at every step.
             watch: Called at every step with the last tick and the changes since.
         """
@@ -340,8 +343,8 @@ class Robot:
         self.body.wake()
         newest = self._looks.newest
         rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
-        end_s = start_s + params.park_s + 0.5 / rate_hz
-        last = int(params.park_s * rate_hz)
+        end_s = start_s + PARK_S + 0.5 / rate_hz
+        last = int(PARK_S * rate_hz)
         while (slot := max(slot, int((clock.now_s() - start_s) * rate_hz + 1e-6)) + 1) <= last:
             clock.sleep_until(start_s + slot / rate_hz)
             t_s = clock.now_s()

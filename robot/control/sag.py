@@ -4,11 +4,10 @@ A servo without an integral part holds a load only with a sufficiently large err
 follows from the load and the servo's P gain, so the goal is moved by it in the opposite direction.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import radians
 
 from gazerig.robot.description.statics import Statics
-from gazerig.robot.model.joint import JointParams
 
 FASTEST_DEG_S = 3.0
 """Speed of a change of a goal, so that nothing jumps when torque is switched on or a gain changes.
@@ -25,25 +24,24 @@ class SagCompensation:
     Args:
         statics: statics of the neck.
         names: names of the joints, in the order of the goals.
-        share: share of the sag that is compensated.
     """
 
-    def __init__(self, statics: Statics, names: Sequence[str], share: float) -> None:
-        self._share = share
+    def __init__(self, statics: Statics, names: Sequence[str]) -> None:
         self._places = tuple((i, name) for i, name in enumerate(names) if name in statics.joints)
         self._at: tuple[float, ...] = ()
         self._wanted: tuple[float, ...] = ()
-        self._set_statics(statics)
+        self._statics = statics
+        joints = [statics.joints[name] for _, name in self._places]
+        self._stiffness = [joint.model_facts.stiffness(joint.gains) for joint in joints]
+        linkages = [joint.make_linkage() for joint in joints]
+        self._steepest = [linkage.steepest for linkage in linkages]
+        self._rising = [linkage.rising for linkage in linkages]
         self.restart()
 
     def restart(self) -> None:
         """Start with unchanged goals, because torque has just been switched on."""
         self._now: tuple[float, ...] = (0.0,) * len(self._places)
         self._last_s: float | None = None
-
-    def retune(self, joints: Mapping[str, JointParams]) -> None:
-        """Apply new parameters of joints."""
-        self._set_statics(self._statics.retuned(joints))
 
     def offsets(self, command_rad: Sequence[float], t_s: float) -> tuple[tuple[int, float], ...]:
         """Return the change of goals in steps, by the number of the joint.
@@ -68,15 +66,6 @@ class SagCompensation:
         self._last_s = t_s
         return tuple([(i, steps) for (i, _), steps in zip(self._places, self._now, strict=True)])
 
-    def _set_statics(self, statics: Statics) -> None:
-        joints = [statics.joints[name] for _, name in self._places]
-        self._statics = statics
-        self._stiffness = [joint.model_facts.stiffness(joint.gains) for joint in joints]
-        linkages = [joint.make_linkage() for joint in joints]
-        self._steepest = [linkage.steepest for linkage in linkages]
-        self._rising = [linkage.rising for linkage in linkages]
-        self._at = ()
-
     def _wanted_steps(self, at: Sequence[float]) -> Iterator[float]:
         pose = {name: angle for (_, name), angle in zip(self._places, at, strict=True)}
         shares = self._statics.drive_shares(pose)
@@ -87,7 +76,7 @@ class SagCompensation:
                 yield 0.0
                 continue
             most = steepest * radians(MOST_DEG)
-            steps = min(max(-self._share * shares[name] / stiff, -most), most)
+            steps = min(max(-shares[name] / stiff, -most), most)
             yield steps if rising else -steps
 
 

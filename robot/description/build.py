@@ -8,7 +8,7 @@ with their signs (robot/model/kinematics.py).
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations, product
-from math import copysign, degrees, pi, radians
+from math import copysign, pi, radians
 from typing import NamedTuple
 
 from gazerig.gaze.angles import rotation
@@ -30,7 +30,7 @@ from gazerig.robot.description.weights import (
     mass_faults,
     weighed,
 )
-from gazerig.robot.model.coupling_params import CouplingParams, coupled_pairs
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
@@ -53,11 +53,11 @@ def joint_torques_nm(
             joint.make_linkage().steepest * 2.0 * pi / joint.model_facts.steps_per_turn
         )
     found = dict(own)
-    for first, second, coupling in coupled_pairs(couplings):
-        if first in joints and second in joints:
-            rates = coupling.rates((0.0, 0.0))
-            for j, name in enumerate((first, second)):
-                found[name] = abs(rates[0][j]) * own[first] + abs(rates[1][j]) * own[second]
+    for pair in couplings.values():
+        if joints.keys() >= {*pair.joints}:
+            both = own[pair.first] + own[pair.second]
+            for name, ratio in zip(pair.joints, pair.rates[0], strict=True):
+                found[name] = ratio * both
     return found
 
 
@@ -138,7 +138,7 @@ class _Builder:
                 self._links.append(
                     parts.facial_part(link_name(name), HEAD, place, joint, self._measures)
                 )
-        self._links = [weighed(link, rig.mass, i >= first) for i, link in enumerate(self._links)]
+        self._links = [weighed(link, rig.mass) for link in self._links]
         self._links.insert(first, self._build_head(neck, self._links[first:]))
         camera = rig.camera
         x, y, z = camera.position_mm
@@ -163,7 +163,7 @@ class _Builder:
     ) -> LinkJoint:
         own = self._rig.joints[of or name]
         limit = own.limit()
-        joint = LinkJoint(
+        return LinkJoint(
             name,
             axis,
             limit.low_rad,
@@ -171,13 +171,6 @@ class _Builder:
             limit.speed_rad_s,
             self._torques[of or name],
             follows,
-        )
-        if follows is not None:
-            return joint
-        return joint._replace(
-            friction_nm=own.friction_nm,
-            spring_nm_rad=degrees(own.spring_nm_deg),
-            spring_rest_rad=radians(own.spring_rest_deg),
         )
 
     def _add_neck(self) -> str:

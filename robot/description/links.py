@@ -95,8 +95,6 @@ class LinkJoint(NamedTuple):
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
     max_torque_nm: largest torque of the servo at the joint
     awake_rad: its angle while the head is awake and looks straight ahead
-    friction_nm: dry friction of its bearings, without that of a servo
-    spring_nm_rad, spring_rest_rad: stiffness of its spring, and the angle at which it is relaxed
     drive: its servos; None if they are unknown or not part of the description
     """
 
@@ -108,9 +106,6 @@ class LinkJoint(NamedTuple):
     max_torque_nm: float
     follows: LinkageFollower | None = None
     awake_rad: float = 0.0
-    friction_nm: float = 0.0
-    spring_nm_rad: float = 0.0
-    spring_rest_rad: float = 0.0
     drive: ServoDrive | None = None
 
 

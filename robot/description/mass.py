@@ -27,11 +27,6 @@ _SKULL = (47.15, (-0.831, 0.0, 0.110), ((65.81, 0.0, 8.78), (0.0, 72.79, 0.0), (
 """Mass, centre and tensor of a head's shell of that thickness, scaled to eyes 1 m apart."""
 
 
-def density_share(params: MassParams) -> float:
-    """Return the density of a rig's printed parts relative to the usual one."""
-    return params.density_kg_m3 / _PRINTED_KG_M3
-
-
 def head_mass_kg(params: MassParams, interocular_m: float) -> float:
     """Return the mass of the whole head: from the rig's file, or from its shapes.
 
@@ -40,7 +35,7 @@ def head_mass_kg(params: MassParams, interocular_m: float) -> float:
     if params.head.mass_kg is not None:
         return params.head.mass_kg
     share = interocular_m / _REFERENCE_M
-    return HEAD_KG * (0.5 + 0.5 * density_share(params) * share * share)
+    return HEAD_KG * (0.5 + 0.5 * share * share)
 
 
 def servo(times: float = 1.0) -> Inertia:
@@ -50,19 +45,12 @@ def servo(times: float = 1.0) -> Inertia:
     return Inertia(mass, (0.0, 0.0, 0.0), diagonal(mass * (y + z), mass * (x + z), mass * (x + y)))
 
 
-def skull(interocular_m: float, printed: float = 1.0) -> Inertia:
-    """Return the shell of a head, of constant thickness, relative to the midpoint between the eyes.
-
-    Args:
-        interocular_m: distance between the eyes.
-        printed: density relative to the usual one.
-    """
+def skull(interocular_m: float) -> Inertia:
+    """Return the shell of a head, of constant thickness, about the midpoint between the eyes."""
     mass, com, tensor = _SKULL
     unit = interocular_m
     return Inertia(
-        printed * mass * unit**2,
-        _vector(np.array(com) * unit),
-        matrix(printed * np.array(tensor) * unit**4),
+        mass * unit**2, _vector(np.array(com) * unit), matrix(np.array(tensor) * unit**4)
     )
 
 

@@ -5,6 +5,9 @@ from typing import Annotated
 
 from gazerig.params import Bounds
 
+_Millimetres = Annotated[float, Bounds(-2000, 2000)]
+_Degrees = Annotated[float, Bounds(-180, 180)]
+
 
 @dataclass(frozen=True)
 class MeshParams:
@@ -13,9 +16,8 @@ class MeshParams:
     # fmt: off
     file: Annotated[str, "path of an STL, OBJ, PLY, OFF, GLB or glTF file, relative to this file"]
     metres_per_unit: Annotated[float, Bounds(1e-6, 1000), "length of one unit of the file; 0.001: it is in millimetres"] = 0.001
-    position_mm: Annotated[tuple[float, float, float], Bounds(-2000, 2000),
+    position_mm: Annotated[tuple[_Millimetres, _Millimetres, _Millimetres],
         "where the file's origin is in the link: ahead, left and above"] = (0.0, 0.0, 0.0)
-    rotation_deg: Annotated[tuple[float, float, float], Bounds(-180, 180),
+    rotation_deg: Annotated[tuple[_Degrees, _Degrees, _Degrees],
         "how the file is turned in the link: to the left, up, right side down"] = (0.0, 0.0, 0.0)
-    colour: Annotated[tuple[int, int, int], Bounds(0, 255), "red, green and blue where the file has no colours"] = (190, 194, 202)
     # fmt: on

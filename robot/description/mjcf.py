@@ -116,19 +116,13 @@ def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
             body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
             range=numbers((joint.low_rad, joint.high_rad)),
         )  # fmt: skip
-        friction = joint.friction_nm
         if joint.drive is not None:
-            friction += joint.drive.friction_nm
             element.set("armature", numbers((joint.drive.armature_kg_m2,)))
             element.set("damping", numbers((joint.drive.damping_nm_s,)))
-        if friction:
-            element.set("frictionloss", numbers((friction,)))
+            element.set("frictionloss", numbers((joint.drive.friction_nm,)))
             # Stiff, so that a load below the friction does not creep.
             element.set("solreffriction", "0.002 1")
             element.set("solimpfriction", "0.9999 0.9999 0.001 0.5 2")
-        if joint.spring_nm_rad:
-            element.set("stiffness", numbers((joint.spring_nm_rad,)))
-            element.set("springref", numbers((joint.spring_rest_rad,)))
         if at_rad:
             element.set("ref", numbers((at_rad,)))
     for shape in link.collisions:

@@ -64,6 +64,8 @@ def unknown_links(description: Description, named: Iterable[str]) -> dict[str, s
 
 
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
+_PLAIN = 190, 194, 202
+"""Colour of a file without colours."""
 _Y_UP = (".glb", ".gltf")
 _MOST_BYTES, _MOST_FACES = 100_000_000, 150_000
 _EDGE_RAD = radians(35.0)
@@ -109,7 +111,7 @@ def read_mesh(params: MeshParams) -> Painted:
     near = (smooth * flat).sum(axis=2, keepdims=True) > cos(_EDGE_RAD)
     normals = np.where(near, smooth, flat)
     if look.kind is None:
-        colours = np.broadcast_to(np.array(params.colour, float), vertices.shape)
+        colours = np.broadcast_to(np.array(_PLAIN, float), vertices.shape)
     else:
         colours = np.asarray(look.vertex_colors, float)[:, :3][faces]
     if y_up:

@@ -1,4 +1,4 @@
-"""Weight and springs at the joints of a rig: torques, fractions of stall torque, rest pose. Pure.
+"""Weight at the joints of a rig: torques, fractions of stall torque, rest pose. Pure.
 
 Emulated servos, examinations, parking and calibration use this model; a world computes the same
 from the same masses. Torques are in Nm and act on a joint in the direction of its angle. The two
@@ -6,7 +6,7 @@ servos of joints that move together share the torques.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from math import atan2, copysign, degrees, hypot, pi
+from math import atan2, copysign, hypot, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from gazerig.robot.description.links import (
 )
 from gazerig.robot.description.mass import in_parent_frame, join_inertias
 from gazerig.robot.model.assumed_servo import GEAR_FRICTION
-from gazerig.robot.model.coupling_params import CoupledPair
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.robot.model.weight import MovingBody, weight_nm
@@ -58,7 +58,7 @@ class Statics:
         self,
         bodies: Sequence[MovingBody],
         joints: Mapping[str, JointParams],
-        pairs: Sequence[CoupledPair],
+        pairs: Collection[CouplingParams],
     ) -> None:
         self.joints = joints
         self._bodies, self._pairs = tuple(bodies), tuple(pairs)
@@ -67,17 +67,10 @@ class Statics:
             for name, one in joints.items()
         }
 
-    def retuned(self, joints: Mapping[str, JointParams]) -> "Statics":
-        """Return the same statics with other joint parameters."""
-        return Statics(self._bodies, {name: joints[name] for name in self.joints}, self._pairs)
-
     def load_nm(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
-        """Return the torque of weight and spring at each joint; omitted joints are at 0."""
+        """Return the torque of the weight at each joint; omitted joints are at 0."""
         weight = weight_nm(self._bodies, angles_rad)
-        return {
-            name: weight.get(name, 0.0) + spring_nm(joint, angles_rad.get(name, 0.0))
-            for name, joint in self.joints.items()
-        }
+        return {name: weight.get(name, 0.0) for name in self.joints}
 
     def stall_shares(self, angles_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the torque that each servo holds in a pose as a fraction of its stall torque.
@@ -92,16 +85,17 @@ class Statics:
         """Return the torques as fractions of the full drive, at the rated voltage."""
         loads = self.load_nm(angles_rad)
         shafts = dict(loads)
-        for first, second, coupling in self._pairs:
-            at = angles_rad.get(first, 0.0), angles_rad.get(second, 0.0)
-            rates = np.array(coupling.rates(at))
-            shares = np.linalg.solve(rates.T, (loads[first], loads[second]))
-            shafts[first], shafts[second] = shares.tolist()
+        for pair in self._pairs:
+            both, against = (
+                loads[pair.first] / pair.first_ratio,
+                loads[pair.second] / pair.second_ratio,
+            )
+            shafts[pair.first], shafts[pair.second] = 0.5 * (both + against), 0.5 * (both - against)
         return {name: torque / self._stall_nm[name] for name, torque in shafts.items()}
 
     def friction_nm(self, name: str) -> float:
         """Return the dry friction that holds a joint without torque."""
-        return GEAR_FRICTION * self._stall_nm[name] + self.joints[name].friction_nm
+        return GEAR_FRICTION * self._stall_nm[name]
 
     def rest_pose(self, near_rad: Mapping[str, float]) -> dict[str, float]:
         """Return the pose of the neck that needs no torque, as near as possible to a given pose.
@@ -213,8 +207,3 @@ def moving_bodies(description: Description, moving: Collection[str]) -> tuple[Mo
                 mass_kg=node.mass_kg + kg, moment_kg_m=add(node.moment_kg_m, moment)
             )
     return tuple(nodes)
-
-
-def spring_nm(joint: JointParams, angle_rad: float) -> float:
-    """Return the torque of a joint's spring at an angle."""
-    return -joint.spring_nm_deg * (degrees(angle_rad) - joint.spring_rest_deg)

@@ -108,12 +108,11 @@ def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]
             element, "limit", lower=numbers((joint.low_rad,)), upper=numbers((joint.high_rad,)),
             effort=numbers((joint.max_torque_nm,)), velocity=numbers((joint.max_speed_rad_s,)),
         )  # fmt: skip
-        drive = joint.drive
-        friction = joint.friction_nm + (0.0 if drive is None else drive.friction_nm)
-        damping = 0.0 if drive is None else drive.damping_nm_s
-        if friction or damping:
-            values = {"damping": numbers((damping,)), "friction": numbers((friction,))}
-            ET.SubElement(element, "dynamics", values)
+        if joint.drive is not None:
+            ET.SubElement(
+                element, "dynamics", damping=numbers((joint.drive.damping_nm_s,)),
+                friction=numbers((joint.drive.friction_nm,)),
+            )  # fmt: skip
         if joint.follows is not None:
             leader, ratio = joint.follows
             ET.SubElement(element, "mimic", joint=leader, multiplier=numbers((ratio,)), offset="0")

@@ -14,34 +14,24 @@ from gazerig.robot.description import mass
 from gazerig.robot.description.head_shape import HeadMeasures, field
 from gazerig.robot.description.links import ORIGIN, Description, Inertia, Link
 from gazerig.robot.description.own_meshes import unknown_links
-from gazerig.robot.model.mass_params import MassParams, Moments
+from gazerig.robot.model.mass_params import MassParams
 
 HEAD = "head"
 _MIDDLE: Vec3 = (-0.85, 0.0, 0.10)
 """Centre of the head's solid, in distances between the eyes; servos and frame are around it."""
 _OUTSIDE = 0.05
 """Largest distance of a centre of mass from the head's surface, in distances between the eyes."""
-_SIZE = 3.6
-"""Largest distance between two points of a head, in distances between the eyes."""
 
 
-def weighed(link: Link, params: MassParams, printed: bool) -> Link:
-    """Return a link other than the head with the mass from the rig's file.
-
-    Args:
-        link: link with the mass of its shape.
-        params: mass parameters of the rig.
-        printed: whether it is a printed part, with the density in the file.
-    """
+def weighed(link: Link, params: MassParams) -> Link:
+    """Return a link other than the head, with the mass of its shape or that of the rig's file."""
     inertia, wanted = link.inertia, params.links.get(link.name)
-    if inertia is not None and printed:
-        inertia = mass.scale_mass(inertia, inertia.mass_kg * mass.density_share(params))
     if wanted is not None:
         shape = inertia or mass.servo()
         kg = shape.mass_kg if wanted.mass_kg is None else wanted.mass_kg
         shape = mass.scale_mass(shape, kg)
         com = shape.com_m if wanted.com_mm is None else scale(wanted.com_mm, 1e-3)
-        inertia = Inertia(kg, com, _tensor(wanted.inertia_kg_mm2) or shape.tensor_kg_m2)
+        inertia = Inertia(kg, com, shape.tensor_kg_m2)
     return link._replace(inertia=_with_counterweights(inertia, link.name, params, ORIGIN))
 
 
@@ -56,7 +46,7 @@ def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[I
     """
     rest = mass.join_inertias(carried)
     kg = _whole_kg(params, measures, rest.mass_kg) - rest.mass_kg
-    own = mass.skull(measures.interocular_m, mass.density_share(params))
+    own = mass.skull(measures.interocular_m)
     middle = measures.scaled(_MIDDLE)
     wanted = params.head
     if wanted.com_mm is None:
@@ -65,10 +55,6 @@ def head_inertia(params: MassParams, measures: HeadMeasures, carried: Sequence[I
         com = _head_com_m(wanted.com_mm, measures)
         ahead = add(com, scale(sub(com, rest.com_m), rest.mass_kg / kg))
         own = mass.filled(own, kg, measures.interocular_m, middle, ahead)
-    if (tensor := _tensor(wanted.inertia_kg_mm2)) is not None:
-        whole = mass.join_inertias((own, rest))
-        excess = np.array(whole.tensor_kg_m2) - np.array(tensor)
-        own = own._replace(tensor_kg_m2=mass.matrix(np.array(own.tensor_kg_m2) - excess))
     with_weights = _with_counterweights(own, HEAD, params, measures.pivot_m)
     assert with_weights is not None
     return with_weights
@@ -85,9 +71,7 @@ def mass_faults(
         built: description of the same rig with the masses of its shapes.
     """
     yield from _unknown(params, built)
-    bodies = [
-        weighed(link, params, True).inertia for link in built.links if _is_carried(link, built)
-    ]
+    bodies = [weighed(link, params).inertia for link in built.links if _is_carried(link, built)]
     rest = mass.join_inertias(body for body in bodies if body is not None)
     wanted, kg = params.head, _whole_kg(params, measures, rest.mass_kg)
     if kg <= rest.mass_kg * 1.01:
@@ -105,22 +89,6 @@ def mass_faults(
                 "this centre of mass is outside the head: give it ahead, left and above of the "
                 "neck's pitch axis, in mm",
             )
-            return
-    own = np.array(head_inertia(params, measures, [rest]).tensor_kg_m2)
-    least, middle, most = np.linalg.eigvalsh(own).tolist()
-    size_m = _SIZE * measures.interocular_m
-    if wanted.inertia_kg_mm2 is None or wanted.inertia_fault():
-        return
-    if least <= 0.0 or least + middle < most * (1.0 - 1e-9):
-        yield (
-            "mass.head.inertia_kg_mm2",
-            "less than eyes, lids and other parts of the head have about its centre of mass",
-        )
-    elif max(wanted.inertia_kg_mm2[:3]) > kg * size_m**2 * 1e6:
-        yield (
-            "mass.head.inertia_kg_mm2",
-            f"a head of {kg:g} kg and this size has at most {kg * size_m**2 * 1e6:.0f} kg mm2",
-        )
 
 
 def _unknown(params: MassParams, built: Description) -> Iterator[tuple[str, str]]:
@@ -160,13 +128,6 @@ def _with_counterweights(
 
 def _head_com_m(com_mm: Vec3, measures: HeadMeasures) -> Vec3:
     return add(scale(com_mm, 1e-3), measures.pivot_m)
-
-
-def _tensor(moments: Moments | None) -> Mat3 | None:
-    if moments is None:
-        return None
-    xx, yy, zz, xy, xz, yz = (moment * 1e-6 for moment in moments)
-    return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
 def carried_links(links: Iterable[Link]) -> list[Inertia]:

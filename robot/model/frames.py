@@ -28,18 +28,22 @@ NeckAngles = tuple[Angles3, Angles2]
 MountedOn = Literal["head", "base"]
 
 
+_Pixels = Annotated[int, Bounds(16, 16384)]
+_Focal = Annotated[float, Bounds(10, 100_000)]
+_Centre = Annotated[float, Bounds(-10_000, 20_000)]
+_Bend = Annotated[float, Bounds(-100, 100)]
+_Millimetres = Annotated[float, Bounds(-2000, 2000)]
+
+
 @dataclass(frozen=True)
 class LensParams:
     """A calibrated lens, for images of one size."""
 
     # fmt: off
-    width_px: Annotated[int, Bounds(16, 16384), "image width at which the lens was calibrated"]
-    height_px: Annotated[int, Bounds(16, 16384), "image height at which the lens was calibrated"]
-    fx_px: Annotated[float, Bounds(10, 100_000), "focal length, in units of the pixel width"]
-    fy_px: Annotated[float, Bounds(10, 100_000), "focal length, in units of the pixel height"]
-    cx_px: Annotated[float, Bounds(-10000, 20000), "principal point, from the left edge of the image"]
-    cy_px: Annotated[float, Bounds(-10000, 20000), "principal point, from the top edge of the image"]
-    distortion: Annotated[tuple[float, float, float, float, float], Bounds(-100, 100),
+    size_px: Annotated[tuple[_Pixels, _Pixels], "width and height of the images with which the lens was calibrated"]
+    focal_px: Annotated[tuple[_Focal, _Focal], "focal length, in units of the pixel width and of the pixel height"]
+    centre_px: Annotated[tuple[_Centre, _Centre], "principal point, from the left and from the top edge of the image"]
+    distortion: Annotated[tuple[_Bend, _Bend, _Bend, _Bend, _Bend],
         "distortion coefficients k1 k2 p1 p2 k3 of the OpenCV model; zeros: no distortion"] = (0.0, 0.0, 0.0, 0.0, 0.0)
     # fmt: on
 
@@ -50,7 +54,7 @@ class CameraParams:
 
     # fmt: off
     mount: Annotated[MountedOn, "head: the camera turns with the head; base: it is fixed"] = "head"
-    position_mm: Annotated[tuple[float, float, float], Bounds(-2000, 2000),
+    position_mm: Annotated[tuple[_Millimetres, _Millimetres, _Millimetres],
         "position of the lens in front of, left of and above the point between the eyes (mount head) or the neck base "
         "(mount base)"] = (20.0, 0.0, 45.0)
     yaw_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera to the left"] = 0.0

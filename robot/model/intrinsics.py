@@ -49,8 +49,8 @@ def intrinsics_of_lens(
         if own is not None:
             return own
         return intrinsics_of_view(view_rad, width_px, height_px)
-    measured = Intrinsics(lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, lens.distortion)
-    return measured.scaled(width_px / lens.width_px, height_px / lens.height_px)
+    measured = Intrinsics(*lens.focal_px, *lens.centre_px, lens.distortion)
+    return measured.scaled(width_px / lens.size_px[0], height_px / lens.size_px[1])
 
 
 def lens_fits(lens: LensParams, width_px: int, height_px: int) -> bool:
@@ -62,16 +62,11 @@ def lens_fault(lens: LensParams, width_px: int, height_px: int) -> str:
     """Return the reason why a measured lens does not fit images of a size, "" if it does."""
     if width_px <= 0 or height_px <= 0:
         return f"images are {width_px} x {height_px}"
-    shape = (width_px * lens.height_px) / (height_px * lens.width_px)
-    if abs(shape - 1.0) > _SAME_SHAPE:
-        measured = f"{lens.width_px} x {lens.height_px}"
-        return f"it was measured on {measured}, images are {width_px} x {height_px}"
-    x, y = lens.cx_px / lens.width_px - 0.5, lens.cy_px / lens.height_px - 0.5
-    if max(abs(x), abs(y)) > _FARTHEST_AXIS:
-        return (
-            f"its axis at {lens.cx_px:g}, {lens.cy_px:g} px is far outside images of "
-            f"{lens.width_px} x {lens.height_px}"
-        )
+    (wide, high), (x, y) = lens.size_px, lens.centre_px
+    if abs((width_px * high) / (height_px * wide) - 1.0) > _SAME_SHAPE:
+        return f"it was measured on {wide} x {high}, images are {width_px} x {height_px}"
+    if max(abs(x / wide - 0.5), abs(y / high - 0.5)) > _FARTHEST_AXIS:
+        return f"its axis at {x:g}, {y:g} px is far outside images of {wide} x {high}"
     return ""
 
 

@@ -158,6 +158,10 @@ class MeasuredLinkage:
         return min(max(bisect_right(self._keys, self._order * steps) - 1, 0), self._last)
 
 
+_AngleOrPosition = Annotated[float, Bounds(-180, 4095)]
+_Gain = Annotated[int, Bounds(0, 16383)]
+
+
 @dataclass(frozen=True)
 class JointParams:
     """A joint: its servo, its installation and its limits."""
@@ -174,23 +178,18 @@ class JointParams:
     ratio: Annotated[float, Bounds(0.05, 50), "gear ratio: turns of the servo for one turn of the joint"] = 1.0
     zero_step: Annotated[int | None, Bounds(0, 4095), Unit("steps or us"),
         "servo position at joint angle 0, for a hobby servo its pulse width in us; null: the middle, 2048 or 1500"] = None
-    transmission_points: Annotated[tuple[tuple[float, float], ...], Bounds(-180, 4095), Unit("deg, steps or us"),
+    transmission_points: Annotated[tuple[tuple[_AngleOrPosition, _AngleOrPosition], ...], Unit("deg, steps or us"),
         "measured points of a push-rod linkage, each [joint angle, servo position]; they replace sign, ratio and zero_step"] = ()
     bus: Annotated[str, "name of the joint's bus under buses; empty: the one under bus"] = ""
     servo_speed_deg_s: Annotated[float | None, Bounds(10, 5000),
         "speed of a hobby servo's own shaft (0.12 s for 60 deg is 500), used to estimate its position because it has no "
         "feedback; null: max_speed_deg_s"] = None
-    gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "Position P, I and D Gain of the servo; null: not changed"] = None
+    gains: Annotated[tuple[_Gain, _Gain, _Gain] | None, "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
         "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
     limp_when_idle_s: Annotated[float | None, Bounds(0.2, 3600),
         "torque off when nothing has moved the joint for so long, so that its servo stays cool and silent; not for joints that "
         "gaze moves; a jaw without a spring drops; null: never"] = None
-    friction_nm: Annotated[float, Bounds(0, 20), "dry friction of the joint's own bearings and linkage, in addition to the servo's"] = 0.0
-    play_deg: Annotated[float, Bounds(0, 10), "play (backlash) between servo and joint, from stop to stop"] = 0.25
-    spring_nm_deg: Annotated[float, Bounds(0, 5), "stiffness of a spring on the joint; 0: none"] = 0.0
-    spring_rest_deg: Annotated[float, Bounds(-720, 720), "angle at which the spring has no torque; outside the range if preloaded"] = 0.0
-    firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware version that is accepted"] = 0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -295,7 +294,6 @@ class JointParams:
             floor(ends[1]),
             radians(self.max_speed_deg_s) * linkage.steepest,
             name,
-            self.firmware_min,
             self.gains,
             self.torque_limit,
             radians(self.max_accel_deg_s2) * linkage.steepest,

@@ -118,10 +118,6 @@ class Kinematics:
         self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
         self._desired_of = _make_picker(self._wanted)
         self._further = (0.0,) * (len(self.names) - len(self._wanted))
-        self.retune(params, lids)
-
-    def retune(self, params: GeometryParams, lids: Mapping[str, LidEnds]) -> None:
-        """Change the geometry and lid angles."""
         self._pivot_m = params.pitch_axis_height_mm / 1e3
         self._base: Vec3 = (0.0, 0.0, params.lower_pitch_axis_height_mm / 1e3)
         self._ahead_m, self._above_m = params.eyes_ahead_mm / 1e3, params.eyes_above_mm / 1e3

@@ -8,9 +8,6 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class LoopParams:
-    """The control rate and the time for parking."""
+    """The control rate."""
 
     rate_hz: Annotated[float, Bounds(20, 1000), "control rate"] = 200.0
-    park_s: Annotated[
-        float, Bounds(0, 30), "longest time for parking before torque is switched off"
-    ] = 4.0

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.types import Clothing
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.tracker_params import TrackerParams
 
 FORBIDDEN: Final = 1e6
 """Cost of an impossible pair; larger than the cost of all possible pairs."""
@@ -60,6 +59,11 @@ _ENOUGH = 0.4
 _ALIKE = -2.0
 # Largest difference of two ranges of one position, in standard deviations.
 _RANGE_SIGMA = 3.0
+GATE_M = 0.35
+"""Largest distance between predicted and detected position across the line of sight, for distances
+up to 1 m; beyond, it grows in proportion to the distance."""
+_GATE_SIGMA = 4.0
+"""Largest distance between them, in standard deviations of their difference."""
 # Up to this number of pairs plain numbers are faster than arrays, which take as long for one pair
 # as for fifty.
 _FEW_PAIRS = 25
@@ -122,7 +126,6 @@ class DetectionRow(NamedTuple):
 def pair_costs(
     tracks: Sequence[TrackRow],
     detections: Sequence[DetectionRow],
-    par: TrackerParams,
     clothing: Sequence[Sequence[float]] | None = None,
 ) -> list[list[float]]:
     """Return the cost of each pair: minus twice the log likelihood.
@@ -134,7 +137,6 @@ def pair_costs(
     Args:
         tracks: n tracks.
         detections: m detections.
-        par: gates.
         clothing: costs of the clothes of each pair, from ``clothing_costs``; None: no known
             clothes.
 
@@ -142,10 +144,10 @@ def pair_costs(
         n rows of m, FORBIDDEN for an impossible pair.
     """
     if len(tracks) * len(detections) > _FEW_PAIRS:
-        return _all_pairs(tracks, detections, par, clothing)
+        return _all_pairs(tracks, detections, clothing)
     return [
         [
-            _pair_cost(k, found, tracks, par, clothing[k][j] if clothing else 0.0)
+            _pair_cost(k, found, tracks, clothing[k][j] if clothing else 0.0)
             for j, found in enumerate(detections)
         ]
         for k in range(len(tracks))
@@ -181,13 +183,12 @@ def clothing_costs(
 def _all_pairs(
     tracks: Sequence[TrackRow],
     detections: Sequence[DetectionRow],
-    par: TrackerParams,
     clothing: Sequence[Sequence[float]] | None = None,
 ) -> list[list[float]]:
     """Return the costs of all pairs, in array expressions."""
     t, d = np.array(tracks).T[:, :, None], np.array(detections).T
     far_m = d[5] * (1.0 + d[9] * (t[9] - 1.0))
-    widest_m = par.gate_m * np.maximum(1.0, far_m)
+    widest_m = GATE_M * np.maximum(1.0, far_m)
     outline_m = _OUTLINE * np.maximum(t[8], d[8])
     other = (t[1] != d[1]) & (t[1] != NO_MARK) & (d[1] != NO_MARK)
     wide_m = np.where(other, np.minimum(widest_m, outline_m), widest_m)
@@ -206,7 +207,7 @@ def _all_pairs(
     higher = t[5] * t[5] * (t[4] - d[4]) ** 2
     far = (aside - higher) / across_sum + higher / upright_sum + deep / along_sum
     expected: Floats = far + np.log(across_sum * upright_sum * along_sum / exact)
-    surprise = ratio * (wide_m / par.gate_sigma) ** 2
+    surprise = ratio * (wide_m / _GATE_SIGMA) ** 2
     far = aside / (across_sum + surprise) + deep / (along_sum + surprise)
     hidden = _hidden_tracks(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK)) & ~alike
     surprise = np.where(hidden, np.minimum(surprise, ratio * (_HIDDEN_M * _HIDDEN_M)), surprise)
@@ -222,9 +223,7 @@ def _all_pairs(
     unlikely |= np.abs(deep_m) > t[13] + _RANGE_SIGMA * np.sqrt(t[7] + along)
     costs = np.minimum(costs, UNPAIRED - _SLOWLY / np.maximum(costs, _NEARLY_UNPAIRED))
     reach = wide_m + t[10]
-    costs[unlikely | (t[0] != d[0]) | (aside > reach * reach) | (far > par.gate_sigma**2)] = (
-        FORBIDDEN
-    )
+    costs[unlikely | (t[0] != d[0]) | (aside > reach * reach) | (far > _GATE_SIGMA**2)] = FORBIDDEN
     rows: list[list[float]] = costs.tolist()
     return rows
 
@@ -246,9 +245,7 @@ def _hidden_tracks(t: Floats) -> NDArray[np.bool_]:
     return hidden
 
 
-def _pair_cost(
-    k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackerParams, worn: float
-) -> float:
+def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], worn: float) -> float:
     """Return the cost of track k and one detection; same rules as ``_all_pairs``."""
     kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, in_sight, *_ = (
         tracks[k]
@@ -258,7 +255,7 @@ def _pair_cost(
     if kind != its_kind:
         return FORBIDDEN
     far_m = its_m * (1.0 + sized * (size - 1.0))
-    wide_m = par.gate_m * max(1.0, far_m)
+    wide_m = GATE_M * max(1.0, far_m)
     other = NO_MARK != mark != its_mark != NO_MARK
     if other:
         wide_m = min(wide_m, _OUTLINE * max(radius_m, its_radius_m))
@@ -279,12 +276,12 @@ def _pair_cost(
     across_sd, along_sd = max(across_sd, _LEAST_SD_M), max(along_sd, _LEAST_SD_M)
     across, along = ratio * across_sd * across_sd, ratio * along_sd * along_sd
     exact = across * across * along
-    wide = wide_m / par.gate_sigma
+    wide = wide_m / _GATE_SIGMA
     surprise = ratio * (wide * wide)
     across_sum, along_sum = across_m2 + across, along_m2 + along
     most_across, most_along = across_sum + surprise, along_sum + surprise
     far = aside / most_across + deep / most_along
-    if not (far <= par.gate_sigma * par.gate_sigma and across_sum > 0.0 and along_sum > 0.0):
+    if not (far <= _GATE_SIGMA * _GATE_SIGMA and across_sum > 0.0 and along_sum > 0.0):
         return FORBIDDEN  # too far away, or not finite
     upright_sum, higher = min(across_m2, upright_m2) + across, range_m * range_m * dz * dz
     cost = (aside - higher) / across_sum + higher / upright_sum + deep / along_sum

@@ -108,10 +108,6 @@ class TrackFilter:
         self.across = Variances(sds_m[0] * sds_m[0], 0.0, var)
         self.along = Variances(sds_m[1] * sds_m[1], 0.0, var)
 
-    def retune(self, noise: ProcessNoise) -> None:
-        """Use another process noise; position and velocity do not change."""
-        self._noise = noise
-
     def predict(
         self, dt_s: float, seen: bool = True, range_known: bool = True, level: bool = False
     ) -> None:

@@ -35,13 +35,6 @@ class MotionSource:
         self._turns = turns
         self._detector = MotionDetector(params)
 
-    def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
-        """Use new parameters from the next frame on; tracks are kept."""
-        self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
-        self._detector.retune(params)
-        if not params.enabled:
-            self._detector.forget()
-
     def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
         """Find motion since the previous frame; return nothing while it is not enabled."""
         if not self._enabled:
@@ -59,12 +52,3 @@ def motion_finder(
 ) -> Motion:
     """Return the motion detector, for the process that receives the frames."""
     return MotionSource(params, lens, field_rad, turns)
-
-
-def retune_finder(
-    params: MotionParams, lens: LensParams | None, field_rad: float, finder: Motion | None
-) -> Motion | None:
-    """Change the parameters of a detector in its own process."""
-    if isinstance(finder, MotionSource):
-        finder.retune(params, lens, field_rad)
-    return finder

@@ -77,8 +77,9 @@ class Perception:
     ) -> None:
         self._mount = mount
         self._own_parts = own_parts
-        self._depth_at = depth_at
-        self.retune(horizontal_field_deg, parts_face_m, lens)
+        own = parts_face_m or {}
+        self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
+        self._locator = FrameLocator(lens, radians(horizontal_field_deg), depth_at)
         self._tracker = tracker
         self._hands = Hands()
         self._tracks: tuple[BodyTrack, ...] = ()
@@ -91,17 +92,6 @@ class Perception:
         self._cuts = 0
         self.frames = 0
         self.frames_with_face = 0
-
-    def retune(
-        self,
-        horizontal_field_deg: float,
-        parts_face_m: Mapping[str, Vec3] | None,
-        lens: LensParams | None,
-    ) -> None:
-        """Change field of view, parts and lens from the next frame; the mount may change too."""
-        own = parts_face_m or {}
-        self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
-        self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
         """Return the percept of the newest frame, None before the first."""
@@ -224,7 +214,6 @@ class Perception:
         blinks = eyes is not None and eyes.opening < EYES_SHUT
         if track.seen_s == t_s and not blinks:
             track.looks_at_head = looks_at_head(
-                self._tracker.params,
                 off_rad,
                 found.turn_sd_rad,
                 gaze is not None,

@@ -9,7 +9,6 @@ import numpy as np
 from gazerig.drivers.types import Clothing, DetectionInCamera, FaceSigns
 from gazerig.gaze.angles import add, angle_between, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.kalman import TrackFilter
 from gazerig.robot.perception.returning_people import SeenPerson
 
@@ -20,6 +19,9 @@ _EYES_SD_RAD = radians(4.0)
 _SMOOTHED = 0.6
 """Ratio of the deviation of a track's turn, smoothed over some frames, to that of one frame: a part
 of the landmark errors is the same in all frames."""
+_FACE_AT_HEAD_RAD, _EYES_AT_HEAD_RAD = radians(10.0), radians(6.0)
+"""Half angles of the cones within which a face, and a gaze of the eyes if it is found, is turned
+to the head."""
 _EDGE_OF_CONE, _EDGE_OF_SD = 0.2, 0.5
 """Distance of inner and outer edge from the cone: fractions of the cone and of the uncertainty."""
 
@@ -54,7 +56,7 @@ def angle_off_head_rad(R_world_face: Mat3, gaze_world: Vec3 | None, from_face_m:
 
 
 def looks_at_head(
-    params: TrackerParams, off_rad: float, turn_sd_rad: float, by_eyes: bool, before: bool | None
+    off_rad: float, turn_sd_rad: float, by_eyes: bool, before: bool | None
 ) -> bool | None:
     """Return whether a person looks at the head, None if that is too uncertain.
 
@@ -63,13 +65,12 @@ def looks_at_head(
     them the last result is kept; the less certain the turn, the farther apart the edges.
 
     Args:
-        params: half angles of the cones.
         off_rad: angle between the person's gaze and the direction to the head.
         turn_sd_rad: standard deviation of the face's turn in one frame.
         by_eyes: whether the angle is that of the eyes' gaze instead of the face.
         before: result of the previous frame.
     """
-    cone = radians(params.eyes_at_head_deg if by_eyes else params.face_at_head_deg)
+    cone = _EYES_AT_HEAD_RAD if by_eyes else _FACE_AT_HEAD_RAD
     sd = _EYES_SD_RAD if by_eyes else _SMOOTHED * turn_sd_rad
     if sd > max(cone, _EYES_SD_RAD):
         return None

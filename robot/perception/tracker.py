@@ -17,6 +17,7 @@ from gazerig.gaze.types import FIRST_THING, Mat3, Vec3
 from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.data_association import (
     FORBIDDEN,
+    GATE_M,
     NO_MARK,
     UNPAIRED,
     DetectionRow,
@@ -55,7 +56,6 @@ def resolve_identities(
     worn: list[list[float]],
     column: dict[int, int],
     detections: list[LocalisedDetection],
-    params: TrackerParams,
 ) -> None:
     """Restore by their clothes the numbers of people who were confused while hidden.
 
@@ -66,7 +66,6 @@ def resolve_identities(
         worn: cost of the clothes of each pair of track and detection.
         column: the detection of each track that has one.
         detections: detections of the frame.
-        params: parameters of tracking.
     """
     sure = True
     for i, j in column.items():
@@ -96,10 +95,10 @@ def resolve_identities(
                     sure = sure and doubt < _SURE
     if not sure:
         unsure = [tracks[i] for i in column if tracks[i].clothes.confirmed < _CONFIRMED]
-        _renumber(tracks, [track for track in unsure if track.is_person], params)
+        _renumber(tracks, [track for track in unsure if track.is_person])
 
 
-def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack], params: TrackerParams) -> None:
+def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack]) -> None:
     """Exchange the numbers of the tracks in sight so that they match all of them best."""
     people = [
         track
@@ -109,7 +108,7 @@ def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack], params: TrackerPar
     costs = [
         [
             0.0 if one is other else _SURE - one.clothes.doubts.get(other.id, 0.0)
-            if other.seen_s == other.at_s or _reachable(one, other, params) else FORBIDDEN
+            if other.seen_s == other.at_s or _reachable(one, other) else FORBIDDEN
             for other in people
         ]
         for one in seen
@@ -131,14 +130,32 @@ def _renumber(tracks: list[BodyTrack], seen: list[BodyTrack], params: TrackerPar
                 tracks.remove(one)  # the supposed new person was this one
 
 
-def _reachable(one: BodyTrack, other: BodyTrack, params: TrackerParams) -> bool:
+def _reachable(one: BodyTrack, other: BodyTrack) -> bool:
     """Return whether a person out of sight can have reached the position of a track."""
     known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
-    gone = params.gate_speed_m_s * (other.at_s - other.seen_s)
-    reach = params.gate_m * max(1.0, one.filter.range_m) + gone + known
+    gone = _GATE_SPEED_M_S * (other.at_s - other.seen_s)
+    reach = GATE_M * max(1.0, one.filter.range_m) + gone + known
     return norm(sub(one.p_world_m, other.p_world_m)) < reach
 
 
+_OF_FACES = ProcessNoise(0.12, 10.0)
+"""The usual acceleration of faces: smaller values give smoother tracks, larger ones follow changes
+sooner; and that while the images show that a person starts or stops moving."""
+_OF_THINGS = ProcessNoise(1.0, 10.0)
+_FIRST_SPEED_M_S = 0.7
+"""Standard deviation of the speed of a new track."""
+_TURN_GAIN, _GAIN = 0.3, 0.15
+"""Weights of a new frame in the smoothed orientation, and length and size, of a face."""
+_COAST_S, _COAST_PERSON_S = 0.25, 1.2
+"""A track without a detection is still reported for this long; a person whose face is not visible
+for longer, as people are searched rarely."""
+_FORGET_S = 1.5
+"""A track without a detection is deleted after this long; what returns later is a new one."""
+_REMEMBER_FACE_S = 20.0
+"""A face that is not visible for longer is remembered for this time: it is recognised within
+``GATE_M``, and is a target if no face is visible."""
+_GATE_SPEED_M_S = 1.0
+"""Speed at which ``GATE_M`` widens while a track gets no detection."""
 _FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
 _PROVED = 3
 # A person in fewer frames than this may be a false detection, whose number is reused. Number of
@@ -155,33 +172,23 @@ _COVERED_S = 0.3
 
 
 class Tracker:
-    """Tracker of faces and moving things: identities and velocities."""
+    """Tracker of faces and moving things: identities and velocities.
 
-    def __init__(self, params: TrackerParams) -> None:
+    Attributes:
+        params: present parameters, which may be replaced at any time.
+    """
+
+    def __init__(self, params: TrackerParams | None = None) -> None:
+        self.params = params or TrackerParams()
         self._tracks: list[BodyTrack] = []
         self._next_person, self._next_thing = 1, FIRST_THING
         self._free: set[int] = set()
         self._left: list[SeenPerson] = []
         self._worn: list[list[float]] | None = None
-        self.retune(params)
-
-    def retune(self, params: TrackerParams) -> None:
-        """Use other parameters from now on; all tracks are kept."""
-        self._params = params
-        lively = params.lively_accel_m_s2
-        self._of_faces = ProcessNoise(params.quiet_accel_m_s2, lively)
-        self._of_things = ProcessNoise(params.things_accel_m_s2, lively)
-        for track in self._tracks:
-            track.filter.retune(self._of_faces if track.is_person else self._of_things)
 
     def forget(self) -> None:
         """End all identities, after a change of the scene. Numbers are not reused."""
         self._tracks, self._left = [], []
-
-    @property
-    def params(self) -> TrackerParams:
-        """Return the present parameters."""
-        return self._params
 
     def step(
         self, detections: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
@@ -202,7 +209,7 @@ class Tracker:
             self._update_track(self._tracks[i], detections[j], p_world_camera_m)
         if self._worn is not None:
             given = {t.id for t in self._tracks if t.is_person and t.returned_person is None}
-            resolve_identities(self._tracks, self._worn, dict(pairs), detections, self._params)
+            resolve_identities(self._tracks, self._worn, dict(pairs), detections)
             self._free |= given - {t.id for t in self._tracks}
         taken = {j for _, j in pairs}
         renamed = {
@@ -233,23 +240,20 @@ class Tracker:
 
     def shows_face(self, track: BodyTrack) -> bool:
         """Return whether the face of a person was seen recently."""
-        coast_s = self._params.coast_ms / 1e3
-        return track.R_world_face is not None and track.at_s - track.faced_s <= coast_s
+        return track.R_world_face is not None and track.at_s - track.faced_s <= _COAST_S
 
     def _coasts_s(self, track: BodyTrack) -> float:
         """Return the time for which a track without a detection is still reported."""
         by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
-        return (self._params.coast_person_ms if by_body else self._params.coast_ms) / 1e3
+        return _COAST_PERSON_S if by_body else _COAST_S
 
     def _kept_s(self, track: BodyTrack) -> float:
         """Return the time for which a track is kept without a detection."""
-        par = self._params
-        known = track.is_person and track.frames >= _KNOWN
-        return max(par.forget_ms / 1e3, par.remember_face_s if known else 0.0)
+        return _REMEMBER_FACE_S if track.is_person and track.frames >= _KNOWN else _FORGET_S
 
     def _is_remembered(self, track: BodyTrack) -> bool:
         """Return whether a track has been out of sight for so long that it is assumed to stay."""
-        return track.at_s - track.seen_s > self._params.forget_ms / 1e3
+        return track.at_s - track.seen_s > _FORGET_S
 
     def _costs(self, detections: list[LocalisedDetection], p_camera: Vec3) -> list[list[float]]:
         """Return the cost of every pair of track and detection."""
@@ -266,11 +270,10 @@ class Tracker:
             )
             for found in detections
         ]
-        coast_s = self._params.coast_ms / 1e3
         tracks = []
         for track in self._tracks:
             unseen_s, person = track.at_s - track.seen_s, track.is_person
-            gone_m = self._params.gate_speed_m_s * unseen_s
+            gone_m = _GATE_SPEED_M_S * unseen_s
             row = TrackRow(
                 kinds.get(track.detection.kind, -1),
                 _mark(track.detection),
@@ -281,7 +284,7 @@ class Tracker:
                 track.detection.radius_m,
                 1.0 if track.depth_s is None else track.face_size,
                 0.0 if self._is_remembered(track) else gone_m,
-                unseen_s <= coast_s,
+                unseen_s <= _COAST_S,
                 gone_m,
                 _FASTEST_M_S * unseen_s if person else inf,
                 _UPRIGHT_M2 + (_STOOPS_M_S * unseen_s) ** 2 if person else inf,
@@ -292,7 +295,7 @@ class Tracker:
             [track.clothes.colours for track in self._tracks],
             [found.clothing for found in detections],
         )
-        return pair_costs(tracks, rows, self._params, self._worn)
+        return pair_costs(tracks, rows, self._worn)
 
     def _begin_track(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> BodyTrack:
         track = BodyTrack(
@@ -302,8 +305,8 @@ class Tracker:
                 detection.p_world_m,
                 p_camera,
                 (detection.across_sd_m, detection.along_sd_m),
-                self._params.first_speed_m_s,
-                self._of_faces if detection.kind == FACE else self._of_things,
+                _FIRST_SPEED_M_S,
+                _OF_FACES if detection.kind == FACE else _OF_THINGS,
             ),
             detection.R_world_face,
             t_s,
@@ -323,7 +326,6 @@ class Tracker:
 
     def _number(self, track: BodyTrack) -> None:
         """Give a person's new track the number of the person who has returned, or a free one."""
-        par, now_s = self._params, track.at_s
         if track.returned_person is not None:
             self._left.append(track.returned_person)
         gone = [
@@ -332,7 +334,7 @@ class Tracker:
             if one.is_person and one is not track and self._is_remembered(one)
         ]
         before, known = track.returned_person, [*self._left, *map(_person, gone)]
-        recent = [one for one in known if now_s - one.seen_s <= par.remember_person_s]
+        recent = [one for one in known if track.at_s - one.seen_s <= self.params.remember_person_s]
         track.returned_person = back = find_returned(recent, _person(track))
         if back is None:
             if before is not None or not track.id:
@@ -384,7 +386,6 @@ class Tracker:
         R = detection.R_world_face
         if R is None and self.shows_face(track):
             return  # the detector missed the face in this frame
-        gain = self._params.shape_gain
         if R is None:
             track.R_world_face = track.looks_at_head = None
         else:
@@ -392,10 +393,10 @@ class Tracker:
             if before is None:
                 track.R_world_face, track.face_length = R, detection.face_length
             else:
-                track.R_world_face = blend(before, R, self._params.turn_gain)
+                track.R_world_face = blend(before, R, _TURN_GAIN)
                 if not covered:
-                    track.face_length += gain * (detection.face_length - track.face_length)
-        self._learn_size(track, detection, gain)
+                    track.face_length += _GAIN * (detection.face_length - track.face_length)
+        self._learn_size(track, detection, _GAIN)
         track.detection = detection
 
     def _learn_size(self, track: BodyTrack, detection: LocalisedDetection, gain: float) -> None:

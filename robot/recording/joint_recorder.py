@@ -27,11 +27,9 @@ class ForwardingBody(Body):
         self.bus, self.names = body.bus, body.names
         self._body = body
 
-    def retune(
-        self, joints: Mapping[str, JointParams], gentle_deg_s: float
-    ) -> dict[int, tuple[float, float]]:
-        """Apply new joint parameters."""
-        return self._body.retune(joints, gentle_deg_s)
+    def retune(self, joints: Mapping[str, JointParams], gentle_deg_s: float) -> None:
+        """Apply new limits of joints."""
+        self._body.retune(joints, gentle_deg_s)
 
     def configured_limits(self) -> tuple[JointLimit, ...]:
         """Return the ranges and speeds in the servos' configuration."""

@@ -9,7 +9,6 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -97,7 +96,7 @@ class PlaybackPerception(Perception):
     """
 
     def __init__(self, mount: CameraMount, horizontal_field_deg: float) -> None:
-        super().__init__(mount, horizontal_field_deg, Tracker(TrackerParams()))
+        super().__init__(mount, horizontal_field_deg, Tracker())
         self.percept: Percept | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:

@@ -26,7 +26,6 @@ class Collisions:
 
     Args:
         params: The forbidden pairs of ranges.
-        margin_deg: Distance to the boxes, because servos round positions and lag.
         limits: One limit per joint.
         joints: The joints' names.
 
@@ -37,11 +36,10 @@ class Collisions:
     def __init__(
         self,
         params: Sequence[CollisionParams],
-        margin_deg: float,
         limits: tuple[JointLimit, ...],
         joints: tuple[str, ...],
     ) -> None:
-        self._pairs = forbidden_pairs(params, margin_deg, limits, joints)
+        self._pairs = forbidden_pairs(params, limits, joints)
         self._joints = sorted({span.joint for pair in self._pairs for span in pair})
         self._keeper = [0] * len(self._pairs)
         self.exits: dict[int, float] = {}

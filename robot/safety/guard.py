@@ -14,11 +14,24 @@ from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import LIMP, GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.health import JointHealth, StallDetector
+from gazerig.robot.safety.health import FAR_RAD, LEAD_RAD, JointHealth, StallDetector
 from gazerig.robot.safety.motion_limiter import LateTicks, LimitChange, MotionLimiter
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9
+JOINT_TIMEOUT_S = 0.15
+"""A joint whose last measurement is older is stopped."""
+FRAME_TIMEOUT_S = 1.5
+"""The neck is stopped while the last frame is older."""
+SOFT_START_S = 1.0
+"""Shortest time of slow motion after torque-on."""
+SOFT_START_RAD_S2 = radians(300.0)
+"""Acceleration after torque-on and while parking."""
+LATE_S = 0.05
+LATE_RAD_S2 = radians(15_000.0)
+"""Highest acceleration for ``LATE_S`` after a tick that missed its slot, because servos brake
+without new goals; slow motion regains its speed with it.
+"""
 _LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "torque_off")
 
 
@@ -64,7 +77,7 @@ class Guard:
         reach: Callable[[], tuple[JointLimit, ...]] | None = None,
         period_s: float = 0.1,
     ) -> None:
-        self._set_params(params)
+        self._gentle_speed = radians(params.soft_start_speed_deg_s)
         self._late = LateTicks(period_s)
         self._soft = False
         self._calm = (
@@ -77,19 +90,11 @@ class Guard:
         self._limits = self._motion.limits
         self._short: dict[int, tuple[int, str]] = {}
         self._findings = _findings(self._short, joints)
-        self._health = JointHealth(params.health, limits)
-        self._stuck = StallDetector(params.stall, len(limits))
-        self._collisions = Collisions(
-            params.collisions, params.collision_margin_deg, limits, joints
-        )
+        self._health = JointHealth(limits)
+        self._stuck = StallDetector(len(limits))
+        self._collisions = Collisions(params.collisions, limits, joints)
         self.limp: frozenset[int] = frozenset()
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
-
-    def _set_params(self, params: GuardParams) -> None:
-        self._params = params
-        self._gentle_speed = radians(params.soft_start_speed_deg_s)
-        self._gentle_accel = radians(params.soft_start_accel_deg_s2)
-        self._late_accel = radians(params.late_accel_deg_s2)
 
     def set_period(self, period_s: float) -> None:
         """Set the nominal time between ticks."""
@@ -104,25 +109,12 @@ class Guard:
         Raises:
             ValueError: A collision leaves no pose inside the limits; nothing has changed.
         """
-        collisions = Collisions(params.collisions, params.collision_margin_deg, limits, self._names)
+        collisions = Collisions(params.collisions, limits, self._names)
         collisions.take_over_keepers(self._collisions)
         self._collisions = collisions
-        self._set_params(params)
-        self._health.retune(params.health)
-        self._stuck.retune(params.stall)
+        self._gentle_speed = radians(params.soft_start_speed_deg_s)
         self._change.retune(limits)
         self._calm = False
-
-    def rescale_joint(self, i: int, factor: float, offset_rad: float) -> None:
-        """Convert a joint's angles after a change of its zero, sign or ratio.
-
-        The angle x becomes factor * x + offset_rad. The servo's goal does not change. The
-        desired angle may change, so the joint moves slowly.
-        """
-        self._motion.rescale_joint(i, factor, offset_rad)
-        self._stuck.forget(i)
-        self._retreat[i] = None
-        self._slow_down(i)
 
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
         """Start slowly and at rest from the present goals on the bus."""
@@ -143,7 +135,7 @@ class Guard:
         for i in range(len(self._limits)):
             self._motion.forget_gaps(i)
         self._gentle = [True] * len(self._limits)
-        self._gentle_until_s = [self._t_s + self._params.soft_start_ms / 1e3] * len(self._limits)
+        self._gentle_until_s = [self._t_s + SOFT_START_S] * len(self._limits)
 
     @property
     def limits(self) -> tuple[JointLimit, ...]:
@@ -193,26 +185,26 @@ class Guard:
         if self._change.waiting or self._change.outside:
             self._calm = False
             self._change.step(bool(self._collisions))
-        dt_s, missed_s = self._late.split(since_s, t_s, self._params.late_ms / 1e3)
+        dt_s, missed_s = self._late.split(since_s, t_s, LATE_S)
         if missed_s > 0.0:
             self._motion.record_gap(missed_s)
         self._soft = t_s < self._late.soft_until_s
         self._health.step(joints, dt_s)
         if self._collisions:
             self._collisions.set_walls(self._motion, desired_rad, joints.position_rad, self._held)
-        no_frame = not frame_age_s <= self._params.frame_timeout_ms / 1e3
+        no_frame = not frame_age_s <= FRAME_TIMEOUT_S
         return self._joints(desired_rad, joints, no_frame, dt_s)
 
     def _joints(
         self, desired_rad: JointAngles, joints: JointState, no_frame: bool, dt_s: float
     ) -> GuardResult:
         """Move all joints; nearly every desired angle is returned unchanged."""
-        motion, far = self._motion, self._stuck.far_rad
+        motion, far = self._motion, FAR_RAD
         if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
             motion.update_easy_range(dt_s)
         command, speed, goal = motion.command, motion.speed, motion.goal
         usual = self._are_all_well(joints) and not no_frame
-        stale_s = self._t_s - self._params.joint_timeout_ms / 1e3
+        stale_s = self._t_s - JOINT_TIMEOUT_S
         short: dict[int, tuple[int, str]] = {}
         followed = True
         rows = zip(
@@ -282,7 +274,7 @@ class Guard:
         if not self._gentle[i]:
             self._motion.forget_gaps(i)
         self._gentle[i] = True
-        self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
+        self._gentle_until_s[i] = self._t_s + SOFT_START_S
 
     def _move_joint(
         self, i: int, desired: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
@@ -376,7 +368,7 @@ class Guard:
         The command does not follow continuously: a neck would sink under its own weight.
         """
         back = self._retreat[i]
-        if fresh and (back is None or abs(back - position) > self._stuck.far_rad):
+        if fresh and (back is None or abs(back - position) > FAR_RAD):
             self._retreat[i] = back = position
         return _Hold(reason, back, restart="slowly")
 
@@ -384,8 +376,8 @@ class Guard:
         self, i: int, goal: float, dt_s: float, top: float = inf, accel: float = inf
     ) -> None:
         """Move to a goal slowly; slow speed lost by a late tick is regained immediately."""
-        speed, soft = min(top, self._gentle_speed), min(accel, self._gentle_accel)
-        self._motion.seek(i, goal, dt_s, speed, soft, regain=min(accel, self._late_accel))
+        speed, soft = min(top, self._gentle_speed), min(accel, SOFT_START_RAD_S2)
+        self._motion.seek(i, goal, dt_s, speed, soft, regain=min(accel, LATE_RAD_S2))
 
     def _move_towards(self, i: int, desired: float, position: float, dt_s: float) -> str:
         """Move a joint towards its desired angle; return why it does not reach it, or ""."""
@@ -394,9 +386,9 @@ class Guard:
         target = min(max(desired, motion.low[i]), motion.high[i])
         top, soft = share * limit.speed_rad_s, share * limit.accel_rad_s2
         if self._soft:
-            soft = min(soft, self._late_accel)
+            soft = min(soft, LATE_RAD_S2)
         if self._gentle[i]:
-            pull, lead = desired, self._stuck.lead_rad
+            pull, lead = desired, LEAD_RAD
             if self._retrying[i]:
                 pull = min(max(desired, position - lead), position + lead)
             self._seek_gently(i, pull, dt_s, top, soft)

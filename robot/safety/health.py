@@ -9,13 +9,37 @@ from collections.abc import Sequence
 from math import isfinite, nan, radians
 from typing import Literal
 
-from gazerig.robot.model.guard_params import HealthParams, StallParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
 _Column = tuple[float | None, ...]
+WARM_C, HOT_C = 15.0, 5.0
+"""Distances below a servo's own temperature limit at which its joint is slowed down and stopped."""
 _COOLER_C = 2.0  # hysteresis: temperatures are whole degrees, without it a joint would stutter
+_SLOWEST = 0.2
+"""Share of speed and acceleration that remains just before a joint is stopped."""
+LASTING_LOAD = 0.5
+"""Share of the stall torque that is allowed continuously; more is weighted by its square (I2t)."""
+_FULL_S = (1.0 - LASTING_LOAD**2) * 0.7
+"""Full load for 0.7 s stops a joint; it is slowed down from half of this time."""
+VOLTAGE_MARGIN_V = 0.3
+"""A joint is slowed down when the voltage is this close to the servo's own limits."""
+_OUTSIDE_S = 0.5
+"""A joint is stopped when the voltage is outside those limits for longer than this."""
+
+FAR_RAD = radians(3.0)
+"""Largest normal distance between a joint and its command, by friction and weight."""
+LEAD_RAD = radians(4.5)
+"""Largest distance of the command ahead of a joint that tries again, so that it pushes weakly."""
+_MOVED_RAD = radians(0.5)
+"""Motion towards the command that counts as moving."""
+_STUCK_S = 0.15
+"""A joint that has not moved for this long is stalled. The dead time of a healthy servo is about
+30 ms; with the age of an answer and one more tick a stall is found within 200 ms.
+"""
+_RETRY_S = 1.0
+"""A stalled joint tries again, slowly, after this time."""
 
 
 class JointHealth:
@@ -30,16 +54,10 @@ class JointHealth:
             one at which they stop, deg C.
     """
 
-    def __init__(self, params: HealthParams, limits: tuple[JointLimit, ...]) -> None:
+    def __init__(self, limits: tuple[JointLimit, ...]) -> None:
         """Start with all joints unstrained."""
         self._limits = limits
-        self._set_params(params)
         self.reset()
-
-    def _set_params(self, params: HealthParams) -> None:
-        self._params = params
-        self._full = (1.0 - params.lasting_load**2) * params.overload_ms / 1e3
-        self._outside_full_s = params.voltage_ms / 1e3
 
     def reset(self) -> None:
         """Set all joints to unstrained until the servos report otherwise."""
@@ -58,17 +76,9 @@ class JointHealth:
         self._no_volts = [False] * count
         self._seen: tuple[_Column, _Column] = ((), ())
 
-    def retune(self, params: HealthParams) -> None:
-        """Set new thresholds; the accumulated heat stays."""
-        self._set_params(params)
-        self._heated = [min(heat, self._full) for heat in self._heated]
-        self._outside_s = [min(s, self._outside_full_s) for s in self._outside_s]
-        self._seen = ((), ())  # evaluate the newest reports again
-        self._counting = True
-
     def step(self, joints: JointState, dt_s: float) -> None:
         """Update with the servos' reports; missing values do not strain a joint."""
-        load, lasting = joints.load, self._params.lasting_load
+        load, lasting = joints.load, LASTING_LOAD
         strained = bool(load) and not (max(load) <= lasting and min(load) >= -lasting)
         before = self._seen
         seen = (joints.temperature_c, joints.voltage_v)
@@ -92,8 +102,7 @@ class JointHealth:
         load = self._load(i, _joint_value(joints.load, i), dt_s)
         volts = self._volts(i, _joint_value(joints.voltage_v, i), dt_s)
         share = min(heat, load, volts)
-        slowest = self._params.slowest
-        self.share[i] = slowest + (1.0 - slowest) * share
+        self.share[i] = _SLOWEST + (1.0 - _SLOWEST) * share
         if share == 1.0:
             self.why[i] = ""
         else:
@@ -107,8 +116,8 @@ class JointHealth:
         """Return the speed share allowed by heat, from 1 when warm to 0 when hot."""
         if celsius is None:
             return 1.0
-        warm = self._limits[i].hottest_c - self._params.warm_c
-        hot = self._limits[i].hottest_c - self._params.hot_c
+        warm = self._limits[i].hottest_c - WARM_C
+        hot = self._limits[i].hottest_c - HOT_C
         self._hot[i] = celsius >= (hot - _COOLER_C if self._hot[i] else hot)
         was_warm = self._warm[i]
         self._warm[i] = celsius >= (warm - _COOLER_C if was_warm else warm)
@@ -123,9 +132,9 @@ class JointHealth:
         continuous load produces it.
         """
         if load is not None:
-            gained = (load * load - self._params.lasting_load**2) * dt_s
-            self._heated[i] = min(max(self._heated[i] + gained, 0.0), self._full)
-        filled = self._heated[i] / self._full
+            gained = (load * load - LASTING_LOAD**2) * dt_s
+            self._heated[i] = min(max(self._heated[i] + gained, 0.0), _FULL_S)
+        filled = self._heated[i] / _FULL_S
         self._overloaded[i] = filled >= (0.5 if self._overloaded[i] else 1.0)
         return min(max(2.0 - 2.0 * filled, 0.0), 1.0)
 
@@ -135,13 +144,13 @@ class JointHealth:
             return 1.0
         room = min(volts - self._limits[i].lowest_v, self._limits[i].highest_v - volts)
         outside_s = self._outside_s[i] + (dt_s if room < 0.0 else -dt_s)
-        self._outside_s[i] = min(max(outside_s, 0.0), self._outside_full_s)
+        self._outside_s[i] = min(max(outside_s, 0.0), _OUTSIDE_S)
         # A sagging supply recovers when the joint stops: the joint rests for the same time.
-        spent = outside_s >= self._outside_full_s and room < 0.0
+        spent = outside_s >= _OUTSIDE_S and room < 0.0
         self._no_volts[i] = spent or (self._no_volts[i] and self._outside_s[i] > 0.0)
-        if room >= self._params.voltage_margin_v:
+        if room >= VOLTAGE_MARGIN_V:
             return 1.0
-        return max(room / self._params.voltage_margin_v, 0.0) if room > 0.0 else 0.0
+        return max(room / VOLTAGE_MARGIN_V, 0.0) if room > 0.0 else 0.0
 
 
 def _joint_value(column: Sequence[float | None], i: int) -> float | None:
@@ -154,26 +163,15 @@ class StallDetector:
     """A detector of stalled joints.
 
     Attributes:
-        far_rad: Largest normal distance between joint and command.
-        lead_rad: Largest distance of the command ahead of a joint that tries again.
         watched: Per joint, the side on which its command is far away (1 or -1), 0 if it is near.
     """
 
-    def __init__(self, params: StallParams, count: int) -> None:
+    def __init__(self, count: int) -> None:
         """Start with no joint stalled."""
-        self.retune(params)
         self.watched = [0] * count
         self._since_s = [0.0] * count
         self._anchor_rad = [0.0] * count
         self._until_s = [nan] * count
-
-    def retune(self, params: StallParams) -> None:
-        """Set new thresholds; stalled joints continue to wait."""
-        self._stuck_s = params.detection_ms / 1e3
-        self._retry_s = params.retry_ms / 1e3
-        self._moved_rad = radians(params.moved_deg)
-        self.far_rad = radians(params.position_error_deg)
-        self.lead_rad = radians(params.retry_deg)
 
     def forget(self, i: int) -> None:
         """Clear a joint's stall, as its command is at its position."""
@@ -200,16 +198,16 @@ class StallDetector:
             t_s: Present time.
         """
         lead = command - position
-        if -self.far_rad <= lead <= self.far_rad:
+        if -FAR_RAD <= lead <= FAR_RAD:
             self.watched[i] = 0
             return False
         side = 1 if lead > 0.0 else -1
         begins = side != self.watched[i]
-        if begins or (position - self._anchor_rad[i]) * side > self._moved_rad:
+        if begins or (position - self._anchor_rad[i]) * side > _MOVED_RAD:
             self.watched[i], self._since_s[i], self._anchor_rad[i] = side, at_s, position
             return False
-        if at_s - self._since_s[i] < self._stuck_s:
+        if at_s - self._since_s[i] < _STUCK_S:
             return False
         self.watched[i] = 0
-        self._until_s[i] = t_s + self._retry_s
+        self._until_s[i] = t_s + _RETRY_S
         return True

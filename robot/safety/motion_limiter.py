@@ -85,22 +85,6 @@ class MotionLimiter:
         """Discard the speed to regain, as a slow motion starts."""
         self._lost[i], self._slow[i] = 0.0, False
 
-    def rescale_joint(self, i: int, factor: float, offset_rad: float) -> None:
-        """Convert a joint's angles: x becomes factor * x + offset_rad."""
-        low, high, speed, accel = self.limits[i][:4]
-        ends = sorted(factor * end + offset_rad for end in (low, high))
-        size = abs(factor)
-        self.limits[i] = self.limits[i]._replace(
-            low_rad=ends[0],
-            high_rad=ends[1],
-            speed_rad_s=size * speed,
-            accel_rad_s2=size * accel,
-        )
-        self.command[i] = self.goal[i] = factor * self.command[i] + offset_rad
-        self.speed[i] *= factor
-        self._lost[i] = 0.0
-        self.reset_range(i)
-
     def set_limit(self, i: int, limit: JointLimit) -> None:
         """Change the limit."""
         self.limits[i] = limit

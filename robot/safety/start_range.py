@@ -4,11 +4,11 @@ A joint a little outside its range, such as a head that sags, moves inside slowl
 outside is more likely not where its servo reports it: it would be driven through the whole way.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from math import degrees
 
-from gazerig.drivers.bus.goal_limits import FAR_CAUSES, FAR_DEG, far_outside_steps
-from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
+from gazerig.drivers.bus.goal_limits import FAR_CAUSES, FAR_DEG
+from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.joint import JointLimit, JointParams
 
 
@@ -22,7 +22,7 @@ def far_outside(angle_rad: float, limit: JointLimit) -> str:
 
 
 def find_far_outside(
-    joints: Mapping[str, JointParams], pairs: Sequence[CoupledPair], steps: Mapping[str, float]
+    joints: Mapping[str, JointParams], pairs: Collection[CouplingParams], steps: Mapping[str, float]
 ) -> dict[str, str]:
     """Return the text of ``far_outside`` of each joint that must get no torque.
 
@@ -32,14 +32,9 @@ def find_far_outside(
         steps: Measured servo positions by joint.
     """
     angles = {name: joints[name].angle_rad(at) for name, at in steps.items()}
-    for first, second, coupling in pairs:
-        shafts = angles.pop(first, None), angles.pop(second, None)
-        if shafts[0] is not None and shafts[1] is not None:
-            angles[first], angles[second] = coupling.joint_rad((shafts[0], shafts[1]))
-    texts = {name: far_outside(angle, joints[name].limit()) for name, angle in angles.items()}
     for pair in pairs:
-        # Far from its range, a coupling may have other joint angles for the same servos.
-        for name, setup in pair_setups(pair, joints, {}).items():
-            if name in steps and not texts.get(name):
-                texts[name] = far_outside_steps(setup, steps[name])
+        shafts = angles.pop(pair.first, None), angles.pop(pair.second, None)
+        if shafts[0] is not None and shafts[1] is not None:
+            angles[pair.first], angles[pair.second] = pair.joint_rad((shafts[0], shafts[1]))
+    texts = {name: far_outside(angle, joints[name].limit()) for name, angle in angles.items()}
     return {name: text for name, text in texts.items() if text}

@@ -138,11 +138,6 @@ class SceneCamera:
             return inf
         return self._on_the_way[0].captured_s + self._params.latency_ms / 1e3 - 1e-9
 
-    def retune(self, locate: Locate) -> bool:
-        """Use another calibration from the next frame on; always possible."""
-        self._locate = locate
-        return True
-
     def events(self) -> tuple[str, ...]:
         """Return no events: none can happen."""
         return ()

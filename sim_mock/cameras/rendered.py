@@ -164,30 +164,6 @@ class PixelCamera:
             self._arrived = self._on_the_way.popleft()
         return self._arrived
 
-    def retune(
-        self,
-        detector: Callable[[], FaceDetector] | None,
-        motion: Callable[[FindMotion | None], FindMotion | None] | None,
-        locate: Locate | None = None,
-    ) -> bool:
-        """Change detectors and calibration from the next frame on; always possible.
-
-        Args:
-            detector: creates another one; None: no change.
-            motion: returns a motion detector from the present one; None: no change.
-            locate: uses another calibration; None: no change.
-
-        Raises:
-            SetupError: the detector cannot be created; the old one stays.
-        """
-        if locate is not None:
-            self._locate = locate
-        if motion is not None:
-            self._find_motion = motion(self._find_motion)
-        if detector is not None:
-            self._detector = detector()
-        return True
-
     def events(self) -> tuple[str, ...]:
         """Return the detector's events since the last call; the camera itself has none."""
         events = getattr(self._detector, "events", None)

@@ -3,7 +3,6 @@
 Frames are not blurred, distorted, dropped or reordered, and the delay is constant.
 """
 
-from collections.abc import Callable
 from typing import Protocol
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer, Locate, Motion
@@ -100,16 +99,6 @@ class FilmCamera:
             self.frames_with_face += bool(found.faces)
             self._newest = found
         return self._newest
-
-    def retune(
-        self,
-        detector: Callable[[], FaceDetector] | None,
-        motion: Callable[[Motion | None], Motion | None] | None,
-        locate: Locate | None = None,
-    ) -> bool:
-        """Change detectors and calibration from the next frame on; always possible."""
-        self._frames.retune(detector, motion, locate)
-        return True
 
     def events(self) -> tuple[str, ...]:
         """Return the assumptions about film and lens, one line each, once."""

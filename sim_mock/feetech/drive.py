@@ -72,7 +72,7 @@ class FeetechDrive(Drive):
         self._current_full = model.stall_current_a / CURRENT_UNIT_A
         self._uses_goal_time = True
         physics, scale = Physics(*spec.physics), self._scale
-        steps = ("upright_steps", "spring_rest_steps", "stop_low_steps", "stop_high_steps")
+        steps = ("upright_steps", "stop_low_steps", "stop_high_steps")
         here = {name: getattr(physics, name) / scale for name in steps}
         own = spec._replace(physics=physics._replace(**here))
         super().__init__(memory, model, own, scale, make_shaft)

@@ -4,7 +4,7 @@ A step is implicit: P and D act on position and speed at its end, because the re
 faster than 1 kHz, acts during the step. So no gain of the registers makes the numbers diverge.
 Five steps are one linear map while no sign changes. Its weights are those of the steps themselves,
 computed once for each controller and voltage with sums and products only: the same on every
-machine. Weight and spring count as constant during a span.
+machine. The weight counts as constant during a span.
 """
 
 from collections.abc import Sequence
@@ -176,7 +176,7 @@ class ShaftMotion:
         if self._heavy:
             built, x = self._built, self.x
             pull = built.gravity * sin((x - built.upright) * built.turn)
-            self._load = self._constant + pull - built.spring * (x - built.relaxed)
+            self._load = self._constant + pull
         # Without a speed to follow, D only brakes.
         kr = 0.0 if profile.is_jump else loop.d + loop.f1
         led = profile.running
@@ -232,7 +232,7 @@ class ShaftMotion:
         before: its position at the start
         """
         loop = self._loop
-        accel, drag, _, dry, rate, _, _, _, _, _, play, sag = self._built
+        accel, drag, _, dry, rate, _, _, _, play, sag = self._built
         kp, kd, u_max = loop.p, loop.d, loop.u_max
         v, rv, volts, error = self.v, self._rv, self.volts, before - self.x
         level = round(volts * VOLTAGE_LEVELS)
@@ -284,7 +284,7 @@ class ShaftMotion:
         This happens every tick while the shaft starts, stops or reverses.
         """
         kp, u_max, slew = self._loop.p, self._loop.u_max, self._loop.slew
-        accel, drag, _, dry, rate, _, _, _, _, _, play, sag = self._built
+        accel, drag, _, dry, rate, _, _, _, play, sag = self._built
         x, v, u, joint, rv = self.x, self.v, self.u, self.joint, self._rv
         low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
         u_least, slew_down, play_low, t = -u_max, -slew, -play, self.effort
@@ -322,7 +322,7 @@ class ShaftMotion:
     def _follow(self, path: Sequence[float], before: float, kr: float) -> None:
         """Follow a path of one position per millisecond, with a gain on its speed."""
         kp, ki, kd, vi, _, kf2, bias, u_max, torque_max, slew = self._loop
-        accel, drag, free, dry, rate, _, _, _, _, _, play, sag = self._built
+        accel, drag, free, dry, rate, _, _, _, play, sag = self._built
         x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
         low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
         rv, u_least, t_least, slew_down, play_low = self._rv, -u_max, -torque_max, -slew, -play

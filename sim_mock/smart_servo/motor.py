@@ -30,7 +30,7 @@ class Shaft(ShaftMotion):
         self._built = mechanics_of(model, physics)
         self._set_load, self._weight = physics.load_nm / model.stall_torque_nm, 0.0
         self._constant = self._load = self._built.accel * self._set_load
-        self._heavy = self._built.gravity != 0.0 or self._built.spring != 0.0
+        self._heavy = self._built.gravity != 0.0
         self._low_high = physics.stop_low_steps, physics.stop_high_steps
         self._low, self._high = self._low_high
         self.supply = self.volts = (physics.supply_v or model.rated_v) / model.rated_v

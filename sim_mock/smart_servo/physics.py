@@ -24,13 +24,11 @@ class Physics(NamedTuple):
         to 5 steps short, as XL430 do (4-10) [R].
     viscous_share: share of the stall torque lost at no-load speed [A]. With both frictions
         the servo still reaches the no-load speed of its data sheet.
-    load_nm: Nm; constant torque on the joint, e.g. a spring or a cable [A: none].
+    load_nm: Nm; constant torque on the joint, e.g. a cable [A: none].
     gravity_nm: Nm; weight times lever: the torque is gravity_nm * sin(x - upright_steps), so
         it drives the joint away from ``upright_steps`` if positive, towards it if negative.
     upright_steps: steps of the encoder at which gravity has no lever.
     gravity_turns: turns of the weight for one turn of the shaft.
-    spring_nm_rad, spring_rest_steps: Nm/rad and steps of the encoder; a spring at the shaft.
-    friction_nm: Nm; dry friction of the joint, in addition to the servo's.
     stop_low_steps, stop_high_steps: steps of the encoder; hard stops of the joint, no bounce.
     play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
         the X430. The encoder of X servos is at the output, so the registers show no play;
@@ -55,9 +53,6 @@ class Physics(NamedTuple):
     gravity_nm: float = 0.0
     upright_steps: float = 2048.0
     gravity_turns: float = 1.0
-    spring_nm_rad: float = 0.0
-    spring_rest_steps: float = 2048.0
-    friction_nm: float = 0.0
     stop_low_steps: float = -inf
     stop_high_steps: float = inf
     play_deg: float = 0.25
@@ -126,9 +121,6 @@ _RANGES: dict[str, tuple[float, float]] = {
     "gravity_nm": (-100.0, 100.0),
     "upright_steps": (-1e7, 1e7),
     "gravity_turns": (-100.0, 100.0),
-    "spring_nm_rad": (0.0, 1e4),
-    "spring_rest_steps": (-1e7, 1e7),
-    "friction_nm": (0.0, 100.0),
     "stop_low_steps": (-inf, inf),
     "stop_high_steps": (-inf, inf),
     "play_deg": (0.0, 10.0),
@@ -207,7 +199,6 @@ class Mechanics(NamedTuple):
     rate: share of the rated voltage that the motor induces per step/ms
     gravity: speed that the weight adds in 1 ms at its full lever; upright: position without lever;
         turn: rad of the weight per step
-    spring: speed that the spring adds in 1 ms per step; relaxed: position without its torque
     play: half the dead travel; sag: share of the voltage that the supply loses at stall
     """
 
@@ -219,8 +210,6 @@ class Mechanics(NamedTuple):
     gravity: float
     upright: float
     turn: float
-    spring: float
-    relaxed: float
     play: float
     sag: float
 
@@ -240,13 +229,11 @@ def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
         accel,
         drag=1.0 + accel * (rate + viscous),
         free=1.0 + accel * viscous,
-        dry=accel * (physics.coulomb_share + physics.friction_nm / stall_nm),
+        dry=accel * physics.coulomb_share,
         rate=rate,
         gravity=accel * physics.gravity_nm / stall_nm,
         upright=physics.upright_steps,
         turn=physics.gravity_turns / STEPS_PER_RAD,
-        spring=accel * physics.spring_nm_rad / STEPS_PER_RAD / stall_nm,
-        relaxed=physics.spring_rest_steps,
         play=physics.play_deg * STEPS_PER_TURN / 720.0,
         sag=min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v),
     )

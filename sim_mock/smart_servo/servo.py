@@ -317,7 +317,7 @@ class EmulatedServo(ABC):
         self.shaft.jam(stuck)
 
     def set_load(self, load_nm: float) -> None:
-        """Apply a constant torque to the joint from now on, as a spring or a cable does."""
+        """Apply a constant torque to the joint from now on, as a cable does."""
         self.shaft.set_load(load_nm / self.model.stall_torque_nm)
 
     @property

@@ -286,7 +286,7 @@ def test_somebody_who_shows_the_board_from_all_sides_gets_the_lens(scene: BoardS
     assert shown[-1].coverage.enough and len(shown) < 25
     lens = steps.result()
     assert lens.intrinsics.fx_px == pytest.approx(scene.lens.fx_px, rel=0.01)
-    assert lens.params().width_px == 640
+    assert lens.params().size_px[0] == 640
 
 
 def test_a_head_that_looks_around_finds_its_camera(scene: BoardScene, neck: MovedNeck) -> None:

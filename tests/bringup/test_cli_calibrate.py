@@ -199,5 +199,5 @@ def test_the_board_is_written(name: str, tmp_path: Path) -> None:
 
 def test_a_simulated_lens_is_measured_and_shown() -> None:
     done = calibrated("camera", "--mock", "--what", "lens", "--dry-run")
-    assert "camera.lens.fx_px" in done.out + done.err
+    assert "camera.lens.focal_px" in done.out + done.err
     assert "reprojection error 0." in done.out + done.err

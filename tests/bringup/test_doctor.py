@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one, setups_of
+from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one
 from present import present
 
 from gazerig.drivers.feetech.memory_table import TABLE_END
@@ -47,8 +47,6 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-FIRMWARE = {"dynamixel": 53, "feetech": 353}
 
 
 @cache
@@ -185,14 +183,6 @@ def test_what_can_be_wrong(kind, values, level, words, remedy):
 )
 def test_at_the_edge(kind, values, edge):
     assert worst_level(apply_rules(servo_state(kind, **values))) == edge
-
-
-@each
-def test_firmware_that_is_too_old(kind):
-    now = FIRMWARE[kind.name]
-    wanted = setups_of(kind)[0]._replace(firmware_min=now + 1)
-    findings = apply_rules(servo_state(kind, wanted))
-    assert one(findings, "error", PAN, f"firmware {now}, the YAML wants {now + 1}")
 
 
 @each

@@ -22,7 +22,6 @@ from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.control.tick import cyclopean_direction
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -30,7 +29,7 @@ SIZE = 640, 400
 FIELD_DEG = 69.0
 LENS = intrinsics_of_view(radians(FIELD_DEG), *SIZE)
 ASSUMED_M, ASSUMED_SD_M = 2.0, 1.0
-NOISES_DEG = 3.0, 6.0, 10.0
+NOISES_DEG = 1.0, 2.0, 3.0
 PICTURE_S = 1.0 / 30.0
 BEGIN_S = 1.0
 NEAR_M = 0.5
@@ -78,7 +77,7 @@ def still_thing(noise_deg: float, swings: bool, pictures: int, seed: int) -> NDA
         seed: of the noise.
     """
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-    perception = Perception(mount, FIELD_DEG, Tracker(TrackerParams(gate_m=5.0, gate_sigma=20.0)))
+    perception = Perception(mount, FIELD_DEG, Tracker())
     poses, rng, found = PoseHistory(_Neck()), np.random.default_rng(seed), []
     true = np.array([ASSUMED_M, 0.0, 0.1])
     for k in range(1, pictures + 1):
@@ -179,7 +178,7 @@ def believed(
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     if film is not None:
-        rig = replace(rig, detector=replace(rig.detector, min_face_px=60, work_width_px=128))
+        rig = replace(rig, detector=replace(rig.detector, work_width_px=128))
         made = assemble(rig, RunOptions(mock=True, fast=True, seed=seed, video=film))
     else:
         camera = CameraParams(mount="base", position_mm=(78.0, 0.0, 190.0))

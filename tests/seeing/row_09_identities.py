@@ -20,7 +20,6 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.tracker_params import TrackerParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
@@ -266,7 +265,7 @@ def perception() -> tuple[Perception, PoseHistory]:
     poses = PoseHistory(None)  # type: ignore[arg-type]
     poses.head_pose = lambda t_s: (tuple(map(tuple, np.eye(3).tolist())), (0.0, 0.0, 0.0))  # type: ignore
     mount = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
-    return Perception(mount, FIELD_DEG, Tracker(TrackerParams())), poses
+    return Perception(mount, FIELD_DEG, Tracker()), poses
 
 
 def idf1(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: bool = True) -> float:

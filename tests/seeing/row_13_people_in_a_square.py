@@ -51,7 +51,7 @@ def measure(full: bool) -> dict[str, float]:
     rig = replace(
         rig,
         loop=replace(rig.loop, rate_hz=100.0),
-        detector=replace(rig.detector, min_face_px=60, work_width_px=128),
+        detector=replace(rig.detector, work_width_px=128),
     )
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, video=film, bus="ideal"))
     ticks: list[Tick] = []

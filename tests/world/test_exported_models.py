@@ -14,7 +14,7 @@ from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.app.servo_drives import servo_drives
 from gazerig.robot.description.urdf import urdf
-from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.coupling import CouplingParams
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 SHARE = 0.05
@@ -56,7 +56,7 @@ def test_an_exported_eye_has_the_inertia_of_the_emulated_one(mujoco: Any, desk_r
 def test_two_servos_of_a_pair_share_their_joints(desk_rig: Rig) -> None:
     """Each of a differential's joints has the rotors, friction and torque of both."""
     alone = servo_drives(desk_rig)["neck_pitch"]
-    pair = CouplingParams("differential", "neck_pitch", "neck_roll")
+    pair = CouplingParams("neck_pitch", "neck_roll")
     both = servo_drives(replace(desk_rig, couplings={"neck": pair}))
     for name in ("neck_pitch", "neck_roll"):
         assert both[name].armature_kg_m2 == pytest.approx(2.0 * alone.armature_kg_m2)
@@ -93,7 +93,7 @@ def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(mujoco: Any, name: 
         assert origin[:3, 3] == pytest.approx(body.ipos, abs=1e-9)
     for joint, drive in servo_drives(rig).items():
         at = read.joint(joint).dofadr[0]
-        dry = rig.joints[joint].friction_nm + drive.friction_nm
+        dry = drive.friction_nm
         assert read.dof_frictionloss[at] == pytest.approx(dry, rel=1e-6)
         assert read.dof_damping[at] == pytest.approx(drive.damping_nm_s, rel=1e-6)
         assert model.dof_frictionloss[model.joint(joint).dofadr[0]] == pytest.approx(dry, rel=1e-6)

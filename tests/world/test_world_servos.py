@@ -1,6 +1,5 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
-from dataclasses import replace
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ import pytest
 from world_rigs import WorldBench, arm, write
 
 from gazerig.config.schema import load_rig
+from gazerig.robot.app.run_bus import JOINT_PLAY_DEG
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 STEP = 200
@@ -62,26 +62,25 @@ def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(
 @pytest.mark.parametrize(("name", "joint"), [("desk", "left_eye_pan"), ("feetech", "neck_yaw")])
 def test_a_joint_with_play_stays_behind_as_that_of_an_emulated_servo(name: str, joint: str) -> None:
     rig = load_rig(name)
-    loose = replace(rig.joints[joint], play_deg=2.0)
-    bench = WorldBench(replace(rig, joints={**rig.joints, joint: loose}))
-    half = radians(1.0)
+    bench = WorldBench(rig)
+    half = radians(0.5 * JOINT_PLAY_DEG)
     for servo in bench.both(joint):
-        arm(servo, loose.gains or ())
+        arm(servo, rig.joints[joint].gains or ())
     bench.pass_ms(100)
     began = round(bench.servos[joint].position_steps)
     gaps = []
-    for steps in (60, 52, 60, 0, 30):
+    for steps in (60, 59, 60, 0, 30):
         for servo in bench.both(joint):
             write(servo, "goal_position", began + steps)
         before = bench.world.joints_rad()[joint]
         for _ in range(40):
             bench.pass_ms(10)
             angle = bench.world.joints_rad()[joint]
-            gaps.append(loose.angle_rad(bench.servos[joint].position_steps) - angle)
+            gaps.append(rig.joints[joint].angle_rad(bench.servos[joint].position_steps) - angle)
             own = bench.own[joint]
             behind = own.position_steps + (own.shaft.joint - own.shaft.x)
-            assert angle == pytest.approx(loose.angle_rad(behind), abs=0.15 * half)
-        if steps == 52:  # 0.7 deg back: within the play
+            assert angle == pytest.approx(rig.joints[joint].angle_rad(behind), abs=radians(0.15))
+        if steps == 59:  # within the play
             assert angle == pytest.approx(before, abs=1e-5)
     assert max(gaps) == pytest.approx(half) and min(gaps) == pytest.approx(-half)
 

@@ -91,12 +91,11 @@ _CURES = (
     ),
     (
         ("out of memory", "not enough", "cannot allocate", "insufficient", "shaves", "cmx"),
-        "its memory is too small for these settings: set smaller frames, oak.depth: false or no oak.face_model",
+        "its memory is too small for colour and depth: use an OAK-D",
     ),
     (
         ("resolution", "sensor mode", "sensor config", "unsupported size"),
-        "its sensor does not support that frame size or rate: set oak.width_px and oak.height_px to "
-        "640 x 400, and oak.rate_hz to 30",
+        "its sensor does not support that frame rate: set oak.rate_hz to 30",
     ),
     (("host only",), "its nodes need a camera"),
 )

@@ -1,30 +1,27 @@
-"""An OAK-D through depthai 3: colour, aligned depth and faces, in host time."""
+"""An OAK-D through depthai 3: colour and aligned depth, in host time."""
 
 import threading
 from collections.abc import Callable
-from dataclasses import replace
 from datetime import timedelta
 from math import inf
 from typing import Any
 
 from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
-from gazerig.drivers.camera.oak.calibration import raw_distortion
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     COLOUR,
+    HEIGHT_PX,
+    WIDTH_PX,
     MakeNodes,
     depth_of,
     device_nodes,
-    faces_of,
     image_of,
     join_outputs,
     lens_of,
 )
-from gazerig.drivers.camera.pinhole import Distortion
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import DetectedFace
 
 _SLICE = timedelta(milliseconds=100)  # longest delay of a stop request
 # The camera's stamp in host time is used if it is not older than this and not in the future.
@@ -32,7 +29,12 @@ _OLDEST_STAMP_S = 1.0
 
 _USB2_BYTES_S = 30e6
 """Capacity of a USB 2 line for frames."""
-_COLOUR_BYTES, _DEPTH_BYTES = 1.5, 2.0  # per pixel, NV12 and RAW16
+_FRAME_BYTES = WIDTH_PX * HEIGHT_PX * (1.5 + 2.0)
+"""Colour (NV12) and depth (RAW16) of one instant."""
+_SILENCE_S = 2.0
+"""A camera that delivers no frame for longer is lost."""
+_LATENCY_S = 0.02
+"""Shortest delay from exposure to arrival, where the camera's clock does not follow the host's."""
 
 
 class OakSource:
@@ -64,9 +66,6 @@ class OakSource:
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
-        self._distortion: Distortion | None = None
-        self._face_fault: Callable[[], str] = str
-        self._face_fault_told = False
         self._slow_line: FrameRateMonitor | None = None
         self._waited = False  # whether the newest frame arrived during a wait
 
@@ -74,12 +73,11 @@ class OakSource:
         """Find the camera, start it, and check its rate.
 
         Raises:
-            CameraError: no camera is found, access is denied, it is busy, or it is on USB 2, which
-                the parameters do not allow.
+            CameraError: no camera is found, access is denied, or it is busy.
         """
         self.close()
         self._dai = self._load()
-        self._slow_line, self._face_fault_told = None, False
+        self._slow_line = None
         try:
             if self._on_device:
                 info = find_oak(self._dai, self._params.device)
@@ -93,7 +91,6 @@ class OakSource:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
             outputs = self._nodes(self._dai, self._pipeline, self._params)
             self._queue = join_outputs(self._dai, self._pipeline, outputs, self._params.rate_hz)
-            self._face_fault = outputs.face_fault
             self._pipeline.start()
         except RuntimeError as error:
             self.close()
@@ -131,9 +128,9 @@ class OakSource:
             arrived_s = now_s()
             if group is not None and (shot := self._shot(group, arrived_s)) is not None:
                 return shot
-            if arrived_s - began_s > self._params.silence_ms / 1e3:
+            if arrived_s - began_s > _SILENCE_S:
                 raise CameraError(
-                    f"the OAK camera delivered no frame for {self._params.silence_ms / 1e3:g} s: "
+                    f"the OAK camera delivered no frame for {_SILENCE_S:g} s: "
                     "check its cable and power supply"
                 )
         return None
@@ -160,37 +157,28 @@ class OakSource:
         self.close()
 
     def _prepare(self) -> None:
-        """Check the device's cameras and USB speed; switch its dot projector on."""
-        if not self._params.undistort:
-            stored = self._device.readCalibration()
-            self._distortion = raw_distortion(self._dai, stored, self._params)
+        """Check the device's cameras and USB speed."""
         self._check_cameras()
         speed = self._device.getUsbSpeed()
         slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
         if speed in slow:
-            text = _usb2_text(self._params, speed.name)
-            if self._params.usb2 == "refuse":
-                raise CameraError(text)
-            self._events.append(text)
+            self._events.append(_usb2_text(self._params, speed.name))
             self._slow_line = FrameRateMonitor("the OAK camera", self._params.rate_hz)
-        if self._params.dot_projector > 0.0:
-            self._device.setIrLaserDotProjectorIntensity(self._params.dot_projector)
 
     def _check_cameras(self) -> None:
-        """Check that the device has the cameras of the rig's settings.
+        """Check that the device has a colour camera and a stereo pair.
 
         Raises:
-            CameraError: it has no colour camera, or none for the requested depth.
+            CameraError: it has not.
         """
         socket, found = self._dai.CameraBoardSocket, set(self._device.getConnectedCameras())
-        wanted = [socket.CAM_A]
-        if self._params.depth:
-            wanted += [socket.CAM_B, socket.CAM_C]
+        wanted = (socket.CAM_A, socket.CAM_B, socket.CAM_C)
         missing = ", ".join(one.name for one in wanted if one not in found)
         if missing:
-            cure = "set oak.depth: false" if socket.CAM_A in found else "use a model with colour"
             name = self._device.getDeviceName() or "this OAK camera"
-            raise CameraError(f"{name} has no camera at {missing}: {cure}")
+            raise CameraError(
+                f"{name} has no camera at {missing}: use an OAK-D, with colour and a stereo pair"
+            )
 
     def _shot(self, group: Any, arrived_s: float) -> Shot | None:
         """Convert a group of messages to a frame."""
@@ -209,31 +197,7 @@ class OakSource:
                 if measured_hz < self._params.rate_hz and "again" not in line:
                     line = _full_line_text(self._params, measured_hz)
                 self._events.append(line)
-        # The lens of a frame, with distortion if the camera has not undistorted it.
-        lens = lens_of(group)
-        if lens is not None and self._distortion is not None:
-            lens = replace(lens, distortion=self._distortion)
-        return Shot(
-            captured_s,
-            self._number,
-            image,
-            depth_of(group, width, height),
-            lens,
-            self._faces(group, width, height),
-        )
-
-    def _faces(self, group: Any, width_px: int, height_px: int) -> tuple[DetectedFace, ...] | None:
-        """Return the faces that the camera found; None if it did not or cannot search."""
-        why = self._face_fault()
-        if not why:
-            return faces_of(group, width_px, height_px, self._params.min_confidence)
-        if not self._face_fault_told:
-            self._face_fault_told = True
-            self._events.append(
-                f"the face model {self._params.face_model} has unreadable outputs ({why}): faces "
-                "are found on the host; take another archive, or leave oak.face_model empty"
-            )
-        return None
+        return Shot(captured_s, self._number, image, depth_of(group, width, height), lens_of(group))
 
     def _captured_s(self, frame: Any, arrived_s: float) -> float:
         """Return the host time of a frame's exposure.
@@ -247,11 +211,11 @@ class OakSource:
         jumps = self._bridge.jumps
         if self._in_step and not 0.0 <= arrived_s - stamped_s <= _OLDEST_STAMP_S:
             self._in_step = False
-            self._bridge = ClockSync(self._params.latency_ms / 1e3)
+            self._bridge = ClockSync(_LATENCY_S)
             jumps = 0
             self._events.append(
                 "the OAK camera's clock is not synchronised with the host's: arrival times minus "
-                f"{self._params.latency_ms:g} ms (latency_ms) are used"
+                f"{1e3 * _LATENCY_S:g} ms are used"
             )
         host_s = self._bridge.host_s(device_s, stamped_s if self._in_step else arrived_s)
         if self._bridge.jumps > jumps:
@@ -281,16 +245,13 @@ def _one_line(error: BaseException) -> str:
 
 def _usb2_text(params: OakParams, speed: str) -> str:
     """Return a message about the effect of a USB 2 line on the requested frames."""
-    frame = params.width_px * params.height_px * (_COLOUR_BYTES + _DEPTH_BYTES * params.depth)
-    most_hz = _USB2_BYTES_S / frame
+    most_hz = _USB2_BYTES_S / _FRAME_BYTES
     text = f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second"
     if most_hz >= params.rate_hz:
         return f"{text}: enough for the requested frames; a USB 3 cable and port reduce the delay"
-    fewer = f"oak.rate_hz {most_hz:.0f}" if most_hz >= 1.0 else "smaller frames"
     return (
-        f"{text}, and {frame * params.rate_hz / 1e6:.0f} are requested: "
-        f"use a USB 3 cable (its plug is often blue) and port, or set {fewer}"
-        f"{' or oak.depth: false' if params.depth else ''}"
+        f"{text}, and {_FRAME_BYTES * params.rate_hz / 1e6:.0f} are requested: use a USB 3 cable "
+        f"(its plug is often blue) and port, or set oak.rate_hz {most_hz:.0f}"
     )
 
 

@@ -27,7 +27,7 @@ from gazerig.drivers.vision.face.mtcnn import (
     propose_faces,
     to_squares,
 )
-from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.params import MIN_CONFIDENCE, MIN_FACE_PX, FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import (
     PreparedImage,
     as_bgr,
@@ -45,6 +45,8 @@ _SHRINK = 0.6
 _TILE_PX, _SHARED_PX = 160, 24
 # Largest enlargement of a frame to find small faces; more would show no more detail.
 _MOST_ENLARGED = 1.2
+# Width of the frame in which far faces of 12 pixels are searched, tile by tile.
+_FAR_WIDTH_PX = 768
 
 
 class Tile(NamedTuple):
@@ -63,22 +65,19 @@ class Tile(NamedTuple):
 
 
 @cache
-def far_tiles(
-    width_px: int, height_px: int, far_width_px: int, near_scale: float
-) -> tuple[Tile, ...]:
+def far_tiles(width_px: int, height_px: int, near_scale: float) -> tuple[Tile, ...]:
     """Return the tiles to search for faces that are too small for the search of the whole frame.
 
     Args:
         width_px: Width of the frame.
         height_px: Height of the frame.
-        far_width_px: Width of the frame at which faces of 12 pixels are found; 0 for none.
         near_scale: Scale at which the search of the whole frame begins.
 
     Returns:
         Tiles, those for the largest faces first.
     """
     tiles: list[Tile] = []
-    scale = min(far_width_px / width_px, _MOST_ENLARGED)
+    scale = min(_FAR_WIDTH_PX / width_px, _MOST_ENLARGED)
     while scale > near_scale / _SHRINK**0.5:
         if min(width_px, height_px) * scale >= WINDOW_PX:
             # Tiles of equal size cover the frame at one scale.
@@ -105,6 +104,10 @@ def _tile_spans(length_px: int, scale: float) -> list[tuple[int, int]]:
 # Confidence threshold of MTCNN's first network in a tile. At 0.8 twice as many pass, without
 # finding more faces.
 _PROPOSE_AT = 0.9
+# A known face is dropped when its confidence falls below this.
+_KEEP_CONFIDENCE = 0.5
+# Number of frames between two searches of the whole frame; and while no face is known.
+_SEARCH_EVERY, _SEARCH_SOON = 4, 2
 # A far face needs a higher confidence than a near one, as a few pixels can resemble a face.
 _FAR_CONFIDENCE = 0.9
 # Common share of the smaller of two boxes above which they are the same face.
@@ -169,13 +172,13 @@ class AutoDetector:
         if first:
             self._known = []
         height, width = frame.shape[:2]
-        near = min(1.0, self._params.work_width_px / width) * WINDOW_PX / self._params.min_face_px
-        tiles = far_tiles(width, height, self._params.far_width_px, near)
+        near = min(1.0, self._params.work_width_px / width) * WINDOW_PX / MIN_FACE_PX
+        tiles = far_tiles(width, height, near)
         known = self._track_faces(frame)
         soon = len(known) < len(self._known) or self._is_cut(frame)
         self._since_search += 1
-        every = self._params.search_every
-        if first or self._since_search >= ((every + 1) // 2 if soon or not known else every):
+        every = _SEARCH_SOON if soon or not known else _SEARCH_EVERY
+        if first or self._since_search >= every:
             self._since_search = 0
             prepared = prepare(frame, self._params.work_width_px)
             assert prepared is not None
@@ -184,9 +187,9 @@ class AutoDetector:
             if self._yunet is not None:
                 found += self._search_frame_by_yunet(self._yunet, prepared, known)
             if self._yunet is None or first or self._searches % _BOTH_EVERY == 0:
-                boxes = propose_faces(self._networks, prepared, self._params.min_face_px)
+                boxes = propose_faces(self._networks, prepared)
                 boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
-                least = self._params.min_confidence
+                least = MIN_CONFIDENCE
                 found += self._confirm_new_faces(frame, [*known, *found], boxes, least)
             known += found
         elif tiles:
@@ -214,7 +217,7 @@ class AutoDetector:
         if not self._known:
             return []
         boxes = np.array([one.box for one in self._known])
-        judged = self._place_faces(frame, boxes, self._params.keep_confidence)
+        judged = self._place_faces(frame, boxes, _KEEP_CONFIDENCE)
         for row, (one, now) in enumerate(zip(self._known, judged, strict=True)):
             if now is None:
                 around = None if one.by_yunet else self._search_around(frame, one)
@@ -243,9 +246,7 @@ class AutoDetector:
         boxes, _ = self._networks.propose(part, _PROPOSE_AT)
         boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
         boxes = self._networks.refine(frame, to_squares(boxes))
-        found = [
-            face for face in self._place_faces(frame, boxes, self._params.min_confidence) if face
-        ]
+        found = [face for face in self._place_faces(frame, boxes, MIN_CONFIDENCE) if face]
         return max(found, key=lambda face: face.face.confidence, default=None)
 
     def _place_by_yunet(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
@@ -253,7 +254,7 @@ class AutoDetector:
         if self._yunet is None:
             return None
         part, where = crop_square(frame, _widen(one.box, _YUNET_AROUND), _YUNET_PX)
-        rows = self._yunet.search(part, self._params.keep_confidence)
+        rows = self._yunet.search(part, _KEEP_CONFIDENCE)
         if not len(rows):
             return None
         row = rows[np.argmax(rows[:, 14])]
@@ -266,7 +267,7 @@ class AutoDetector:
         self, yunet: YunetNetwork, prepared: PreparedImage, known: list[_KnownFace]
     ) -> list[_KnownFace]:
         """Search the whole frame with YuNet; MTCNN's last network places faces it also finds."""
-        least = self._params.min_confidence
+        least = MIN_CONFIDENCE
         rows = yunet.search(prepared.working_size, least)
         rows[:, :14] *= np.tile(prepared.full_per_working, 7)
         points = rows[:, 4:14].reshape(-1, 5, 2)
@@ -292,8 +293,7 @@ class AutoDetector:
         boxes = boxes * np.tile(stretch, 2) + (tile.left, tile.top, tile.left, tile.top)
         boxes = to_squares(boxes)
         boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
-        least = max(_FAR_CONFIDENCE, self._params.min_confidence)
-        return self._confirm_new_faces(frame, known, boxes, least)
+        return self._confirm_new_faces(frame, known, boxes, _FAR_CONFIDENCE)
 
     def _confirm_new_faces(
         self, frame: ImageArray, known: list[_KnownFace], boxes: Floats, least: float

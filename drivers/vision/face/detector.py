@@ -10,6 +10,7 @@ from typing import cast
 from gazerig.drivers.plugins import DETECTOR, DetectorPlugin, create, is_ours, load
 from gazerig.drivers.types import FaceDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_files import FACE_LANDMARK, IRIS_LANDMARK
 
 
 def mtcnn(params: FaceDetectorParams) -> FaceDetector:
@@ -37,7 +38,7 @@ YUNET = DetectorPlugin(_yunet, FaceDetectorParams)
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
-    """Create the detector set in the parameters, with meshes, people and palms if wanted.
+    """Create the detector set in the parameters, with a mesh, people and palms if wanted.
 
     Raises:
         ModelFileError: a model file is missing or damaged.
@@ -48,10 +49,10 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
         detector = cast(FaceDetector, part.make(params))
     else:
         detector = create(DETECTOR, params.kind, part, getattr(params, params.kind))
-    if params.mesh_faces > 0:
+    if all(file.state() == "there" for file in (FACE_LANDMARK, IRIS_LANDMARK)):
         from gazerig.drivers.vision.face.mesh import MeshedDetector
 
-        detector = MeshedDetector(detector, params.mesh_faces)
+        detector = MeshedDetector(detector)
     if params.people_hz > 0.0 or params.hands_hz > 0.0:
         from gazerig.drivers.vision.body_detector import add_body_detection
 

@@ -6,6 +6,7 @@ TensorFlow, which is not needed here.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 from math import atan2, cos, exp, sin
 from pathlib import Path
@@ -107,45 +108,26 @@ _LEAST_CERTAINTY = 0.5
 
 
 class MeshedDetector:
-    """A face detector that adds meshes to the largest faces of another detector.
+    """A face detector that adds a mesh to the largest face of another detector."""
 
-    Args:
-        detector: Finds the faces.
-        count: Number of faces that get a mesh, the largest first.
-    """
-
-    def __init__(self, detector: FaceDetector, count: int) -> None:
+    def __init__(self, detector: FaceDetector) -> None:
         """Load the networks.
 
         Raises:
             ModelFileError: a file is missing or altered.
         """
-        self._detector, self._count = detector, count
+        self._detector = detector
         self._meshes = MeshNetworks()
-        self._eyes = [EyeLandmarkCache() for _ in range(count)]
+        self._eyes = EyeLandmarkCache()
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return faces, the largest first, in pixels of the image."""
-        return self.add_meshes(image, self._detector.find(image))
-
-    def add_meshes(
-        self, image: ImageArray, faces: tuple[DetectedFace, ...]
-    ) -> tuple[DetectedFace, ...]:
-        """Return faces, which a camera itself may have found, with meshes for the first ones."""
+        faces = self._detector.find(image)
         if not faces:
             return faces
-        full = as_bgr(image)
-        add_meshes = [
-            DetectedFace(
-                face.box_px,
-                face.landmarks_px,
-                face.confidence,
-                face.gaze_camera,
-                self._meshes.mesh(full, face.landmarks_px, eyes),
-            )
-            for face, eyes in zip(faces, self._eyes, strict=False)
-        ]
-        return (*add_meshes, *faces[self._count :])
+        first, *others = faces
+        mesh = self._meshes.mesh(as_bgr(image), first.landmarks_px, self._eyes)
+        return replace(first, mesh=mesh), *others
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""

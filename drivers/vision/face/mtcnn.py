@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.params import MIN_CONFIDENCE, MIN_FACE_PX, FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import (
     PreparedImage,
     crop_square,
@@ -250,19 +250,17 @@ class MtcnnDetector:
         prepared = prepare(image, self._params.work_width_px)
         if prepared is None:
             return ()
-        boxes = self._networks.refine(
-            prepared.full_size, propose_faces(self._networks, prepared, self._params.min_face_px)
-        )
+        boxes = self._networks.refine(prepared.full_size, propose_faces(self._networks, prepared))
         placed = self._networks.place(prepared.full_size, boxes)
-        sure = np.nonzero(placed.scores >= self._params.min_confidence)[0]
+        sure = np.nonzero(placed.scores >= MIN_CONFIDENCE)[0]
         keep = sure[suppress_nested(placed.boxes[sure], placed.scores[sure])]
         return sort_by_size([face_of(placed, i) for i in keep])
 
 
-def propose_faces(networks: MtcnnNetworks, prepared: PreparedImage, min_face_px: int) -> Floats:
+def propose_faces(networks: MtcnnNetworks, prepared: PreparedImage) -> Floats:
     """Search an image at every scale; return (n, 4) square boxes, most confident first."""
     boxes, scores = [np.zeros((0, 4))], [np.zeros(0)]
-    for scaled in _pyramid(prepared.working_size, WINDOW_PX / min_face_px):
+    for scaled in _pyramid(prepared.working_size, WINDOW_PX / MIN_FACE_PX):
         found, sure = networks.propose(scaled, _PROPOSE_AT)
         height, width = prepared.full_size.shape[:2]
         boxes.append(found * np.tile((width / scaled.shape[1], height / scaled.shape[0]), 2))

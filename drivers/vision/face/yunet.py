@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.params import MIN_CONFIDENCE, MIN_FACE_PX, FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import improve_contrast, prepare, sort_by_size
 from gazerig.drivers.vision.model_files import YUNET, yunet_file
 
@@ -128,10 +128,9 @@ class YunetDetector:
         prepared = prepare(image, self._params.work_width_px)
         if prepared is None:
             return ()
-        smallest = self._params.min_face_px
-        if min(prepared.working_size.shape[:2]) < smallest:
+        if min(prepared.working_size.shape[:2]) < MIN_FACE_PX:
             return ()  # no face fits
-        rows = self._network.search(prepared.working_size, self._params.min_confidence)
-        rows = rows[rows[:, 3] >= smallest]
+        rows = self._network.search(prepared.working_size, MIN_CONFIDENCE)
+        rows = rows[rows[:, 3] >= MIN_FACE_PX]
         rows[:, :14] *= np.tile(prepared.full_per_working, 7)
         return sort_by_size([face_of_row(row) for row in rows])

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from gazerig.drivers.vision.motion.clustering import PixelGroup
 from gazerig.drivers.vision.motion.image import Floats, Plane
 from gazerig.drivers.vision.motion.optical_flow import Flow
-from gazerig.drivers.vision.motion.params import MotionParams
 
 Vec3 = tuple[float, float, float]
 
+ASSUMED_M, _ASSUMED_SPREAD = 2.0, 0.5
+"""Distance assumed for things without a measured depth; its standard deviation as a share of it."""
 # A depth image has holes and, at edges, the background; a tenth of a thing must have depth.
 _LEAST_SHARE, _LEAST_PIXELS = 0.1, 5
 _LEAST_SD_M = 0.005
@@ -45,7 +46,7 @@ def shrink_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane 
     return out
 
 
-def distance(group: PixelGroup, depth: Plane | None, params: MotionParams) -> Distance:
+def distance(group: PixelGroup, depth: Plane | None) -> Distance:
     """Return a thing's distance from the depth image, or the assumed one."""
     if depth is not None:
         values = depth[group.rows, group.columns]
@@ -54,8 +55,7 @@ def distance(group: PixelGroup, depth: Plane | None, params: MotionParams) -> Di
             z = float(np.median(values))
             spread = _MAD * float(np.median(np.abs(values - z)))
             return Distance(z, max(_LEAST_SD_M, spread), True)
-    z = params.assumed_distance_m
-    return Distance(z, z * params.assumed_distance_spread, False)
+    return Distance(ASSUMED_M, ASSUMED_M * _ASSUMED_SPREAD, False)
 
 
 def back_project(point_px: Floats, z_m: float, K: Floats) -> Vec3:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from gazerig.drivers.vision.motion.image import Floats, Grey
 from gazerig.drivers.vision.motion.lucas_kanade import affine_residual
 from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
-from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import MotionMask
 
 Indices = NDArray[np.intp]
@@ -23,6 +22,12 @@ _PARTING_SHARE = 0.8
 # ... and their residual is below this share of that of one motion.
 _BETTER_SHARE = 0.6
 _MOST_SPLITS = 3
+# Smallest moving region that is reported, as a share of the image's area.
+_LEAST_AREA_SHARE = 0.001
+# Moving regions closer to each other are merged, in pixels of the scaled-down image.
+_CLOSE_PX = 7
+MOST_BLOBS = 8
+"""Most moving regions reported; the largest are chosen."""
 # Number of patches that are examined per reported one.
 _LOOKED_AT = 3
 _SMOOTH_PX = 3
@@ -62,13 +67,16 @@ def fastest_quarter(group: PixelGroup) -> tuple[Floats, Floats]:
     return at, flow
 
 
-def cluster_motion(things: MotionMask, params: MotionParams) -> list[PixelGroup]:
-    """Return the moving things, the largest first."""
-    least = max(4, round(params.min_area_share * things.mask.size))
+def cluster_motion(things: MotionMask, shrink: int) -> list[PixelGroup]:
+    """Return the moving things, the largest first.
+
+    shrink: pixels of the scaled-down image for one of the searched one
+    """
+    least = max(4, round(_LEAST_AREA_SHARE * things.mask.size))
     pieces = [
         piece
         for group in _connected_groups(
-            things.mask, things.flow, params.close_px, least, _LOOKED_AT * params.max_blobs
+            things.mask, things.flow, _CLOSE_PX // shrink | 1, least, _LOOKED_AT * MOST_BLOBS
         )
         for piece in _split(group, things, least, _MOST_SPLITS)
     ]
@@ -81,7 +89,7 @@ def cluster_motion(things: MotionMask, params: MotionParams) -> list[PixelGroup]
             > (_LEAST_CHANGE * min(1.0, small / len(piece.columns))) ** 2
         ]
     pieces.sort(key=lambda group: (-len(group.columns), group.columns[0], group.rows[0]))
-    return pieces[: params.max_blobs]
+    return pieces[:MOST_BLOBS]
 
 
 def _percentile_97(values: NDArray[np.float32]) -> float:

@@ -11,7 +11,6 @@ While the camera turns fast, and if the camera's motion cannot be separated from
 nothing is reported, like human vision during a saccade.
 """
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,6 +67,7 @@ from gazerig.drivers.vision.motion.optical_flow import (
 )
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import (
+    LEAST_FLOW_PX,
     ImageDifference,
     image_difference,
     segment_motion,
@@ -82,6 +82,11 @@ _SEARCH_AGAIN_PX = 1.5
 _SHAKES_ON_S = 0.5
 # Smallest common share of both images, below which motions cannot be separated.
 _LEAST_KNOWN = 0.4
+# No motion is reported while the camera turns faster, or if a smaller share of the image's texture
+# moves uniformly.
+_FASTEST_TURN_DEG_S, _LEAST_BACKGROUND_SHARE = 200.0, 0.35
+# Frames further apart in time are not compared.
+_LONGEST_GAP_S = 0.3
 # Margin at the image's edge, as a share of its width, where flow is unknown if the camera turns.
 _EDGE_SHARE = 0.06
 # Distance from the edge at which a patch continues beyond it.
@@ -114,19 +119,12 @@ class MotionDetector:
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
-        self._search = FlowSearch(params.preset)
-        self._tracks = MotionTracks(params)
+        self._search = FlowSearch()
+        self._tracks = MotionTracks()
         self._gloves = GloveDetector()
         self._before: SmallImage | None = None
         self._moved_s = -np.inf  # time of the last camera motion known only from the image
         self.report = MotionReport()
-
-    def retune(self, params: MotionParams) -> None:
-        """Apply changed parameters from the next image on; tracks stay."""
-        if params.preset != self._params.preset:
-            self._search = FlowSearch(params.preset)
-        self._params = params
-        self._tracks.retune(params)
 
     @property
     def before_s(self) -> float | None:
@@ -156,7 +154,7 @@ class MotionDetector:
         Raises:
             ValueError: the image has another shape or type.
         """
-        now = scale_down(image, self._params.work_px, lens, captured_s, self._params.finest_level)
+        now = scale_down(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
         self.report = self._compare_images(now, before, R_now_before, depth_m, t_now_before_m)
         if self._params.gloves:
@@ -187,7 +185,7 @@ class MotionDetector:
             self._tracks.forget()
             return MotionReport(no_result_reason="first frame")
         dt_s = now.captured_s - before.captured_s
-        if not 0.0 < dt_s <= self._params.max_gap_ms / 1e3:
+        if not 0.0 < dt_s <= _LONGEST_GAP_S:
             return MotionReport(no_result_reason="no frame shortly before")
         depth = shrink_depth(depth_m, now.grey.shape)
         shift = parallax(depth, now.K, t_now_before_m)
@@ -197,9 +195,9 @@ class MotionDetector:
         if why:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return MotionReport((), why, turn, ego.background_share, ego.noise_px)
-        params = scale_to_level(self._params, now)
-        things = segment_motion(pair, ego, params, R_now_before is None, still)
-        groups = cluster_motion(things, params)
+        shrink = now.fine_grey.shape[0] // now.grey.shape[0]
+        things = segment_motion(pair, ego, shrink, R_now_before is None, still)
+        groups = cluster_motion(things, shrink)
         frames = blur_images(pair) if groups else ()
         moving: list[tuple[PixelGroup, Floats, PatchMotion]] = []
         for group in groups:
@@ -208,7 +206,7 @@ class MotionDetector:
             if pair.shift is not None:
                 off = np.median(pair.shift[group.rows, group.columns], axis=0).astype(np.float64)
             centre, motion = _centre_and_motion(group, frames, BackgroundWarp(ego.B, off))
-            if _motion_px(group, motion, now.grey.shape) > params.min_flow_px:
+            if _motion_px(group, motion, now.grey.shape) > LEAST_FLOW_PX / shrink:
                 moving.append((group, centre, motion))
         follows = self._tracks.step(
             [centre for _, centre, _ in moving],
@@ -248,21 +246,18 @@ class MotionDetector:
         ego = estimate_ego_motion(pair, now.K, R_now_before is not None, moved_before)
         if ego.unforeseen_px > 0.0:
             self._moved_s = now.captured_s
-        if (
-            ego.background_share < self._params.min_background_share
-            or ego.unforeseen_px < _SEARCH_AGAIN_PX
-        ):
+        if ego.background_share < _LEAST_BACKGROUND_SHARE or ego.unforeseen_px < _SEARCH_AGAIN_PX:
             return pair, ego, None
         again = self._search.search(align_images(now, before, ego.total)._replace(shift=shift))
         return again, estimate_ego_motion(again, now.K, True), None
 
     def _separation_fault(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:
         """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
-        if not turn_deg_s <= self._params.max_turn_deg_s:
+        if not turn_deg_s <= _FASTEST_TURN_DEG_S:
             return "the camera turns too fast"
         if pair.valid_mask.mean() < _LEAST_KNOWN:
             return "too little of the last frame in view"
-        if ego.background_share < self._params.min_background_share:
+        if ego.background_share < _LEAST_BACKGROUND_SHARE:
             return "no common motion of the background"
         return ""
 
@@ -276,7 +271,7 @@ class MotionDetector:
         dt_s: float,
     ) -> MovingBlob:
         """Combine the measurements of one thing."""
-        far = distance(group, depth, self._params)
+        far = distance(group, depth)
         point = thing_pixel(group, now.grey, follow.centre, follow.offset)
         follow.offset = point - follow.centre
         p = back_project(point, far.z_m, now.K)
@@ -314,16 +309,6 @@ class MotionDetector:
             / float(now.K[0, 0]),
             from_side=x <= edge_px or x + width >= now.grey.shape[1] - edge_px,
         )
-
-
-def scale_to_level(params: MotionParams, now: SmallImage) -> MotionParams:
-    """Return the parameters with lengths in pixels of the searched image."""
-    shrink = now.fine_grey.shape[0] // now.grey.shape[0]
-    return replace(
-        params,
-        min_flow_px=params.min_flow_px / shrink,
-        close_px=params.close_px // shrink | 1,
-    )
 
 
 def _motion_px(group: PixelGroup, motion: PatchMotion, shape: tuple[int, ...]) -> float:

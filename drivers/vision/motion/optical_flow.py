@@ -20,11 +20,6 @@ Flow = NDArray[np.float32]
 # Below 8 px at the finest level of its pyramid, a quarter of the image, DIS reads outside its
 # memory; its count of levels depends on the version of OpenCV.
 _LARGEST_ASPECT = 4.0
-_PRESETS = {
-    "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
-    "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
-    "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
-}
 # Margin around changes in which flow is computed, and share of the image above which all of it is.
 _AROUND_PX, _MOST_SHARE = 8, 0.7
 _STILL_PX = 0.02
@@ -71,8 +66,9 @@ class ImagePair(NamedTuple):
 class FlowSearch:
     """DIS with its buffers, for images of any supported size."""
 
-    def __init__(self, preset: str) -> None:
-        self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
+    def __init__(self) -> None:
+        # The slower presets smooth the flow more, which loses small things.
+        self._dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._dis.setFinestScale(0)
 
     def search(self, pair: ImagePair, windows: tuple[Window, ...] | None = None) -> ImagePair:

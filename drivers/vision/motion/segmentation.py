@@ -14,8 +14,14 @@ import numpy as np
 from gazerig.drivers.vision.motion.ego_motion import EgoMotion
 from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, remove_illumination
 from gazerig.drivers.vision.motion.optical_flow import Flow, ImagePair, Mask, gradients
-from gazerig.drivers.vision.motion.params import MotionParams
 
+LEAST_FLOW_PX = 0.25
+"""Smallest displacement that counts as motion, in pixels of the scaled-down image."""
+# Ratio to the noise of the flow on the still background that motion must exceed.
+_NOISE_FACTOR = 5.0
+# Threshold as a share of the camera's own motion: still things nearer than the background move
+# relative to it when the head turns.
+_PARALLAX_SHARE = 0.1
 # Window in which brightness is compared: wide enough to average noise, narrow enough for a hand.
 _WINDOW_PX = 3
 # Window for edges and light.
@@ -83,7 +89,7 @@ def image_difference(pair: ImagePair, there: Flow | None = None) -> ImageDiffere
 def segment_motion(
     pair: ImagePair,
     ego: EgoMotion,
-    params: MotionParams,
+    shrink: int,
     by_image: bool = False,
     still: ImageDifference | None = None,
 ) -> MotionMask:
@@ -92,7 +98,7 @@ def segment_motion(
     Args:
         pair: The two images and their flow.
         ego: The camera's own motion.
-        params: Thresholds.
+        shrink: Pixels of the scaled-down image for one of the searched one.
         by_image: Whether only the image shows that motion. In that case any motion that a still,
             nearer thing cannot have (against the room or across its motion) counts.
         still: Their difference, if the room keeps its position in the older image.
@@ -103,9 +109,9 @@ def segment_motion(
         if pair.shift is not None:
             there += pair.shift
         still = image_difference(pair, there)
-    threshold = max(params.min_flow_px, params.noise_factor * ego.noise_px)
+    threshold = max(LEAST_FLOW_PX / shrink, _NOISE_FACTOR * ego.noise_px)
     if not by_image:
-        threshold += params.parallax_share * ego.shift_px
+        threshold += _PARALLAX_SHARE * ego.shift_px
     shape = pair.now.shape
     change = np.zeros(shape, np.float32)
     flow = np.zeros((*shape, 2), np.float32)
@@ -117,7 +123,7 @@ def segment_motion(
         rest = -part.flow if at is None else at - _add_flow(part.flow, 1.0)
         moves = rest
         if by_image and ego.shift_px > _STANDS_PX:
-            moves = rest - _parallax_part(rest, ego, params.parallax_share)
+            moves = rest - _parallax_part(rest, ego, _PARALLAX_SHARE)
         mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _parallax_differences(
             part.shift
         )

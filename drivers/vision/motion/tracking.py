@@ -10,7 +10,6 @@ import numpy as np
 
 from gazerig.drivers.vision.motion.image import Floats
 from gazerig.drivers.vision.motion.optical_flow import warp_points
-from gazerig.drivers.vision.motion.params import MotionParams
 
 # Largest distance from the expected position, in sizes (root of box width times height).
 _GATE_SIZES = 0.75
@@ -18,6 +17,10 @@ _LEAST_GATE_PX = 5.0
 # Largest ratio of the sizes of a matched pair: the visible part of a thing varies, but a person
 # does not become a hand.
 _LARGEST_GROWTH = 3.0
+# Number of consecutive images in which a patch must be detected before it is reported.
+_CONFIRMED = 2
+# A thing that did not move for longer gets a new id when it moves again.
+_FORGET_S = 0.5
 
 
 @dataclass(slots=True)
@@ -42,14 +45,9 @@ class PatchTrack:
 class MotionTracks:
     """Tracks of moving patches with persistent ids."""
 
-    def __init__(self, params: MotionParams) -> None:
-        self._params = params
+    def __init__(self) -> None:
         self._patch_tracks: list[PatchTrack] = []
         self._next_id = 1
-
-    def retune(self, params: MotionParams) -> None:
-        """Apply changed parameters; the tracks stay."""
-        self._params = params
 
     def step(
         self,
@@ -94,17 +92,13 @@ class MotionTracks:
             follow.consecutive_images += 1
         seen_now = {follow.id for follow in found.values()}
         for follow in self._patch_tracks:
-            if (
-                follow.id not in seen_now
-                and follow.consecutive_images < self._params.confirm_frames
-            ):
+            if follow.id not in seen_now and not self.is_confirmed(follow):
                 follow.consecutive_images = 0  # a flicker, not a thing: count again
         return [found[j] for j in range(len(centres))]
 
     def predict(self, total: Floats, t_s: float, dt_s: float) -> None:
         """Predict every track to ``t_s`` and delete those unseen for too long."""
-        forget_s = self._params.forget_ms / 1e3
-        self._patch_tracks = [f for f in self._patch_tracks if t_s - f.seen_s <= forget_s]
+        self._patch_tracks = [f for f in self._patch_tracks if t_s - f.seen_s <= _FORGET_S]
         for follow in self._patch_tracks:
             at = warp_points(total, follow.centre[None, :])[0] + follow.velocity_px_s * dt_s
             if np.isfinite(at).all():
@@ -116,4 +110,4 @@ class MotionTracks:
 
     def is_confirmed(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been detected often enough."""
-        return follow.consecutive_images >= self._params.confirm_frames
+        return follow.consecutive_images >= _CONFIRMED

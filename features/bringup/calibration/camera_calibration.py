@@ -88,7 +88,7 @@ def lens_params(lens: Intrinsics, width_px: int, height_px: int) -> LensParams:
     """Return a lens in the format of the rig's file."""
     fx, fy, cx, cy = (round(px, 2) for px in (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px))
     k1, k2, p1, p2, k3 = (round(k, 6) + 0.0 for k in lens.distortion)
-    return LensParams(width_px, height_px, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
+    return LensParams((width_px, height_px), (fx, fy), (cx, cy), (k1, k2, p1, p2, k3))
 
 
 class _Fit(NamedTuple):

@@ -75,7 +75,7 @@ class LinkageFit(NamedTuple):
     max_deg: float
 
 
-Value = int | float | tuple[tuple[float, float], ...]
+Value = int | float | tuple[float, float] | tuple[tuple[float, float], ...]
 """A value that a calibration writes."""
 
 
@@ -132,12 +132,6 @@ def zero_name(joint_name: str) -> str:
 def is_lid(joint_name: str) -> bool:
     """Return whether a joint moves a lid, which has two ends but no "straight ahead"."""
     return joint_name in LIDS
-
-
-def lid_keys(joint_name: str) -> tuple[str, str]:
-    """Return the keys of a lid's shut and open angle under lid_joints, as in LidJoints."""
-    lid = joint_name.removesuffix("_lid").removesuffix("_upper")
-    return f"{lid}_shut_deg", f"{lid}_open_deg"
 
 
 def centre_zero(marks: Marks) -> Marks:
@@ -271,9 +265,8 @@ def rig_changes(
             for angle, at in made.transmission_points
         )
     if is_lid(name):
-        shut, wide = lid_keys(name)
-        wanted[f"lid_joints.{shut}"] = made.min_deg
-        wanted[f"lid_joints.{wide}"] = made.max_deg
+        key = name.removesuffix("_lid").removesuffix("_upper")
+        wanted[f"lid_joints.{key}_deg"] = made.min_deg, made.max_deg
     parked = park_deg.get(name)
     if parked is not None and not made.min_deg <= parked <= made.max_deg:
         wanted[f"park_deg.{name}"] = made.min_deg if parked < made.min_deg else made.max_deg

@@ -45,7 +45,6 @@ from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.app.rig_weight import weight_findings
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, complete_suggestions
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.safety.start_range import find_far_outside
 
 app = typer.Typer()
@@ -125,7 +124,7 @@ def _examine_buses(
             examine = partial(BOARDS[config.kind], line, config, setups)
         else:
             kind = servo_kind(setups[0].model)
-            far = partial(find_far_outside, rig.joints, coupled_pairs(rig.couplings))
+            far = partial(find_far_outside, rig.joints, rig.couplings.values())
             examine = partial(checkup.examine_bus, line, kind, setups, config.baud, progress, far)
         findings[bus] = checkup.examine_ports(line, bench.host, examine)
         if can_be_released(rig, bus):

@@ -16,7 +16,6 @@ from gazerig.robot.control.body import Body
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.safety.guard import Guard
 
 BOARDS = {"maestro": "a Maestro", "pca9685": "a PCA9685"}
@@ -49,7 +48,7 @@ def holding_rig(
         typer.Exit: not all servos confirmed the torque-off after a successful block.
     """
     body = Body(
-        guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=coupled_pairs(rig.couplings)
+        guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=rig.couplings.values()
     )
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / params.rate_hz)
     control = ManualControl(body, guard, RealClock(), params, stopped, watch)

@@ -36,7 +36,6 @@ from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.cli.console import Console
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, record_signals
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import coupled_pairs
 from gazerig.robot.model.joint import JointParams
 
 app = typer.Typer()
@@ -73,7 +72,7 @@ def monitor(
         refuse_packages(found, "monitor")
         with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:
             joints = {name: found.joints[name] for name in found.names}
-            watch = Monitor(readers, joints, clock.now_s, coupled_pairs(found.couplings))
+            watch = Monitor(readers, joints, clock.now_s, found.couplings.values())
             samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
             if as_lines:
                 start_s = clock.now_s()

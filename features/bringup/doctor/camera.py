@@ -52,7 +52,7 @@ def examine_camera(
             if shot is None:
                 break
             began_s = perf_counter()
-            found = shot.faces if shot.faces is not None else detector.find(shot.image)
+            found = detector.find(shot.image)
             spent_s = {"faces": perf_counter() - began_s}
             conditions = health.assess(shot, found, spent_s, assumed and shot.lens is None)
             frames, with_face = frames + 1, with_face + bool(found)

@@ -50,8 +50,6 @@ ADVICE = {
     "voltage": Advice("error", "{limits}{checks.out_of_voltage}", "{remedy}"),
     "weak": Advice("warn", "{limits}; made for {model.rated_v:g} V, it is slow and weak here",
         "measure at the supply and at this servo: thin wires and long chains lose volts"),
-    "firmware": Advice("error", "firmware {found.firmware}, the YAML wants {setup.firmware_min}",
-        "update it with {checks.maker_program}"),
     "baud": Advice("warn", "answers at {found.baud} bit/s, but its Baud Rate is {rate}: after its "
         "next start it will not be heard here", "gazerig setup --joint {setup.name}"),
     "far": Advice("error", "{far} No torque is switched on there",
@@ -238,10 +236,9 @@ def _far_outside(state: ServoState) -> Iterator[Diagnostic]:
 
 
 def _firmware(state: ServoState) -> Iterator[Diagnostic]:
-    firmware, wanted = state.found.firmware, state.setup.firmware_min
-    notes = ((wanted, ADVICE["firmware"]), *state.checks.firmware_notes(state.setup.model))
+    notes = state.checks.firmware_notes(state.setup.model)
     # The first one is used.
-    yield from [state.finding(advice) for below, advice in notes if firmware < below][:1]
+    yield from [state.finding(note) for below, note in notes if state.found.firmware < below][:1]
 
 
 def _baud(state: ServoState) -> Iterator[Diagnostic]:

@@ -15,7 +15,6 @@ from gazerig.features.world.rig_in_world import (
 )
 from gazerig.robot.app.bus_wiring import servo_configs
 from gazerig.robot.app.run_bus import STOP_BEYOND_DEG, start_angles_rad
-from gazerig.robot.model.coupling_params import coupled_pairs
 
 if TYPE_CHECKING:
     from gazerig.features.world.ideal_bus import WorldIdealBus
@@ -83,10 +82,10 @@ def _servo(rig: Rig, name: str) -> ServoInWorld:
     joint = rig.joints[name]
     joints: tuple[str, ...] = (name,)
     transmission: Transmission = JointTransmission(joint.make_linkage())
-    for first, second, coupling in coupled_pairs(rig.couplings):
-        if name in (first, second):
-            joints = first, second
-            transmission = PairTransmission(coupling, joints.index(name), joint.make_linkage())
+    for pair in rig.couplings.values():
+        if name in pair.joints:
+            joints = pair.joints
+            transmission = PairTransmission(pair, joints.index(name), joint.make_linkage())
     return ServoInWorld(
         name, joint.bus, joint.id, joints, transmission, joint.model_facts.steps_per_turn
     )

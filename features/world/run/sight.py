@@ -247,7 +247,7 @@ def world_camera(
                 DrawnSource, partial(served_pixels, world, poses), poses
             )
             parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-            process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
+            process = CameraProcess(parts, clock.now_s)
         return WorldCamera(process, ideal, poses)
     if options.no_pictures:
         return ideal(poses.begin_s)

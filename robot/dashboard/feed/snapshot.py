@@ -16,7 +16,6 @@ from gazerig.robot.control.tick_text import control_text, head_activity, tick_co
 from gazerig.robot.description.build import RigShape
 from gazerig.robot.model.control_source import control_sentence, playing
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.types import (
@@ -35,6 +34,7 @@ from gazerig.robot.model.types import (
     Snapshot,
     Trail,
 )
+from gazerig.robot.safety.health import HOT_C, LASTING_LOAD, VOLTAGE_MARGIN_V, WARM_C
 
 _TICKS_KEPT = 600
 """Largest number of waiting ticks: those of three seconds, for a delayed reader."""
@@ -53,7 +53,6 @@ class ShownRig(NamedTuple):
 
     kinematics: Kinematics
     limits: tuple[JointLimit, ...]
-    health: HealthParams
     mount: CameraMount
     horizontal_rad: float
     shape: RigShape | None = None
@@ -328,13 +327,13 @@ def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
 def _servos(tick: Tick, rig: ShownRig | None) -> Servos:
     joints, limits = tick.joints, None
     if rig is not None:
-        health, of_joints = rig.health, rig.limits
+        of_joints = rig.limits
         limits = ServoLimits(
-            tuple([limit.hottest_c - health.warm_c for limit in of_joints]),
-            tuple([limit.hottest_c - health.hot_c for limit in of_joints]),
-            tuple([limit.lowest_v + health.voltage_margin_v for limit in of_joints]),
-            tuple([limit.highest_v - health.voltage_margin_v for limit in of_joints]),
-            (health.lasting_load,) * len(of_joints),
+            tuple([limit.hottest_c - WARM_C for limit in of_joints]),
+            tuple([limit.hottest_c - HOT_C for limit in of_joints]),
+            tuple([limit.lowest_v + VOLTAGE_MARGIN_V for limit in of_joints]),
+            tuple([limit.highest_v - VOLTAGE_MARGIN_V for limit in of_joints]),
+            (LASTING_LOAD,) * len(of_joints),
         )
     return Servos(
         joints.temperature_c,

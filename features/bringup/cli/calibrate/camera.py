@@ -165,8 +165,8 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     params, lens = found.camera_params(camera), found.lens
     place = ("position_mm", "yaw_deg", "pitch_deg", "roll_deg")
     return {f"camera.{key}": getattr(params, key) for key in place} | {
-        f"camera.lens.{key}": round(getattr(lens, key), 2)
-        for key in ("fx_px", "fy_px", "cx_px", "cy_px")
+        "camera.lens.focal_px": (round(lens.fx_px, 2), round(lens.fy_px, 2)),
+        "camera.lens.centre_px": (round(lens.cx_px, 2), round(lens.cy_px, 2)),
     }
 
 
@@ -306,10 +306,11 @@ def _measure_mount(
         raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
     shot = _first_frame(job, eye)
     height, width = shot.image.shape[:2]
-    if (camera.lens.width_px, camera.lens.height_px) != (width, height):
+    if camera.lens.size_px != (width, height):
+        wide, high = camera.lens.size_px
         raise SetupError(
-            f"frames are {width} x {height}, the lens was measured on {camera.lens.width_px} x "
-            f"{camera.lens.height_px}: calibrate it again (--what all)"
+            f"frames are {width} x {height}, the lens was measured on {wide} x {high}: calibrate it "
+            "again (--what all)"
         )
     lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
     yaw, pitch, roll = (neck_span(job.rig, name) for name in NECK)

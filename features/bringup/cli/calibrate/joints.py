@@ -59,7 +59,7 @@ from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.coupling_params import coupled_pairs, joint_partners
+from gazerig.robot.model.coupling import joint_partners
 
 JointMove = Calibration | LinkageFit
 
@@ -352,7 +352,7 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
-    coupled = joint_partners(coupled_pairs(rig.couplings))
+    coupled = joint_partners(rig.couplings.values())
     for name in rig.names:
         if name in coupled and (not asked or name in asked):
             text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"
