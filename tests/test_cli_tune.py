@@ -124,9 +124,11 @@ def test_what_is_wrong_is_refused_with_the_rule_and_exit_code_2(
 
 def test_save_keeps_comments_and_the_old_file(rig: Running) -> None:
     before = rig.path.read_text(encoding="utf-8")
+    gazerig("ctl", "character", "shy")
     gazerig("ctl", "set", RATE, "150")
     done = gazerig("ctl", "save")
     assert f"{RATE}: 200.0 -> 150.0" in done.stdout and str(rig.path) in done.stderr
+    assert "character: (not in the file) -> shy" in done.stdout
     assert load_rig(str(rig.path)).loop.rate_hz == 150.0
     kept = [line for line in before.splitlines() if line.lstrip().startswith("#")]
     assert all(line in rig.path.read_text(encoding="utf-8") for line in kept)
@@ -134,6 +136,7 @@ def test_save_keeps_comments_and_the_old_file(rig: Running) -> None:
     assert backup.read_text(encoding="utf-8") == before and str(backup) in done.stderr
     assert "nothing to save" in gazerig("ctl", "save").stderr
     backup.unlink()
+    gazerig("ctl", "character", "none")
     gazerig("ctl", "set", RATE, "200")
     gazerig("ctl", "save")
 

@@ -197,7 +197,7 @@ def save(
     """Write changed values into the rig's YAML; comments stay, the old file is kept as a backup."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         saved = rig.save(path)
-    _print_notes(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
+    _print_notes(map(str, saved.changes))
     if not saved.changes and saved.backup is not None:
         say(f"{saved.path} had faults: it now contains the present values; backup: {saved.backup}")
         return
