@@ -161,8 +161,8 @@ class FrameAnalyzer:
         return (*faults, *self._health.events(), *told)
 
 
-LOST, BACK = "camera lost", "camera back"
-"""First words of events about the loss of a source, and about its reconnection."""
+LOST, BACK, CLOSING = "camera lost", "camera back", "closing the camera"
+"""First words of events about the loss of a source, its reconnection, and an error at its end."""
 
 
 class CaptureLoop:
@@ -238,7 +238,7 @@ class CaptureLoop:
             self._source.close()
         except Exception as error:
             named = plugin_error(error) or describe_error(error)
-            self._report(f"closing the camera: {named}")
+            self._report(f"{CLOSING}: {named}")
 
     def _take(self, stop: threading.Event) -> Shot | None:
         """Return the next frame, reopening a lost source; None if ``stop`` was set."""

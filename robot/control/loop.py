@@ -5,6 +5,7 @@ from collections.abc import Callable
 from math import inf, radians
 from typing import NamedTuple
 
+from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.plugins import describe_error, plugin_error
 from gazerig.drivers.types import Camera
@@ -380,10 +381,10 @@ class Robot:
         """Close the camera; its error must not hide the reason of the end."""
         try:
             self.camera.close()
-            self.closing_events = tuple(self.camera.events())
+            self.closing_events = tuple([e for e in self.camera.events() if e.startswith(CLOSING)])
         except Exception as error:
             named = plugin_error(error) or describe_error(error)
-            self.closing_events = (f"closing the camera: {named}",)
+            self.closing_events = (f"{CLOSING}: {named}",)
 
     def _execute_commands(self, t_s: float) -> tuple[Command, ...]:
         """Execute and return the queued commands, and end a control that was not renewed."""

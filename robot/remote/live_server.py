@@ -103,18 +103,15 @@ class FileWatch:
         files: Returns the files in use.
         changed: Called in this thread with a path of ``files`` that should be read again, also if
             the file is missing.
-        every_s: Period of the checks, s.
     """
 
     def __init__(
         self,
         files: Callable[[], Iterable[Path]],
         changed: Callable[[Path], None],
-        every_s: float = EVERY_S,
     ) -> None:
         self._files = files
         self._changed = changed
-        self._every_s = every_s
         self._lock = threading.Lock()
         self._watched: dict[Path, Debouncer] = {}
         self._over = threading.Event()
@@ -162,7 +159,7 @@ class FileWatch:
             self._changed(path)
 
     def _watch(self) -> None:
-        while not self._over.wait(self._every_s):
+        while not self._over.wait(EVERY_S):
             self.look()
 
 
