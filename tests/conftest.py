@@ -11,6 +11,8 @@ import pytest
 from hypothesis import settings
 
 if TYPE_CHECKING:
+    from recorded_run import Recorded
+
     from gazerig.config.schema import Rig
     from gazerig.gaze.scanpath.scanpath import Walk
 
@@ -87,6 +89,18 @@ def printed_walk() -> "Walk":
     from gazerig.config.schema import load_walk
 
     return load_walk("nakamoto_tsuruno")
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> "Recorded":
+    """A run in which one of everything is ordered."""
+    from recorded_run import ordered, record
+
+    from gazerig.robot.model import commands
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(commands, "MIN_HOLD_S", 0.1)  # a shorter run
+        return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+from expressive_rig import faults
+
 from gazerig.config.rig import Rig
-from gazerig.config.schema import RULES, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.types import further_joints, order_joints
@@ -14,10 +16,6 @@ def with_joint(name: str) -> Rig:
     rig = load_rig("desk")
     jaw = replace(rig.joints["left_upper_lid"], id=42, min_deg=-2.0, max_deg=25.0)
     return replace(rig, joints={name: jaw, **rig.joints})
-
-
-def faults(rig: Rig) -> list[str]:
-    return [f"{key}: {text}" for rule in RULES for key, text in rule(rig)]
 
 
 def test_joints_of_gaze_come_first_and_others_follow_by_name() -> None:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import pytest
 from fakes.runs import VISIT, record
+from recorded_rigs import Run
+from recorded_run import exact
 
 from gazerig.config.load import load
 from gazerig.config.rig import Rig
@@ -74,16 +76,11 @@ def recorded(
     return record(path, rig, seconds, options, each, start_s=start_s)
 
 
-class Once(NamedTuple):
-    recording: RunRecording
-    ticks: list[Tick]
-
-
 @pytest.fixture(scope="module")
-def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
+def once(tmp_path_factory: pytest.TempPathFactory) -> Run:
     path = tmp_path_factory.mktemp("reruns") / "run.mcap"
     ticks = recorded(path, 2.1, PUPPET)
-    return Once(RunRecording(path), ticks)
+    return Run(RunRecording(path), ticks)
 
 
 class Again(NamedTuple):
@@ -93,7 +90,7 @@ class Again(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def again(once: Once, tmp_path_factory: pytest.TempPathFactory) -> Again:
+def again(once: Run, tmp_path_factory: pytest.TempPathFactory) -> Again:
     """The run done again with all as it was, and recorded itself."""
     path = tmp_path_factory.mktemp("again") / "again.mcap"
     recorder = Recorder(path, once.recording.info, patient=True)
@@ -109,11 +106,7 @@ def again(once: Once, tmp_path_factory: pytest.TempPathFactory) -> Again:
     return Again(found, seen, path)
 
 
-def exact(tick: Tick) -> str:
-    return repr(tick._replace(detections=None, percept=None))
-
-
-def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Once, again: Again) -> None:
+def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Run, again: Again) -> None:
     found = again.found
     assert found.is_same and found.ticks == found.agreeing_ticks == len(once.ticks) == 419
     assert found.first_difference_s is None and found.difference == ""
@@ -123,18 +116,18 @@ def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Once, ag
     assert list(map(exact, again.ticks)) == list(map(exact, once.ticks))
 
 
-def test_the_same_bytes_go_over_the_bus(once: Once, again: Again) -> None:
+def test_the_same_bytes_go_over_the_bus(once: Run, again: Again) -> None:
     assert len(once.recording.end.tx_sha256) == 64
     assert again.found.sent_bytes_same is True
 
 
-def test_emulated_servos_do_what_they_did(once: Once) -> None:
+def test_emulated_servos_do_what_they_did(once: Run) -> None:
     found = rerun(once.recording, joints="emulated")
     assert found.joints == "emulated"
     assert found.is_same and found.sent_bytes_same is True
 
 
-def test_the_last_bit_of_one_joint_is_seen(once: Once, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_last_bit_of_one_joint_is_seen(once: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     real = RunRecording.moments
 
     def bent(self: RunRecording) -> Iterator[TickRecord]:
@@ -152,13 +145,13 @@ def test_the_last_bit_of_one_joint_is_seen(once: Once, monkeypatch: pytest.Monke
     assert found.first_difference_s == pytest.approx(0.1)
 
 
-def test_the_recorded_rig(once: Once, tmp_path: Path) -> None:
+def test_the_recorded_rig(once: Run, tmp_path: Path) -> None:
     path = tmp_path / "recorded.yaml"
     path.write_text(once.recording.info.config_yaml, encoding="utf-8")
     assert repr(load(path, Rig)) == repr(load_rig("desk"))
 
 
-def test_a_recording_without_ticks_is_refused(once: Once, tmp_path: Path) -> None:
+def test_a_recording_without_ticks_is_refused(once: Run, tmp_path: Path) -> None:
     path = tmp_path / "none.mcap"
     writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), as_text(once.recording.info), 0)
     writer.close(RunEnd("seconds"))

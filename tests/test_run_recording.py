@@ -22,8 +22,6 @@ from recorded_run import (
     exact,
     handed_over,
     info_for,
-    ordered,
-    record,
 )
 
 from gazerig.config.load import load
@@ -34,7 +32,6 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.model import commands
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
@@ -59,13 +56,6 @@ def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
         for number, at_s in enumerate(times_s, 1)
         if picker.is_due(Detections(at_s, number, 2, 2, image=picture))
     ]
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(commands, "MIN_HOLD_S", 0.1)  # a shorter run
-        return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
 
 
 def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:

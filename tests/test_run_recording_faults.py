@@ -11,24 +11,15 @@ import pytest
 from fakes.runs import ticks
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from recorded_run import Recorded, assembly, exact, info_for, ordered, record
+from recorded_run import Recorded, assembly, exact, info_for
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.model import commands
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, as_text
 from gazerig.robot.recording.run_writer import RunWriter
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(commands, "MIN_HOLD_S", 0.1)  # a shorter run
-        return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
-
 
 # --- what cannot be read
 

@@ -44,17 +44,7 @@ def drawn(count: int) -> np.ndarray:
     return np.array(parts)
 
 
-def test_printed_matrix_is_as_printed(printed_walk: Walk) -> None:
-    assert [round(sum(row), 1) for row in printed_walk.matrix] == [
-        0.9,
-        0.8,
-        1.1,
-        1.1,
-        0.9,
-        1.0,
-        1.0,
-        0.9,
-    ]
+def test_the_order_and_the_start_are_as_printed(printed_walk: Walk) -> None:
     assert printed_walk.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
     assert printed_walk.start == "FR"
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from recorded_rigs import Run, recorded
+from recorded_run import exact
 from six_joints import SIX
 
 from gazerig.config.schema import load_rig
@@ -29,10 +30,6 @@ def maker(tmp_path_factory: pytest.TempPathFactory) -> Run:
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return recorded(tmp_path_factory.mktemp("nine") / "desk.mcap", load_rig("desk"), 2.0)
-
-
-def exact(tick: Tick) -> str:
-    return repr(tick._replace(detections=None, percept=None))
 
 
 def messages(path: Path, *topics: str) -> Iterator[tuple[str, dict[str, Any]]]:

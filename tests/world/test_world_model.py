@@ -72,7 +72,6 @@ def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path)
 
 UNUSABLE = (
     ("", "read"),
-    ("<mujoco><worldbody>", "read"),
     ("no xml", "read"),
     (
         '<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>'
