@@ -94,9 +94,7 @@ class _Board(NamedTuple):
     gaze: tuple[str, ...] = ()
 
 
-_NECKLESS_GAZE = (
-    "idle: {reach_deg: 28, glance_yaw_deg: 24, glance_pitch_deg: 9, search_aside_deg: 14}"
-)
+_NECKLESS_GAZE = "idle: {reach_deg: 28}"
 """Idle gaze without a neck goes no farther than the eyes alone can turn."""
 _HOBBY = "servo_speed_deg_s: 600"
 _HOBBY_GAZE = (

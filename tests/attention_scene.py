@@ -1,25 +1,22 @@
 """Bodies about a head that attends to them."""
 
-from math import radians
+from math import inf, radians
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.attention import Attention, AttentionParams
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
 from gazerig.gaze.attention.idle import Idle, IdleParams
-from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Vec3
 
 IDENTITY = rotation((0.0, 0.0, 0.0))
 
-UNBOUNDED = BottomUpParams(
-    smoothing_s=0.0, saturation=0.0, hand_saturation=0.0, onset_s=0.5, onset_recovery_s=0.0
-)
-"""Eq 1 as it is, with an onset."""
+NO_STAYS: Any = SimpleNamespace(standard_normal=lambda: -99.0)
+"""Draws no additional times of looks."""
 
 
 def looking(eye_yaw_deg: float = 0.0) -> GazeState:
@@ -69,24 +66,29 @@ def salience(
     v_eye: Vec3 = (0.0, 0.0, 0.0),
     gaze: Vec3 = (1.0, 0.0, 0.0),
     in_view: bool = True,
+    limit: float = inf,
 ) -> Terms:
     n = len(seen)
-    limits = [model.limit()] * n
+    limits = [limit] * n
     rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, [in_view] * n, limits, [1.0] * n)
     return Terms(*np.array(rows).reshape(-1, 5).T)
 
 
-def visible(view: FieldOfView, seen: Bodies, state: GazeState) -> list[bool]:
-    return view.are_visible(seen, seen.rows(), state)
-
-
-def attention(**params: Any) -> Attention:
+def attention(
+    top_down: TopDownParams | None = None,
+    rng: np.random.Generator | None = None,
+    stays: np.random.Generator = NO_STAYS,
+    **params: Any,
+) -> Attention:
+    """Return attention that changes its target at once without a generator for its reactions."""
+    reaction = "none" if rng is None else "people"
     return Attention(
-        AttentionParams(**params),
-        FieldOfView(FieldOfViewParams()),
-        BottomUp(UNBOUNDED),
-        TopDown(TopDownParams()),
-        Idle(IdleParams()),
+        AttentionParams(**{"reaction": reaction, **params}),
+        BottomUp(BottomUpParams()),
+        TopDown(top_down or TopDownParams()),
+        Idle(IdleParams(explores=False), np.random.default_rng(0)),
+        rng or np.random.default_rng(0),
+        stays,
     )
 
 

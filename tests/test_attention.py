@@ -6,21 +6,11 @@ from math import cos, exp, inf, radians, sin
 
 import numpy as np
 import pytest
-from attention_scene import (
-    FACE,
-    UNBOUNDED,
-    attention,
-    body,
-    looking,
-    percept,
-    salience,
-    visible,
-    waving,
-)
+from attention_scene import FACE, attention, body, looking, percept, salience, waving
 
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
-from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, are_occluded
+from gazerig.gaze.attention.top_down import Rule, TopDownParams
+from gazerig.gaze.field_of_view import are_visible
 from gazerig.gaze.types import Bodies, Percept
 
 
@@ -49,32 +39,13 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     things = percept(0.0, *(body(n, "thing", (far, 0, 0)) for n, far in ((1, 1), (2, 4), (3, 1))))
     spins = np.array([[0.0, 0, 0], [-6.0, 0, 0], [0, 6.0, 0]])
     turning = replace(things.bodies, w_world_rad_s=spins)
-    params = replace(UNBOUNDED, onset_salience=0.0)
-    found = salience(BottomUp(params), turning, (0, 0, 0), 0.0)
-    expected = 6.0 / params.rotation_reference_rad_s
-    assert found.rotation == pytest.approx([0.0, expected, 0.0])
-    assert found.total == pytest.approx([0.0, expected, 0.0])
-
-
-def test_the_person_looked_at_last_counts_as_nearer() -> None:
-    faces = percept(0.0, body(1, "face", (1.0, 0, 0)), body(2, "face", (1.5, 0, 0))).bodies
-    params = TopDownParams(stay_with_person=2.0, nearness=1.0)
-    found = TopDown(params).step(faces.rows(), [True, True], (0.0, 0.0, 0.0))
-    assert found is not None and found.nearness == pytest.approx([1.0, 1.0 / 1.5])
-    assert found.stay == 2.0
-    assert TopDown(replace(params, nearness=0.5)).step(
-        faces.rows(), [True, True], (0.0, 0.0, 0.0)
-    ).stay == pytest.approx(2.0**0.5)  # type: ignore[union-attr]
-
-
-def test_what_is_behind_the_eye_hides_nothing_before_it() -> None:
-    places, rows = np.array([[2.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 0]]), np.array([0])
-    assert not are_occluded(places[:2], np.array([0.1, 0.3]), rows).any()
-    assert are_occluded(places[[0, 2]], np.array([0.1, 0.3]), rows).all()
+    found = salience(BottomUp(BottomUpParams()), turning, (0, 0, 0), 9.0)
+    assert found.rotation == pytest.approx([0.0, 2.0, 0.0])
+    assert found.total == pytest.approx([0.0, 2.0, 0.0])
 
 
 def test_pulls_rise_with_the_time_constant() -> None:
-    model = BottomUp(replace(UNBOUNDED, smoothing_s=0.1))
+    model = BottomUp(BottomUpParams())
     seen = percept(0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(11):
         total = salience(model, seen.bodies, (0, 0, 0), k * 0.01).total
@@ -89,15 +60,13 @@ def test_pulls_rise_with_the_time_constant() -> None:
 def test_field_of_both_eyes(yaw: float, pitch: float, seen: bool) -> None:
     y, p = radians(yaw), radians(pitch)
     far = (100 * np.cos(p) * np.cos(y), 100 * np.cos(p) * np.sin(y), 100 * np.sin(p))
-    view = FieldOfView(FieldOfViewParams())
-    assert visible(view, percept(0.0, body(1, "x", far)).bodies, looking()) == [seen]
+    assert are_visible(bodies(body(1, "x", far)).rows(), looking()) == [seen]
 
 
 def test_field_turns_with_the_eyes() -> None:
-    view = FieldOfView(FieldOfViewParams())
-    behind = percept(0.0, body(1, "x", (-0.5, 100.0, 0.0))).bodies
-    assert visible(view, behind, looking(40.0)) == [True]
-    assert visible(view, behind, looking(-40.0)) == [False]
+    behind = bodies(body(1, "x", (-0.5, 100.0, 0.0))).rows()
+    assert are_visible(behind, looking(40.0)) == [True]
+    assert are_visible(behind, looking(-40.0)) == [False]
 
 
 def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one() -> None:
@@ -113,11 +82,11 @@ def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one() -> None:
 def test_nearly_equal_pulls_do_not_flicker() -> None:
     model, kinds = attention(), []
     for k in range(600):
-        speed = 0.2 * (1.05 if k % 2 else 0.95)  # its salience swings about the face's 0.5
+        speed = 0.35 * (1.1 if k // 6 % 2 else 0.9)  # its salience swings about the face's 0.5
         kinds.append(model.choose(waving(k / 30, speed), looking(), k / 30).kind)
     assert sum(a != b for a, b in zip(kinds[:60], kinds[1:60], strict=False)) <= 1
     stays = [len(list(same)) / 30 for _, same in groupby(kinds)]
-    assert len(stays) < 20 and min(stays[:-1]) > 0.3
+    assert len(stays) < 20 and min(stays[1:-1]) > 0.3
 
 
 def test_a_winner_is_kept_for_the_shortest_time() -> None:
@@ -150,17 +119,17 @@ def test_a_lost_target_is_waited_for_and_then_left() -> None:
 
 def test_a_target_that_has_left_the_picture_is_waited_for_where_it_was_in_it() -> None:
     model = attention()
-    moving = percept(0.0, body(2, "hand", (1.0, 0.3, 0.0), (0.0, 2.0, 0.0)))
-    seen = model.choose(moving, looking(), 0.0)
-    waited = model.choose(percept(0.1), looking(), 0.1)
+    moving = percept(9.0, body(2, "hand", (1.0, 0.3, 0.0), (0.0, 2.0, 0.0)))
+    seen = model.choose(moving, looking(), 9.0)
+    waited = model.choose(percept(9.1), looking(), 9.1)
     assert (waited.id, waited.p_world_m, waited.why) == (2, seen.p_world_m, "lost, waiting")
-    assert model.choose(moving, looking(), 0.2).id == 2
-    blind = model.choose(None, looking(), 1.0)
+    assert model.choose(moving, looking(), 9.2).id == 2
+    blind = model.choose(None, looking(), 10.0)
     assert blind.p_world_m == pytest.approx((1.0, 0.7, 0.0)) and blind.why == "lost, waiting"
 
 
 def test_stale_pictures_tell_nothing() -> None:
-    model = attention(stale_ms=400.0)
+    model = attention()
     model.choose(percept(0.0, FACE), looking(), 0.0)
     assert model.choose(percept(0.0, FACE), looking(), 0.3).why != "lost, waiting"
     assert model.choose(percept(0.0, FACE), looking(), 0.5).why == "lost, waiting"
@@ -187,16 +156,15 @@ def bodies(*rows: tuple[int, str, tuple[float, ...], tuple[float, ...]]) -> Bodi
 
 
 def test_what_only_one_eye_sees_is_seen() -> None:
-    view = FieldOfView(FieldOfViewParams(temporal_deg=40.0, nasal_deg=20.0))
-    left = (100 * cos(radians(30)), 100 * sin(radians(30)), 0.0)
+    left = (100 * cos(radians(80)), 100 * sin(radians(80)), 0.0)
     right = (left[0], -left[1], 0.0)
-    both = bodies(body(1, "x", left), body(2, "x", right))
-    assert visible(view, both, looking()) == [True, True]
+    both = bodies(body(1, "x", left), body(2, "x", right)).rows()
+    assert are_visible(both, looking()) == [True, True]
     # With the left eye turned in, nothing sees the left body any more, and vice versa.
     turned = looking()._replace(eye_left_rad=(radians(-30), 0.0))
-    assert visible(view, both, turned) == [False, True]
+    assert are_visible(both, turned) == [False, True]
     turned = looking()._replace(eye_right_rad=(radians(30), 0.0))
-    assert visible(view, both, turned) == [True, False]
+    assert are_visible(both, turned) == [True, False]
 
 
 def test_ones_own_body_is_not_looked_at_however_it_moves() -> None:
@@ -204,35 +172,10 @@ def test_ones_own_body_is_not_looked_at_however_it_moves() -> None:
     model = attention()
     assert model.choose(percept(0.0, FACE, fist), looking(), 0.0).kind == "face"
     assert attention().choose(percept(0.0, fist), looking(), 0.0).kind == "rest"
-    view = FieldOfView(FieldOfViewParams(own_kinds=("arm",)))
-    arm = bodies(FACE, fist, body(3, "arm", (0.4, 0.1, -0.1)))
-    assert visible(view, arm, looking()) == [True, True, False]
-
-
-@pytest.mark.parametrize(
-    ("place", "seen"),
-    [((2.0, 0.0, 0.0), False), ((2.0, 0.15, 0.0), False), ((2.0, 0.25, 0.0), True),
-     ((0.5, 0.0, 0.0), True), ((1.05, 0.0, 0.0), True), ((1.0, 0.0, 0.0), True)],
-)  # fmt: skip
-def test_what_stands_behind_another_body_is_hidden(place: tuple[float, ...], seen: bool) -> None:
-    both = bodies(body(1, "thing", (1.0, 0.0, 0.0)), (2, "hand", place, (0, 0, 0)))
-    hiding = FieldOfView(FieldOfViewParams(occlusion=True))
-    assert visible(hiding, both, looking())[1] is seen
-    assert visible(FieldOfView(FieldOfViewParams()), both, looking()) == [True, True]
-
-
-def test_ones_own_hand_hides_and_the_body_around_the_eye_does_not() -> None:
-    view = FieldOfView(FieldOfViewParams(occlusion=True))
-    seen = bodies(body(1, "own", (0.3, 0, 0)), body(2, "face", (1, 0, 0)))
-    assert visible(view, seen, looking()) == [False, False]
-    around = bodies(body(1, "own", (0.05, 0, 0)), body(2, "face", (1, 0, 0)))
-    assert visible(view, around, looking()) == [False, True]
 
 
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
-    model = BottomUp(
-        BottomUpParams(form="literal", smoothing_s=0.0, translation_reference_rad_s=9.0)
-    )
+    model = BottomUp(BottomUpParams(form="literal", reference=9.0))
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
     seen = replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
@@ -244,11 +187,10 @@ def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
 
 
 def test_retinal_form_is_relative_to_the_moving_eye() -> None:
-    model = BottomUp(UNBOUNDED)
     seen = bodies(body(1, "x", (2, 0, 0), (0, 1, 0)), body(2, "x", (2, 0, 0)))
-    with_it = salience(model, seen, (0, 0, 0), 0.0, (0, 1, 0))
+    with_it = salience(BottomUp(BottomUpParams()), seen, (0, 0, 0), 9.0, (0, 1, 0))
     assert with_it.total.tolist() == [0.0, 1.0]  # what is stationary slides by 0.5 rad/s
-    coming = salience(model, seen, (0, 0, 0), 0.0, (2, 0, 0))
+    coming = salience(BottomUp(BottomUpParams()), seen, (0, 0, 0), 9.0, (2, 0, 0))
     assert coming.looming.tolist() == [2.0, 2.0]
 
 
@@ -257,13 +199,14 @@ def test_the_heads_own_motion_makes_what_stands_still_slide() -> None:
     here, there = looking(), looking()._replace(p_world_head_m=(0.0, 0.01, 0.0))
     model.choose(percept(0.0, FACE), here, 0.0)
     moved = model.choose(percept(0.05, FACE), there, 0.05)
-    assert moved.saliences[0].translation == pytest.approx(0.2 / 0.5, rel=0.01)
+    smoothed = 1.0 - exp(-0.05 / 0.1)
+    assert moved.saliences[0].translation == pytest.approx(0.2 / 0.5 * smoothed, rel=0.01)
     model.choose(percept(1.0, FACE), here, 1.0)  # too long ago for a speed
-    assert model.choose(percept(1.0, FACE), here, 1.0).saliences[0].translation == 0.0
+    assert model.choose(percept(1.0, FACE), here, 1.0).saliences[0].translation < 1e-4
 
 
 def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
-    model = BottomUp(BottomUpParams(onset_salience=0.8, onset_s=0.5))
+    model = BottomUp(BottomUpParams(onset_salience=0.8))
     first, second = body(1, "x", (1, 0, 0)), body(2, "x", (1, 0.3, 0))
     for k in range(11):
         assert salience(model, bodies(first), (0, 0, 0), k / 10).onset.tolist() == [0.0]
@@ -276,7 +219,7 @@ def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
 
 def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> None:
     for arrives, onset in ((0.2, 0.0), (0.4, 1.0)):
-        model = BottomUp(UNBOUNDED)
+        model = BottomUp(BottomUpParams())
         for k in range(round(arrives * 20)):
             salience(model, bodies(), (0, 0, 0), k / 20)
         assert salience(model, bodies(FACE), (0, 0, 0), arrives).onset.tolist() == [onset]
@@ -284,19 +227,20 @@ def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> 
 
 @pytest.mark.parametrize(("from_s", "onset"), [(0.3, 0.0), (0.7, 1.0)])
 def test_what_moves_in_the_first_moments_has_not_just_begun_to(from_s: float, onset: float) -> None:
-    model = BottomUp(BottomUpParams(smoothing_s=0.0))
+    model = BottomUp(BottomUpParams())
     found = []
     for k in range(20):
         speed = 1.0 if k / 20 >= from_s else 0.0
         seen = bodies(body(1, "hand", (1.0, 0.0, 0.0), (0.0, speed, 0.0)))
-        found.append(float(salience(model, seen, (0, 0, 0), k / 20).onset[0]))
+        now = salience(model, seen, (0, 0, 0), k / 20, limit=model.limit())
+        found.append(float(now.onset[0]))
     assert max(found) == pytest.approx(onset)
 
 
 @pytest.mark.parametrize(("gap_s", "onset"), [(0.1, 0.0), (0.29, 0.0), (0.4, 1.0)])
 @pytest.mark.parametrize("how", ["missed", "out of the field"])
 def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset: float) -> None:
-    model = BottomUp(replace(UNBOUNDED, smoothing_s=1.0))
+    model = BottomUp(BottomUpParams())
     moving = bodies(body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(21):
         before = salience(model, moving, (0, 0, 0), k / 10).translation[0]
@@ -313,7 +257,7 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
 
 
 def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
-    model = BottomUp(UNBOUNDED)
+    model = BottomUp(BottomUpParams())
     for k in range(11):
         salience(model, bodies(FACE), (0, 0, 0), k / 10)
     back = salience(model, bodies(FACE, body(8, "face", (1, 1, 0))), (0, 0, 0), 3.0)
@@ -321,11 +265,8 @@ def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
 
 
 def test_a_pause_of_the_camera_keeps_smoothed_motion() -> None:
-    model, moving = (
-        BottomUp(replace(UNBOUNDED, smoothing_s=2.0)),
-        body(1, "x", (1, 0, 0), (0, 1, 0)),
-    )
+    model, moving = BottomUp(BottomUpParams()), body(1, "x", (1, 0, 0), (0, 1, 0))
     for k in range(100):
         before = salience(model, bodies(moving), (0, 0, 0), k / 10).translation[0]
     still = salience(model, bodies(body(1, "x", (1, 0, 0))), (0, 0, 0), 10.4)
-    assert still.translation[0] == pytest.approx(before * exp(-0.5 / 2.0))
+    assert still.translation[0] == pytest.approx(before * exp(-0.5 / 0.1))

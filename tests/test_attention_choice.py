@@ -8,11 +8,7 @@ import pytest
 from attention_scene import FACE, attention, body, looking, percept, waving
 
 from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
-from gazerig.gaze.attention.idle import Idle, IdleParams
-from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Salience, Target
 
 
@@ -20,9 +16,7 @@ def by(
     look_at: str, salience: float = 0.9, point_world_m: tuple[float, float, float] | None = None
 ) -> Attention:
     rule = Rule(look_at, salience, point_world_m)
-    model = attention()
-    model.top_down = TopDown(TopDownParams(behaviour="wait", rules={"wait": rule}))
-    return model
+    return attention(TopDownParams(behaviour="wait", rules={"wait": rule}))
 
 
 def test_a_rule_may_name_one_body() -> None:
@@ -41,14 +35,14 @@ def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
             0.9,
             "point: rule wait 0.90",
         )
-    model = by("point", point_world_m=(1.0, 0.5, 0.6))
+    model = by("point", 0.5, (1.0, 0.5, 0.6))
     model.choose(waving(0.0, 0.0), looking(), 0.0)
-    assert model.choose(waving(0.5, 2.0), looking(), 0.5).kind == "hand"
+    assert model.choose(waving(0.7, 2.0), looking(), 0.7).kind == "hand"
 
 
 @pytest.mark.parametrize(
     ("look_at", "point", "rule"),
-    [("id:x", None, "does not name an id"), ("id:", None, "does not name an id"), ("point", None, "go together"),
+    [("id:x", None, 'e.g. "id:7"'), ("id:", None, 'e.g. "id:7"'), ("point", None, "go together"),
      ("face", (1.0, 0.0, 0.0), "go together")],
 )  # fmt: skip
 def test_a_rule_says_one_thing(
@@ -77,17 +71,14 @@ def test_a_change_of_mind_does_not_wait_for_the_end_of_a_fixation() -> None:
 def test_every_decision_carries_the_pulls_of_the_winner_and_the_next_three() -> None:
     model = attention()
     rows = [body(k, "hand", (1.0, 0.1 * k, 0.0), (0.0, 0.02 * k, 0.0)) for k in range(2, 9)]
-    target = model.choose(percept(0.0, FACE, *rows), looking(), 0.0)
+    target = model.choose(percept(9.0, FACE, *rows), looking(), 9.0)
     assert [salience.id for salience in target.saliences] == [1, 8, 7, 6]
     face, hand = target.saliences[:2]
     assert face == Salience(1, "face", 0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.5)
     d = hypot(1.0, 0.8)
     assert hand.translation == pytest.approx(0.16 / d / d / 0.5)
     assert hand.looming == pytest.approx(0.16 * 0.8 / d / d / 0.5)
-    for salience in target.saliences:
-        moving = salience.translation + salience.looming + salience.rotation + salience.onset
-        assert salience.total == pytest.approx(max(moving, salience.rule) * salience.habituation)
-    assert len(model.choose(percept(0.1, FACE), looking(), 0.1).saliences) == 1
+    assert len(model.choose(percept(9.1, FACE), looking(), 9.1).saliences) == 1
 
 
 def test_the_winner_comes_first_even_while_it_is_only_favoured() -> None:
@@ -101,25 +92,26 @@ def test_the_winner_comes_first_even_while_it_is_only_favoured() -> None:
 def test_the_strongest_of_a_crowd_are_listed_in_order() -> None:
     rng = np.random.default_rng(8)
     rows = [body(k, "x", (2.0, 0.0, 0.0), (0.0, v, 0.0)) for k, v in enumerate(rng.random(500))]
-    target = attention().choose(percept(0.0, *rows), looking(), 0.0)
+    target = attention().choose(percept(9.0, *rows), looking(), 9.0)
     speeds = sorted((row[3][1] for row in rows), reverse=True)
     assert [salience.translation for salience in target.saliences] == pytest.approx(speeds[:4])
 
 
 def test_boredom_changes_the_comparison_and_moves_no_head() -> None:
     model = attention()
-    looks = [model.choose(waving(k / 30, 1.0), looking(), k / 30) for k in range(60)]
+    times = [9.0 + k / 30 for k in range(30)]
+    looks = [model.choose(waving(t, 1.0), looking(), t) for t in times]
     assert {look.kind for look in looks} == {"hand"}
     assert looks[-1].salience == pytest.approx(looks[0].salience)
-    assert looks[-1].saliences[0].habituation == pytest.approx(1.0 - 0.2 * 59 / 30)
+    assert looks[-1].saliences[0].habituation == pytest.approx(1.0 - 0.2 * 29 / 30)
 
 
 def test_a_target_that_leaves_the_field_is_left() -> None:
     model = attention()
-    moved = percept(0.0, FACE, body(2, "hand", (0.8, 0.3, -0.1), (0.0, 2.0, 0.0)))
-    assert model.choose(moved, looking(), 0.0).kind == "hand"
-    gone = percept(0.1, FACE, body(2, "hand", (-0.5, 0.3, -0.1), (0.0, 2.0, 0.0)))
-    assert model.choose(gone, looking(), 0.1).kind == "face"
+    moved = percept(9.0, FACE, body(2, "hand", (0.8, 0.3, -0.05), (0.0, 2.0, 0.0)))
+    assert model.choose(moved, looking(), 9.0).kind == "hand"
+    gone = percept(9.1, FACE, body(2, "hand", (-0.5, 0.3, -0.05), (0.0, 2.0, 0.0)))
+    assert model.choose(gone, looking(), 9.1).kind == "face"
 
 
 # The tests of Mitake et al. 4, on bodies alone: a face with two fists at the chin, looked at
@@ -139,13 +131,7 @@ def boxer(t: float, face: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> list[
 
 def lived(scene: Callable[[float], list[Row]], seconds: float) -> list[tuple[float, Target]]:
     """Look at a scene of places; velocities are their differences."""
-    model = Attention(
-        AttentionParams(),
-        FieldOfView(FieldOfViewParams()),
-        BottomUp(BottomUpParams()),
-        TopDown(TopDownParams()),
-        Idle(IdleParams()),
-    )
+    model = attention()
     looks = []
     for k in range(round(30 * seconds)):
         t = k / 30

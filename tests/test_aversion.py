@@ -2,17 +2,19 @@
 
 from itertools import pairwise
 from math import atan2, degrees, inf
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from gazerig.gaze.angles import angle_between, sub, unit
-from gazerig.gaze.attention.aversion import (
+from gazerig.gaze.attention.conversation import (
     DIRECTIONS_PERCENT,
-    Aversion,
-    AversionMode,
     AversionParams,
+    ConversationGaze,
+    ConversationParams,
+    LooksAway,
 )
 from gazerig.gaze.types import Target, Vec3
 
@@ -28,8 +30,13 @@ def face(shift: int = 1, name: int = 4) -> Target:
     )
 
 
-def aversion(seed: int = 0, **params: float) -> Aversion:
-    return Aversion(AversionParams(**params), np.random.default_rng(seed))
+ATTENTION: Any = SimpleNamespace(converse=lambda *of: None)
+PARAMS = AversionParams(), ConversationParams()
+
+
+def aversion(seed: int = 0, looks_away: LooksAway = "people") -> ConversationGaze:
+    rngs = (np.random.default_rng((seed, n)) for n in range(2))
+    return ConversationGaze(looks_away, *PARAMS, ATTENTION, *rngs)
 
 
 class Stay(NamedTuple):
@@ -40,12 +47,12 @@ class Stay(NamedTuple):
     place: Vec3
 
 
-def stays(model: Aversion, seconds: float, dt: float = DT) -> list[Stay]:
+def stays(model: ConversationGaze, seconds: float, dt: float = DT) -> list[Stay]:
     """Run on one face and give the complete stays."""
     found, since = [], 0.0
-    last = model.step(face(), HEAD, 0.0)
+    last = model.look(face(), HEAD, 0.0)
     for k in range(1, round(seconds / dt)):
-        now = model.step(face(), HEAD, k * dt)
+        now = model.look(face(), HEAD, k * dt)
         if now.kind != last.kind:
             found.append(Stay(last.kind, k * dt - since, last.p_world_m))
             since = k * dt
@@ -59,10 +66,10 @@ def stays(model: Aversion, seconds: float, dt: float = DT) -> list[Stay]:
 )
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_e54_mutual_gaze(
-    mode: AversionMode, bout: float, bout_band: float, share: float, share_band: float, seed: int
+    mode: str, bout: float, bout_band: float, share: float, share_band: float, seed: int
 ) -> None:
     model = aversion(seed)
-    model.converse(mode, 0.0)
+    model.choose_mode(mode, 0.0)
     found = stays(model, 600.0)
     mutual = [s.seconds for s in found if s.kind == "face"]
     away = [s.seconds for s in found if s.kind == "away"]
@@ -73,27 +80,29 @@ def test_e54_mutual_gaze(
 
 def test_long_times_keep_the_measured_spread() -> None:
     model = aversion(5)
-    model.converse("talk", 0.0)
+    model.choose_mode("talk", 0.0)
     away = [s.seconds for s in stays(model, 10_000.0, 0.05) if s.kind == "away"]
     assert np.mean(away) == pytest.approx(0.93, rel=0.05)
     assert np.std(away) == pytest.approx(0.80, rel=0.15)
     assert min(away) >= 0.2 - 1e-9
 
 
-def test_who_never_looks_away_in_silence_passes_targets_untouched() -> None:
-    model, target = aversion(silent_mutual_s=0.0), face()
+def test_who_never_looks_away_passes_targets_untouched() -> None:
+    model, target = aversion(looks_away="none"), face()
     for k in range(5000):
-        assert model.step(target, HEAD, k * DT) is target
+        if k == 1000:
+            model.choose_mode("think", k * DT)
+        assert model.look(target, HEAD, k * DT) is target
 
 
 def test_only_faces_are_looked_away_from() -> None:
     model = aversion()
-    model.converse("talk", 0.0)
+    model.choose_mode("talk", 0.0)
     hand = face()._replace(kind="hand")
-    assert all(model.step(hand, HEAD, k * DT) is hand for k in range(3000))
+    assert all(model.look(hand, HEAD, k * DT) is hand for k in range(3000))
 
 
-def angles_and_ways(model: Aversion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def angles_and_ways(model: ConversationGaze, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Return distance and direction of the stays, 0 right and 90 up, degrees."""
     to_face = unit(sub(FACE, HEAD))
     found = [s.place for s in stays(model, seconds, 0.1) if s.kind == "away"]
@@ -107,8 +116,8 @@ def angles_and_ways(model: Aversion, seconds: float) -> tuple[np.ndarray, np.nda
 
 def test_how_far_away_follows_the_published_law() -> None:
     """Beyond the face's outline, whose height is 8 deg here with what is kept beside it."""
-    model = aversion(7, least_deg=0.0)
-    model.converse("talk", 0.0)
+    model = aversion(7)
+    model.choose_mode("talk", 0.0)
     far, _ = angles_and_ways(model, 20_000.0)
     beyond = far[far > 9.0] - 9.0
     assert beyond.mean() == pytest.approx(6.9 * (1.0 - np.exp(-18.5 / 6.9)), abs=0.4)
@@ -122,7 +131,7 @@ def test_a_look_away_passes_beside_the_face_however_near_it_is(distance_m: float
     near = face()._replace(p_world_m=(0.05 + distance_m, 0.0, 0.2), centre_world_m=None)
     places = set()
     for k in range(20_000):
-        target = model.step(near, HEAD, 0.05 * k)
+        target = model.look(near, HEAD, 0.05 * k)
         if target.kind == "away":
             places.add(target.p_world_m)
     assert len(places) > 100
@@ -135,18 +144,18 @@ def test_a_look_away_passes_beside_the_face_however_near_it_is(distance_m: float
 def test_a_look_away_leaves_when_the_rest_on_a_part_is_over() -> None:
     model = aversion(4)
     for k in range(4000):
-        assert model.step(face(), HEAD, 0.01 * k, rests_until_s=inf).kind == "face"
-    assert model.step(face(), HEAD, 40.0, rests_until_s=40.1).kind == "face"
-    assert model.step(face(), HEAD, 40.1, rests_until_s=40.1).kind == "away"
+        assert model.look(face(), HEAD, 0.01 * k, rests_until_s=inf).kind == "face"
+    assert model.look(face(), HEAD, 40.0, rests_until_s=40.1).kind == "face"
+    assert model.look(face(), HEAD, 40.1, rests_until_s=40.1).kind == "away"
     # It returns when its own time is over, whatever the walk over the face chooses.
-    later = [model.step(face(), HEAD, 40.1 + 0.01 * k, rests_until_s=inf).kind for k in range(400)]
+    later = [model.look(face(), HEAD, 40.1 + 0.01 * k, rests_until_s=inf).kind for k in range(400)]
     assert later.index("face") > 15
 
 
 @pytest.mark.parametrize(("mode", "most"), [("talk", 27.5), ("listen", 22.7), ("think", 27.5)])
-def test_away_is_beside_the_face_and_within_the_cap(mode: AversionMode, most: float) -> None:
+def test_away_is_beside_the_face_and_within_the_cap(mode: str, most: float) -> None:
     model = aversion(8)
-    model.converse(mode, 0.0)
+    model.choose_mode(mode, 0.0)
     far, _ = angles_and_ways(model, 4000.0)
     assert far.min() >= 5.0 - 1e-6 and far.max() <= most + 1e-6
     assert far.mean() > 9.0
@@ -154,7 +163,7 @@ def test_away_is_beside_the_face_and_within_the_cap(mode: AversionMode, most: fl
 
 def test_directions_are_those_of_the_table() -> None:
     model = aversion(9)
-    model.converse("talk", 0.0)
+    model.choose_mode("talk", 0.0)
     _, ways = angles_and_ways(model, 16_000.0)
     counts = np.bincount(((ways + 22.5) // 45.0).astype(int) % 8, minlength=8)
     expected = np.array(DIRECTIONS_PERCENT) / 100.0
@@ -162,17 +171,17 @@ def test_directions_are_those_of_the_table() -> None:
 
 
 @pytest.mark.parametrize("before", ["none", "talk", "listen"])
-def test_thinking_looks_away_at_once(before: AversionMode) -> None:
+def test_thinking_looks_away_at_once(before: str) -> None:
     model = aversion(10)
-    model.converse(before, 0.0)
-    assert model.step(face(), HEAD, 0.0).kind == "face"
-    model.converse("think", 0.01)
-    assert model.step(face(), HEAD, 0.02).kind == "away"
+    model.choose_mode(before, 0.0)
+    assert model.look(face(), HEAD, 0.0).kind == "face"
+    model.choose_mode("think", 0.01)
+    assert model.look(face(), HEAD, 0.02).kind == "away"
 
 
 def test_thinking_looks_mostly_up_and_for_longer() -> None:
     model = aversion(10)
-    model.converse("think", 0.0)
+    model.choose_mode("think", 0.0)
     found = [s for s in stays(model, 3000.0, 0.05) if s.kind == "away"]
     assert np.mean([s.seconds for s in found]) == pytest.approx(3.54, abs=0.3)
     assert np.std([s.seconds for s in found]) == pytest.approx(1.26, abs=0.25)
@@ -181,9 +190,9 @@ def test_thinking_looks_mostly_up_and_for_longer() -> None:
 
 def test_a_place_away_keeps_the_head_with_the_person() -> None:
     model = aversion(11)
-    model.converse("think", 0.0)
-    model.step(face(), HEAD, 0.0)
-    seen = [model.step(face(), HEAD, k * DT) for k in range(500)]
+    model.choose_mode("think", 0.0)
+    model.look(face(), HEAD, 0.0)
+    seen = [model.look(face(), HEAD, k * DT) for k in range(500)]
     away = next(t for t in seen if t.kind == "away")
     assert (away.id, away.part, away.top_down, away.centre_world_m) == (4, None, True, FACE)
     assert away.v_world_m_s == (0.0, 0.0, 0.0)
@@ -194,9 +203,9 @@ def test_a_place_away_keeps_the_head_with_the_person() -> None:
 
 def test_every_leave_and_return_is_one_new_shift_and_the_count_never_falls() -> None:
     model = aversion(12)
-    model.converse("talk", 0.0)
+    model.choose_mode("talk", 0.0)
     # The part beneath changes every 0.4 s, also while the gaze is away.
-    seen = [model.step(face(k // 20), HEAD, k * DT) for k in range(5000)]
+    seen = [model.look(face(k // 20), HEAD, k * DT) for k in range(5000)]
     turns = 0
     for before, now in pairwise(seen):
         assert now.shift >= before.shift
@@ -206,55 +215,47 @@ def test_every_leave_and_return_is_one_new_shift_and_the_count_never_falls() -> 
         elif now.kind == "away":
             assert now == before._replace(at_s=now.at_s)
     assert turns > 20
-    model.converse("none", 100.0)
-    after = model.step(face(250), HEAD, 100.02)
+    model.choose_mode("none", 100.0)
+    after = model.look(face(250), HEAD, 100.02)
     assert after.kind == "face" and after.shift > seen[-1].shift - 1
     assert after == face(250)._replace(shift=after.shift)
 
 
 def test_another_face_is_looked_at_before_it_is_looked_away_from() -> None:
     model = aversion(13)
-    model.converse("think", 0.0)
+    model.choose_mode("think", 0.0)
     t = 0.0
-    while model.step(face(), HEAD, t).kind == "face":
+    while model.look(face(), HEAD, t).kind == "face":
         t += DT
-    other = model.step(face(2, name=5), HEAD, t + DT)
+    other = model.look(face(2, name=5), HEAD, t + DT)
     assert (other.kind, other.id) == ("face", 5)
-    assert model.step(face(2, name=5), HEAD, t + 2 * DT).kind == "face"
+    assert model.look(face(2, name=5), HEAD, t + 2 * DT).kind == "face"
 
 
 def test_a_change_of_the_conversation_returns_to_the_face() -> None:
     model = aversion(14)
-    model.converse("think", 0.0)
+    model.choose_mode("think", 0.0)
     t = 0.0
-    while model.step(face(), HEAD, t).kind == "face":
+    while model.look(face(), HEAD, t).kind == "face":
         t += DT
-    model.converse("listen", t)
-    assert model.mode == "listen"
-    assert {model.step(face(), HEAD, t + k * DT).kind for k in range(50)} == {"face"}
-    model.converse("listen", t + 1.0)  # the same again changes nothing
-    with pytest.raises(ValueError, match="modes: none, talk, listen, think"):
-        model.converse("sing", t)  # type: ignore[arg-type]
+    model.choose_mode("listen", t)
+    assert {model.look(face(), HEAD, t + k * DT).kind for k in range(50)} == {"face"}
+    model.choose_mode("listen", t + 1.0)  # the same again changes nothing
 
 
 def test_a_face_straight_above_has_places_beside_it() -> None:
     model = aversion(15)
-    model.converse("think", 0.0)
+    model.choose_mode("think", 0.0)
     above = face()._replace(p_world_m=(0.05, 0.0, 1.2), centre_world_m=None)
-    away = next(t for k in range(1000) if (t := model.step(above, HEAD, k * DT)).kind == "away")
+    away = next(t for k in range(1000) if (t := model.look(above, HEAD, k * DT)).kind == "away")
     angle = angle_between((0.0, 0.0, 1.0), sub(away.p_world_m, HEAD))
     assert 5.0 - 1e-6 <= degrees(angle) <= 27.5 + 1e-6
-
-
-def test_limits_that_contradict_are_refused() -> None:
-    with pytest.raises(ValueError, match="least_deg"):
-        AversionParams(least_deg=20.0, listen_most_deg=10.0)
 
 
 def test_same_dice_same_looks() -> None:
     def run(seed: int) -> list[Stay]:
         model = aversion(seed)
-        model.converse("talk", 0.0)
+        model.choose_mode("talk", 0.0)
         return stays(model, 60.0)
 
     assert run(1) == run(1) != run(2)
@@ -262,11 +263,11 @@ def test_same_dice_same_looks() -> None:
 
 def test_reset_forgets_and_keeps_the_mode() -> None:
     model = aversion(16)
-    model.converse("talk", 0.0)
+    model.choose_mode("talk", 0.0)
     stays(model, 30.0)
     model.reset(40.0)
-    assert model.mode == "talk"
-    assert model.step(face(), HEAD, 40.0) == face()
+    assert model.chosen_mode == "talk"
+    assert model.look(face(), HEAD, 40.0) == face()
 
 
 # ---- without a conversation -----------------------------------------------------------
@@ -285,23 +286,39 @@ def test_silent_bouts_of_mutual_gaze_last_as_long_as_people_prefer() -> None:
 def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> None:
     model = aversion(18)
     t = 0.0
-    while model.step(face(), HEAD, t).kind == "face":
+    while model.look(face(), HEAD, t).kind == "face":
         t += DT
-    looks = [model.step(face(), HEAD, t + k * DT, ordered=True) for k in range(1000)]
+    looks = [model.look(face(), HEAD, t + k * DT, ordered=True) for k in range(1000)]
     assert {look.kind for look in looks} == {"face"}
     t += 20.0
-    again = [model.step(face(), HEAD, t + k * DT).kind for k in range(1000)]
+    again = [model.look(face(), HEAD, t + k * DT).kind for k in range(1000)]
     assert again[0] == "face" and "away" in again
-    model.converse("talk", t + 20.0)
-    kinds = {model.step(face(), HEAD, t + 20.0 + k * DT, ordered=True).kind for k in range(2000)}
+    model.choose_mode("talk", t + 20.0)
+    kinds = {model.look(face(), HEAD, t + 20.0 + k * DT, ordered=True).kind for k in range(2000)}
     assert kinds == {"face", "away"}
 
 
 def test_looking_away_in_silence_can_be_switched_on_and_off_while_it_runs() -> None:
-    model = aversion(19, silent_mutual_s=0.0)
+    model = aversion(19, looks_away="none")
     assert {s.kind for s in stays(model, 60.0)} == set()
-    model.retune(AversionParams())
-    assert "away" in {model.step(face(), HEAD, 60.0 + k * DT).kind for k in range(1000)}
-    model.retune(AversionParams(silent_mutual_s=0.0))
-    kinds = [model.step(face(), HEAD, 90.0 + k * DT).kind for k in range(2000)]
-    assert set(kinds[1000:]) == {"face"}
+    model.retune("people", *PARAMS)
+    assert "away" in {model.look(face(), HEAD, 60.0 + k * DT).kind for k in range(1000)}
+    model.retune("none", *PARAMS)
+    assert {model.look(face(), HEAD, 90.0 + k * DT).kind for k in range(2000)} == {"face"}
+
+
+def test_turns_look_aside_or_as_in_eyes_alive_and_for_the_given_times() -> None:
+    ways = {}
+    laws: tuple[LooksAway, ...] = ("people", "eyes_alive")
+    for law in laws:
+        model = aversion(20, law)
+        model.enter("thinking", None, None, 0.0, 0.0)
+        ways[law] = np.mean([abs((way + 90.0) % 180.0 - 90.0) < 40.0
+                             for way in angles_and_ways(model, 3000.0)[1]])  # fmt: skip
+    assert ways["people"] > 0.7 and ways["eyes_alive"] < 0.3
+    model = aversion(21)
+    model.retune("people", AversionParams(speaking_s=(1.5, 4.0)), ConversationParams())
+    model.enter("speaking", None, None, 0.0, 0.0)
+    found = stays(model, 3000.0, 0.05)
+    for kind, mean_s in (("face", 1.5), ("away", 4.0)):
+        assert np.mean([s.seconds for s in found if s.kind == kind]) == pytest.approx(mean_s, 0.1)

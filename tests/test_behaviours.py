@@ -176,12 +176,7 @@ def test_no_wave_no_feint_and_no_hand_from_aside_is_guarded_against(boxing: Live
 @pytest.mark.parametrize("planned", [True, False])
 def test_without_the_pull_of_motion_the_planner_alone_brings_the_gaze_there(planned: bool) -> None:
     rig = load_rig("desk")
-    dull = replace(
-        rig.gaze.bottom_up,
-        translation_reference_rad_s=20.0,
-        looming_reference_1_s=20.0,
-        rotation_reference_rad_s=100.0,
-    )
+    dull = replace(rig.gaze.bottom_up, form="none")
     rig = replace(
         rig, gaze=replace(rig.gaze, bottom_up=dull), loop=replace(rig.loop, rate_hz=100.0)
     )

@@ -15,7 +15,6 @@ from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
-from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.types import Bodies, GazeState, Percept
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -41,12 +40,14 @@ def hands_about_a_face(t_s: float) -> Percept:
 
 
 def face_share(gaze: GazeConfig, seconds: float = 60.0) -> float:
+    rng = np.random.default_rng(0)
     model = Attention(
-        gaze.attention,
-        FieldOfView(gaze.field_of_view),
+        replace(gaze.attention, reaction="none"),
         BottomUp(gaze.bottom_up),
         TopDown(gaze.top_down),
-        Idle(gaze.idle),
+        Idle(gaze.idle, rng),
+        rng,
+        rng,
     )
     times = [k / 15 for k in range(round(15 * seconds))]
     kinds = [model.choose(hands_about_a_face(t), AHEAD, t).kind for t in times]

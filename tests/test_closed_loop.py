@@ -22,7 +22,7 @@ from gazerig.sim_mock.cameras.rendered import PixelCameraParams
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_error_rad, true_part
 
 KEEPS_TO_THE_FACE: dict[str, Value] = {
-    "gaze.aversion.silent_mutual_s": 0.0,
+    "gaze.looks_away": "none",
     "gaze.head.goal_model": "attention",
 }
 """The gaze stays on the face, on which it is measured; the head turns nearly all the way."""

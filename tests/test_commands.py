@@ -11,9 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.attention.aversion import Aversion, AversionParams
+from gazerig.gaze.attention.conversation import (
+    AversionParams,
+    ConversationGaze,
+    ConversationParams,
+)
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.attention.turn_gaze import TurnGaze, TurnParams
 from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.gaze.track.expression import Expressions
 from gazerig.gaze.track.track import TrackParams
@@ -221,9 +224,10 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there() -> None:
     for mode in ("talk", "none"):
         lids = Lids(LidParams(), np.random.default_rng(1))
         none = TrackChoices({}, TrackPlayer(0), TrackParams(), ("eyes_pan",), {})
-        aversion = Aversion(AversionParams(), np.random.default_rng(2))
         unused: Any = None  # no turn is reported
-        turns = TurnGaze(TurnParams(), aversion, unused, np.random.default_rng(3))
+        rngs = (np.random.default_rng(n) for n in (2, 3))
+        params = AversionParams(), ConversationParams()
+        turns = ConversationGaze("people", *params, unused, *rngs)
         menus = Menus(turns, lids, Expressions({}, 0.5, 0), none)
         menus.choose(Ask("conversation", mode), TopDown(TopDownParams()), 0.0)
         blinks[mode] = blinks_in_two_minutes(lids)

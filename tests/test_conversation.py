@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from math import inf, nan, radians
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,12 @@ from commanded_robot import Running, running_desk
 import gazerig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between
-from gazerig.gaze.attention.aversion import Aversion, AversionParams
-from gazerig.gaze.attention.turn_gaze import NOD
+from gazerig.gaze.attention.conversation import (
+    NOD,
+    AversionParams,
+    ConversationGaze,
+    ConversationParams,
+)
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
@@ -280,17 +285,25 @@ def test_a_websocket_renews_what_its_program_controls() -> None:
         assert program.held == held and program.who == message["who"]
 
 
+def gaze(seed: int) -> ConversationGaze:
+    attention: Any = SimpleNamespace(converse=lambda *of: None)
+    rngs = (np.random.default_rng((seed, n)) for n in range(2))
+    return ConversationGaze("people", AversionParams(), ConversationParams(), attention, *rngs)
+
+
+def person(at_m: Vec3, t_s: float = 0.0) -> Target:
+    return Target(at_m, (0.0, 0.0, 0.0), t_s, "face", 1, 1.0, True, None, 0, "a person")
+
+
 def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
-    aversion = Aversion(AversionParams(), np.random.default_rng(2))
-    head, still = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    model, head = gaze(2), (0.0, 0.0, 0.0)
 
     def look(at_m: Vec3, t_s: float) -> Target:
-        face = Target(at_m, still, t_s, "face", 1, 1.0, True, None, 0, "a person")
-        return aversion.step(face, head, t_s)
+        return model.look(person(at_m, t_s), head, t_s)
 
     ahead = (1.0, 0.0, 0.0)
     look(ahead, 0.0)
-    aversion.converse("thinking", 0.0, averts=True)
+    model.enter("thinking", None, None, 0.0, 0.0)
     away = look(ahead, 0.1)
     assert away.kind == "away" and look(ahead, 0.2).p_world_m == away.p_world_m
     moved = look(away.p_world_m, 0.3)  # the face is where the gaze was
@@ -299,12 +312,13 @@ def test_a_look_away_stays_beside_a_face_that_moves_into_it() -> None:
 
 
 def test_a_look_over_two_turns_is_no_stare() -> None:
-    rng = np.random.default_rng(1)
-    aversion = Aversion(AversionParams(), rng)
-    face = Target((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, "face", 1, 1.0, True, None, 0, "a person")
-    aversion.step(face, (0.0, 0.0, 0.0), 0.0)
-    aversion.converse("speaking", 0.0)
-    aversion.keep_face(0.0, 20.0)
-    aversion.converse("listening", 10.0)
-    kinds = [aversion.step(face, (0.0, 0.0, 0.0), 10.0 + 0.1 * n).kind for n in range(49)]
+    model, head, face = gaze(1), (0.0, 0.0, 0.0), person((1.0, 0.0, 0.0))
+    model.look(face, head, 0.0)
+    model.enter("speaking", None, 10.0, 1.0, 0.0)
+    model.look(face, head, 0.5)
+    model.step(8.5)  # on the face before the end
+    kinds = [model.look(face, head, 8.5 + 0.1 * n).kind for n in range(15)]
+    assert set(kinds) == {"face"}
+    model.enter("listening", None, None, 0.0, 10.0)
+    kinds = [model.look(face, head, 10.0 + 0.1 * n).kind for n in range(145)]
     assert kinds[0] == "face" and "away" in kinds

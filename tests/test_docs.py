@@ -358,7 +358,7 @@ def test_the_glossary_has_a_line_for_every_section_of_gaze() -> None:
     assert terms == sorted(terms, key=str.lower) and len(set(terms)) == len(terms)
     # The sections whose names are terms of the field; the others are plain words.
     sections = {field.name for field in fields(GazeConfig)} - {
-        "field_of_view", "chooser", "attention", "idle", "breathing", "lids", "mouth", "oculomotor",
+        "chooser", "attention", "idle", "breathing", "lids", "mouth", "oculomotor",
     }  # fmt: skip
     named = set(re.findall(r"`gaze\.(\w+)", text)) | {"tracks" for term in terms if term == "track"}
     assert sections <= named

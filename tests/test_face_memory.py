@@ -35,14 +35,14 @@ def _speaking(id: int) -> Face:
     return Face(id, p, (0.0, 0.0, 0.0), rotation((pi, 0.0, 0.0)), (p,) * 8, 0.9, speaks=True)
 
 
-@pytest.mark.parametrize(("memory_s", "kind"), [(15.0, "face"), (0.0, "hand")])
+@pytest.mark.parametrize(("social", "kind"), [("people", "face"), ("none", "hand")])
 def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there(
-    memory_s: float, kind: str
+    social: str, kind: str
 ) -> None:
-    model = attention(face_memory_s=memory_s)
+    model = attention(social=social)
     looks(model, [FACE], 0.0, 0.5)
     assert looks(model, [FACE, HAND], 0.5, 0.5)[-1].kind == "hand"
-    assert looks(model, [HAND], 1.0, 1.0)[-1].kind == "hand"
+    looks(model, [HAND], 1.0, 1.0)
     after = looks(model, [], 2.0, 0.5)[-1]
     assert after.kind == kind
     if kind == "face":
@@ -74,13 +74,13 @@ def test_after_a_cut_nobody_is_looked_for_where_they_were(cut: bool) -> None:
 def test_memory_lasts_as_long_as_it_is_told_and_no_longer() -> None:
     memory = FaceMemory()
     both, one = percept(0.0, HAND, OTHER).bodies, percept(0.0, HAND).bodies
-    assert memory.step(both, 3, 0.0, 5.0) is both
-    assert memory.step(one, 3, 1.0, 5.0).ids == (3, 2)
-    assert memory.step(one, 3, 5.0, 5.0).ids == (3, 2)
-    assert memory.step(one, 3, 5.1, 5.0) is one
-    memory.step(both, 3, 6.0, 5.0)
+    assert memory.step(both, 3, 0.0) is both
+    assert memory.step(one, 3, 1.0).ids == (3, 2)
+    assert memory.step(one, 3, 15.0).ids == (3, 2)
+    assert memory.step(one, 3, 15.1) is one
+    memory.step(both, 3, 16.0)
     memory.reset()
-    assert memory.step(one, 3, 6.1, 5.0) is one
+    assert memory.step(one, 3, 16.1) is one
 
 
 @pytest.mark.parametrize("talked", [False, True])

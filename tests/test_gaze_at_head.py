@@ -156,13 +156,15 @@ def percept_of(t_s: float, *rows: Face) -> Percept:
     return Percept(t_s, Bodies(ids, ("face",) * n, places, still, still, np.full(n, 0.1)), rows)
 
 
-@pytest.mark.parametrize(("ratio", "looked_at"), [(0.85, [(2,), (1,)]), (1.0, [(1, 2), (1, 2)])])
+@pytest.mark.parametrize(
+    ("social", "looked_at"), [("people", [(2,), (1,)]), ("none", [(1, 2), (1, 2)])]
+)
 def test_of_two_faces_the_one_that_looks_at_the_head_gets_more(
-    ratio: float, looked_at: list[tuple[int, ...]]
+    social: str, looked_at: list[tuple[int, ...]]
 ) -> None:
     left, right = (1.0, 0.2, 0.0), (1.0, -0.2, 0.0)
     for (one, other), first in zip([(False, True), (True, False)], looked_at, strict=True):
-        model = attention(looks_elsewhere_ratio=ratio)
+        model = attention(social=social)
         looks = [
             model.choose(
                 percept_of(k / 30, face_at(1, left, one), face_at(2, right, other)),

@@ -94,4 +94,4 @@ def test_a_world_with_a_boxer_is_looked_at_by_both_and_others_are_not() -> None:
         (RunOptions(mock=True, scene="visitor"), False, False),
     ):
         made = with_options(rig, options)
-        assert (made.gaze.top_down.planner.enabled, made.motion.gloves) == (planned, gloves)
+        assert (made.gaze.top_down.planner, made.motion.gloves) == (planned, gloves)

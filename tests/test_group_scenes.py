@@ -55,22 +55,16 @@ def test_the_pinwheel_turns_as_fast_as_it_says() -> None:
     assert cos(angles[-1]) == pytest.approx(cos(11.0 * 1.5), abs=1e-3) and angles[-1] > pi
 
 
-@pytest.mark.parametrize(("reference", "looks"), [(3.0, True), (100.0, False)])
-def test_e80_what_spins_draws_the_gaze_by_its_spin_alone(reference: float, looks: bool) -> None:
+def test_e80_what_spins_draws_the_gaze_by_its_spin() -> None:
     rig = load_rig("desk")
-    bottom_up = replace(rig.gaze.bottom_up, rotation_reference_rad_s=reference)
-    gaze = replace(rig.gaze, bottom_up=bottom_up)
-    rig = replace(rig, gaze=gaze, loop=replace(rig.loop, rate_hz=50.0))
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
     scene, (start_s, end_s) = load_scene("two-people"), SPIN_S
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="two-people"))
     lived = Lived(made, scene, end_s)
     on = [tick for tick in lived.within(start_s, end_s) if tick.target.kind == "pinwheel"]
-    if not looks:
-        assert len(on) / 50.0 < 0.3
-    else:
-        assert len(on) / 50.0 > 0.5
-        first = on[0].target
-        assert first.p_world_m == pytest.approx(PINWHEEL, abs=0.03)
-        salience = first.saliences[0]
-        assert salience.rotation > 0.2 and salience.onset > 0.2  # it has begun to spin
-        assert salience.rotation > 3.0 * (salience.translation + salience.looming)
+    assert len(on) / 50.0 > 0.5
+    first = on[0].target
+    assert first.p_world_m == pytest.approx(PINWHEEL, abs=0.03)
+    salience = first.saliences[0]
+    assert salience.rotation > 0.2 and salience.onset > 0.2  # it has begun to spin
+    assert salience.rotation > 3.0 * (salience.translation + salience.looming)

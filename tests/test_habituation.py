@@ -2,25 +2,17 @@
 
 from itertools import groupby
 from math import exp, radians
+from typing import Literal
 
 import numpy as np
 import pytest
+from attention_scene import NO_STAYS, attention, looking
 
-from gazerig.gaze.angles import rotation
-from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
-from gazerig.gaze.attention.habituation import Habituation
-from gazerig.gaze.attention.idle import Idle, IdleParams
-from gazerig.gaze.attention.params import AttentionParams, HabituationParams
-from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3
+from gazerig.gaze.attention.habituation import Habituation, HabituationParams
+from gazerig.gaze.types import Bodies, Percept, Target, Vec3
 
-AHEAD = GazeState(
-    (0, 0, 0), (0, 0, 0), (0, 0), (0, 0), rotation((0.0, 0.0, 0.0)),
-    (0, 0, 0), (0, 0.03, 0), (0, -0.03, 0), 1.0, 1.0,
-)  # fmt: skip
 EYE: Vec3 = (0.0, 0.0, 0.0)
+PARAMS = HabituationParams()
 
 
 def bodies(kinds: str, *places: Vec3, speed: float = 0.0) -> Bodies:
@@ -41,19 +33,16 @@ def arc(*away_m: float) -> Bodies:
 
 
 def watch(
-    seen: Bodies, seconds: float, later: Bodies | None = None, **params: float
+    seen: Bodies,
+    seconds: float,
+    later: Bodies | None = None,
+    habituation: HabituationParams | Literal["none"] = PARAMS,
 ) -> list[Target]:
     """Let attention look at a scene that stays as it is, 30 pictures a second."""
-    model = Attention(
-        AttentionParams(habituation=HabituationParams(**params)),
-        FieldOfView(FieldOfViewParams()),
-        BottomUp(BottomUpParams(smoothing_s=0.0)),
-        TopDown(TopDownParams()),
-        Idle(IdleParams()),
-    )
+    model = attention(habituation=habituation)
     scenes = [seen, later] if later is not None else [seen]
     times = [k / 30 for k in range(round(30 * seconds * len(scenes)))]
-    return [model.choose(Percept(t, scenes[int(t / seconds)]), AHEAD, t) for t in times]
+    return [model.choose(Percept(t, scenes[int(t / seconds)]), looking(), t) for t in times]
 
 
 def waits_s(targets: list[Target], n: int) -> list[float]:
@@ -78,7 +67,7 @@ def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> lis
 
 
 def test_interest_falls_while_attended_and_recovers_otherwise() -> None:
-    model = Habituation(HabituationParams(decay_rate_1_s=0.2, recovery_rate_1_s=1.0))
+    model = Habituation(PARAMS, NO_STAYS)
     seen = bodies("face face", (1, 0.5, 0), (1, -0.5, 0))
     assert interest(model, seen, -1, 0.0) == [1.0, 1.0]
     assert interest(model, seen, 1, 2.0) == pytest.approx([0.6, 1.0])
@@ -88,7 +77,7 @@ def test_interest_falls_while_attended_and_recovers_otherwise() -> None:
 
 
 def test_interest_outlives_an_absence() -> None:
-    model = Habituation(HabituationParams())
+    model = Habituation(PARAMS, NO_STAYS)
     seen, nobody = bodies("face", (1, 0, 0)), bodies("")
     interest(model, seen, -1, 0.0)
     interest(model, seen, 1, 5.0)
@@ -100,7 +89,7 @@ def test_interest_outlives_an_absence() -> None:
 
 def test_a_rule_keeps_its_floor_of_interest() -> None:
     """A second of looking, at a body of half the weight, is a lead of two."""
-    model = Habituation(HabituationParams(rule_floor=0.6, decay_rate_1_s=0.3))
+    model = Habituation(HabituationParams(rule_floor=0.6, decay_rate_1_s=0.3), NO_STAYS)
     assert model.share([1, 2], [1.0, 0.5], 1, 0.0) == pytest.approx([1.0, 1.0], abs=0.01)
     assert model.share([1, 2], [1.0, 0.5], 2, 1.0)[0] == 1.0
     assert model.share([1, 2], [1.0, 0.5], -1, 1.0)[1] == pytest.approx(
@@ -113,28 +102,19 @@ def test_a_rule_keeps_its_floor_of_interest() -> None:
 def test_the_place_left_is_avoided_by_a_gaussian_that_decays(
     aside_deg: float, age_s: float
 ) -> None:
-    model = Habituation(
-        HabituationParams(
-            inhibition_of_return_strength=0.8,
-            inhibition_of_return_sigma_deg=4.0,
-            inhibition_of_return_s=1.5,
-        )
-    )
+    model = Habituation(PARAMS, NO_STAYS)
     a = radians(aside_deg)
     seen = bodies("hand", (2 * np.cos(a), 2 * np.sin(a), 0))
     interest(model, seen, -1, 10.0)
     model.record_left((1.0, 0.0, 0.0), 10.0)
-    expected = 1.0 - 0.8 * np.exp(-0.5 * (aside_deg / 4.0) ** 2 - age_s / 1.5)
+    expected = 1.0 - 0.5 * np.exp(-0.5 * (aside_deg / 4.0) ** 2 - age_s / 1.5)
     assert interest(model, seen, -1, 10.0 + age_s) == pytest.approx([expected])
     assert interest(model, seen, -1, 17.0) == [1.0]
 
 
-def test_what_is_attended_is_not_avoided_and_strength_0_avoids_nothing() -> None:
-    seen = bodies("hand", (1, 0, 0))
-    for strength, attended in ((1.0, 1), (0.0, -1)):
-        model = Habituation(
-            HabituationParams(decay_rate_1_s=0.0, inhibition_of_return_strength=strength)
-        )
+def test_what_is_attended_is_not_avoided_and_without_habituation_nothing_is() -> None:
+    seen, still = bodies("hand", (1, 0, 0)), HabituationParams(decay_rate_1_s=0.0)
+    for model, attended in ((Habituation(still, NO_STAYS), 1), (Habituation("none", NO_STAYS), -1)):
         model.record_left((1.0, 0.0, 0.0), 0.0)
         assert interest(model, seen, attended, 0.1) == [1.0]
 
@@ -157,8 +137,8 @@ def test_two_faces_share_the_gaze_without_flicker() -> None:
 
 
 def test_without_habituation_two_faces_do_not_share() -> None:
-    share = shares(watch(bodies("face face", (1, 0.3, 0), (1, -0.3, 0)), 30.0, decay_rate_1_s=0.0))
-    assert share == {1: 1.0}
+    two = bodies("face face", (1, 0.3, 0), (1, -0.3, 0))
+    assert shares(watch(two, 30.0, habituation="none")) == {1: 1.0}
 
 
 @pytest.mark.parametrize(
@@ -173,9 +153,8 @@ def test_people_are_looked_at_for_times_as_their_nearness(away_m: tuple[float, .
 
 def test_nobody_of_three_is_left_out() -> None:
     three = bodies("face face face", (1, 0.4, 0), (1.1, 0, 0), (1, -0.4, 0))
-    for strength in (0.0, 0.5):
-        targets = watch(three, 120.0, inhibition_of_return_strength=strength)
-        assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
+    targets = watch(three, 120.0)
+    assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
 
 
 @pytest.mark.parametrize("n", [4, 6, 8])

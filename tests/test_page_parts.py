@@ -255,7 +255,7 @@ def healthy(t_s: float = 1.0) -> Snapshot:
         now, target_name="thing <4>", why="slide <0.4>", health="bus ok", behaviour="wait",
         servos=WELL, timing=LoopFigures(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), frame_age_s=0.06,
         commanded_pose=pose, camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6),
-        field_deg=(100.0, 60.0, 60.0, 75.0), trail=(Trail(t_s, REST, REST, REST),),
+        trail=(Trail(t_s, REST, REST, REST),),
         events=(SeenSaccade(0.5, 0.05, 5.0), SeenBlink(0.2, 0.3)),
     )  # fmt: skip
 

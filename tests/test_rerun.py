@@ -52,7 +52,7 @@ PUPPET: Asked = {
     240: (Stop("a finger is in it"),),
     650: (Resume(),),
     700: (Tune((("gaze.saccade.profile", "min_jerk"), ("joints.neck_yaw.zero_step", 2060))),),
-    730: (Tune((("gaze.attention.stale_ms", 200.0), ("gaze.idle.rest_ms", 500.0))),),
+    730: (Tune((("gaze.attention.habituation", "none"), ("gaze.idle.hold_ms", 500.0))),),
 }
 
 

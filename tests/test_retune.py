@@ -39,8 +39,6 @@ def some_changes(
             yield from ({key: choice} for choice in knob.choices if choice != now)
         case "list" if key == "gaze.scanpath.simple_order":
             yield {key: ("M", "N", "RE")}
-        case "list" if key == "gaze.field_of_view.own_kinds":
-            yield {key: ("own", "thing")}
         case "list" if key == "guard.collisions":
             yield {key: (COLLISION,)}
         case "list" if key.endswith("point_world_m"):

@@ -1,9 +1,14 @@
 """Several standing people, seen by the whole robot: no one is left out."""
 
 import pytest
+from attention_scene import NO_STAYS
 from seeing import row_08_several_people as row
 
-from gazerig.gaze.attention.shared_attention import SharedAttention
+from gazerig.gaze.attention.habituation import Habituation, HabituationParams
+
+
+def sharing() -> Habituation:
+    return Habituation(HabituationParams(), NO_STAYS)
 
 
 @pytest.mark.usefixtures("ideal_servos")
@@ -23,27 +28,27 @@ def test_e88_of_people_unlike_the_nearer_get_more_and_nobody_nothing() -> None:
 
 
 def test_surpluses_grow_with_the_looks_and_are_those_over_the_one_looked_at_least() -> None:
-    shared = SharedAttention()
-    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 0.0) == [0.0, 0.0, 0.0]
-    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], 2, 0.5) == pytest.approx([0.0, 0.5, 0.0])
+    shared = sharing()
+    assert shared.surpluses([1, 2, 3], [1.0, 1.0, 1.0], -1, 0.0) == [0.0, 0.0, 0.0]
+    assert shared.surpluses([1, 2, 3], [1.0, 1.0, 1.0], 2, 0.5) == pytest.approx([0.0, 0.5, 0.0])
     # A new person is behind no one; the heaviest of similar ones comes first.
-    assert shared.step([2, 4], [0.5, 1.0], 4, 0.5)[1] == 0.0
-    surpluses = shared.step([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
+    assert shared.surpluses([2, 4], [0.5, 1.0], 4, 0.5)[1] == 0.0
+    surpluses = shared.surpluses([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
     assert surpluses[2] == 0.0 and surpluses[0] == pytest.approx(0.4) and 0.45 < surpluses[1] < 0.5
 
 
 def test_a_look_at_a_body_of_half_the_weight_counts_twice() -> None:
-    shared = SharedAttention()
-    shared.step([1, 2], [1.0, 0.5], -1, 0.0)
-    shared.step([1, 2], [1.0, 0.5], 1, 1.0)
-    assert shared.step([1, 2], [1.0, 0.5], 2, 1.5)[0] == pytest.approx(0.0, abs=0.1)
+    shared = sharing()
+    shared.surpluses([1, 2], [1.0, 0.5], -1, 0.0)
+    shared.surpluses([1, 2], [1.0, 0.5], 1, 1.0)
+    assert shared.surpluses([1, 2], [1.0, 0.5], 2, 1.5)[0] == pytest.approx(0.0, abs=0.1)
 
 
 def test_surpluses_are_bounded_fade_and_are_forgotten() -> None:
-    shared, all_three, alike = SharedAttention(), [1, 2, 3], [1.0, 1.0, 1.0]
+    shared, all_three, alike = sharing(), [1, 2, 3], [1.0, 1.0, 1.0]
     for k in range(100):
-        surpluses = shared.step(all_three, alike, 1, 0.5 * k)
+        surpluses = shared.surpluses(all_three, alike, 1, 0.5 * k)
     assert surpluses == [8.0, 0.0, 0.0]
-    assert 0.0 < shared.step(all_three, alike, -1, 60.0)[0] < 3.0
+    assert 0.0 < shared.surpluses(all_three, alike, -1, 60.0)[0] < 3.0
     shared.reset(60.0)
-    assert shared.step(all_three, alike, -1, 60.0) == [0.0, 0.0, 0.0]
+    assert shared.surpluses(all_three, alike, -1, 60.0) == [0.0, 0.0, 0.0]

@@ -47,7 +47,6 @@ def shown_rig() -> ShownRig:
         limits,
         made.mount,
         radians(made.horizontal_field_deg),
-        rig.gaze.field_of_view,
     )
 
 

@@ -17,7 +17,7 @@ from gazerig.sim_mock.scenes.scene import Thing
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-SECONDS = 3.0
+SECONDS = 5.0
 
 
 class Room(EmptyScene):
@@ -32,15 +32,14 @@ class Room(EmptyScene):
 
 
 def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:
-    """Run a rig that hardly rests between glances around, with all of the head in each."""
+    """Run a rig with all of the head in each glance around."""
     patch.setattr(run_rig, "load_scene", lambda name, seed: room)
     rig = load_rig("desk")
-    idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_salience=1.0)
     head = replace(rig.gaze.head, eye_only_range_deg=6.0, head_slope=1.0)
     rig = replace(
         rig,
         loop=replace(rig.loop, rate_hz=100.0),
-        gaze=replace(rig.gaze, idle=idle, head=head),
+        gaze=replace(rig.gaze, head=head),
         detector=replace(rig.detector, work_width_px=128),
     )
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene=room.name, pixels=True))

@@ -281,8 +281,8 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     assert bench.made.live_params.rig.gaze.scanpath.model == "random"
     assert bench.made.live_params.rig.loop.rate_hz == 50.0
     assert [change.key for change in bench.tuning.unsaved()] == ["character"]
-    bench.tuning.set({"gaze.aversion.min_dwell_s": 0.3})
+    bench.tuning.set({"gaze.idle.hold_ms": 300.0})
     bench.tuning.save()
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"
     assert load_rig(str(mine)).loop.rate_hz == 200.0
-    assert load_rig(str(mine)).gaze.aversion.min_dwell_s == 0.3
+    assert load_rig(str(mine)).gaze.idle.hold_ms == 300.0

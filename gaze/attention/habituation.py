@@ -126,8 +126,17 @@ class Habituation:
 
         attended_id: id of the gaze target since the previous step; -1 for none
         """
-        self._habituate(attended_id, max(0.0, t_s - self._at_s))
-        self._at_s = t_s
+        par, dt_s, self._at_s = self.params, max(0.0, t_s - self._at_s), t_s
+        if isinstance(par, str):
+            return [1.0] * len(rows.ids)
+        # The factor of the attended body falls, those of the rest rise.
+        risen = _RECOVERY_1_S * dt_s
+        attended = max(0.0, self._habituation.pop(attended_id, 1.0) - par.decay_rate_1_s * dt_s)
+        self._habituation = {
+            id: left + risen for id, left in self._habituation.items() if left + risen < 1.0
+        }
+        if attended_id >= 0 and attended < 1.0:
+            self._habituation[attended_id] = attended
         self._left = [one for one in self._left if t_s - one.at_s < 4.0 * _RETURN_S]
         return [
             self._habituation.get(id, 1.0)
@@ -193,18 +202,6 @@ class Habituation:
                 k: one for k, one in self._surpluses.items() if t_s - one.at_s < _KEPT_S
             }
         return surpluses
-
-    def _habituate(self, attended_id: int, dt_s: float) -> None:
-        """Lower the factor of the attended body and raise those of the rest."""
-        risen = _RECOVERY_1_S * dt_s
-        attended = self._habituation.pop(attended_id, 1.0)
-        self._habituation = {
-            id: left + risen for id, left in self._habituation.items() if left + risen < 1.0
-        }
-        rate = 0.0 if isinstance(self.params, str) else self.params.decay_rate_1_s
-        attended = max(0.0, attended - rate * dt_s)
-        if attended_id >= 0 and attended < 1.0:
-            self._habituation[attended_id] = attended
 
     def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
         """Return the factor of one body near the points left."""

@@ -24,7 +24,7 @@ WANTED = {
 
 ON_ONE_POINT: dict[str, Value] = {
     "gaze.scanpath.model": "face_tracking",
-    "gaze.aversion.silent_mutual_s": 0.0,
+    "gaze.looks_away": "none",
 }
 _NAMED = {0.1: ".1", 0.5: ".5", 0.7: ".7", 1.0: "1", 1.5: "1.5"}
 _BETWEEN = (0.2, 0.3, 0.4, 0.6, 0.85, 1.25, 2.0)

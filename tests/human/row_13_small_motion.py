@@ -17,7 +17,7 @@ from gazerig.robot.model.commands import Value
 SCENE = "sits-still"
 ONE_POINT: dict[str, Value] = {
     "gaze.scanpath.model": "face_tracking",
-    "gaze.aversion.silent_mutual_s": 0.0,
+    "gaze.looks_away": "none",
 }
 
 WANTED = {

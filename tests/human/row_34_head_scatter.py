@@ -15,7 +15,6 @@ from human.measured_run import MeasuredRun, Runner
 from human.row_16_idle import FURNISHED
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.commands import Value
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 _YAWS = (40, 0, -40, 0)
@@ -25,8 +24,6 @@ _TOGETHER_S = 0.008
 _FREE_DEG = 17.9
 _WAYS, _AT = (0.05, 0.95), (0.189, 0.811)
 """Shares of a movement by minimum jerk, and of its time until then."""
-_FAR: dict[str, Value] = {"gaze.idle.thing_share": 0.95, "gaze.idle.glance_yaw_deg": 60.0}
-"""From thing to thing, so that many looks are as large as in that task."""
 _KINDS = ("glance", "search", "rest", "light")
 
 WANTED = {
@@ -74,7 +71,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         [_shifts(run(SCENE, seed=n, seconds=seconds, overrides=lit)) for n in seeds]
     )
     natural = np.concatenate(
-        [_shifts(run(FURNISHED, seed=n, seconds=seconds, overrides=_FAR)) for n in seeds]
+        [_shifts(run(FURNISHED, seed=n, seconds=seconds, overrides={})) for n in seeds]
     )
     out = equal[equal[:, 0] > _FREE_DEG + 8.0]
     slopes = out[:, 1] / (out[:, 0] - _FREE_DEG)

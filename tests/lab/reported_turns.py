@@ -10,10 +10,12 @@ from gazerig.config.schema import load_rig
 from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
 from gazerig.features.lab.report.turns import STATES, Role, TurnTrace
 from gazerig.gaze.angles import yaw_pitch
-from gazerig.gaze.attention.aversion import Aversion, AversionParams
-from gazerig.gaze.attention.turn_gaze import TurnGaze, TurnParams
-from gazerig.gaze.attention.turn_state import TurnState
-from gazerig.gaze.types import Target
+from gazerig.gaze.attention.conversation import (
+    AversionParams,
+    ConversationGaze,
+    ConversationParams,
+)
+from gazerig.gaze.types import Target, TurnState
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, TickLoop
@@ -47,11 +49,11 @@ def scripted_turns(role: Script, rng: np.random.Generator) -> Iterator[tuple[Tur
 
 
 def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -> TurnTrace:
-    """Return the trace of aversion and turns, without a robot, before a face at 1 m."""
+    """Return the trace of looks away and turns, without a robot, before a face at 1 m."""
     random = [np.random.default_rng((seed, n)) for n in range(4)]
-    aversion = Aversion(AversionParams(), random[0])
     attention: Any = type("Unused", (), {"converse": lambda *of: None})()
-    gaze = TurnGaze(TurnParams(), aversion, attention, random[1])
+    params = AversionParams(), ConversationParams()
+    gaze = ConversationGaze("people", *params, attention, *random[:2])
     face = Target((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, "face", 1, 1.0, True, None, 0, "a person")
     script, rests_s, end_s, number, rows = scripted_turns(role, random[2]), 0.0, 0.0, 0, []
     for t_s in np.arange(0.0, 60.0 * minutes, step_s).tolist():
@@ -62,7 +64,7 @@ def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -
             planned_s = end_s + 10.0 * (role == "interrupted") if state == "speaking" else None
             gaze.enter(state, 1, planned_s, 0.9, t_s)
         gaze.step(t_s)
-        target = aversion.step(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
+        target = gaze.look(face, (0.0, 0.0, 0.0), t_s, False, rests_s)
         if t_s > rests_s:
             rests_s = t_s + float(random[3].exponential(0.3))  # looks at parts of the face
         yaw, pitch = yaw_pitch(target.p_world_m)

@@ -382,7 +382,7 @@ def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path:
     out, key, jerky = tmp_path / "fit", "gaze.saccade.profile", tmp_path / "jerky.yaml"
     jerky.write_text(  # and so many shifts that a few seconds judge most measures
         "gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50},\n"
-        "  scanpath: {rate_scale: 4, min_dwell_ms: 40}, aversion: {silent_mutual_s: 0}}\n"
+        "  scanpath: {rate_scale: 4, min_dwell_ms: 40}, looks_away: none}\n"
     )
     words = (
         *("sweep", "--fit", "--out", str(out), "--seconds", "7", "--bus", "ideal", "--jobs", "1"),

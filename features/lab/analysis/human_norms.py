@@ -195,8 +195,8 @@ _PARALLEL = (
 )
 _STARES = (
     "conversation none",
-    "no conversation was on: with gaze.aversion.silent_mutual_s 0 the gaze then leaves a face only "
-    "for something that pulls more; set it, or choose talk or listen for looks away",
+    "no conversation was on: with gaze.looks_away none the gaze then leaves a face only "
+    "for something that pulls more; set it to people, or choose talk or listen for looks away",
 )
 
 BANDS: tuple[NormBand, ...] = (
