@@ -99,7 +99,7 @@ _NECKLESS_GAZE = "idle: {reach_deg: 28}"
 _HOBBY = "servo_speed_deg_s: 600"
 _HOBBY_GAZE = (
     "saccade: {max_speed_deg_s: 380}",
-    "oculomotor: {eye_lag_ms: 35, refixation_deg: 0}",
+    "oculomotor: {eye_lag_ms: 35, refixations: false}",
     "lids: {close_ms: 170, open_ms: 260}",
 )
 _DYNAMIXEL = _Board(

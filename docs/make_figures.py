@@ -19,13 +19,9 @@ import start_figures  # noqa: E402
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
 from gazerig.gaze.angles import rotation  # noqa: E402
-from gazerig.gaze.lids.lids import LidParams, Lids  # noqa: E402
-from gazerig.gaze.oculomotor.binocular import BinocularController  # noqa: E402
-from gazerig.gaze.oculomotor.head import HeadModel  # noqa: E402
-from gazerig.gaze.oculomotor.params import (
-    HeadParams,  # noqa: E402
-    PursuitParams,  # noqa: E402
-)
+from gazerig.gaze.lids.blink import LidParams, closure  # noqa: E402
+from gazerig.gaze.oculomotor.binocular import DELAY_S, BinocularController  # noqa: E402
+from gazerig.gaze.oculomotor.head import HeadParams, HeadShare  # noqa: E402
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalise  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
@@ -76,17 +72,20 @@ def saved(name: str, figure: plt.Figure) -> None:
 def main_sequence() -> None:
     """Duration and peak speed over amplitude, beside human fits."""
     sizes = np.linspace(0.5, 60.0, 120)
-    saccade, human = SaccadeModel(SaccadeParams(profile="min_jerk")), SaccadeModel(SaccadeParams())
+    saccade = SaccadeModel(SaccadeParams(profile="min_jerk")).profile
+    human = SaccadeModel(SaccadeParams()).profile
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.6))
     left.plot(sizes, [1e3 * saccade.duration_s(radians(a)) for a in sizes], INK, label="eqs 2-6")
     left.plot(sizes, [1e3 * human.duration_s(radians(a)) for a in sizes], "tab:red", label="human")
     left.plot(sizes, 21.0 + 2.2 * sizes, HUMAN, ls="--", label="human, 21 + 2.2 A")
     left.plot(sizes, 25.0 + 2.4 * sizes, HUMAN, ls=":", label="human, 25 + 2.4 A (Eyes Alive)")
     left.set(xlabel="amplitude, deg", ylabel="duration, ms", title="duration")
-    peaks = [degrees(saccade.peak_speed_rad_s(radians(a))) for a in sizes]
-    right.plot(sizes, peaks, INK, label="eqs 2-6")
-    peaks = [degrees(human.peak_speed_rad_s(radians(a))) for a in sizes]
-    right.plot(sizes, peaks, "tab:red", label="human")
+    for profile, colour, label in ((saccade, INK, "eqs 2-6"), (human, "tab:red", "human")):
+        times = np.arange(0.0, 0.25, 2e-4)
+        moved = np.degrees(
+            [[profile.displacement_rad(radians(a), t) for t in times] for a in sizes]
+        )
+        right.plot(sizes, np.diff(moved, axis=1).max(axis=1) / 2e-4, colour, label=label)
     right.plot(
         sizes, 551 * (1 - np.exp(-sizes / 14)), HUMAN, ls="--", label="human, 551 (1 - exp(-A/14))"
     )
@@ -99,20 +98,15 @@ def main_sequence() -> None:
 
 def head_goal() -> None:
     """Offset of the head goal over the amount of attention (eq 7)."""
-    params = HeadParams(goal_model="attention", min_salience=0.0, max_salience=1.0)
-    limits = ((-2.0, 2.0), (-1.0, 1.0))
+    share = HeadShare(HeadParams(goal_model="attention", min_salience=0.0), radians(55.0))
     pulls = np.linspace(-0.2, 1.2, 200)
     figure, axes = plt.subplots(figsize=(4.8, 3.4))
-    for limit, style in ((55.0, "-"), (20.0, "--")):
-        head = HeadModel(params, radians(limit), limits)
-        offsets = [degrees(head.share.offset_rad(a)) for a in pulls]
-        axes.plot(pulls, offsets, INK, ls=style, label=f"eye limit {limit:.0f} deg")
+    axes.plot(pulls, [degrees(share.offset_rad(a)) for a in pulls], INK)
     axes.set(
         xlabel="attention, 0 = A1, 1 = A2",
         ylabel="head stops short by, deg",
         title="eq 7, sign corrected",
     )
-    axes.legend(fontsize=7)
     saved("head_goal", figure)
 
 
@@ -130,10 +124,10 @@ def followed(
     def eyes(version: float, vergence: float) -> tuple[tuple[float, float], tuple[float, float]]:
         return (radians(version - vergence / 2), 0.0), (radians(version + vergence / 2), 0.0)
 
-    controller, rows = BinocularController(PursuitParams(model="binocular")), []
+    controller, rows = BinocularController(), []
     for k in range(round((seconds + 1.0) / TICK_S)):
         t = k * TICK_S - 1.0
-        seen = where(t - controller.delay_s) if t >= controller.delay_s else start
+        seen = where(t - DELAY_S) if t >= DELAY_S else start
         if where(0.0) is None:
             seen = None
         R = rotation((radians(head(max(0.0, t))), 0.0, 0.0))
@@ -205,10 +199,11 @@ def reflex() -> None:
 
 def blink() -> None:
     """Closure of the lids during a blink."""
-    lids = Lids(LidParams(), np.random.default_rng(0))
+    par = LidParams()
+    lasts_s = [ms / 1e3 for ms in (par.close_ms, par.hold_ms, par.open_ms)]
     times = np.linspace(0.0, 0.35, 500)
     figure, axes = plt.subplots(figsize=(4.8, 3.0))
-    axes.plot(1e3 * times, [lids.closure(t) for t in times], INK)
+    axes.plot(1e3 * times, [closure(t, *lasts_s) for t in times], INK)
     axes.set(xlabel="ms since onset", ylabel="closure", title="a blink closes faster than it opens")
     saved("blink", figure)
 
@@ -228,7 +223,7 @@ def scanpath() -> None:
         for j in range(8):
             if matrix[i, j] > 0.0:
                 left.text(j, i, f"{matrix[i, j]:.2f}", ha="center", va="center", fontsize=7)
-    printed = ScanpathParams(min_dwell_ms=0.0, diagonal="refixation")
+    printed = ScanpathParams(law="literal")
     model = markov_walk(printed, walk, np.random.default_rng(0))
     drawn = [np.array([model.dwell_s(i) for _ in range(4000)]) for i in range(8)]
     right.boxplot(drawn, showfliers=False, medianprops={"color": INK})

@@ -10,13 +10,14 @@ from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.lids.lids import LidParams, Lids
-from gazerig.gaze.oculomotor.head import HeadModel
+from gazerig.gaze.lids.blink import LidParams
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.drift import Drift
+from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
+from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
-from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
-from gazerig.gaze.oculomotor.pursuit import Pursuit
+from gazerig.gaze.oculomotor.pursuit import Pursuit, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
-from gazerig.gaze.track.breathing import Breathing
 from gazerig.gaze.types import GazeCommand, Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
@@ -24,17 +25,10 @@ from gazerig.robot.model.types import JointState
 DT = 0.005
 CENTRED = GeometryParams(0.0, 0.0, 0.0)
 DESK = GeometryParams(60.0, 40.0, 50.0)
-NO_RELIEF = HeadParams(
-    goal_model="attention",
-    recentre_after_ms=60_000.0,
-    recentre_now_above=10.0,
-    pursue_above_deg_s=0.0,
-)
+NO_RELIEF = HeadParams(goal_model="attention")
 """The paper's head: eq 7, and nothing after it."""
 
-EXACT = OculomotorParams(
-    undershoot=0.0, endpoint_scatter_along=0.0, endpoint_scatter_across=0.0, refixation_deg=0.0
-)
+EXACT = OculomotorParams(law="exact")
 """Saccades land on their targets, and nothing moves between them."""
 
 AT_ONCE = replace(EXACT, eye_lag_ms=DT * 1e3)
@@ -63,8 +57,8 @@ class Rig:
         neck_deg: float = 90.0,
         params: OculomotorParams = AT_ONCE,
         saccade: SaccadeParams = SACCADE,
-        breathing: Breathing | None = None,
-        dice: int | None = None,
+        drift: Drift | None = None,
+        dice: int = 0,
         pursuit: PursuitParams | None = None,
     ) -> None:
         self.kinematics = Kinematics(geometry, GAZE_JOINTS, LIDS)
@@ -77,9 +71,9 @@ class Rig:
             SaccadeModel(saccade),
             Pursuit(pursuit if pursuit is not None else PursuitParams()),
             HeadModel(head, radians(eye_deg), (neck, neck)),
-            Lids(LidParams(eye_down_deg=0.0, eye_nasal_deg=0.0), np.random.default_rng(0)),
-            breathing,
-            None if dice is None else np.random.default_rng(dice),
+            Lids(LidParams(blinks_per_min=0.0, law="none"), np.random.default_rng(0)),
+            np.random.default_rng(dice),
+            drift,
         )
         self.joints = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ())
 

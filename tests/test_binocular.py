@@ -1,4 +1,4 @@
-"""The eyes of the profile mitake, through Oculomotor, against the numbers of their controller.
+"""The eyes of the profile mitake against the numbers of their controller.
 
 Checks are listed in docs/checks.md; tests/test_reference_binocular.py holds the reference model to
 the same. A head that does at once what it is told; degrees and seconds; an angle of tick k
@@ -12,14 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from gaze_trace_rig import CENTRED, DESK, NO_RELIEF, Rig
+from gaze_trace_rig import CENTRED, DESK, Rig
 
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, angle_between, direction, scale
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor.params import OculomotorParams, PursuitParams
-from gazerig.gaze.types import GazeState, Target, Vec3
+from gazerig.gaze.oculomotor.binocular import BinocularController, EyeGeometry, Eyes
+from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
+from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
 
@@ -28,12 +29,37 @@ HALF_M = CENTRED.interocular_mm / 2e3
 FAR_M = 10.0
 
 
-def mitake(profile: str = "mitake") -> GazeConfig:
-    return load_rig("desk", profile=profile).gaze
+def mitake() -> GazeConfig:
+    return load_rig("desk", profile="mitake").gaze
 
 
-def without_saccades() -> OculomotorParams:
-    return replace(mitake().oculomotor, eye_lag_ms=0.0, saccade_deg=30.0)
+def at_once() -> OculomotorParams:
+    return replace(mitake().oculomotor, eye_lag_ms=0.0)
+
+
+class NoSaccades:
+    is_saccade_due = is_correction_due = False
+
+
+class Alone:
+    """Eyes that the controller moves without any saccade, on a head that is held."""
+
+    def __init__(self, geometry: GeometryParams = CENTRED) -> None:
+        self.kinematics = Rig(geometry=geometry).kinematics
+        self._controller, self._gaze = BinocularController(), (1.0, 0.0, 0.0)
+
+    def tick(self, target: Target, head_rad: tuple[float, ...], t: float, dt: float) -> Eyes:
+        state = self.kinematics.forward(
+            JointState((*(0.0,) * 6, *head_rad), (0.0,) * 9, (t,) * 9, ())
+        )
+        on = self.kinematics.eye_angles_to
+        view = EyeGeometry(state.R_world_head, state.p_world_head_m, on, lambda eyes: eyes)
+        if not self._controller.started:
+            self._gaze = target.p_world_m
+        eyes, self._gaze = self._controller.fixate(
+            target, self._gaze, None, NoSaccades(), view, t, dt
+        )
+        return eyes
 
 
 class Followed(NamedTuple):
@@ -60,26 +86,19 @@ def eyes(
     begin: Target | None = None,
     turning: Callable[[float], float] | None = None,
     geometry: GeometryParams = CENTRED,
-    pursuit: PursuitParams | None = None,
 ) -> Followed:
     """Let the eyes follow; they begin at rest on ``begin`` or the first target.
 
     turning: yaw of the head in radians, which is held by hand
     """
-    rig = Rig(geometry=geometry, params=without_saccades(), pursuit=pursuit or mitake().pursuit)
-    rows = []
+    alone, rows = Alone(geometry), []
     first = begin if begin is not None else where(0.0)._replace(v_world_m_s=(0.0, 0.0, 0.0))
     settle = round(4.0 / dt)
     for k in range(-settle, round(seconds / dt)):
         t = k * dt
         target = where(t) if k >= 0 else first._replace(at_s=t)
-        joints = rig.joints
-        if turning is not None:
-            joints = JointState((*joints.position_rad[:6], turning(max(0.0, t)), 0.0, 0.0),
-                                (0.0,) * 9, (t,) * 9, ())  # fmt: skip
-        command = rig.oculomotor.step(target, rig.kinematics.forward(joints), t, dt)
-        rig.joints = JointState(rig.kinematics.inverse(command), (0.0,) * 9, (t,) * 9, ())
-        left, right = command.eye_left_rad[0], command.eye_right_rad[0]
+        yaw = turning(max(0.0, t)) if turning is not None else 0.0
+        left, right = (eye[0] for eye in alone.tick(target, (yaw, 0.0, 0.0), t, dt))
         if k >= 0:
             rows.append((t + dt, degrees(0.5 * (left + right)), degrees(right - left)))
     return Followed(*np.array(rows).T)
@@ -111,7 +130,7 @@ def sine_numbers(hz: float, dt: float) -> tuple[float, float]:
 def test_the_profile_mitake_runs_this_controller_and_the_others_do_not() -> None:
     assert mitake().pursuit.model == "binocular"
     for profile in ("robot", "nakamoto", "small"):
-        assert mitake(profile).pursuit.model != "binocular"
+        assert load_rig("desk", profile=profile).gaze.pursuit.model != "binocular"
 
 
 @pytest.mark.parametrize("speed", [10.0, 20.0, 30.0])
@@ -197,13 +216,10 @@ def test_e27_both_eyes_meet_on_the_target() -> None:
 
 def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> None:
     # One camera sees for both eyes: a stopped eye continues with the other.
-    # Without a margin of the eyes: with one the head turns, so that the stopped eye can follow.
-    head = replace(NO_RELIEF, eye_margin_deg=0.0)
-    params = without_saccades()
-    rig = Rig(head=head, params=params, pursuit=mitake().pursuit)
+    rig = Rig(params=at_once(), pursuit=mitake().pursuit)
     span = (-1.0, 1.0)
     limits = ((span, span), ((-1.0, radians(-1.0)), span))
-    rig.oculomotor.retune(params, limits)
+    rig.oculomotor.retune(at_once(), limits)
     path = lambda t: -3.0 + 1.5 * min(max(t - 1.0, 0.0), 1.0)  # noqa: E731
     last = None
     for k in range(800):
@@ -214,13 +230,13 @@ def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> N
     wanted = path(4.0)
     assert degrees(last.eye_left_rad[0]) == pytest.approx(wanted, abs=0.25)
     assert degrees(last.eye_right_rad[0]) == pytest.approx(wanted, abs=0.25)
-    rig.oculomotor.retune(params, ((span, span), ((-1.0, radians(-2.0)), span)))
+    rig.oculomotor.retune(at_once(), ((span, span), ((-1.0, radians(-2.0)), span)))
     covered = rig.tick(aim(wanted, t=4.0), 4.0, DT)
     assert degrees(covered.eye_right_rad[0]) == pytest.approx(-2.0)
     assert degrees(covered.eye_left_rad[0]) == pytest.approx(
         degrees(last.eye_left_rad[0]), abs=0.01
     )
-    rig.oculomotor.retune(params, ((span, span), (span, span)))
+    rig.oculomotor.retune(at_once(), ((span, span), (span, span)))
     free = rig.tick(aim(wanted, t=4.005), 4.005, DT)
     assert abs(degrees(free.eye_right_rad[0] - last.eye_right_rad[0])) < 0.1
 
@@ -252,45 +268,21 @@ def test_e29_the_reflex_is_late_by_its_delay_and_no_part_of_a_tick(dt: float) ->
     assert -np.angle(z) / w == pytest.approx(0.010, abs=0.0005)
 
 
-@pytest.mark.parametrize("gain", [0.0, 0.5, 0.95, 1.3])
-def test_a_reflex_of_another_gain_takes_back_its_share_of_the_heads_turn(gain: float) -> None:
-    """Without a target nothing else moves the eyes: the head turns 10 deg, they turn -gain 10."""
-    lost = aim(0.0, 0.0, 100.0)._replace(v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
-    trace = eyes(
-        lambda t: lost, 2.0, begin=aim(0.0, 0.0, 100.0, -4.0),
-        turning=lambda t: radians(10.0) * min(max(t - 0.5, 0.0), 1.0),
-        pursuit=replace(mitake().pursuit, reflex_gain=gain),
-    )  # fmt: skip
-    assert trace.version[trace.t < 0.45] == pytest.approx(0.0, abs=0.01)
-    assert trace.version[-1] == pytest.approx(-10.0 * gain, abs=0.1)
-
-
 def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
-    exact = PursuitParams(model="binocular", reflex_delay_ms=0.0, gain_1_s=0.0, velocity_gain=0.0)
-    rig = Rig(geometry=DESK, params=without_saccades(), pursuit=exact)
+    alone = Alone(DESK)
     target = Target((1.5, 0.2, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
-    held = rig.run(lambda t: target, 1.0)
-    before, _ = lines(rig, held.commands[-1], rig.kinematics.forward(rig.joints))
-    q = rig.joints.position_rad
-    for k in range(200):
-        share = k / 199
-        turned = (radians(40.0) * share, radians(20.0) * share, radians(10.0) * share)
-        joints = JointState((*q[:6], *turned), (0.0,) * 9, (0.0,) * 9, ())
-        state = rig.kinematics.forward(joints)
-        command = rig.oculomotor.step(target, state, 1.0 + k * DT, DT)
-        # No target helps: the reflex alone holds the direction in space.
-        now, _ = lines(rig, command, state)
-        assert degrees(angle_between(now, before)) < 0.1
-
-
-def lines(rig: Rig, command: object, state: GazeState) -> tuple[Vec3, Vec3]:
-    """Return the mean line of sight of commanded eyes on a head, and the left one."""
-    angles = rig.kinematics.inverse(command)[:6]  # type: ignore[arg-type]
-    seen = rig.kinematics.forward(
-        JointState((*angles, *state.head_rad), (0.0,) * 9, (0.0,) * 9, ())
-    )
-    left, right = line_of_sight(seen, True), line_of_sight(seen, False)
-    return add(left, right), left
+    lost = target._replace(v_world_m_s=(0.0, 1e-9, 0.0))  # the reflex alone holds the gaze
+    lines = []
+    for k in range(620):
+        share = min(max((k - 400) / 199, 0.0), 1.0)
+        head = (radians(40.0) * share, radians(20.0) * share, radians(10.0) * share)
+        eyes = alone.tick(target if k < 390 else lost, head, k * DT, DT)
+        angles = JointState((*eyes[0], *eyes[1], 0.0, 0.0, *head), (0.0,) * 9, (0.0,) * 9, ())
+        seen = alone.kinematics.forward(angles)
+        lines.append(add(line_of_sight(seen, True), line_of_sight(seen, False)))
+    # It is late by its delay of 10 ms while the head turns.
+    assert max(degrees(angle_between(one, lines[389])) for one in lines[400:]) < 0.9
+    assert degrees(angle_between(lines[-1], lines[389])) < 0.1
 
 
 def test_e58_a_lost_target_fades() -> None:
@@ -312,8 +304,7 @@ def test_e58_a_lost_target_fades() -> None:
 
 
 def test_a_saccade_prescribes_the_angles_and_pursuit_goes_on_after_it() -> None:
-    gaze = mitake()
-    rig = Rig(params=replace(gaze.oculomotor, eye_lag_ms=0.0), pursuit=gaze.pursuit)
+    rig = Rig(params=at_once(), pursuit=mitake().pursuit)
     yaws, phases = [], []
     for k in range(400):
         t = k * DT

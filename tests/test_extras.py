@@ -56,7 +56,7 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
         tmp_path,
         ("report", "--scene", "face-to-face"),
         ("report", "a.mcap", "b.mcap"),
-        ("sweep", "--set", "gaze.head.comfort_deg=4:16:7"),
+        ("sweep", "--set", "gaze.head.eye_only_range_deg=16:56:7"),
         ("calibrate", "camera", "--oak", "--what", "lens", "--out", "copy.yaml"),
         ("calibrate", "camera", "desk", "--mock", "--yes"),
     )

@@ -6,17 +6,17 @@ from math import degrees, hypot, radians
 
 import numpy as np
 import pytest
-from gaze_trace_rig import AT_ONCE, EXACT, HUMAN, Rig, still
+from gaze_trace_rig import HUMAN, Rig, still
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale, sub, unit
-from gazerig.gaze.oculomotor.gaze_point import Refixations, endpoint
-from gazerig.gaze.oculomotor.params import OculomotorParams
+from gazerig.gaze.oculomotor.gaze_point import OculomotorParams, Refixations, endpoint
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
 from gazerig.gaze.types import Target, Vec3
 
 EYE = (0.0, 0.0, 0.0)
 MODEL = SaccadeModel(SaccadeParams())
+PEOPLE = OculomotorParams(refixations=False)
 
 
 def at(yaw_deg: float, pitch_deg: float = 0.0, distance_m: float = 1.0) -> Vec3:
@@ -63,7 +63,7 @@ MAX_ACCELERATION_DEG_S2 = SaccadeParams().max_acceleration_deg_s2
 
 
 def double_step(jump_s: float, first_deg: float = 28.0, then_deg: float = 34.0) -> Rig:
-    rig = Rig(params=AT_ONCE, saccade=HUMAN)
+    rig = Rig(params=replace(PEOPLE, eye_lag_ms=5.0), saccade=HUMAN)
 
     def where(t: float) -> Target:
         late = t >= jump_s
@@ -87,14 +87,13 @@ def test_a_target_that_jumps_early_bends_the_saccade_and_a_late_jump_waits_100_m
 
 
 def test_a_saccade_falls_short_from_10_deg_on_and_scatters_with_its_size() -> None:
-    exact = OculomotorParams(
-        undershoot=0.07, endpoint_scatter_along=0.0, endpoint_scatter_across=0.0
-    )
-    for size, short in ((4.0, 0.0), (7.5, 0.2625), (10.0, 0.7), (20.0, 1.4)):
-        landing = endpoint(at(size), at(0.0), EYE, exact, None)
-        assert size - degrees(angle_between(at(0.0), landing)) == pytest.approx(short, abs=1e-6)
+    for size, short in ((4.0, 0.0), (7.5, 0.3), (10.0, 0.8), (20.0, 1.6)):
+        rng = np.random.default_rng(0)
+        landings = [endpoint(at(size), at(0.0), EYE, rng) for _ in range(2000)]
+        short_deg = size - np.degrees([angle_between(at(0.0), one) for one in landings])
+        assert np.mean(short_deg) == pytest.approx(short, abs=0.05)
     rng = np.random.default_rng(0)
-    ends = [endpoint(at(20.0), at(0.0), EYE, OculomotorParams(), rng) for _ in range(2000)]
+    ends = [endpoint(at(20.0), at(0.0), EYE, rng) for _ in range(2000)]
     yaw = np.degrees([np.arctan2(y, x) for x, y, _ in ends])
     pitch = np.degrees([np.arcsin(unit(e)[2]) for e in ends])
     assert np.mean(yaw) == pytest.approx(18.4, abs=0.06) and np.std(yaw) == pytest.approx(
@@ -109,7 +108,7 @@ def test_about_a_third_of_large_saccades_are_corrected_100_to_200_ms_later() -> 
     corrected, after_ms = 0, []
     sizes = np.linspace(10.5, 16.0, 60)
     for n, size in enumerate(sizes):
-        rig = Rig(params=replace(OculomotorParams(), refixation_deg=0.0), saccade=HUMAN, dice=n)
+        rig = Rig(params=PEOPLE, saccade=HUMAN, dice=n)
         trace = rig.run(still(float(size)), 0.5)
         phases = [c.phase == "saccade" for c in trace.commands]
         if trace.commands[-1].saccades > 1:
@@ -121,7 +120,7 @@ def test_about_a_third_of_large_saccades_are_corrected_100_to_200_ms_later() -> 
 
 
 def test_refixations_stay_near_the_middle_and_come_once_a_second() -> None:
-    rig = Rig(params=replace(EXACT, refixation_deg=1.7), saccade=HUMAN, dice=3)
+    rig = Rig(params=OculomotorParams(), saccade=HUMAN, dice=3)
     trace = rig.run(still(2.0), 60.0)
     jumps = trace.commands[-1].saccades - 1
     assert 0.75 < jumps / 60.0 < 1.1
@@ -134,11 +133,11 @@ def test_refixations_stay_near_the_middle_and_come_once_a_second() -> None:
         degrees(angle_between(tuple(points[a]), tuple(points[b])))
         for a, b in zip(on, off, strict=False)
     ]
-    assert min(sizes) > 0.45 and max(sizes) < 1.75
+    assert min(sizes) > 0.45 and max(sizes) < 1.85  # 1.7, and scatter
 
 
 def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_followed() -> None:
-    points = Refixations(OculomotorParams(), np.random.default_rng(0))
+    points = Refixations(np.random.default_rng(0))
     times = np.arange(0.0, 20.0, 0.005)
     assert not any(points.is_due(t, still=False) for t in times)
     assert any(points.is_due(20.0 + t) for t in times)
@@ -147,10 +146,6 @@ def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_follow
     assert points.offset_rad == (0.0, 0.0)
 
 
-def test_without_sizes_or_a_generator_nothing_is_fixated_again() -> None:
-    for params, rng in (
-        (OculomotorParams(refixation_deg=0.0), np.random.default_rng(0)),
-        (OculomotorParams(), None),
-    ):
-        points = Refixations(params, rng)
-        assert not any(points.is_due(t) for t in np.arange(0.0, 10.0, 0.005))
+def test_hobby_servos_fixate_one_point() -> None:
+    trace = Rig(params=PEOPLE, saccade=HUMAN, dice=3).run(still(2.0), 20.0)
+    assert trace.commands[-1].saccades == 1

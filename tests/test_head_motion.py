@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gazerig.gaze.oculomotor.head import HeadModel
-from gazerig.gaze.oculomotor.params import HeadParams
+from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.types import Floats, Target
 
 DT = 0.005
@@ -59,7 +58,7 @@ def test_slow_and_short_motion_is_left_to_the_eyes() -> None:
     jump = np.clip((t - 2.0) * 180.0, 0.0, 9.0)
     assert np.abs(follow(model(), jump, "thing")).max() == 0.0
     walk = 12.0 * np.sin(2.0 * pi * 0.08 * t)
-    assert np.abs(follow(model(pursue_above_deg_s=0.0), walk, "thing")).max() == 0.0
+    assert np.abs(follow(model(goal_model="attention"), walk, "thing")).max() == 0.0
 
 
 def test_after_pursuit_the_head_comes_to_rest() -> None:
@@ -141,7 +140,7 @@ def test_the_head_recentres_soon_before_what_it_is_most_interested_in(
 
 def shifts(seed: int | None) -> Floats:
     """Return how far the head turned for 40 deg, 40 times; degrees."""
-    head, turned = model(seed, recentre_after_ms=60_000.0), []
+    head, turned = model(seed), []
     for n in range(40):
         head.reset(n * 2.0, (0.0, 0.0, 0.0))
         place = (radians(40.0), 0.0)
@@ -175,8 +174,9 @@ def test_a_search_is_completed_by_the_head() -> None:
     assert follow(model(), place, "glance")[-1] == 0.0
 
 
-def test_without_spreads_a_generator_changes_no_shift() -> None:
-    exact = {"slope_spread": 0.0, "duration_spread": 0.0, "lead_spread_ms": 0.0}
+@pytest.mark.parametrize("law", ["attention", "align"])
+def test_the_papers_heads_are_not_random(law: str) -> None:
     place = np.full(200, 50.0)
-    assert (follow(model(1, **exact), place) == follow(model(None, **exact), place)).all()
-    assert model(1, **exact).draw_lead_s(target(0.0), 1.0) == 0.0
+    one, other = (follow(model(seed, goal_model=law), place) for seed in (1, None))
+    assert (one == other).all()
+    assert model(1, goal_model=law).draw_lead_s(target(0.0), 1.0) == 0.0

@@ -26,13 +26,15 @@ from gazerig.gaze.angles import (
     yaw_pitch,
 )
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor.head import HeadShare
-from gazerig.gaze.oculomotor.params import HeadParams
+from gazerig.gaze.oculomotor.drift import Drift
+from gazerig.gaze.oculomotor.gaze_point import OculomotorParams
+from gazerig.gaze.oculomotor.head import HeadParams, HeadShare
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
-from gazerig.gaze.track.breathing import Breathing, BreathingParams
 from gazerig.gaze.types import ORDERED, Angles2, GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState
+
+PEOPLE = OculomotorParams(refixations=False, eye_lag_ms=5.0)
 
 
 def test_e17_gaze_timeline_of_a_60_degree_shift() -> None:
@@ -62,30 +64,18 @@ def test_e15_head_start_rule(size: float, top_down: bool) -> None:
 
 @pytest.mark.parametrize("size", range(5, 85, 5))
 def test_e16_every_target_is_reached_with_a_small_eye_range(size: float) -> None:
-    trace = Rig(eye_deg=20.0).run(still(size, salience=0.2), 3.0)
+    trace = Rig(eye_deg=20.0, head=HeadParams()).run(still(size, salience=0.2), 3.0)
     assert trace.error[-1] <= 0.5
 
 
 @pytest.mark.parametrize("distance_m", [0.22, 0.3, 0.4, 0.8])
-@pytest.mark.parametrize(
-    ("model", "margin_deg", "kind"),
-    [
-        ("stahl", 2.0, "thing"),
-        ("attention", 2.0, "thing"),
-        ("align", 2.0, "thing"),
-        ("align", 0.0, ORDERED),
-    ],
-)
+@pytest.mark.parametrize(("model", "kind"), [("stahl", "thing"), ("align", ORDERED)])
 def test_the_head_leaves_room_for_both_eyes_to_converge(
-    model: str, margin_deg: float, kind: str, distance_m: float
+    model: str, kind: str, distance_m: float
 ) -> None:
     """A head that stops short for one line of sight would hold an eye at its limit."""
     head = HeadParams(
-        goal_model=model,  # type: ignore[arg-type]
-        align=0.0,
-        eye_margin_deg=margin_deg,
-        recentre_after_ms=60_000.0,
-        pursue_above_deg_s=0.0,
+        goal_model=model  # type: ignore[arg-type]
     )
     for yaw in (15.0, 18.0, 24.0, 27.0, 40.0, 60.0):
         rig = Rig(eye_deg=25.0, geometry=DESK, head=head)
@@ -96,10 +86,9 @@ def test_the_head_leaves_room_for_both_eyes_to_converge(
         assert last.phase == "fixate" and last.limited == (), yaw
 
 
-@pytest.mark.parametrize("margin_deg", [0.0, 2.0])
-def test_only_a_near_target_takes_range_of_the_eyes(margin_deg: float) -> None:
-    share = HeadShare(HeadParams(eye_margin_deg=margin_deg), radians(20.0))
-    assert share.for_near_target(radians(20.1 - margin_deg)) is share
+def test_only_a_near_target_takes_range_of_the_eyes() -> None:
+    share = HeadShare(HeadParams(), radians(20.0))
+    assert share.for_near_target(radians(18.1)) is share
     assert degrees(share.for_near_target(radians(15.0)).reach_rad) == pytest.approx(15.0)
 
 
@@ -115,36 +104,10 @@ def test_e8_oblique_saccade_keeps_to_the_great_circle(profile: SaccadeParams) ->
     assert abs(moves[0][-1] - moves[1][-1]) <= 1
 
 
-def test_latency_delays_the_saccade_and_the_gaze_waits_where_it_is() -> None:
-    late = replace(EXACT, eye_lag_ms=5.0, latency_ms=200.0)
-    trace = Rig(params=late).run(lambda t: still(1.5)(t - 0.4), 1.0)
-    assert np.abs(trace.eye[trace.t < 0.7 - 1e-9]).max() < 1e-6
-    assert trace.t[np.argmax(np.abs(trace.eye) > 1e-6)] == pytest.approx(0.705, abs=DT + 1e-9)
-    assert trace.commands[-1].saccades == 1
-    assert trace.error[-1] < 0.01
-
-
-@pytest.mark.parametrize("top_down", [False, True])
-def test_the_head_goes_first_only_where_it_is_wanted(top_down: bool) -> None:
-    head = HeadParams(goal_model="attention", recentre_after_ms=60_000.0, lead_ms=100.0)
-    trace = Rig(head=head).run(still(45.0, top_down=top_down), 1.0)
-    eyes = np.argmax([c.phase == "saccade" for c in trace.commands])
-    turns = np.argmax(np.abs(trace.head) > 1e-9)
-    lead = 0.1 if top_down else -0.02
-    assert (eyes - turns) * DT == pytest.approx(lead, abs=DT + 1e-9)
-    if top_down:
-        # Until they go, the eyes hold the old place against the turning head.
-        held = np.abs(trace.eye + trace.head)[:eyes]
-        assert held.max() < 0.05 and np.abs(trace.head[eyes - 1]) > 0.5
-
-
 def test_scattered_landings_are_corrected_by_small_saccades() -> None:
-    noisy = replace(
-        EXACT, eye_lag_ms=5.0, endpoint_scatter_along=0.05, endpoint_scatter_across=0.02
-    )
     after, misses = [], []
     for seed in range(12):
-        trace = Rig(params=noisy, dice=seed).run(still(28.0), 0.8)
+        trace = Rig(params=PEOPLE, dice=seed).run(still(28.0), 0.8)
         phases = [c.phase == "saccade" for c in trace.commands]
         landed = len(phases) - 1 - phases[::-1].index(True)
         first = phases.index(True)
@@ -156,21 +119,16 @@ def test_scattered_landings_are_corrected_by_small_saccades() -> None:
             start = ends + phases[ends:].index(True)
             after.append((start - ends) * DT)
         assert trace.error[-1] < 0.1 and landed < len(phases) - 1
-    assert 0.4 < np.mean(misses) < 2.2
+    assert 1.2 < np.mean(misses) < 3.2  # 0.08 of 28 deg
     assert after and min(after) >= 0.1 and max(after) <= 0.205
 
 
-def test_scatter_without_dice_is_refused() -> None:
-    with pytest.raises(ValueError, match="need a random generator"):
-        Rig(params=replace(EXACT, endpoint_scatter_along=0.04))
-
-
-def test_breathing_moves_the_head_and_not_the_gaze() -> None:
-    rig = Rig(geometry=DESK, breathing=Breathing(BreathingParams(pitch_deg=1.0, roll_deg=0.5)))
+def test_drift_moves_the_head_and_not_the_gaze() -> None:
+    rig = Rig(geometry=DESK, drift=Drift("people", np.random.default_rng(0)))
     target = Target((1.0, 0.1, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
     trace = rig.run(lambda t: target, 12.0)
     pitch = np.degrees([c.head_rad[1] for c in trace.commands])
-    assert np.ptp(pitch[-800:]) == pytest.approx(2.0, abs=0.1)
+    assert np.ptp(pitch[-800:]) > 0.8
     assert trace.error[100:].max() < 0.05
     assert trace.commands[-1].saccades == 1
 
@@ -192,7 +150,7 @@ def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
 
 
 def test_e58_a_lost_target_is_followed_for_a_moment_and_then_no_more() -> None:
-    rig = Rig(params=replace(EXACT, eye_lag_ms=5.0))
+    rig = Rig(params=PEOPLE)
     v = radians(20.0)
 
     def where(t: float) -> Target:
@@ -217,7 +175,7 @@ def test_a_target_faster_than_pursuit_is_caught_up_with_by_saccades() -> None:
             point, (-v * point[1], v * point[0], 0), t, "hand", 1, 0.2, False, None, 1, ""
         )
 
-    trace = Rig().run(where, 0.8)
+    trace = Rig(params=PEOPLE).run(where, 0.8)
     assert trace.commands[-1].saccades >= 3
     assert np.median(trace.error[40:]) < 4.0
 
@@ -267,10 +225,13 @@ def test_small_errors_are_followed_and_not_jumped_to() -> None:
 
 
 def test_a_target_change_in_flight_waits_for_the_landing() -> None:
-    rig = Rig()
+    rig = Rig(params=PEOPLE)
     a, b = still(30.0)(1.0), still(-30.0)(1.0)._replace(id=2, shift=3)
-    trace = rig.run(lambda t: a if t < 0.03 else b, 0.5)
-    assert trace.commands[-1].saccades == 2
+    trace = rig.run(lambda t: a if t < 0.03 else b, 1.5)
+    phases = [c.phase == "saccade" for c in trace.commands]
+    landed = phases.index(False, phases.index(True))
+    assert (phases.index(True, landed) - landed) * DT == pytest.approx(0.1, abs=DT)
+    assert trace.commands[-1].saccades in (2, 3), "one more corrects the second"
     speed = np.abs(np.diff(trace.eye)) / DT
     assert speed.max() < 505.0
     assert trace.error[-1] < 0.01
@@ -315,8 +276,8 @@ def test_no_eye_beyond_its_limit_nothing_infinite_and_no_gaze_above_the_cap(
     rig = Rig(
         eye,
         geometry,
-        HeadParams(lead_ms=float(rng.choice((0.0, 80.0)))),
-        params=replace(EXACT, eye_lag_ms=0.0, latency_ms=float(rng.choice((0.0, 120.0)))),
+        HeadParams(),
+        params=replace(EXACT, eye_lag_ms=0.0),
         saccade=profile,
     )
     t, shift, before = 0.0, 0, None
@@ -370,7 +331,7 @@ def test_e16_any_eye_range_and_timing_reaches_the_target(
     eye: float, yaw: float, pitch: float, salience: float, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
-    rig = Rig(eye_deg=eye, geometry=DESK)
+    rig = Rig(eye_deg=eye, geometry=DESK, head=HeadParams())
     where, t = still(yaw, salience, bool(seed % 2), pitch), 0.0
     for _ in range(600):
         dt = float(rng.choice((0.002, 0.005, 0.005, 0.010, 0.030)))

@@ -28,7 +28,7 @@ def view(head_deg: Angles3) -> EyeGeometry:
     yaw, pitch, roll = head_deg
     kinematics = rig_kinematics(load_rig("desk"))
     R, p = kinematics.head_pose((radians(yaw), radians(pitch), radians(roll)))
-    return EyeGeometry(R, p, kinematics.eye_angles_to, 0.2, in_range)
+    return EyeGeometry(R, p, kinematics.eye_angles_to, in_range)
 
 
 def stand(model: OppositeAngles, head_deg: Angles3, gaze: Vec3 = POINT) -> tuple[Eyes, Vec3]:

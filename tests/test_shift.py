@@ -4,7 +4,6 @@ from math import radians
 
 import pytest
 
-from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Slip
 from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger
 
@@ -13,23 +12,28 @@ def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:
     return Slip((0.0, radians(error_deg), 0.0), (0.0, radians(slip_deg_s), 0.0))
 
 
-def settled(params: OculomotorParams | None = None, scatters: bool = False) -> SaccadeTrigger:
-    """Return a rule that has answered its first event and landed at 0."""
-    rule = SaccadeTrigger(params or OculomotorParams(), scatters)
+REFRACTORY_S = 0.15
+
+
+def settled() -> SaccadeTrigger:
+    """Return a rule that has answered its first event and landed exactly at 0."""
+    rule = SaccadeTrigger(True)
     rule.record_shift(1, 0.0, None, -1.0)
-    assert not rule.is_due(slip(0.0), 0.0)
+    assert not rule.is_due(slip(0.0), 0.0, REFRACTORY_S)
     assert not rule.is_saccade_due
-    rule.record_landing(0.0)
+    rule.record_landing(0.0, 0.155)
+    assert not rule.is_due(slip(0.0), 0.0, REFRACTORY_S)
     return rule
 
 
 def first_s(rule: SaccadeTrigger, seen: Slip, until_s: float = 1.0) -> float | None:
     times = (k / 1000 for k in range(1, round(until_s * 1000)))
-    return next((t for t in times if rule.is_due(seen, t)), None)
+    return next((t for t in times if rule.is_due(seen, t, REFRACTORY_S)), None)
 
 
 def test_error_beyond_two_degrees_jumps_after_the_refractory_time() -> None:
     assert first_s(settled(), slip(2.1)) == pytest.approx(0.150, abs=0.001)
+    assert settled().is_due(slip(2.1), 0.001, 0.0)
     assert first_s(settled(), slip(1.9)) is None
 
 
@@ -48,21 +52,10 @@ def test_a_target_that_slips_away_is_caught_up_with() -> None:
 def test_new_target_jumps_at_once_unless_it_is_nearly_there() -> None:
     rule = settled()
     rule.record_shift(2, 0.0, None, 0.15)
-    assert rule.is_due(slip(1.0), 0.15)
+    assert rule.is_due(slip(1.0), 0.15, REFRACTORY_S)
     rule.record_shift(3, 0.0, None, 0.16)
-    assert not rule.is_due(slip(0.2), 0.16)
+    assert not rule.is_due(slip(0.2), 0.16, REFRACTORY_S)
     assert not rule.is_saccade_due
-
-
-def test_latency_counts_from_the_first_unanswered_event() -> None:
-    rule = settled(OculomotorParams(latency_ms=200.0))
-    rule.record_shift(2, 0.0, None, 0.1)
-    rule.record_shift(3, 0.0, None, 0.25)
-    assert rule.is_saccade_due
-    assert rule.onset_s == pytest.approx(0.3)
-    assert not rule.is_due(slip(5.0), 0.299)
-    assert rule.is_due(slip(5.0), 0.300)
-    assert rule.onset_s == pytest.approx(0.3)
 
 
 def test_nothing_jumps_sooner_than_100_ms_after_a_landing() -> None:
@@ -82,18 +75,31 @@ def test_an_event_early_in_flight_redirects_and_a_late_one_waits_after_the_landi
     late.record_shift(2, 0.0, 0.26, 0.2)
     assert late.onset_s == pytest.approx(0.36)
     assert not any(late.may_redirect(t) for t in (0.2, 0.23, 0.255))
-    late.record_landing(0.26)
-    assert not late.is_due(slip(5.0), 0.355)
-    assert late.is_due(slip(5.0), 0.36)
+    late.record_landing(0.26, 0.155)
+    assert not late.is_due(slip(5.0), 0.355, REFRACTORY_S)
+    assert late.is_due(slip(5.0), 0.36, REFRACTORY_S)
 
 
 def test_landings_that_err_are_corrected_and_exact_ones_are_not() -> None:
-    scattered = settled(scatters=True)
+    scattered = settled()
     scattered.record_landing(0.0, 0.17)
-    assert not scattered.is_due(slip(1.5), 0.01)
+    assert not scattered.is_due(slip(1.5), 0.01, REFRACTORY_S)
     assert scattered.is_correction_due
     assert first_s(scattered, slip(1.5)) == pytest.approx(0.17, abs=0.001)
     assert first_s(settled(), slip(1.5)) is None
-    small = settled(scatters=True)
-    assert not small.is_due(slip(1.1), 0.01)
-    assert not small.is_correction_due
+    scattered.record_landing(1.0, 0.17)
+    assert not scattered.is_due(slip(1.1), 1.01, REFRACTORY_S)
+    assert not scattered.is_correction_due
+
+
+def test_exact_saccades_are_neither_corrected_nor_bent_and_follow_each_other_at_once() -> None:
+    rule = SaccadeTrigger(False)
+    rule.record_landing(0.0, 0.155)
+    assert first_s(rule, slip(1.5)) is None
+    assert first_s(rule, slip(3.0, -60.0)) == pytest.approx(0.150, abs=0.001)
+    rule.record_landing(1.0, 0.155)
+    rule.record_shift(2, 0.0, None, 1.0)
+    assert rule.onset_s == 1.0
+    rule.reset(2.0)
+    rule.record_shift(3, 0.0, 2.9, 2.0)
+    assert rule.onset_s == pytest.approx(2.9)

@@ -29,11 +29,11 @@ def target(path: Path, t: float, name: int = 1) -> Target:
     return at(path(t), (path(t + d) - path(t - d)) / (2.0 * d), t, name)
 
 
-def shown(path: Path, seconds: float, model: str = "periodic", noise_m: float = 0.0,
+def shown(path: Path, seconds: float, noise_m: float = 0.0,
           fastest: float = FAST) -> TargetPrediction:  # fmt: skip
     """Return a prediction that has seen a path for a time."""
     rng = np.random.default_rng(0)
-    prediction = TargetPrediction(model, 0.12, 0.3)  # type: ignore[arg-type]
+    prediction = TargetPrediction()
     for k in range(round(seconds / FRAME_S) + 1):
         seen = target(path, k * FRAME_S)
         x, y, z = seen.p_world_m
@@ -53,7 +53,7 @@ def y_of(moved: Vec3) -> float:
 
 @pytest.mark.parametrize("hz", [0.5, 0.7, 1.0, 1.5, 2.0])
 def test_a_swing_is_recognised_after_one_to_two_cycles_and_predicted(hz: float) -> None:
-    path, prediction, known_s = swing(hz), TargetPrediction("periodic", 0.12, 0.3), None
+    path, prediction, known_s = swing(hz), TargetPrediction(), None
     off = []
     for k in range(round(5.0 / hz / FRAME_S)):
         t = k * FRAME_S
@@ -68,16 +68,8 @@ def test_a_swing_is_recognised_after_one_to_two_cycles_and_predicted(hz: float) 
     assert np.abs(off).max() < 0.03 * 0.1
 
 
-def test_velocity_alone_overshoots_a_swing_by_a_tenth() -> None:
-    path, prediction = swing(1.0), shown(swing(1.0), 3.25, "velocity")
-    off = path(3.25) + y_of(prediction.displacement(prediction._at_s + AGE_S))
-    assert prediction.sine is None
-    assert abs(off - path(prediction._at_s + AGE_S)) > 0.08 * 0.1
-
-
-@pytest.mark.parametrize("model", ["velocity", "periodic"])
-def test_a_steady_motion_is_extrapolated_with_its_velocity_and_fades(model: str) -> None:
-    prediction = shown(lambda t: 0.2 * t, 2.0, model)
+def test_a_steady_motion_is_extrapolated_with_its_velocity_and_fades() -> None:
+    prediction = shown(lambda t: 0.2 * t, 2.0)
     end_s = prediction._at_s
     assert y_of(prediction.displacement(end_s + 0.1)) == pytest.approx(0.02, abs=1e-4)
     assert y_of(prediction.motion(end_s + 0.1)[1]) == pytest.approx(0.2, abs=1e-3)
@@ -95,7 +87,8 @@ def test_a_motion_that_slows_down_is_extrapolated_along_its_curve() -> None:
 
 
 def test_nothing_is_extrapolated_where_a_profile_wants_none() -> None:
-    prediction = shown(lambda t: 0.2 * t, 2.0, "none")
+    prediction = shown(lambda t: 0.2 * t, 2.0)
+    prediction.retune(False, 0.0)
     assert prediction.displacement(2.1) == (0.0, 0.0, 0.0)
 
 
@@ -106,7 +99,7 @@ def test_a_step_aside_and_one_back_are_no_swing(lasts_s: float) -> None:
         back = (t - 4.5) / lasts_s
         return 0.4 * (min_jerk(min(max(s, 0.0), 1.0)) - min_jerk(min(max(back, 0.0), 1.0)))
 
-    prediction = TargetPrediction("periodic", 0.12, 0.3)
+    prediction = TargetPrediction()
     for k in range(round(7.0 / FRAME_S)):
         prediction.record_target(target(path, k * FRAME_S), EYE, FAST)
         assert prediction.sine is None
@@ -200,7 +193,7 @@ def test_noise_of_the_tracker_does_not_hide_a_swing() -> None:
 def test_whatever_is_seen_predictions_are_finite_and_bounded(
     seen: list[tuple[float, float]], gap_s: float
 ) -> None:
-    prediction = TargetPrediction("periodic", 0.12, 0.3)
+    prediction = TargetPrediction()
     for k, (y, v) in enumerate(seen):
         prediction.record_target(at(y, v, k * gap_s), EYE, 1.2)
         for age_s in (0.0, 0.05, 0.3, 5.0):
@@ -210,7 +203,7 @@ def test_whatever_is_seen_predictions_are_finite_and_bounded(
 
 
 def test_cos_and_sin_of_an_ellipse_are_both_predicted() -> None:
-    prediction = TargetPrediction("periodic", 0.12, 0.3)
+    prediction = TargetPrediction()
     w = 2.0 * pi
 
     def place(t: float) -> Vec3:
@@ -233,7 +226,7 @@ def to_and_fro(hz: float, size: float = 0.1) -> Path:
 
 @pytest.mark.parametrize("hz", [0.4, 0.7, 1.2])
 def test_motion_at_one_speed_is_no_sine_and_never_outrun(hz: float) -> None:
-    path, prediction = to_and_fro(hz), TargetPrediction("periodic", 0.12, 0.3)
+    path, prediction = to_and_fro(hz), TargetPrediction()
     speed = 4.0 * hz * 0.1
     for k in range(round(6.0 / FRAME_S)):
         t = k * FRAME_S

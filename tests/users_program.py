@@ -16,7 +16,7 @@ def follow(head: gazerig.Head, seconds: float) -> str:
         break
     for event in head.events(timeout_s=0.0):
         print(event.text)
-    head.set({"gaze.head.comfort_deg": 10.0})
+    head.set({"gaze.head.eye_only_range_deg": 30.0})
     return outcome
 
 

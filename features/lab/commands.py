@@ -20,7 +20,10 @@ SWEEP = CommandEntry(
     SPECIALIST,
     examples={
         "sweep": (
-            ("sweep --set gaze.head.comfort_deg=4:16:7 --seeds 8", "a table and curves of 56 runs"),
+            (
+                "sweep --set gaze.head.eye_only_range_deg=16:56:7 --seeds 8",
+                "a table and curves of 56 runs",
+            ),
             (
                 "sweep --set gaze.lids.blinks_per_min=8:30:5 --set gaze.lids.close_ms=50,75",
                 "a heat map",

@@ -57,7 +57,7 @@ MAX_RAD_S, REJECT_RAD_S = radians(58.0), radians(100.0)
 taken as a jump and not pursued."""
 MAX_ERROR_RAD = radians(5.0)
 """The rate of closing applies to at most this error; larger errors are closed no faster."""
-_DELAY_S, _SMOOTH_S, _VERGENCE_DELAY_S = 0.1, 0.04, 0.06
+DELAY_S, _SMOOTH_S, _VERGENCE_DELAY_S = 0.1, 0.04, 0.06
 """Visual delay tau_c, including the age of a frame, smoothing time Tf of the observed direction,
 and the additional delay of vergence."""
 _WIDEST_RAD = radians(20.0)
@@ -184,7 +184,7 @@ class BinocularController:
         gaze: the point fixated so far, or that a saccade prescribes
         prescribed: eye angles of a saccade; None: no saccade is in flight
         """
-        place = self.sight.position_at(target, t_s - _DELAY_S)
+        place = self.sight.position_at(target, t_s - DELAY_S)
         seen = None if place is None else view.eyes_to(place)
         if prescribed is not None or dt_s <= 0.0 or not self.started:
             eyes = view.eyes_to(gaze) if prescribed is None else prescribed

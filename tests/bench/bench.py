@@ -333,7 +333,7 @@ def bench_world() -> None:
 
 def bench_sweep() -> None:
     """Sixteen runs on one process and on all processors."""
-    key = "gaze.head.comfort_deg=4,8,12,16"
+    key = "gaze.head.eye_only_range_deg=16,24,32,40"
     jobs = os.cpu_count() or 1
 
     def swept(count: int) -> float:

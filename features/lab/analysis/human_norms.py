@@ -174,7 +174,7 @@ _LITERAL = (
 )
 _FLOOR = (
     "scanpath markov",
-    "the model holds no look shorter than its floor (gaze.scanpath.min_dwell_ms), which "
+    "the model holds no look shorter than its floor of .14 s, which "
     "lengthens the shortest ones of table 1",
 )
 _NO_WALK = (

@@ -165,7 +165,7 @@ def _plan_runs(
     refuse_unfit(rig, asked)
     axes = make_axes(rig, settings, read_value)
     if not axes:
-        example = "--set gaze.head.comfort_deg=4:16:7"
+        example = "--set gaze.head.eye_only_range_deg=16:56:7"
         raise SetupError(f"nothing to vary: give --set KEY=VALUES, for example {example}")
     if fit:
         points = vary_one_by_one(axes)

@@ -183,7 +183,7 @@ FIRST = {
     "gaze.scanpath.rate_scale": "liveliness",
     "gaze.scanpath.spot_height_mm": "time on the eyes",
     "gaze.lids.blinks_per_min": "blinks",
-    "gaze.head.head_slope": "head share",
+    "gaze.head.eye_only_range_deg": "range of the eyes alone",
 }
 """Parameters with which Tune opens, and their plain names."""
 ALL = "all parameters"
