@@ -7,13 +7,13 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gazerig.gaze.lids.blink import closure
-from gazerig.gaze.lids.lids import LidParams, Lids
+from gazerig.gaze.lids.blink import LidParams, closure
+from gazerig.gaze.lids.lids import Lids
 from gazerig.params import declarations
 
 DT = 0.005
 STEEPEST = 1.875  # slope of minimum jerk at its middle
-GLIDE_S, DROOP_S = 0.3, 1.0
+GLIDE_S = 0.3
 # To simplify sixty numbers takes minutes; the found example is sufficient.
 WITHOUT_SHRINKING = (Phase.explicit, Phase.generate)
 
@@ -52,7 +52,7 @@ class Event(NamedTuple):
 
 EVENTS = st.builds(
     Event,
-    st.sampled_from(["", "", "left", "right", "sleepy", "rest", "conversation", "retune"]),
+    st.sampled_from(["", "", "left", "right", "rest", "conversation", "retune"]),
     st.floats(0.0, 1.0),
     st.floats(-60.0, 60.0),
     st.none() | st.floats(-90.0, 90.0),
@@ -64,22 +64,15 @@ def happen(model: Lids, event: Event, other: LidParams, t_s: float) -> None:
     if event.what in ("left", "right"):
         model.wink(event.what, t_s + event.level - 0.5)  # type: ignore[arg-type]
     elif event.what in ("rest", "conversation"):
-        model.set_mode(event.what)  # type: ignore[arg-type]
-    elif event.what == "sleepy":
-        model.set_sleepiness(event.level)
+        model.set_conversation(event.what == "conversation")
     elif event.what == "retune":
         model.retune(other)
 
 
 def fastest_per_s(params: LidParams) -> float:
-    """Return the steepest slope that blink, glide and droop may have together."""
+    """Return the steepest slope that blink and glide may have together."""
     blink = max(STEEPEST / (params.close_ms / 1e3), OPENING / (params.open_ms / 1e3))
-    return blink + STEEPEST / GLIDE_S + STEEPEST / DROOP_S
-
-
-def following_per_deg(params: LidParams) -> float:
-    upper = params.follow_per_deg * max(1.0, params.follow_up_share)
-    return max(upper, params.lower_follow_per_deg)
+    return blink + 4.0 * STEEPEST / GLIDE_S  # following changes as well, by up to 60 deg
 
 
 @settings(max_examples=60, deadline=None, phases=WITHOUT_SHRINKING)
@@ -89,7 +82,6 @@ def test_lids_stay_within_bounds_and_never_jump(
 ) -> None:
     model = Lids(first, np.random.default_rng(seed))
     most = max(fastest_per_s(first), fastest_per_s(other)) * DT
-    per_deg = max(following_per_deg(first), following_per_deg(other))
     t_s, pitch_deg, before = 0.0, 0.0, None
     for event in events:
         happen(model, event, other, t_s)
@@ -104,63 +96,15 @@ def test_lids_stay_within_bounds_and_never_jump(
             assert (now >= 0.0).all() and (now <= 1.0).all()
             if before is not None:
                 step = np.abs(now - before).max()
-                assert step <= most + per_deg * abs(turn_deg) + 1e-9
+                assert step <= most + 0.0222 * abs(turn_deg) + 1e-9
             before = now
-
-
-@settings(max_examples=60, deadline=None, phases=WITHOUT_SHRINKING)
-@given(admissible(), st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(0.0, 1.0))
-def test_both_lids_follow_the_eye_the_same_way_with_any_parameters(
-    params: LidParams, one_deg: float, other_deg: float, level: float
-) -> None:
-    model = Lids(params, np.random.default_rng(0))
-    model.set_sleepiness(level)
-    down, up = (model.step(0.0, radians(a), None) for a in sorted((one_deg, other_deg)))
-    assert up.left >= down.left and up.right >= down.right
-    assert up.lower_left <= down.lower_left and up.lower_right <= down.lower_right
-
-
-@settings(max_examples=60, deadline=None, phases=WITHOUT_SHRINKING)
-@given(admissible(), st.floats(-60.0, 60.0), st.floats(0.0, 1.0))
-def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
-    params: LidParams, pitch_deg: float, level: float
-) -> None:
-    whole = {"lower_close_share": 1.0, "incomplete_share": 0.0, "gaze_evoked_blink_literal": True}
-    whole["gaze_evoked_blink_jitter_ms"] = 0.0
-    whole["duration_spread"] = 0.0
-    never = {"blinks_per_min": 0.0, "gaze_evoked_blink_literal_deg": 0.0, "sleepy_level": 0.0}
-    chosen = LidParams(**{**vars(params), **whole, **never, "sleepy_slowness": 0.0})
-    model = Lids(chosen, np.random.default_rng(0))
-    model.set_sleepiness(level)
-    model.step(0.0, radians(pitch_deg), radians(90.0))
-    shut = model.step(chosen.close_ms / 1e3, radians(pitch_deg), None)
-    assert shut.blink and (shut.left, shut.right, shut.lower_left, shut.lower_right) == (0.0,) * 4
 
 
 def test_rounding_errors_lead_no_lid_beyond_shut_or_open() -> None:
     # Minimum jerk comes out beyond its end by up to 2e-15 just before it.
     near = 1.0 - np.logspace(-2.0, -8.0, 4001)
     assert min(closure(1.0 + float(s), 0.0, 1.0, 1.0) for s in near) == 0.0
-    still = LidParams(sleepy_droop=1.0, lower_sleepy_rise=1.0, blinks_per_min=0.0, close_ms=500.0)
-    winking, drowsy = (Lids(still, np.random.default_rng(0)) for _ in range(2))
+    winking = Lids(LidParams(blinks_per_min=0.0, close_ms=500.0), np.random.default_rng(0))
     winking.wink("left", 0.0)
-    drowsy.set_sleepiness(1.0)
     winks = [winking.step(0.5 * float(t_s), 0.0, None) for t_s in near]
     assert min(o.left for o in winks) == min(o.lower_left for o in winks) == 0.0
-    sinks = [drowsy.step(float(t_s), 0.0, None) for t_s in near]
-    assert min(o.left for o in sinks) == min(o.lower_left for o in sinks) == 0.0
-
-
-def test_the_steepest_rule_of_evoked_blinks_can_be_reckoned() -> None:
-    steep = LidParams(
-        gaze_evoked_blink_steepness_1_deg=5.0,
-        gaze_evoked_blink_middle_deg=180.0,
-        gaze_evoked_blink_jitter_ms=0.0,
-        blinks_per_min=0.0,
-    )
-    model = Lids(steep, np.random.default_rng(0))
-    for k in range(100):
-        model.step(k * 1.0, 0.0, radians(1.0))
-    assert model.blinks == 0
-    model.step(101.0, 0.0, radians(200.0))
-    assert model.blinks == 1

@@ -50,7 +50,7 @@ from gazerig.features.lab.report.statistics import (
     longest,
     mean,
 )
-from gazerig.gaze.lids.lids import LidParams, Lids
+from gazerig.gaze.lids.blink import closure
 from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
@@ -321,14 +321,15 @@ SIZES = (2.0, -3.0, 5.0, -8.0, 12.0, -20.0, 30.0, -30.0, 1.5, -10.0)
 def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz: float) -> None:
     found = jumps(stepped(trace(SIZES, rate_hz)), rate_hz)
     assert len(found) == len(SIZES)
-    law = Jumps(SaccadeParams(profile="min_jerk"))
+    law = Jumps(SaccadeParams(profile="min_jerk")).profile
     for n, (jump, size) in enumerate(zip(found, SIZES, strict=True)):
         size = radians(abs(size))
         assert np.radians(jump.amplitude_deg) == pytest.approx(size, rel=0.08, abs=0.002)
         assert jump.onset_s == pytest.approx(0.25 + 0.5 * n, abs=0.012)
         assert jump.duration_s == pytest.approx(law.duration_s(size), abs=0.016)
         low = 0.8 if rate_hz == 100.0 else 0.92
-        peak = np.degrees(law.peak_speed_rad_s(size))
+        moved = [law.displacement_rad(size, t) for t in np.arange(0.0, 0.3, 0.0005)]
+        peak = np.degrees(np.diff(moved).max() / 0.0005)
         assert low * peak - 5.0 < jump.peak_deg_s < 1.1 * peak + 12.0
         assert jump.peak_share == pytest.approx(0.5, abs=0.12)
 
@@ -350,15 +351,17 @@ def test_noise_and_a_gap_make_no_saccade() -> None:
     assert not any(finder.update(t, at(0.0 if t < 1.1 else 15.0)) for t in times)
 
 
+BLINK_S = 0.075, 0.035, 0.175
+
+
 def blinks(openings: list[tuple[float, float, float]]) -> list[BlinkEvent]:
     finder = BlinkFinder()
     return [blink for row in openings if (blink := finder.update(*row)) is not None]
 
 
 def test_a_blink_is_found_with_its_phases() -> None:
-    lids = Lids(LidParams(), np.random.default_rng(0))
     t = np.arange(0.0, 3.0, 0.005)
-    rows = [(s, o := 0.8 * (1.0 - lids.closure(s - 1.0)), o) for s in t]
+    rows = [(s, o := 0.8 * (1.0 - closure(s - 1.0, *BLINK_S)), o) for s in t]
     (blink,) = blinks(rows)
     assert blink.onset_s == pytest.approx(1.0, abs=0.01)
     assert blink.depth == pytest.approx(1.0, abs=0.01)
@@ -371,11 +374,10 @@ def test_a_blink_is_found_with_its_phases() -> None:
 
 def test_a_wink_a_droop_and_a_glance_down_are_no_blinks() -> None:
     t = np.arange(0.0, 4.0, 0.005)
-    lids = Lids(LidParams(), np.random.default_rng(0))
-    assert blinks([(s, 0.8 * (1.0 - lids.closure(s - 1.0)), 0.8) for s in t]) == []
+    assert blinks([(s, 0.8 * (1.0 - closure(s - 1.0, *BLINK_S)), 0.8) for s in t]) == []
     down = [(s, o := 0.8 if s < 1.0 else 0.3, o) for s in t]
     assert blinks(down) == []
-    shallow = [(s, o := 0.8 * (1.0 - 0.4 * lids.closure(s - 1.0)), o) for s in t]
+    shallow = [(s, o := 0.8 * (1.0 - 0.4 * closure(s - 1.0, *BLINK_S)), o) for s in t]
     assert blinks(shallow) == []
 
 
