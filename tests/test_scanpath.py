@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.config.schema import load_walk
-from gazerig.gaze.scanpath.dwell import stationary
+from gazerig.config.load import load, shipped_path
 from gazerig.gaze.scanpath.fit import FitParams, PartFixation, fit_walk
 from gazerig.gaze.scanpath.models import MarkovWalk
 from gazerig.gaze.scanpath.scanpath import (
@@ -25,44 +24,43 @@ from gazerig.gaze.scanpath.scanpath import (
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
-PRINTED = ScanpathParams(
-    min_dwell_ms=0.0, diagonal="refixation", start="as_walk", least_shift_deg=0.0
-)
-ONE_REST = ScanpathParams(diagonal="one_rest", least_shift_deg=0.0)
+WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
+PRINTED = ScanpathParams(law="literal")
 """The walk as the paper has it."""
 
 
 def walker(seed: int = 1, params: ScanpathParams = PRINTED) -> Scanpath:
-    return Scanpath(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(seed))
+    return Scanpath(params, WALK, np.random.default_rng(seed))
 
 
 @cache
 def drawn(count: int) -> np.ndarray:
-    walk, parts = markov_walk(PRINTED, load_walk("nakamoto_tsuruno"), np.random.default_rng(1)), [0]
+    walk, parts = markov_walk(PRINTED, WALK, np.random.default_rng(1)), [0]
     for _ in range(count):
         parts.append(walk.next_part(parts[-1]))
     return np.array(parts)
 
 
-def test_the_order_and_the_start_are_as_printed(printed_walk: Walk) -> None:
-    assert printed_walk.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
-    assert printed_walk.start == "FR"
+def test_printed_matrix_is_as_printed() -> None:
+    assert [round(sum(row), 1) for row in WALK.matrix] == [0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9]
+    assert WALK.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
+    assert WALK.start == "FR"
 
 
-def test_e35_transitions_follow_the_normalised_matrix(printed_walk: Walk) -> None:
+def test_e35_transitions_follow_the_normalised_matrix() -> None:
     parts = drawn(200_000)
     counts = np.zeros((8, 8))
     np.add.at(counts, (parts[:-1], parts[1:]), 1)
-    wanted = normalise(printed_walk.matrix)
+    wanted = normalise(WALK.matrix)
     assert np.abs(counts / counts.sum(axis=1, keepdims=True) - wanted).max() < 0.02
     assert counts[wanted == 0.0].sum() == 0
 
 
-def test_e36_rows_are_from_and_columns_to(printed_walk: Walk) -> None:
+def test_e36_rows_are_from_and_columns_to() -> None:
     parts = drawn(200_000)
     share = np.bincount(parts, minlength=8) / len(parts)
-    assert share[printed_walk.order.index("N")] == pytest.approx(0.222, abs=0.010)
-    assert share[printed_walk.order.index("RE")] == pytest.approx(0.255, abs=0.010)
+    assert share[WALK.order.index("N")] == pytest.approx(0.222, abs=0.010)
+    assert share[WALK.order.index("RE")] == pytest.approx(0.255, abs=0.010)
 
 
 FACE = Face(
@@ -92,18 +90,18 @@ def test_e37_face_time_share() -> None:
         assert time[part] / total == pytest.approx(share, abs=0.03), part
 
 
-def test_e40_dwell_times(printed_walk: Walk) -> None:
-    walk = markov_walk(PRINTED, printed_walk, np.random.default_rng(3))
+def test_e40_dwell_times() -> None:
+    walk = markov_walk(PRINTED, WALK, np.random.default_rng(3))
     for part in range(8):
         times = np.array([walk.dwell_s(part) for _ in range(200_000)])
         assert times.min() > 0.0
-        assert times.mean() == pytest.approx(printed_walk.dwell_mean_s[part], rel=0.04)
-        assert times.std() == pytest.approx(printed_walk.dwell_sd_s[part], rel=0.10)
+        assert times.mean() == pytest.approx(WALK.dwell_mean_s[part], rel=0.04)
+        assert times.std() == pytest.approx(WALK.dwell_sd_s[part], rel=0.10)
 
 
-def test_tempo(printed_walk: Walk) -> None:
+def test_tempo() -> None:
     def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
-        return markov_walk(params, printed_walk, np.random.default_rng(seed))
+        return markov_walk(params, WALK, np.random.default_rng(seed))
 
     slow = walk(5, replace(PRINTED, rate_scale=0.5))
     quick = walk(5, PRINTED)
@@ -142,88 +140,40 @@ def test_other_targets_pass_through_and_a_new_face_starts_anew() -> None:
     assert walk.wander(TARGET, PERCEPT, 3.2, settled=True).part == "FR"
 
 
-def test_wrong_shapes_are_named(printed_walk: Walk) -> None:
+def test_wrong_shapes_are_named() -> None:
     with pytest.raises(ValueError, match="8 rows of 8"):
-        replace(printed_walk, matrix=printed_walk.matrix[:7])
+        replace(WALK, matrix=WALK.matrix[:7])
     with pytest.raises(ValueError, match="each of DN"):
-        replace(printed_walk, order=("DN",) * 8)
+        replace(WALK, order=("DN",) * 8)
     with pytest.raises(ValueError, match="positive"):
-        replace(printed_walk, matrix=(*printed_walk.matrix[:7], (0.0,) * 8))
+        replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 8))
     with pytest.raises(ValueError, match="8 numbers each"):
-        replace(printed_walk, dwell_sd_s=(0.1,))
+        replace(WALK, dwell_sd_s=(0.1,))
 
 
 # ---- rests as the default robot makes them ----------------------------------------------
 
 
-def rests(count: int, rate_scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return the parts of a walk in their order of the matrix, and the rest on each."""
-    walk = markov_walk(
-        replace(ONE_REST, rate_scale=rate_scale),
-        load_walk("nakamoto_tsuruno"),
-        np.random.default_rng(4),
-    )
-    parts, times, part = [], [], 0
-    for _ in range(count):
-        part = walk.next_part(part)
-        parts.append(part)
-        times.append(walk.dwell_s(part))
-    return np.array(parts), np.array(times)
-
-
-def test_rests_are_never_short_and_keep_the_rate_of_the_table() -> None:
-    params = ONE_REST
-    parts, times = rests(40_000)
-    assert (np.diff(parts) != 0).all()
-    assert times.min() >= params.min_dwell_ms / 1e3
-    assert (times < 0.14).mean() < 0.04  # which servos and ticks make 150 ms
-    visit_s = times.mean() + params.shift_ms / 1e3
-    assert visit_s == pytest.approx(0.2715, rel=0.01)
-    assert np.histogram(times, np.arange(0.0, 2.0, 0.01))[0].max() / len(times) < 0.13
-
-
-def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest(
-    printed_walk: Walk,
-) -> None:
-    parts, times = rests(40_000)
-    visits = [times[parts == part].mean() + ONE_REST.shift_ms / 1e3 for part in range(8)]
-    table = (0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165)
-    for name, visit, wanted in zip(printed_walk.order, visits, table, strict=True):
-        low, high = (1.05, 1.25) if name in ("LE", "UP") else (0.95, 1.0)
-        assert low * wanted < visit < high * wanted, name
-
-
-@pytest.mark.parametrize("rate_scale", [0.5, 1.1])
-def test_a_rate_that_rests_allow_is_kept(rate_scale: float) -> None:
-    _, times = rests(20_000, rate_scale=rate_scale)
-    visit_s = times.mean() + ONE_REST.shift_ms / 1e3
-    assert visit_s == pytest.approx(0.2715 / rate_scale, rel=0.02)
-
-
-def test_a_rate_beyond_the_shortest_rests_is_as_fast_as_they_allow() -> None:
-    _, times = rests(5000, rate_scale=5.0)
-    assert times.min() >= 0.14 and times.mean() == pytest.approx(0.14 * 1.15, rel=0.02)
-
-
-def test_a_walk_with_a_part_that_is_never_left_still_rests(printed_walk: Walk) -> None:
-    stuck = replace(printed_walk, matrix=(*printed_walk.matrix[:7], (0.0,) * 7 + (1.0,)))
+def test_a_walk_with_a_part_that_is_never_left_still_rests() -> None:
+    stuck = replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 7 + (1.0,)))
     walk = markov_walk(ScanpathParams(), stuck, np.random.default_rng(0))
     assert walk.next_part(7) == 7
     assert all(0.14 <= walk.dwell_s(part) < 30.0 for part in range(8))
 
 
-@pytest.mark.parametrize("diagonal", ["refixation", "whole_visit"])
-def test_any_reading_begins_at_the_shortest_dwell_and_keeps_the_means_above(
-    printed_walk: Walk, diagonal: str
-) -> None:
-    params = ScanpathParams(diagonal=diagonal, min_dwell_ms=100.0)  # type: ignore[arg-type]
-    walk = markov_walk(params, printed_walk, np.random.default_rng(6))
-    for part, mean_s in enumerate(printed_walk.dwell_mean_s):
+def test_rests_begin_at_the_shortest_one_and_keep_the_means_above() -> None:
+    walk = markov_walk(ScanpathParams(), WALK, np.random.default_rng(6))
+    parts = [0]
+    for _ in range(2000):
+        parts.append(walk.next_part(parts[-1]))
+    assert (np.diff(parts) != 0).all()
+    for part, mean_s in enumerate(WALK.dwell_mean_s):
         times = np.array([walk.dwell_s(part) for _ in range(20_000)])
-        assert times.min() >= 0.1
+        assert times.min() >= 0.14 and times.max() <= 3.0
         assert (times == times.min()).sum() == 1  # drawn, not cut off
-        if mean_s > 0.15:
-            assert times.mean() == pytest.approx(mean_s, rel=0.12)
+        assert times.mean() == pytest.approx(max(mean_s, 0.14 * 1.15), rel=0.12)
+    quick = markov_walk(ScanpathParams(rate_scale=5.0), WALK, np.random.default_rng(6))
+    assert min(quick.dwell_s(0) for _ in range(2000)) >= 0.14
 
 
 @pytest.mark.parametrize(
@@ -234,7 +184,7 @@ def test_a_face_is_entered_at_the_eye_or_the_nose_nearest_to_the_gaze(
     gaze_m: tuple[float, float, float], end: Callable[..., str]
 ) -> None:
     # The parts of FACE are in a row, the first in the middle, the last farthest to the left.
-    walk = walker(6, replace(ONE_REST, start="nearest"))
+    walk = walker(6, ScanpathParams())
     wanted, farthest = end(ENTRY_PARTS, key=PARTS.index), max(ENTRY_PARTS, key=PARTS.index)
     head = (0.0, 0.0, 0.2)
     assert walk.wander(TARGET, PERCEPT, 0.0, False, head, gaze_m).part == wanted
@@ -247,10 +197,10 @@ def test_a_face_is_entered_at_the_eye_or_the_nose_nearest_to_the_gaze(
 
 def test_the_first_rest_on_a_face_begins_when_the_gaze_arrives() -> None:
     """What "settled" says in the tick of entry is of what was looked at before."""
-    walk = walker(6, ONE_REST)
+    walk = walker(6, ScanpathParams())
     assert walk.rests_until_s == -inf
     entered = walk.wander(TARGET, PERCEPT, 0.0, True)
-    assert walk.rests_until_s == inf and walk.looks.dwell[1] is None
+    assert walk.rests_until_s == inf and walk.looks.until_s is None
     walk.wander(TARGET, PERCEPT, 0.005, False)  # the saccade is in flight
     assert walk.rests_until_s == inf
     walk.wander(TARGET, PERCEPT, 0.060, True)
@@ -272,15 +222,14 @@ def test_a_face_that_is_one_point_is_never_held_by_a_rest() -> None:
 # Fitting a walk to fixations: what is known comes back, what cannot be trusted is refused
 
 
-def walked(count: int, seed: int = 1, dwell_distribution: str = "gamma") -> list[PartFixation]:
-    """Fixations of the known walk, 20 ms of flight between them."""
-    params = ScanpathParams(
-        min_dwell_ms=0.0, diagonal="refixation", dwell_distribution=dwell_distribution
-    )
-    walk = markov_walk(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(seed))
+def walked(count: int, seed: int = 1) -> list[PartFixation]:
+    """Fixations of the known walk with gamma laws, 20 ms of flight between them."""
+    rng = np.random.default_rng(seed)
+    walk = markov_walk(PRINTED, WALK, rng)
     part, t_s, out = 5, 0.0, []
     for _ in range(count):
-        dwell_s = walk.dwell_s(part)
+        mean_s, sd_s = WALK.dwell_mean_s[part], WALK.dwell_sd_s[part]
+        dwell_s = float(rng.gamma((mean_s / sd_s) ** 2, sd_s**2 / mean_s)) + 1e-9
         out.append(PartFixation(PARTS[part], t_s, dwell_s))
         t_s += dwell_s + 0.02
         part = walk.next_part(part)
@@ -292,19 +241,17 @@ def dice() -> np.random.Generator:
 
 
 @pytest.mark.parametrize("smoothing", ["none", "laplace", "bootstrap"])
-def test_a_known_walk_is_recovered(printed_walk: Walk, smoothing: str) -> None:
+def test_a_known_walk_is_recovered(smoothing: str) -> None:
     fitted = fit_walk(walked(20_000), FitParams(smoothing=smoothing, resamples=200), dice())
-    wanted = normalise(printed_walk.matrix)
+    wanted = normalise(WALK.matrix)
     for row, counts, truth in zip(fitted.matrix, fitted.counts, wanted, strict=True):
         n = sum(counts)
         for cell, p in zip(row, truth, strict=True):
             # Four standard errors of a share, and what the added half counts may move it by.
             assert abs(cell.value - p) <= 4.0 * np.sqrt(p * (1.0 - p) / n) + 4.0 / n
     for i in range(8):
-        n, sd = fitted.visits[i], printed_walk.dwell_sd_s[i]
-        assert abs(
-            fitted.dwell_mean_s[i].value - printed_walk.dwell_mean_s[i]
-        ) < 4.0 * sd / np.sqrt(n)
+        n, sd = fitted.visits[i], WALK.dwell_sd_s[i]
+        assert abs(fitted.dwell_mean_s[i].value - WALK.dwell_mean_s[i]) < 4.0 * sd / np.sqrt(n)
         assert fitted.dwell_sd_s[i].value == pytest.approx(sd, rel=0.15)
     assert fitted.start == "FR" and fitted.outside_fixations == 0 and fitted.pooled_parts == ()
     assert np.sum([[c.value for c in row] for row in fitted.matrix], axis=1) == pytest.approx(
@@ -312,8 +259,8 @@ def test_a_known_walk_is_recovered(printed_walk: Walk, smoothing: str) -> None:
     )
 
 
-def test_intervals_hold_the_truth_about_as_often_as_they_say(printed_walk: Walk) -> None:
-    wanted, held, cells = normalise(printed_walk.matrix), 0, 0
+def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
+    wanted, held, cells = normalise(WALK.matrix), 0, 0
     dwells_held = 0
     for seed in range(18):
         fitted = fit_walk(walked(600, seed), FitParams(smoothing="none", resamples=200), dice())
@@ -326,7 +273,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(printed_walk: Walk)
                     assert cell.value == 0.0 and cell.low == 0.0 and cell.high > 0.0
         dwells_held += sum(
             mean.low <= truth <= mean.high
-            for mean, truth in zip(fitted.dwell_mean_s, printed_walk.dwell_mean_s, strict=True)
+            for mean, truth in zip(fitted.dwell_mean_s, WALK.dwell_mean_s, strict=True)
         )
     assert 0.90 < held / cells < 0.98
     assert 0.80 < dwells_held / (18 * 8) < 0.98  # skewed laws: the bootstrap is known to fall short
@@ -380,10 +327,12 @@ def test_what_cannot_be_trusted_is_refused() -> None:
 
 # ---- the average observer, and one observer --------------------------------------------
 
+PEOPLE = load(shipped_path("scanpaths", "people"), Walk)
+
 
 def visited(face: Face, params: ScanpathParams | None = None, seed: int = 1) -> dict[str, float]:
     """Return the share of the looks at each part of a face 1 m or more ahead."""
-    walk = Scanpath(params or ScanpathParams(), load_walk("people"), np.random.default_rng(seed))
+    walk = Scanpath(params or ScanpathParams(), PEOPLE, np.random.default_rng(seed))
     percept, parts = Percept(0.0, Bodies(), (face,)), []
     target = TARGET._replace(p_world_m=face.p_world_m)
     shift = None
@@ -405,14 +354,12 @@ def face_at(away_m: float, speaks: bool = False) -> Face:
     return Face(3, centre, (0.0, 0.0, 0.0), R, parts, 0.9, speaks=speaks)
 
 
-def test_the_average_observer_looks_at_the_eyes_most(printed_walk: Walk) -> None:
+def test_the_average_observer_looks_at_the_eyes_most() -> None:
     share = visited(face_at(0.8))
     assert 0.40 < share["LE"] + share["RE"] < 0.50
     assert 0.18 < share["N"] < 0.27 and 0.07 < share["M"] < 0.14
-    never = np.array(printed_walk.matrix) == 0.0
-    assert (np.array(load_walk("people").matrix)[never] == 0.0).all(), (
-        "shifts of the paper and no others"
-    )
+    never = np.array(WALK.matrix) == 0.0
+    assert (np.array(PEOPLE.matrix)[never] == 0.0).all(), "shifts of the paper and no others"
 
 
 def test_speech_draws_looks_to_the_mouth() -> None:
@@ -425,7 +372,7 @@ def test_a_look_that_returns_from_the_side_begins_at_an_eye_or_the_nose() -> Non
     percept = Percept(0.0, Bodies(), (face,))
     target = TARGET._replace(p_world_m=face.p_world_m)
     for aside in (-1.0, 1.0):
-        walk = Scanpath(ScanpathParams(), load_walk("people"), np.random.default_rng(0))
+        walk = Scanpath(ScanpathParams(), PEOPLE, np.random.default_rng(0))
         look = walk.wander(target, percept, 0.0, True, gaze_world_m=(0.8, aside, -0.3))
         assert look.part in ENTRY_PARTS
 
@@ -434,8 +381,6 @@ def test_a_spot_of_ones_own_draws_looks() -> None:
     high, low = (visited(face_at(0.8), ScanpathParams(spot_height_mm=mm)) for mm in (20.0, -30.0))
     assert high["LE"] + high["RE"] > low["LE"] + low["RE"] + 0.1
     assert low["M"] > high["M"] + 0.06
-    left, right = (visited(face_at(0.8), ScanpathParams(spot_left_mm=mm)) for mm in (30.0, -30.0))
-    assert left["LE"] / left["RE"] > 1.5 * right["LE"] / right["RE"]
 
 
 def test_parts_of_a_far_face_that_are_close_together_are_one_look() -> None:
@@ -445,13 +390,15 @@ def test_parts_of_a_far_face_that_are_close_together_are_one_look() -> None:
 
 
 def test_rests_of_the_average_observer_are_as_different_as_peoples() -> None:
-    people = load_walk("people")
-    steps, dwells = steps_and_dwells(ScanpathParams(), people)
-    share, rng = stationary(steps), np.random.default_rng(3)
-    parts = rng.choice(8, 20_000, p=share)
+    steps, dwells = steps_and_dwells(ScanpathParams(), PEOPLE)
+    share, rng = (
+        np.linalg.matrix_power(0.5 * (steps + np.eye(8)), 4096)[0],
+        np.random.default_rng(3),
+    )
+    parts = rng.choice(8, 20_000, p=share / share.sum())
     rests = np.array([dwells[part](rng) for part in parts])
     assert 0.5 < rests.std() / rests.mean() < 0.62
     assert 0.07 < (rests > 0.5).mean() < 0.14
-    eyes = np.isin(parts, [people.order.index(part) for part in ("LE", "RE")])
+    eyes = np.isin(parts, [PEOPLE.order.index(part) for part in ("LE", "RE")])
     assert 0.003 < (rests[eyes] > 1.0).mean() < 0.04
     assert 2.0 < 1.0 / (rests.mean() + 0.036) < 3.0

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.config.load import load
-from gazerig.config.schema import load_walk
+from gazerig.config.load import load, shipped_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import Samples
 from gazerig.features.lab.analysis.fit_scanpath import fit_to_recording
@@ -21,6 +20,8 @@ from gazerig.gaze.scanpath.scanpath import (
     row_sums_note,
 )
 from gazerig.gaze.types import PARTS
+
+WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 
 # A face of about 400 by 560 px in a picture of 800 by 800; y runs down.
 BOXES_YAML = """\
@@ -45,11 +46,13 @@ def boxes(tmp_path: Path) -> PartBoxes:
 
 def walked(count: int, seed: int, dwell_s: float | None = None) -> Iterator[tuple[str, float]]:
     """Parts and dwell times of the known walk."""
-    params = ScanpathParams(dwell_distribution="gamma", min_dwell_ms=0.0, diagonal="refixation")
-    walk = markov_walk(params, load_walk("nakamoto_tsuruno"), np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    walk = markov_walk(ScanpathParams(law="literal"), WALK, rng)
     part = 5
     for _ in range(count):
-        yield PARTS[part], walk.dwell_s(part) if dwell_s is None else dwell_s
+        mean_s, sd_s = WALK.dwell_mean_s[part], WALK.dwell_sd_s[part]
+        drawn_s = float(rng.gamma((mean_s / sd_s) ** 2, sd_s**2 / mean_s)) + 1e-9
+        yield PARTS[part], drawn_s if dwell_s is None else dwell_s
         part = walk.next_part(part)
 
 
@@ -96,13 +99,11 @@ def labelled_csv(path: Path, count: int, seed: int = 1) -> Path:
     return written(path, "start,duration,part", rows())
 
 
-def test_labelled_fixations_of_a_known_walk_give_it_back(
-    printed_walk: Walk, tmp_path: Path
-) -> None:
+def test_labelled_fixations_of_a_known_walk_give_it_back(tmp_path: Path) -> None:
     out = tmp_path / "mine.yaml"
     report = fit_to_recording(labelled_csv(tmp_path / "looks.csv", 8000), None, out)
     walk = load(out, Walk)
-    wanted, found = normalise(printed_walk.matrix), normalise(walk.matrix)
+    wanted, found = normalise(WALK.matrix), normalise(walk.matrix)
     assert "8000 fixations on the face, 0 elsewhere, 7999 transitions" in report
     shares = {"DN": 0.0607, "FL": 0.0842, "LE": 0.0931, "M": 0.0999,
               "N": 0.2217, "FR": 0.0946, "RE": 0.2550, "UP": 0.0907}  # fmt: skip
@@ -110,24 +111,22 @@ def test_labelled_fixations_of_a_known_walk_give_it_back(
         n = 8000 * shares[part] * 0.9
         limit = 4.0 * np.sqrt(wanted[i] * (1.0 - wanted[i]) / n) + 4.0 / n
         assert (np.abs(found[i] - wanted[i]) <= limit).all(), part
-        sd = printed_walk.dwell_sd_s[i]
+        sd = WALK.dwell_sd_s[i]
         assert walk.dwell_mean_s[i] == pytest.approx(
-            printed_walk.dwell_mean_s[i], abs=4.0 * sd / np.sqrt(n)
+            WALK.dwell_mean_s[i], abs=4.0 * sd / np.sqrt(n)
         )
         assert walk.dwell_sd_s[i] == pytest.approx(sd, rel=0.25)
     assert row_sums_note(walk) is None
     Scanpath(ScanpathParams(), walk, np.random.default_rng(1))
 
 
-def test_samples_of_a_known_walk_give_it_back(
-    printed_walk: Walk, tmp_path: Path, boxes: PartBoxes
-) -> None:
+def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) -> None:
     # Looks of a fifth of a second: a detector needs at least 60 ms.
     recording = as_csv(tmp_path / "gaze.csv", samples(boxes, walked(1000, 2, 0.2), 3))
     out = tmp_path / "mine.yaml"
     report = fit_to_recording(recording, boxes, out, "none")
     walk = load(out, Walk)
-    wanted, found = normalise(printed_walk.matrix), normalise(walk.matrix)
+    wanted, found = normalise(WALK.matrix), normalise(walk.matrix)
     for i, share in enumerate((0.0607, 0.0842, 0.0931, 0.0999, 0.2217, 0.0946, 0.2550, 0.0907)):
         n = 1000 * share * 0.85
         assert np.abs(found[i] - wanted[i]).max() < 4.0 * np.sqrt(0.25 / n), PARTS[i]

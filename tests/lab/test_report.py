@@ -307,7 +307,7 @@ def stepped(yaw_deg: np.ndarray) -> np.ndarray:
 def trace(amplitudes: tuple[float, ...], rate_hz: float, slow_deg_s: float = 0.0) -> np.ndarray:
     """Jump every half second, onto something that moves with ``slow_deg_s``."""
     t = np.arange(0.0, 0.5 * len(amplitudes) + 0.5, 1.0 / rate_hz)
-    jump, yaw = Jumps(SaccadeParams(profile="min_jerk")), slow_deg_s * t
+    jump, yaw = Jumps(SaccadeParams(profile="min_jerk")).profile, slow_deg_s * t
     for n, size in enumerate(amplitudes):
         gone = [jump.displacement_rad(radians(abs(size)), s - 0.25 - 0.5 * n) for s in t]
         yaw = yaw + np.sign(size) * np.degrees(gone)
