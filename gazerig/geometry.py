@@ -14,8 +14,7 @@ from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.reachability import look_reply, reached_joints
-from gazerig.robot.model.command_json import check_command
-from gazerig.robot.model.commands import LookAt
+from gazerig.robot.model.commands import LookAt, check_command
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.reply import JointReply
 from gazerig.robot.model.types import JointState

@@ -101,12 +101,12 @@ class Head(ABC):
             Refused: the coordinates are not a point.
         """
         if frame == "head":
-            return self._send(LookAtInHead((x_m, y_m, z_m), self._who, self._stay, for_s))
+            return self._send(LookAtInHead((x_m, y_m, z_m), stay=self._stay, for_s=for_s))
         if frame != "world":
             from gazerig.errors import Refused
 
             raise Refused(f"frame {frame!r}: expected world or head")
-        return self._send(LookAt((x_m, y_m, z_m), self._who, self._stay, for_s))
+        return self._send(LookAt((x_m, y_m, z_m), stay=self._stay, for_s=for_s))
 
     def look_towards(
         self, yaw_deg: float, pitch_deg: float, *, frame: Frame = "world",
@@ -125,7 +125,7 @@ class Head(ABC):
             Refused: the angles are not a direction.
         """
         angles = (radians(yaw_deg), radians(pitch_deg))
-        return self._send(LookAtDirection(angles, frame, distance_m, self._who, self._stay, for_s))
+        return self._send(LookAtDirection(angles, frame, distance_m, stay=self._stay, for_s=for_s))
 
     def look_at_person(self, id: int, *, for_s: float | None = None) -> Order:
         """Look at a person's face, part by part as people do, and follow it.
@@ -136,7 +136,7 @@ class Head(ABC):
             id: ``Person.id``.
             for_s: seconds until the order gives up control.
         """
-        return self._send(LookAtPerson(id, self._who, self._stay, for_s))
+        return self._send(LookAtPerson(id, stay=self._stay, for_s=for_s))
 
     def look_at_pixel(
         self, x_px: float, y_px: float, *, distance_m: float | None = None,
@@ -153,13 +153,11 @@ class Head(ABC):
             for_s: seconds until the order gives up control.
         """
         pixel = (x_px, y_px)
-        return self._send(
-            LookAtPixel(pixel, distance_m, captured_s, None, self._who, self._stay, for_s)
-        )
+        return self._send(LookAtPixel(pixel, distance_m, captured_s, stay=self._stay, for_s=for_s))
 
     def look_freely(self) -> Order:
         """Let the head choose its targets again."""
-        return self._send(LookAt(None, self._who))
+        return self._send(LookAt(None))
 
     # Joints
 
@@ -174,11 +172,11 @@ class Head(ABC):
         Raises:
             Refused: the rig has no such joint, or the angle is outside its range.
         """
-        return self._send(Jog(((joint, radians(deg)),), self._who, self._stay, for_s))
+        return self._send(Jog(((joint, radians(deg)),), stay=self._stay, for_s=for_s))
 
     def release_joints(self) -> Order:
         """Return all joints from ``jog`` to the control of gaze."""
-        return self._send(Jog((), self._who))
+        return self._send(Jog(()))
 
     # Face and behaviour
 
@@ -200,11 +198,11 @@ class Head(ABC):
         Raises:
             Refused: the rig has no such track; the message lists its tracks.
         """
-        return self._send(Play(track, speed, times, self._who, from_s, loop))
+        return self._send(Play(track, speed, times, from_s, loop))
 
     def end_track(self, track: str = "") -> Order:
         """End a track, or all; its joints return to gaze."""
-        return self._send(EndTrack(track, self._who))
+        return self._send(EndTrack(track))
 
     def sync_track(self, number: int, position_s: float) -> Order:
         """Give the position of a track by a clock of yours, at most some ten times per second.
@@ -271,7 +269,7 @@ class Head(ABC):
         text = str(what)
         if Path(text).suffix.lower() in KINDS and Path(text).is_file():
             text = str(Path(text).absolute())
-        return self._send(Say(text, volume, sway, tuple(spoken), self._who))
+        return self._send(Say(text, volume, sway, tuple(spoken)))
 
     def _say_stream(
         self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float
@@ -316,7 +314,7 @@ class Head(ABC):
         Raises:
             Refused: a value is invalid.
         """
-        return self._send(Talk("listening", person, who=self._who, stay=self._stay))
+        return self._send(Talk("listening", person, stay=self._stay))
 
     def thinking(self, person: int | None = None) -> Order:
         """Look away as a person who thinks; report it when the partner has finished.
@@ -324,7 +322,7 @@ class Head(ABC):
         Args:
             person: as in ``listening``.
         """
-        return self._send(Talk("thinking", person, who=self._who, stay=self._stay))
+        return self._send(Talk("thinking", person, stay=self._stay))
 
     def speaking(
         self, person: int | None = None, *, seconds: float | None = None, text: str = "",
@@ -346,17 +344,15 @@ class Head(ABC):
             Refused: a value is invalid.
         """
         pairs = tuple((word, start_s) for word, start_s in words)
-        return self._send(
-            Talk("speaking", person, seconds, text, pairs, str(sound), self._who, self._stay)
-        )
+        return self._send(Talk("speaking", person, seconds, text, pairs, str(sound), self._stay))
 
     def interrupt(self) -> Order:
         """Return to the face at once and listen: the partner has interrupted speech or thought."""
-        return self._send(Talk("interrupt", who=self._who, stay=self._stay))
+        return self._send(Talk("interrupt", stay=self._stay))
 
     def idle(self) -> Order:
         """End the conversation; the head looks as without one."""
-        return self._send(Talk("idle", who=self._who, stay=self._stay))
+        return self._send(Talk("idle", stay=self._stay))
 
     def behave(self, behaviour: str) -> Order:
         """Choose a behaviour of the rig's rules.
@@ -374,7 +370,7 @@ class Head(ABC):
 
     def stop(self, why: str = "requested by the program") -> Order:
         """Switch the torque off immediately, without parking; the program continues."""
-        order = self._send(Stop(why, self._who))
+        order = self._send(Stop(why))
         _ = order.reply  # wait until the torque is off
         return order
 
@@ -385,7 +381,7 @@ class Head(ABC):
             confirmed: a person has confirmed that no hand is in the mechanism; needed if another
                 person or program has stopped the head.
         """
-        order = self._send(Resume(self._who, confirmed))
+        order = self._send(Resume(confirmed))
         _ = order.reply
         return order
 
@@ -506,7 +502,7 @@ class Head(ABC):
 
     def _release_control(self) -> None:
         """Let the head choose its targets again, without waiting for the reply."""
-        self._send(LookAt(None, self._who))
+        self._send(LookAt(None))
 
     def _states(self, every_s: float, seconds: float | None) -> Iterator[HeadState]:
         last_s, end_s = float("-inf"), float("inf")
@@ -530,7 +526,7 @@ class Head(ABC):
 
     @abstractmethod
     def _send(self, command: Command) -> Order:
-        """Send a command to the head.
+        """Send a command to the head under this program's name.
 
         Raises:
             Refused: a value of the command is invalid.

@@ -29,7 +29,7 @@ from gazerig.robot.control.loop import TickLoop
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Command, Say, Value
+from gazerig.robot.model.commands import Command, Say, Value, set_client
 from gazerig.robot.model.outcome import Progress
 
 _LOG = logging.getLogger("gazerig")
@@ -105,6 +105,7 @@ class LocalHead(Head):
     def _send(self, command: Command) -> Order:
         robot = self._active_run().assembly.robot
         try:
+            command = set_client(command, self._who)
             if isinstance(command, Say):
                 command = self._voice().prepare(command)
             ticket = robot.command(command)

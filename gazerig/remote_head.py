@@ -8,10 +8,9 @@ from typing import Self
 from gazerig.errors import HeadEnded, NotFound
 from gazerig.head import Head
 from gazerig.order import Order
-from gazerig.robot.control.command_handler import as_value
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Command, Value
+from gazerig.robot.model.commands import Command, Value, as_value
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import RequestRejected, RobotClient, connect_to_all
 

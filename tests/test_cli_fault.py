@@ -6,8 +6,7 @@ import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.drivers.bus.servo_models import SERVOS
-from gazerig.robot.control.command_handler import REAL
-from gazerig.robot.remote.request_handler import RequestHandler
+from gazerig.robot.remote.request_handler import REAL, RequestHandler
 from gazerig.sim_mock.device_spec import line_of
 from gazerig.sim_mock.devices import build
 

@@ -39,11 +39,11 @@ def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
 
 
 def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running: Running) -> None:
-    running.order(Jog((("neck_yaw", 0.3),), "ann"))
+    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
     first = running.go(0.2)[0]
-    running.order(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), "ann"))
+    running.order(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), who="ann"))
     for _ in range(6):
-        running.order(Jog((("neck_yaw", 0.3),), "ann"))
+        running.order(Jog((("neck_yaw", 0.3),), who="ann"))
         tick = running.go(0.5)[-1]
     leads = tick_control_source(tick)
     assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
@@ -68,26 +68,26 @@ def test_a_point_and_a_pointer_are_led_by_who_chose_them(
     running: Running, pointer: bool, kind: str, said: str
 ) -> None:
     for _ in range(10):
-        running.order(LookAt((1.0, 0.2, 0.3), "ann", pointer=pointer))
+        running.order(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer))
         tick = running.go(0.2)[-1]
     assert tick_control_source(tick).kind == kind
     assert head_activity(tick).headline == said
 
 
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
-    running.order(Jog((("neck_yaw", 0.3),), "ann"))
+    running.order(Jog((("neck_yaw", 0.3),), who="ann"))
     running.go(0.2)
-    running.order(Stop("STOP was pressed", "ann"))
+    running.order(Stop("STOP was pressed", who="ann"))
     shot = shown(running.go(0.5)[-1])
     assert shot.control_source.kind == shot.target_name == shot.phase == "stopped"
     assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
-    running.order(Resume("ann"))
+    running.order(Resume(who="ann"))
     assert tick_control_source(running.go(0.1)[-1]) == ControlSource()
 
 
 def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:
-    running.order(Jog((("neck_yaw", 0.3),), "ann", stay=True))
+    running.order(Jog((("neck_yaw", 0.3),), who="ann", stay=True))
     running.go(1.0)
     made = running.made
     ticks: list[Tick] = []

@@ -1,7 +1,7 @@
 """Gaze targets of clients: points of two frames, directions, people, pixels; the end of control."""
 
 from collections.abc import Iterator
-from math import degrees, nan, radians
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
 from gazerig.robot.app.session import run as run_session
 from gazerig.robot.model.client_control import ARRIVED_RAD
-from gazerig.robot.model.command_json import from_json
 from gazerig.robot.model.commands import (
     Command,
     Jog,
@@ -26,6 +25,7 @@ from gazerig.robot.model.commands import (
     Stop,
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL
+from gazerig.robot.model.requests import read_request
 from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -40,26 +40,19 @@ def rig() -> Iterator[Running]:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"do": "look_at", "p_world_m": None, "for_s": 0}, "for_s must be above 0"),
-        ({"do": "look_at", "p_world_m": None, "for_s": nan}, "for_s must be above 0"),
-        ({"do": "look_at_in_head", "p_head_m": None}, "three finite numbers"),
-        ({"do": "look_at_in_head", "p_head_m": [nan, 0, 0]}, "three finite numbers"),
-        ({"do": "look_at_direction", "direction_rad": [4.0, 0.0]}, "within .-180 deg"),
-        ({"do": "look_at_direction", "direction_rad": [0.0, 1.7]}, "within\n? ?.-90 deg"),
-        ({"do": "look_at_direction", "direction_rad": [0, 0], "frame": "moon"}, "world or head"),
-        ({"do": "look_at_direction", "direction_rad": [0, 0], "distance_m": 0}, "above 0"),
-        ({"do": "look_at_person", "id": -1}, "whole number"),
-        ({"do": "look_at_person", "id": True}, "whole number"),
-        ({"do": "look_at_pixel", "pixel_px": [1.0]}, "two finite numbers"),
-        ({"do": "look_at_pixel", "pixel_px": [1.0, 10**400]}, "two finite numbers"),
-        ({"do": "look_at_pixel", "pixel_px": [1, 2], "distance_m": -1}, "above 0"),
-        ({"do": "look_at_pixel", "pixel_px": [1, 2], "captured_s": 10**400}, "time of a frame"),
-        ({"do": "look_at_pixel", "pixel_px": [1, 2], "p_world_m": [1]}, "three finite"),
+        ({"do": "look_at", "p_world_m": None, "for_s": 0}, "> 0.0 - at `.*for_s"),
+        ({"do": "look_at_in_head", "p_head_m": None}, "p_head_m"),
+        ({"do": "look_at_direction", "direction_rad": [4.0, 0.0]}, "<= 3.14"),
+        ({"do": "look_at_direction", "direction_rad": [0.0, 1.7]}, "<= 1.57"),
+        ({"do": "look_at_direction", "direction_rad": [0, 0], "distance_m": 0}, "> 0.0"),
+        ({"do": "look_at_person", "id": True}, "got `bool`"),
+        ({"do": "look_at_pixel", "pixel_px": [1.0]}, "length 2"),
+        ({"do": "look_at_pixel", "pixel_px": [1, 2], "captured_s": 10**400}, "out of range"),
     ],
 )
 def test_what_cannot_be_looked_at_is_refused_with_the_rule(data: Any, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        from_json(data)
+        read_request(data)
 
 
 def test_a_point_of_the_head_is_where_the_head_had_it(rig: Running) -> None:
@@ -141,7 +134,7 @@ def test_a_pixel_without_a_frame_is_refused(rig: Running) -> None:
 
 
 def test_a_lead_ends_after_its_time_and_says_so(rig: Running) -> None:
-    ticks = rig.do(LookAt((1.0, 0.5, 0.3), "a show", True, for_s=0.5), 1.0)[1]
+    ticks = rig.do(LookAt((1.0, 0.5, 0.3), who="a show", stay=True, for_s=0.5), 1.0)[1]
     led = [tick for tick in ticks if tick.controlled_by]
     assert led[-1].t_s - led[0].t_s == pytest.approx(0.5, abs=0.011)
     assert (
@@ -165,7 +158,7 @@ def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:
         and not ticks[0].client_control.arrived
     )
     assert ticks[-1].client_control.arrived
-    free = rig.do(LookAt(None, "a show"))
+    free = rig.do(LookAt(None, who="a show"))
     assert (
         free[0].control_number == 0
         and free[1][-1].client_control.end_reason == "a show looks elsewhere"

@@ -153,7 +153,7 @@ def test_a_parameter_is_found_changed_marked_and_put_back(at_the_rig: tuple[Rig,
 def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     evil = "<img src=x onerror='window.evil=1'><script>window.evil=1</script>"
-    shown = [rig.robot.command(Stop(evil, evil))]
+    shown = [rig.robot.command(Stop(evil, who=evil))]
     wait_for(lambda: person.reads("<img src=x"), "the words as they are")
     assert shown and person.run("window.evil === undefined") is True
     assert person.run(f"{everywhere('img[src=x]')}.length") == 0

@@ -20,8 +20,6 @@ from websockets.sync.client import ClientConnection
 from gazerig.gaze.types import PARTS
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.model.command_json import as_json
-from gazerig.robot.model.commands import Stop
 from gazerig.robot.model.types import SeenFace
 
 OWED_BYTES = 6_000_000
@@ -141,7 +139,7 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig, path:
         wait_for(lambda: listener.reads("the target of later"), "the newest words")
         seen = reads_all.bytes
         wait_for(lambda: reads_all.bytes > seen, "more for who reads")
-        assert visitor.ask(as_json(Stop("a test"))) == 204
+        assert visitor.ask({"do": "stop", "why": "a test"}) == 204
         wait_for(lambda: [asked["do"] for asked in rig.heard] == ["stop"], "the stop")
         wait_for(lambda: visitor.state()["stopped"] == "a test", "the button's news")
         # It was deaf indeed: what it was owed was not all kept for it.

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from msgspec import structs
 from shown_page import SNAPSHOT
 from ticked_rig import Outbox
 
@@ -72,7 +73,7 @@ def test_a_playing_track_is_ended() -> None:
 
 
 def replace_state(state: TrackState, **changes: object) -> TrackState:
-    return state._replace(**changes)  # type: ignore[arg-type]
+    return structs.replace(state, **changes)
 
 
 def test_the_timeline_shows_position_owners_cues_and_limits() -> None:
@@ -82,9 +83,9 @@ def test_the_timeline_shows_position_owners_cues_and_limits() -> None:
         "show: neck_yaw: slower by 1.2", "show at 12.0 s",
     ):  # fmt: skip
         assert words in html, words
-    ended = SHOW._replace(end_reason="stage has ended it")
+    ended = replace_state(SHOW, end_reason="stage has ended it")
     assert "show has ended: stage has ended it" in timeline_html((ended,), {}, NoWaves())
-    done = SHOW._replace(end_reason=FINISHED, limited="")
+    done = replace_state(SHOW, end_reason=FINISHED, limited="")
     assert "note" not in timeline_html((done,), {}, NoWaves())
 
 

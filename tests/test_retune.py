@@ -1,11 +1,11 @@
 """Every knob turned while the rig runs: no jump on the bus, nothing forgotten, nothing idle."""
 
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from retuned_run import DT_S, Judge, Running, started
@@ -13,8 +13,7 @@ from retuned_run import DT_S, Judge, Running, started
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.parameters import NEXT_START, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.model.command_json import as_json, from_json
-from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value
+from gazerig.robot.model.commands import AnyCommand, Jog, Resume, Stop, Tune, Value
 from gazerig.robot.model.parameter import Parameter
 
 
@@ -134,7 +133,9 @@ def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
 def test_an_order_that_crossed_processes_is_checked_in_its_tick() -> None:
     running = started()
     running.go(10)
-    order = from_json(json.loads(json.dumps(as_json(Tune((("gaze.lids.close_ms", 90.0),))))))
+    order = msgspec.json.decode(
+        msgspec.json.encode(Tune((("gaze.lids.close_ms", 90.0),))), type=AnyCommand
+    )
     running.made.robot.command(order)
     running.go(1)
     assert running.rig.gaze.lids.close_ms == 90.0

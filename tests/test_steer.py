@@ -3,7 +3,7 @@
 from math import degrees
 
 from gazerig.robot.cli.steer import END, KeyControls, run_steering
-from gazerig.robot.model.commands import LookAtDirection
+from gazerig.robot.model.commands import Ask, LookAtDirection, Play
 from gazerig.robot.remote.client import RequestRejected
 from gazerig.robot.remote.steering import KEYS_LET_GO_S, STOP, Steering
 
@@ -51,21 +51,18 @@ class Rig:
         self.who, self.in_control, self.told = "me", False, list[object]()
         self.refuses = False
 
-    def send(self, command: LookAtDirection) -> None:
-        if self.refuses:
-            raise RequestRejected("stopped: resume first")
-        self.in_control = True
-        self.told.append(tuple(round(degrees(angle)) for angle in command.direction_rad))
+    def send(self, command: LookAtDirection | Play | Ask) -> None:
+        if isinstance(command, LookAtDirection):
+            if self.refuses:
+                raise RequestRejected("stopped: resume first")
+            self.in_control = True
+            self.told.append(tuple(round(degrees(angle)) for angle in command.direction_rad))
+        else:
+            self.told.append(command.track if isinstance(command, Play) else command.choice)
 
     def look_freely(self) -> None:
         self.in_control = False
         self.told.append("free")
-
-    def play(self, track: str) -> None:
-        self.told.append(track)
-
-    def ask(self, menu: str, choice: str) -> None:
-        self.told.append(choice)
 
     def stop(self, why: str) -> None:
         self.told.append(STOP)

@@ -142,12 +142,12 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     machine.go(1.0)
     held = machine.holding()
     machine.command("unplug")
-    machine.made.robot.command(Stop("a hand", "the space bar"))
+    machine.made.robot.command(Stop("a hand", who="the space bar"))
     ticks = machine.go(7.0)  # longer than the bus's time-out
     assert machine.ended == "seconds" and ticks[-1].stopped == "a hand"
     assert machine.said("the stop is pending, torque is NOT YET off")
     assert any(machine.holding())
-    ticket = machine.made.robot.command(Resume("the space bar"))
+    ticket = machine.made.robot.command(Resume(who="the space bar"))
     machine.go(0.1)
     reply = ticket.wait(0.0)
     assert reply is not None and reply.refused.startswith("still stopped: ")
@@ -157,7 +157,7 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     assert machine.said("torque switched off, as requested while the port was gone")
     machine.go(4.0)
     assert not any(machine.holding()) and machine.ticks[-1].stopped
-    machine.made.robot.command(Resume("the space bar"))
+    machine.made.robot.command(Resume(who="the space bar"))
     machine.go(2.0)
     assert machine.holding() == held and not machine.ticks[-1].stopped
     machine.made.robot.stop()

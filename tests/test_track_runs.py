@@ -54,7 +54,7 @@ def test_joints_follow_tracks_within_limits_and_the_eyes_stay_on_the_point(name:
     lids = np.array([joint.endswith("lid") for joint in rig.names])
     try:
         made.robot.start(made.clock)
-        made.robot.command(LookAt(POINT, "test", stay=True))
+        made.robot.command(LookAt(POINT, who="test", stay=True))
         before = ticks(made, 500)[-1]
         for track in ("nod", "shake", "laugh", "look_around"):
             _, done = played(made, track)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from math import degrees
 
+import msgspec
 import pytest
 from expressive_rig import started
 from typer.testing import CliRunner
@@ -45,7 +46,8 @@ class TickedRig:
         return self.made.robot.tracks()
 
     def write(self, request: object, within_s: float) -> None:
-        self.answer = self.handler.answer(request)
+        answer = self.handler.answer(msgspec.to_builtins(request))
+        self.answer = msgspec.json.decode(msgspec.json.encode(answer))
 
     def read(self, first_s: float, within_s: float) -> object:
         return self.answer

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from gazerig.config.allowed_folder import file_in_folders
 from gazerig.config.rig import Rig
@@ -38,8 +39,16 @@ from gazerig.gaze.track.track import LIMIT_SHARE
 from gazerig.gaze.types import Floats
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.command_json import MAX_SPEECH_S, check_command
-from gazerig.robot.model.commands import Command, EndTrack, Say, SetLevel, Speak, SyncTrack
+from gazerig.robot.model.commands import (
+    MAX_SPEECH_S,
+    Command,
+    EndTrack,
+    Say,
+    SetLevel,
+    Speak,
+    SyncTrack,
+    check_command,
+)
 from gazerig.robot.model.control_source import FINISHED, TrackState
 from gazerig.robot.model.reply import CommandTaker
 
@@ -125,7 +134,7 @@ class RunVoice:
             ValueError: the command is invalid.
             SoundError: the file, the text or a program is not usable.
         """
-        check_command(command)
+        command = check_command(command)
         what, params = command.what, self._rig().sound
         if what.lower().endswith(KINDS):
             sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
@@ -142,8 +151,8 @@ class RunVoice:
             speech = self._from_pcm(silence + said.pcm, said.rate_hz, 1, phonemes)
         self._open_loudspeaker()
         if not command.sway:
-            speech = speech._replace(sway_deg=0.0)
-        return speech._replace(volume=command.volume, who=command.who)
+            speech = structs.replace(speech, sway_deg=0.0)
+        return structs.replace(speech, volume=command.volume, who=command.who)
 
     def prepare_stream(
         self, pieces: Sequence[bytes], rate_hz: int, channels: int, who: str
@@ -154,7 +163,7 @@ class RunVoice:
             SoundError: the format is not possible.
         """
         check_format(rate_hz, channels)
-        return self._from_pcm(b"".join(pieces), rate_hz, channels, ())._replace(who=who)
+        return structs.replace(self._from_pcm(b"".join(pieces), rate_hz, channels, ()), who=who)
 
     def _from_pcm(
         self,

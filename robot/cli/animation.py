@@ -15,7 +15,7 @@ from gazerig.gaze.track.track import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import NO_TRACK
+from gazerig.robot.model.commands import NO_TRACK, Express, Play, Say, SetLevel
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -44,7 +44,7 @@ def express(
             there = rig.menus().get("expression", ())
             say(", ".join(there) or "this rig has no table expressions")
             return
-        rig.express(expression, strength)
+        rig.send(Express(expression, strength))
         say(f"{expression} is active" + (f", strength {strength:g}" if strength != 1.0 else ""))
 
 
@@ -72,8 +72,8 @@ def level(
         with RobotClient.connect(pid, "gazerig ctl level") as rig:
             with contextlib.suppress(KeyboardInterrupt):
                 for one in values:
-                    rig.set_level(name, one)
-            rig.set_level(name, 0.0)
+                    rig.send(SetLevel(name, one))
+            rig.send(SetLevel(name, 0.0))
 
 
 @app.command()
@@ -115,7 +115,8 @@ def play(
         from_s: float | str = start
         with contextlib.suppress(ValueError):
             from_s = float(start)
-        say(rig.play("" if track == NO_TRACK else track, speed, count, from_s, loop).text())
+        name = "" if track == NO_TRACK else track
+        say(rig.send(Play(name, speed, count, from_s, loop)).text())
 
 
 @app.command(name="say")
@@ -144,7 +145,7 @@ def say_aloud(
             return
         if Path(what).suffix.lower() in KINDS and Path(what).is_file():
             what = str(Path(what).absolute())
-        say(rig.say(what, volume, sway).text())
+        say(rig.send(Say(what, volume, sway)).text())
 
 
 def _track_line(track: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ from math import inf, radians
 from typing import Annotated
 
 import typer
+from msgspec import structs
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli.terminal import FAULT, clear_errors, confirm, say
@@ -72,7 +73,7 @@ def look(
                 rig.look_freely()
                 say("it looks freely")
                 return
-            reply = rig.send(command._replace(who=rig.who, stay=stay))
+            reply = rig.send(structs.replace(command, stay=stay))
             until = "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
             say(f"{reply.text()}, until: {'gazerig ctl look free' if stay else until}")
             if stay:

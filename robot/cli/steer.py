@@ -12,7 +12,7 @@ from gazerig.gaze.angles import Angles2
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say, status
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.commands import LookAtDirection
+from gazerig.robot.model.commands import Ask, LookAtDirection, Play
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 from gazerig.robot.remote.steering import STOP, TRACKS, Steering
 
@@ -79,11 +79,11 @@ def run_steering(
             for track in pressed:
                 if track in TRACKS:
                     if track == "wink":
-                        rig.ask("lids", "wink left")
+                        rig.send(Ask("lids", "wink left"))
                     else:
-                        rig.play(track)
+                        rig.send(Play(track))
             if wanted is not None and (wanted != looks or not rig.in_control):
-                rig.send(LookAtDirection(wanted, "world", _FAR_M, rig.who))
+                rig.send(LookAtDirection(wanted, distance_m=_FAR_M))
             elif wanted is None and looks is not None:
                 rig.look_freely()
             show("you lead" if wanted is not None else "it looks freely")

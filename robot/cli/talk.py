@@ -32,7 +32,7 @@ def talk(
     """Report what a voice agent does, so that the running head looks as a partner; idle ends it."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl talk") as rig:
         order = cast(TalkOrder, state.value)
-        rig.send(Talk(order, person, seconds, text, who=rig.who, stay=True))
+        rig.send(Talk(order, person, seconds, text, stay=True))
         now = rig.status()
         said, ends_s = now["conversation"], now["conversation"]["ends_s"]
         planned = "" if ends_s is None else f", planned end in {ends_s - now['t_s']:.1f} s"

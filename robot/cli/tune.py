@@ -19,7 +19,8 @@ from gazerig.robot.cli import steer as cli_steer
 from gazerig.robot.cli import talk as cli_talk
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
-from gazerig.robot.model.parameter import JsonValue, Parameter
+from gazerig.robot.model.commands import Ask
+from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.remote.client import RobotClient, connect_to_all
 
 ctl = typer.Typer(
@@ -72,8 +73,8 @@ def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
         return complete_key(incomplete)
     try:
         with RobotClient.connect() as rig:
-            param = rig.parameter(given[-1])
-    except DriverError:
+            (param,) = (one for one in rig.parameters(given[-1]) if one.key == given[-1])
+    except (DriverError, ValueError):
         return []
     values = ("true", "false") if param.kind == "bool" else tuple(map(_value_text, param.choices))
     return [value for value in values if value.startswith(incomplete)]
@@ -245,7 +246,7 @@ def ask(
     """Choose a behaviour, or talk, listen or think, on the running head; or list all choices."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         if menu is not None and choice is not None:
-            rig.ask(menu, choice)
+            rig.send(Ask(menu, choice))
             say(f"{menu} {choice} is active")
             return
         menus = rig.menus()
@@ -342,9 +343,7 @@ def _talk_lines(now: Mapping[str, Any]) -> list[str]:
     return [f"conversation: {talk['state']}{partner}, reported by {talk['who'] or 'a client'}"]
 
 
-def _table(
-    found: Iterable[Parameter], values: dict[str, JsonValue], unsaved: set[str]
-) -> list[str]:
+def _table(found: Iterable[Parameter], values: dict[str, Any], unsaved: set[str]) -> list[str]:
     """Format parameters in columns without cutting text, as programs read the lines too."""
     rows = [("", "key", "value", "unit", "default", "")]
     for param in found:

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+from msgspec import structs
+
 from gazerig.gaze.attention.conversation import ConversationGaze
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.track.animation import Animation
@@ -23,6 +25,7 @@ from gazerig.robot.model.commands import (
     EndTrack,
     Express,
     Jog,
+    Look,
     LookAtPerson,
     MoveOpponent,
     Play,
@@ -129,13 +132,12 @@ class CommandExecutor:
         match command:
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
-            case _ if isinstance(command, ControlCommand):
+            case ControlCommand():
                 if self._stop.stop_reason:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
                 reply = self._take_control(command, t_s)
-                return reply._replace(
-                    control_number=self._lead.state.number * self._lead.state.active
-                )
+                number = self._lead.state.number * self._lead.state.active
+                return structs.replace(reply, control_number=number)
             case Play() | Speak():
                 if self._stop.stop_reason:
                     return CommandReply(f"stopped ({self._stop.stop_reason}): resume first")
@@ -177,7 +179,7 @@ class CommandExecutor:
             if isinstance(command, LookAtPerson):
                 face, captured_s = self._looks.face(command.id)
                 self._change_control(lambda: self._lead.follow(command, face, captured_s, t_s))
-            else:
+            elif isinstance(command, Look):
                 point = self._looks.point(command)
                 self._change_control(lambda: self._lead.look(command, point, t_s))
         except ValueError as error:

@@ -5,7 +5,7 @@ roll + right ear down; lengths in m; times in s of the rig's own clock.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from math import degrees
 from typing import Any
 
@@ -199,6 +199,15 @@ class HeadState:
     conversation: ConversationState = field(default=NO_CONVERSATION)
 
 
+@dataclass(frozen=True, slots=True)
+class HeadReport:
+    """The newest tick, None before the first, and events; number: that of the newest event."""
+
+    state: HeadState | None
+    events: tuple[HeadEvent, ...]
+    number: int = 0
+
+
 def head_state(tick: Tick) -> HeadState:
     """Return the state of a head in a tick."""
     percept = tick.percept
@@ -220,65 +229,6 @@ def head_state(tick: Tick) -> HeadState:
         head_activity(tick).headline,
         tick.conversation,
     )
-
-
-def as_json(state: HeadState) -> dict[str, Any]:
-    """Return a state as plain JSON values."""
-    named: dict[str, Any] = {
-        "client_control": state.client_control,
-        "control_source": state.control_source,
-        "conversation": state.conversation,
-    }
-    tracks = [track._asdict() for track in state.tracks]
-    plain = {name: value._asdict() for name, value in named.items()}
-    return {**asdict(state), **plain, "tracks": tracks}
-
-
-def from_json(data: Mapping[str, Any]) -> HeadState:
-    """Return the state that ``as_json`` wrote; fields unknown to this version are ignored.
-
-    Raises:
-        KeyError, TypeError, ValueError: The data is not a state.
-    """
-    made = _known_fields(HeadState, data)
-    made["joints"] = {
-        name: JointReading(**_known_fields(JointReading, one))
-        for name, one in data["joints"].items()
-    }
-    made["gaze"] = GazeReading(**_known_fields(GazeReading, data["gaze"]))
-    made["people"] = tuple(
-        Person(
-            **_known_fields(Person, one)
-            | {"parts_m": {name: tuple(point) for name, point in one["parts_m"].items()}}
-        )
-        for one in data["people"]
-    )
-    made["client_control"] = ControlState(**_known_fields(ControlState, data["client_control"]))
-    made["tracks"] = tracks_from_json(data)
-    if "control_source" in data:
-        made["control_source"] = ControlSource(
-            **_known_fields(ControlSource, data["control_source"])
-        )
-    if "conversation" in data:
-        made["conversation"] = ConversationState(
-            **_known_fields(ConversationState, data["conversation"])
-        )
-    return HeadState(**made)
-
-
-def tracks_from_json(data: Mapping[str, Any]) -> tuple[TrackState, ...]:
-    """Return the tracks in the result of ``as_json``."""
-    return tuple(TrackState(**_known_fields(TrackState, one)) for one in data["tracks"])
-
-
-def _known_fields(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields that a class has, with JSON's lists as tuples."""
-    names = kind._fields if hasattr(kind, "_fields") else {one.name for one in fields(kind)}
-    return {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in data.items()
-        if name in names
-    }
 
 
 def _joints(tick: Tick) -> dict[str, JointReading]:

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from msgspec import structs
+
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, direction, rotate, scale
 from gazerig.gaze.types import Face, GazeState, Percept, Vec3
@@ -47,7 +49,7 @@ class LookPoints:
         point = self._pixels.point(
             command.pixel_px, found, self.newest.percept, command.distance_m, command.captured_s
         )
-        return command._replace(p_world_m=point)
+        return structs.replace(command, p_world_m=point)
 
     def point(self, command: Look) -> Vec3 | None:
         """Return the point in the world to look at, None to free the gaze.

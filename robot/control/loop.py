@@ -32,7 +32,6 @@ from gazerig.robot.control.tick import stopped_result
 from gazerig.robot.control.track_choices import TrackChoices, TrackInfo
 from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.command_json import check_command
 from gazerig.robot.model.commands import (
     NO_TRACK,
     Ask,
@@ -42,6 +41,7 @@ from gazerig.robot.model.commands import (
     Play,
     Speak,
     Tune,
+    check_command,
 )
 from gazerig.robot.model.conversation import Conversation
 from gazerig.robot.model.frames import PoseHistory
@@ -150,7 +150,7 @@ class Robot:
             ValueError: The command is invalid, or the queue is full; the message lists the
                 available choices.
         """
-        check_command(command)
+        command = check_command(command)
         if isinstance(command, Jog):
             refuse_out_of_range(command, self.body.names, self._guard.limits)
         if isinstance(command, MoveOpponent) and self._executor.opponent is None:
@@ -163,7 +163,7 @@ class Robot:
         Raises:
             ValueError: As ``command``.
         """
-        check_command(command)
+        command = check_command(command)
         refuse_impossible(command, self.menus, self.body.names, self._animation, self._tracks)
         return self._commands.add(command)
 

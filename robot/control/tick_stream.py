@@ -17,7 +17,6 @@ import numpy as np
 from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Percept, Target, Vec3
 from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.command_json import as_recorded_json
 from gazerig.robot.model.control_source import ControlState, TrackState
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
@@ -57,7 +56,7 @@ class TickRow(NamedTuple):
         dt_s: Time since the previous tick.
         percept: Number of the percept, None without one.
         command_is_desired: Whether ``guard_result.desired_rad`` equals ``desired_rad``.
-        commands: JSON from ``command_json.as_recorded_json``.
+        commands: Plain values of the commands.
         before: Further inputs of the run, for a recording.
     """
 
@@ -72,7 +71,7 @@ class TickRow(NamedTuple):
     guard_result: GuardResult
     command_is_desired: bool
     events: tuple[str, ...]
-    commands: list[dict[str, Any]]
+    commands: list[Any]
     stopped: str
     controlled_by: str
     client_control: ControlState
@@ -170,7 +169,7 @@ class TickStream:
                 tick.t_s, dt_s, None if percept is None else self._number, tick.joints, tick.pose,
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
-                [as_recorded_json(command) for command in tick.commands], tick.stopped, tick.controlled_by,
+                tick.commands, tick.stopped, tick.controlled_by,
                 tick.client_control, tick.tracks, tick.parking, tick.conversation, before,
             ))  # fmt: skip
         return encode((percepts, rows))
@@ -185,7 +184,7 @@ def encode(value: object) -> bytes:
     try:
         return _encoder.encode(value)
     except UnicodeEncodeError:  # a file or device name that is not text
-        return _encoder.encode(_to_utf8(value))
+        return _encoder.encode(_to_utf8(msgspec.to_builtins(value, enc_hook=_to_plain)))
 
 
 def decode_rows(data: bytes) -> tuple[dict[int, Percept], list[TickRow]]:

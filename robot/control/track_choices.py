@@ -1,9 +1,9 @@
 """Tracks of a robot: the available ones, their fit to this rig, and their control."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
+from msgspec import Struct, structs
 
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.mouth.mouth_keys import MouthKey
@@ -32,7 +32,7 @@ _MOST_SPEECHES = 8
 _SPEECHES = (SPEECH, SPEECH_SWAY)
 
 
-class TrackInfo(NamedTuple):
+class TrackInfo(Struct, frozen=True):
     """A track on this rig, played from the middle of all ranges.
 
     Attributes:
@@ -133,7 +133,8 @@ class TrackChoices:
             self._end_state(number, FINISHED, t_s)
         for number, voice in voices.items():
             state, passed = self._playing[number], voice.passed
-            self._playing[number] = state._replace(
+            self._playing[number] = structs.replace(
+                state,
                 position_s=voice.position_s(t_s) - voice.ahead_s,
                 cue=passed[-1] if passed else state.cue,
                 cues=state.cues + len(passed),
@@ -175,13 +176,14 @@ class TrackChoices:
         Raises:
             ValueError: The rig has no such level.
         """
-        key = command._replace(lead_s=None, who="")
+        key = structs.replace(command, lead_s=None, who="")
         if key not in self._speeches:
             if command.level and command.level not in self._tables.levels:
                 raise ValueError(f"no level {command.level!r} for the mouth")
-            sound, duration_s, level, pairs, sway_deg, volume, *_ = command
-            mouth = [MouthKey(*pair) for pair in pairs]
-            tracks = {SPEECH: speech_track(sound, duration_s, level, mouth, volume)}
+            duration_s, sway_deg = command.duration_s, command.sway_deg
+            mouth = [MouthKey(*pair) for pair in command.mouth]
+            speech = speech_track(command.sound, duration_s, command.level, mouth, command.volume)
+            tracks = {SPEECH: speech}
             if sway_deg > 0.0 and any(name.startswith("neck_") for name in self._joints):
                 tracks[SPEECH_SWAY] = sway_track(duration_s, mouth, sway_deg)
             for old in tuple(self._speeches)[: 1 - _MOST_SPEECHES]:
@@ -221,12 +223,12 @@ class TrackChoices:
         if command.lead_s is not None:
             return command
         if isinstance(command, Speak):
-            return command._replace(lead_s=self.latencies_s())
+            return structs.replace(command, lead_s=self.latencies_s())
         track = self._tracks.get(command.track)
         if track is None or not track.sound:
             return command
         sound_s = self._sounds.get(track.sound, 0.0)
-        return command._replace(lead_s=self.latencies_s(), sound_s=sound_s)
+        return structs.replace(command, lead_s=self.latencies_s(), sound_s=sound_s)
 
     def latencies_s(self) -> tuple[float, ...]:
         """Return the latencies of all joints, measured or assumed. Thread-safe."""
@@ -349,7 +351,7 @@ class TrackChoices:
             if voice.number == command.number:
                 voice.sync(t_s, command.position_s)
                 state = self._playing[voice.number]
-                self._playing[voice.number] = state._replace(clock=command.clock)
+                self._playing[voice.number] = structs.replace(state, clock=command.clock)
 
     def _end(
         self, voices: Sequence[Voice], t_s: float, limits: Sequence[JointLimit], who: str
@@ -370,7 +372,8 @@ class TrackChoices:
         return CommandReply(track=TrackReply("", fade_s))
 
     def _end_state(self, number: int, reason: str, t_s: float) -> None:
-        self._ended[number] = self._playing.pop(number)._replace(end_reason=reason), t_s
+        ended = structs.replace(self._playing.pop(number), end_reason=reason)
+        self._ended[number] = ended, t_s
 
     def drop_present(self, t_s: float) -> str:
         """Drop all tracks, as a client holds their joints or the torque is off.

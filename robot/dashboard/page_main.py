@@ -22,6 +22,7 @@ from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import viser
 
 from gazerig.drivers.process import message_link
@@ -42,12 +43,11 @@ from gazerig.robot.dashboard.feed.page_process import (
     URL,
 )
 from gazerig.robot.dashboard.page_view import PageView
-from gazerig.robot.dashboard.requests.outbox import DOOR, Outbox
+from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import LookAt, MoveOpponent
 
 _FRAME_S = 0.04
@@ -123,8 +123,10 @@ def serve(
     pointer = PointerToLook(
         lambda browser: camera_of(server, browser),
         # Do not mark the browser as in control: only its points show that a pointer is present.
-        lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
-        move_opponent=lambda point: outbox.ask(as_json(MoveOpponent(point)), DOOR),
+        lambda point, who: outbox.forward(
+            msgspec.json.encode(LookAt(point, who=who, pointer=True))
+        ),
+        move_opponent=lambda point: outbox.forward(msgspec.json.encode(MoveOpponent(point))),
     )
     door = AuthProxy(
         host, open_port, inside, outbox.forward, stop, token, browsers, widgets, pointer.look_at_pointer,

@@ -7,6 +7,8 @@ Times are those of the ticks and heartbeats are commands, so a repeated run time
 from math import degrees, radians
 from typing import Literal
 
+from msgspec import structs
+
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import (
@@ -15,6 +17,7 @@ from gazerig.robot.model.commands import (
     Look,
     LookAt,
     LookAtDirection,
+    LookAtInHead,
     LookAtPerson,
     LookAtPixel,
     Renew,
@@ -106,7 +109,9 @@ class ClientControl:
             self._describe()
             if self.state.active:  # the gaze returns to the previous target
                 arrived = self.state.arrived
-                self.state = self._new_state(self.state.number, t_s)._replace(arrived=arrived)
+                self.state = structs.replace(
+                    self._new_state(self.state.number, t_s), arrived=arrived
+                )
             return
         if command.who != self._lease.who:
             self.point = self.person = None
@@ -192,7 +197,7 @@ class ClientControl:
             point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
             error = gaze_error(point, pose, converges).whole
         arrived = self.state.arrived or error <= ARRIVED_RAD
-        self.state = self.state._replace(arrived=arrived, error_rad=error)
+        self.state = structs.replace(self.state, arrived=arrived, error_rad=error)
         return self.state
 
     def _start(self, command: ControlCommand, t_s: float) -> None:
@@ -263,8 +268,9 @@ def _target_text(command: Look) -> str:
             return f"look at person {person}"
         case LookAtPixel(pixel):
             return f"look at pixel {pixel[0]:.0f} {pixel[1]:.0f}"
-        case _:
-            return f"look at {_numbers(command.p_head_m)} of the head"
+        case LookAtInHead(p):
+            return f"look at {_numbers(p)} of the head"
+    raise TypeError(f"no text for {command}")
 
 
 def _numbers(point: Vec3) -> str:

@@ -1,101 +1,155 @@
 """Commands to a running robot from the page, another program or the command line.
 
-A command is plain data. It is sent between processes as JSON and executed at the next tick. A
-recording of a run contains it, so that the run can be repeated.
+A command is plain data: Python, the sockets, HTTP and recordings use these classes as they are. It
+is executed at the next tick. A recording of a run contains it, so that the run can be repeated.
 
 The latch of a stop stores the client that stopped, the shortest duration, and the clients that may
 resume. Its times are those of the ticks, so a repeated run is stopped and resumed as recorded.
 """
 
+import re
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from math import pi
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from gazerig.gaze.angles import Angles2, Vec3
+import msgspec
+from msgspec import Meta, Struct, structs
+
+from gazerig.gaze.track.track import MAX_COUNT, MAX_DURATION_S, MAX_SPEED, MIN_SPEED
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """Value of a key in a rig's YAML."""
 
-Frame = Literal["world", "head"]
 HEARTBEAT_S = 1.0
 """A control or conversation without ``stay`` ends if it is not renewed for this time."""
 FAR_M = 100.0
 """Distance beyond which the eyes are practically parallel."""
+MAX_WORDS = 200
+"""Longest name or reason in a command, in characters."""
+MAX_SPEECH_S = 1200.0
+"""Longest speech; longer ones belong into a track's file."""
+OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))
+"""Least and greatest x, y and z to which the opponent's fist can be moved."""
+NO_TRACK = "none"
+"""Choice in the menu of tracks that ends the present one."""
+
+Frame = Literal["world", "head"]
+TalkOrder = Literal["listening", "thinking", "speaking", "idle", "interrupt"]
+"""What a voice agent does now; interrupt: the other person has interrupted it."""
+
+_Name = Annotated[str, Meta(max_length=MAX_WORDS)]
+_Text = Annotated[str, Meta(max_length=10_000)]
+_Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_Coordinate = Annotated[float, Meta(ge=-1000.0, le=1000.0)]
+_Point = tuple[_Coordinate, _Coordinate, _Coordinate]
+_Distance = Annotated[float, Meta(gt=0.0, le=1000.0)]
+_Pixel = Annotated[float, Meta(ge=-20_000.0, le=20_000.0)]
+_Angle = Annotated[float, Meta(ge=-2.0 * pi, le=2.0 * pi)]
+_Yaw = Annotated[float, Meta(ge=-pi, le=pi)]
+_Pitch = Annotated[float, Meta(ge=-0.5 * pi, le=0.5 * pi)]
+_Position = Annotated[float, Meta(ge=0.0, le=MAX_DURATION_S)]
+_Number = Annotated[int, Meta(ge=0, le=2**53)]
+"""Number of a person or a track: every client and recording can hold it."""
+_SpeechTime = Annotated[float, Meta(ge=0.0, le=MAX_SPEECH_S)]
+_Lead = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], ...]
+_ControlTime = Annotated[float, Meta(gt=0.0, le=86_400.0)]
+_TalkTime = Annotated[float, Meta(ge=0.0, le=600.0)]
 
 
-class Ask(NamedTuple):
+def _verb(class_name: str) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", class_name).lower()
+
+
+class Request(Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag=_verb):
+    """A message to a running rig; its verb is the class's name: SetLevel is set_level."""
+
+
+class Command(Request, frozen=True):
+    """A request that a tick executes."""
+
+
+class ClientCommand(Command, frozen=True, kw_only=True):
+    """A command with its client.
+
+    Attributes:
+        who: Name of the client.
+    """
+
+    who: _Name = ""
+
+
+class ControlCommand(ClientCommand, frozen=True, kw_only=True):
+    """A command that takes control of gaze or joints.
+
+    Attributes:
+        stay: Keep it until another command; if False, it needs a ``Renew`` at least every
+            ``HEARTBEAT_S``.
+        for_s: Duration in s, None if unlimited.
+    """
+
+    stay: bool = False
+    for_s: _ControlTime | None = None
+
+
+class Look(ControlCommand, frozen=True):
+    """A command that chooses the gaze's target instead of the models."""
+
+
+class Ask(Command, frozen=True):
     """A choice from a menu: a behaviour, a mode of conversation, a motion of the lids."""
 
-    menu: str
-    choice: str
+    menu: _Name
+    choice: _Name
 
 
-class LookAt(NamedTuple):
+class LookAt(Look, frozen=True):
     """Look at a point in the world instead of the models' target; None frees the gaze.
 
     Attributes:
         p_world_m: Point in m, x ahead, y left, z up of the neck base.
-        who: Name of the client.
-        stay: Keep the target until another command; if False, it needs a ``Renew`` at least
-            every ``HEARTBEAT_S``.
-        for_s: Duration in s, None if unlimited.
         pointer: Whether the point is a person's mouse pointer, for texts.
     """
 
-    p_world_m: Vec3 | None
-    who: str = ""
-    stay: bool = False
-    for_s: float | None = None
+    p_world_m: _Point | None
     pointer: bool = False
 
 
-class LookAtInHead(NamedTuple):
+class LookAtInHead(Look, frozen=True):
     """Look at the world point that is now at a position in the head's frame.
 
     Attributes:
         p_head_m: Position in m, x ahead, y left, z up of the point midway between the eyes, along
             the head's axes at the time of the command.
-        who, stay, for_s: As in LookAt.
     """
 
-    p_head_m: Vec3
-    who: str = ""
-    stay: bool = False
-    for_s: float | None = None
+    p_head_m: _Point
 
 
-class LookAtDirection(NamedTuple):
+class LookAtDirection(Look, frozen=True):
     """Look in a direction from the head's present position.
 
     Attributes:
         direction_rad: (yaw, pitch), yaw + left, pitch + up.
         frame: Axes of the neck base, or of the head at the time of the command.
         distance_m: Distance at which the eyes converge.
-        who, stay, for_s: As in LookAt.
     """
 
-    direction_rad: Angles2
+    direction_rad: tuple[_Yaw, _Pitch]
     frame: Frame = "world"
-    distance_m: float = FAR_M
-    who: str = ""
-    stay: bool = False
-    for_s: float | None = None
+    distance_m: _Distance = FAR_M
 
 
-class LookAtPerson(NamedTuple):
+class LookAtPerson(Look, frozen=True):
     """Look at a person and follow until the person has not been visible for some time.
 
     Attributes:
         id: Perception's number of the person.
-        who, stay, for_s: As in LookAt.
     """
 
-    id: int
-    who: str = ""
-    stay: bool = False
-    for_s: float | None = None
+    id: _Number
 
 
-class LookAtPixel(NamedTuple):
+class LookAtPixel(Look, frozen=True):
     """Look at the object at a pixel of a camera frame.
 
     Attributes:
@@ -104,33 +158,25 @@ class LookAtPixel(NamedTuple):
             the distance of the object detected there.
         captured_s: The frame's time of exposure, None for the newest frame.
         p_world_m: World point of the pixel, set on execution for the recording.
-        who, stay, for_s: As in LookAt.
     """
 
-    pixel_px: tuple[float, float]
-    distance_m: float | None = None
-    captured_s: float | None = None
-    p_world_m: Vec3 | None = None
-    who: str = ""
-    stay: bool = False
-    for_s: float | None = None
+    pixel_px: tuple[_Pixel, _Pixel]
+    distance_m: _Distance | None = None
+    captured_s: Annotated[float, Meta(ge=-1e12, le=1e12)] | None = None
+    p_world_m: _Point | None = None
 
 
-class Jog(NamedTuple):
+class Jog(ControlCommand, frozen=True):
     """Hold all joints, these at the given angles; without any, free the gaze again.
 
     Attributes:
         angles_rad: (joint, angle) pairs.
-        who, stay, for_s: As in LookAt.
     """
 
-    angles_rad: tuple[tuple[str, float], ...]
-    who: str = ""
-    stay: bool = False
-    for_s: float | None = None
+    angles_rad: Annotated[tuple[tuple[_Name, _Angle], ...], Meta(max_length=64)]
 
 
-class Express(NamedTuple):
+class Express(Command, frozen=True):
     """Move to a facial expression of the rig's table.
 
     Attributes:
@@ -138,29 +184,24 @@ class Express(NamedTuple):
         strength: 1 as defined .. 0 none.
     """
 
-    expression: str
-    strength: float = 1.0
+    expression: _Name
+    strength: _Share = 1.0
 
 
-class SetLevel(NamedTuple):
+class SetLevel(Command, frozen=True):
     """Set a level of the rig's table, 0..1; if it is not set again within 0.5 s it falls to 0."""
 
-    level: str
-    value: float
+    level: _Name
+    value: _Share
 
 
-NO_TRACK = "none"
-"""Choice in the menu of tracks that ends the present one."""
-
-
-class Play(NamedTuple):
+class Play(ClientCommand, frozen=True):
     """Play a track; "" ends all tracks.
 
     Attributes:
         track: Name of the track.
         speed: Factor on its defined speed.
         times: Number of repetitions, 0 for the track's own.
-        who: Name of the client.
         from_s: Position in the track, in s or as the name of a cue, at which it begins.
         loop: Repeat it until it is ended, as a track with ``loop: true`` does.
         lead_s: Latencies of all joints, by which the motion of a track with sound is early; set on
@@ -168,29 +209,26 @@ class Play(NamedTuple):
         sound_s: Duration of its sound, set on execution.
     """
 
-    track: str
-    speed: float = 1.0
-    times: int = 0
-    who: str = ""
-    from_s: float | str = 0.0
+    track: _Name
+    speed: Annotated[float, Meta(ge=MIN_SPEED, le=MAX_SPEED)] = 1.0
+    times: Annotated[int, Meta(ge=0, le=MAX_COUNT)] = 0
+    from_s: _Position | _Name = 0.0
     loop: bool = False
-    lead_s: tuple[float, ...] | None = None
-    sound_s: float = 0.0
+    lead_s: _Lead | None = None
+    sound_s: _Position = 0.0
 
 
-class EndTrack(NamedTuple):
+class EndTrack(ClientCommand, frozen=True):
     """End tracks that are playing.
 
     Attributes:
         track: Name of the track, "" for all.
-        who: Name of the client.
     """
 
-    track: str = ""
-    who: str = ""
+    track: _Name = ""
 
 
-class SyncTrack(NamedTuple):
+class SyncTrack(Command, frozen=True):
     """Position of a track by another clock, at most some ten times per second.
 
     Attributes:
@@ -199,16 +237,12 @@ class SyncTrack(NamedTuple):
         clock: Source of the position.
     """
 
-    number: int
-    position_s: float
+    number: _Number
+    position_s: _Position
     clock: Literal["sound", "external"] = "external"
 
 
-TalkOrder = Literal["listening", "thinking", "speaking", "idle", "interrupt"]
-"""What a voice agent does now; interrupt: the other person has interrupted it."""
-
-
-class Talk(NamedTuple):
+class Talk(ClientCommand, frozen=True):
     """Report what a voice agent does, so that the gaze is that of a partner in conversation.
 
     Attributes:
@@ -218,21 +252,24 @@ class Talk(NamedTuple):
         text: What is spoken.
         words: (word, start in s after this command) pairs of the speech.
         sound: Path of the sound file that is spoken.
-        who: Name of the client.
-        stay: As in LookAt.
+        stay: As in ControlCommand.
     """
 
     state: TalkOrder
-    person: int | None = None
-    seconds: float | None = None
-    text: str = ""
-    words: tuple[tuple[str, float], ...] = ()
-    sound: str = ""
-    who: str = ""
+    person: _Number | None = None
+    seconds: Annotated[float, Meta(gt=0.0, le=600.0)] | None = None
+    text: _Text = ""
+    words: Annotated[tuple[tuple[_Name, _TalkTime], ...], Meta(max_length=2000)] = ()
+    sound: _Text = ""
     stay: bool = False
 
+    @property
+    def has_plan(self) -> bool:
+        """Return whether it plans a speech, which only belongs to speaking."""
+        return self.seconds is not None or any((self.text, self.words, self.sound))
 
-class Say(NamedTuple):
+
+class Say(ClientCommand, frozen=True):
     """Say a sound file or a text; a run's voice makes a ``Speak`` of it.
 
     Attributes:
@@ -240,17 +277,15 @@ class Say(NamedTuple):
         volume: Factor 0..1.
         sway: Whether the head sways.
         spoken: (phoneme or word, begin in s) of the file, if known.
-        who: Name of the client.
     """
 
     what: str
-    volume: float = 1.0
+    volume: _Share = 1.0
     sway: bool = True
-    spoken: tuple[tuple[str, float], ...] = ()
-    who: str = ""
+    spoken: tuple[tuple[str, _SpeechTime], ...] = ()
 
 
-class Speak(NamedTuple):
+class Speak(ClientCommand, frozen=True):
     """Speak: a track with a sound, its mouth and a sway.
 
     Attributes:
@@ -260,104 +295,123 @@ class Speak(NamedTuple):
         mouth: (time in s, opening 0..1) pairs; the mouth shuts at the end.
         sway_deg: Largest yaw of the sway.
         volume: Factor 0..1.
-        who: Name of the client.
         lead_s: As in Play.
     """
 
     sound: str
-    duration_s: float
+    duration_s: Annotated[float, Meta(gt=0.0, le=MAX_SPEECH_S)]
     level: str = ""
-    mouth: tuple[tuple[float, float], ...] = ()
-    sway_deg: float = 0.0
-    volume: float = 1.0
-    who: str = ""
-    lead_s: tuple[float, ...] | None = None
+    mouth: Annotated[tuple[tuple[_SpeechTime, _Share], ...], Meta(max_length=40_000)] = ()
+    sway_deg: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.0
+    volume: _Share = 1.0
+    lead_s: _Lead | None = None
 
 
-OPPONENT_BOX_M = ((0.36, 1.2), (-0.6, 0.6), (-0.4, 0.45))
-"""Least and greatest x, y and z to which the opponent's fist can be moved."""
-
-
-class MoveOpponent(NamedTuple):
+class MoveOpponent(Command, frozen=True, tag="opponent"):
     """Move the leading fist of a boxing world's opponent; after 1 s its script continues.
 
     Attributes:
         p_world_m: Point in m within ``OPPONENT_BOX_M``; the fist follows within its limits.
     """
 
-    p_world_m: Vec3
+    p_world_m: tuple[
+        Annotated[float, Meta(ge=OPPONENT_BOX_M[0][0], le=OPPONENT_BOX_M[0][1])],
+        Annotated[float, Meta(ge=OPPONENT_BOX_M[1][0], le=OPPONENT_BOX_M[1][1])],
+        Annotated[float, Meta(ge=OPPONENT_BOX_M[2][0], le=OPPONENT_BOX_M[2][1])],
+    ]
 
 
-class Renew(NamedTuple):
+class Renew(ClientCommand, frozen=True):
     """Heartbeat of the client in control of gaze, joints or talk; others' have no effect."""
 
-    who: str = ""
 
-
-class Stop(NamedTuple):
+class Stop(ClientCommand, frozen=True):
     """Switch the torque off immediately, without parking; the program continues reading."""
 
-    why: str
-    who: str = ""
+    why: _Name
 
 
-class Resume(NamedTuple):
+class Resume(ClientCommand, frozen=True):
     """Switch the torque on again after a stop, at the present angles, and continue slowly.
 
     Only the client that stopped may resume, or one with ``confirmed``; the rules are in
     ``gazerig.robot.model.commands``.
 
     Attributes:
-        who: Name of the client.
         confirmed: A person has confirmed that no hand is in the mechanism.
     """
 
-    who: str = ""
     confirmed: bool = False
 
 
-class Tune(NamedTuple):
+class Tune(Command, frozen=True):
     """Apply parameters.
 
     Attributes:
         changes: (dotted key of the rig's YAML, value) pairs that have been checked.
     """
 
-    changes: tuple[tuple[str, Value], ...]
+    changes: tuple[tuple[str, Any], ...]
 
 
-Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
-ControlCommand = Look | Jog
-"""Commands that take control of gaze or joints."""
-Command = (
-    Ask
-    | ControlCommand
-    | Express
-    | SetLevel
-    | Play
-    | EndTrack
-    | SyncTrack
-    | Talk
-    | Say
-    | Speak
-    | MoveOpponent
-    | Renew
-    | Stop
-    | Resume
-    | Tune
-)
-
+AnyCommand = (
+    Ask | LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel | Jog | Express
+    | SetLevel | Play | EndTrack | SyncTrack | Talk | Say | Speak | MoveOpponent | Renew | Stop
+    | Resume | Tune
+)  # fmt: skip
 REPEATED = (Renew, SetLevel, SyncTrack, MoveOpponent)
 """Commands that programs send many times per second; they create no message and no mark."""
 
-COMMANDS: dict[str, type[Command]] = {
-    "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
-    "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
-    "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
-    "play": Play, "end_track": EndTrack, "sync_track": SyncTrack,
-    "talk": Talk, "say": Say, "speak": Speak, "opponent": MoveOpponent,
-    "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
-}  # fmt: skip
+
+def verb(kind: type[Request]) -> str:
+    """Return the verb of a class of requests."""
+    return str(kind.__struct_config__.tag)
+
+
+COMMANDS: dict[str, type[Command]] = {verb(kind): kind for kind in get_args(AnyCommand)}
+
+_C = TypeVar("_C", bound=Command)
+_checker = msgspec.msgpack.Decoder(AnyCommand)
+
+
+def check_command(command: _C) -> _C:
+    """Return a command whose values are checked, with whole numbers as floats where they belong.
+
+    Raises:
+        ValueError: A value is invalid; the message states the rule and the place.
+    """
+    if isinstance(command, Tune):
+        return structs.replace(command, changes=as_value(command.changes))
+    try:  # not JSON, in which NaN would become null
+        checked: _C = _checker.decode(msgspec.msgpack.encode(command))
+    except ValueError as error:
+        raise ValueError(f"{verb(type(command))}: {error}") from None
+    if isinstance(checked, Say) and not checked.what.strip():
+        raise ValueError(
+            "a text without a word is no speech: give the words, or the name of a sound file"
+        )
+    if isinstance(checked, Talk) and checked.has_plan and checked.state != "speaking":
+        raise ValueError(
+            f"seconds, text, words and sound belong to speaking: omit them for {checked.state}"
+        )
+    return checked
+
+
+def set_client(command: _C, who: str) -> _C:
+    """Return a command with its client's name; commands without that field stay unchanged."""
+    if isinstance(command, ClientCommand):
+        return structs.replace(command, who=who[:MAX_WORDS])
+    return command
+
+
+def as_value(value: Any) -> Value:
+    """Convert JSON's lists to tuples, as the reader of files does."""
+    if isinstance(value, list | tuple):
+        return tuple(as_value(item) for item in value)
+    if isinstance(value, dict):
+        return {key: as_value(item) for key, item in value.items()}
+    assert value is None or isinstance(value, bool | int | float | str)
+    return value
 
 
 MIN_HOLD_S = 2.0

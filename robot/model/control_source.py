@@ -4,7 +4,9 @@ The page, the status line, other programs and Python all use these texts.
 """
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
+
+from msgspec import Struct
 
 ControlKind = Literal["gaze", "person", "pointer", "joint", "track", "stopped", "parking"]
 """gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
@@ -15,7 +17,7 @@ _WORTH_TELLING_S = 1.0
 _MINUTE_S = 60.0
 
 
-class ControlState(NamedTuple):
+class ControlState(Struct, frozen=True):
     """The newest control by a client, after a tick.
 
     Attributes:
@@ -48,7 +50,7 @@ FINISHED = "finished"
 """End reason of a track that was played to its end."""
 
 
-class TrackState(NamedTuple):
+class TrackState(Struct, frozen=True):
     """One track after a tick; an ended one is shown for ``SHOWN_S``, the newest one always.
 
     Attributes:
@@ -104,7 +106,7 @@ def playing(tracks: Sequence[TrackState]) -> TrackState | None:
     return next((track for track in found if track.sound), found[0] if found else None)
 
 
-class ControlSource(NamedTuple):
+class ControlSource(Struct, frozen=True):
     """The source of control, and its command.
 
     Attributes:

@@ -1,6 +1,6 @@
 """State of a conversation, as a voice agent reports it, and its end."""
 
-from typing import NamedTuple
+from msgspec import Struct
 
 from gazerig.gaze.types import TurnState
 from gazerig.robot.model.commands import Talk
@@ -20,7 +20,7 @@ SHOWN_CHARACTERS = 80
 """Length of the text that each tick contains; the command contains the whole."""
 
 
-class ConversationState(NamedTuple):
+class ConversationState(Struct, frozen=True):
     """State of the conversation after a tick.
 
     Attributes:
@@ -140,7 +140,7 @@ def _planned_end(command: Talk, t_s: float) -> tuple[float | None, float]:
     if command.seconds is not None:
         return t_s + command.seconds, GIVEN
     if command.words:
-        return t_s + command.words[-1][1] + LAST_WORD_S, TIMED
+        return t_s + max([start_s for _, start_s in command.words]) + LAST_WORD_S, TIMED
     if command.text.strip():
         return t_s + len(command.text.strip()) / CHARACTERS_PER_S, ESTIMATED
     return None, 0.0

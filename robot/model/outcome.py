@@ -1,6 +1,8 @@
 """Outcomes of commands, from the replies and the progress of the head."""
 
-from typing import Literal, NamedTuple
+from typing import Literal
+
+from msgspec import Struct
 
 from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.control_source import (
@@ -26,7 +28,7 @@ timed out: none of these within the given time
 """
 
 
-class Progress(NamedTuple):
+class Progress(Struct, frozen=True):
     """The progress of a client's command and of tracks.
 
     Attributes:

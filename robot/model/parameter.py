@@ -1,14 +1,15 @@
 """Parameters of a rig, changed values and saved files, for file, rig, page and client."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
+
+from msgspec import Struct
 
 JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "JsonValue"]
 """A value in JSON, with lists instead of the rig's tuples."""
 
 
-class Parameter(NamedTuple):
+class Parameter(Struct, frozen=True):
     """A parameter of a rig with its rules and its default.
 
     Attributes:
@@ -40,14 +41,8 @@ class Parameter(NamedTuple):
     length: int | None = None
     items: str | None = None
 
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> "Parameter":
-        """Return a parameter from a rig's answer; keys that are not fields are ignored."""
-        named = {name: data[name] for name in cls._fields if name in data}
-        return cls(**{**named, "choices": tuple(named["choices"])})
 
-
-class ParamChange(NamedTuple):
+class ParamChange(Struct, frozen=True):
     """A value that differs from the file or from the default.
 
     Attributes:
@@ -65,7 +60,7 @@ class ParamChange(NamedTuple):
         return f"{self.key}: {'(not in the file)' if self.old is None else self.old} -> {self.new}"
 
 
-class SavedFile(NamedTuple):
+class SavedFile(Struct, frozen=True):
     """A file that was saved; ``backup`` is None if nothing differed or the file is new."""
 
     path: Path

@@ -1,9 +1,10 @@
 """Replies to commands: refused, done, or done as far as the joints reach."""
 
 import threading
-from collections.abc import Callable, Mapping
-from math import degrees, radians
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from math import degrees
+
+from msgspec import Struct
 
 from gazerig.gaze.angles import Vec3
 from gazerig.robot.model.commands import Command
@@ -12,7 +13,7 @@ _ON_POINT_DEG = 1.0
 """A gaze with a smaller error counts as on its point."""
 
 
-class JointReply(NamedTuple):
+class JointReply(Struct, frozen=True):
     """The reply for one commanded joint, in rad.
 
     Attributes:
@@ -42,7 +43,7 @@ class JointReply(NamedTuple):
         )
 
 
-class TrackReply(NamedTuple):
+class TrackReply(Struct, frozen=True):
     """The reply for a track that starts, or with name "" for the end of the present one.
 
     Attributes:
@@ -76,7 +77,7 @@ class TrackReply(NamedTuple):
         return "; ".join(parts)
 
 
-class CommandReply(NamedTuple):
+class CommandReply(Struct, frozen=True):
     """The robot's reply to one command on its execution.
 
     Attributes:
@@ -121,66 +122,6 @@ class CommandReply(NamedTuple):
         if self.error_deg < _ON_POINT_DEG:
             return "it looks there"
         return f"it looks {self.error_deg:.0f} deg off" + (f": {ends}" if ends else "")
-
-    def as_json(self) -> dict[str, object]:
-        """Return plain JSON values: angles in deg, lengths in m, text."""
-        text = self.text()
-        return {
-            "refused": self.refused,
-            "asked_m": self.asked_m,
-            "done_m": self.done_m,
-            "error_deg": self.error_deg,
-            "control_number": self.control_number,
-            "joints": [
-                {
-                    "joint": one.joint,
-                    "asked_deg": degrees(one.asked_rad),
-                    "done_deg": degrees(one.done_rad),
-                    "low_deg": degrees(one.low_rad),
-                    "high_deg": degrees(one.high_rad),
-                    "reason": one.reason,
-                }
-                for one in self.joints
-            ],
-            "track": None if self.track is None else self.track._asdict(),
-            "text": text,
-        }
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> "CommandReply":
-        """Return the reply that ``as_json`` wrote.
-
-        Raises:
-            KeyError, TypeError, ValueError: The data is not a reply.
-        """
-        joints = tuple(
-            JointReply(
-                one["joint"],
-                radians(one["asked_deg"]),
-                radians(one["done_deg"]),
-                radians(one["low_deg"]),
-                radians(one["high_deg"]),
-                one["reason"],
-            )
-            for one in data["joints"]
-        )
-        asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
-        track = data.get("track")
-        if track is not None:
-            reduced = tuple((joint, share) for joint, share in track["reduced_joints"])
-            changed = {"reduced_joints": reduced, "left_out": tuple(track["left_out"])}
-            track = TrackReply(**{**track, **changed})
-        error_rad = radians(data["error_deg"])
-        return cls(
-            data["refused"], asked, done, joints, error_rad, data.get("control_number", 0), track
-        )
-
-
-def _point(data: Any) -> Vec3 | None:
-    if data is None:
-        return None
-    x, y, z = data
-    return (x, y, z)
 
 
 class Ticket:

@@ -22,6 +22,7 @@ from math import degrees, nan
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
@@ -254,11 +255,10 @@ def target_text(target: Target) -> str:
 
 def command_text(command: Command) -> str:
     """Return a command as text, e.g. "requested: stop why=space bar"."""
-    usual = command._field_defaults
     given = " ".join(
-        f"{name}={value}"
-        for name, value in command._asdict().items()
-        if name not in usual or value != usual[name]
+        f"{field.name}={value}"
+        for field in structs.fields(command)
+        if (value := getattr(command, field.name)) != field.default
     )
     return f"requested: {type(command).__name__.lower()} {given}".rstrip()
 

@@ -60,7 +60,7 @@ _XYZ = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
 _TURN = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
 _COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
 _POSE = _object(position=_XYZ, orientation=_TURN)
-_ORDER: Schema = {"type": "object", "properties": {"order": _TEXT}}
+_ORDER: Schema = {"type": "object", "properties": {"do": _TEXT}}
 
 _DESCRIPTIONS = {
     "t_s": "the rig's own time, s",
@@ -98,7 +98,8 @@ def type_schema(kind: Any) -> Schema:
     Args:
         kind: a number, text, list, tuple, NumPy array, optional type, or class with fields.
     """
-    if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
+    named = any(hasattr(kind, one) for one in ("_fields", "__struct_fields__"))
+    if named or dataclasses.is_dataclass(kind):
         fields = {
             name: _describe(type_schema(of), text)
             if (text := _DESCRIPTIONS.get(name))

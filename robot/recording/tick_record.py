@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from gazerig.gaze.types import (
@@ -23,7 +24,7 @@ from gazerig.gaze.types import (
 )
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickRow
-from gazerig.robot.model.command_json import from_recorded_json as command_from_json
+from gazerig.robot.model.commands import AnyCommand, check_command
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
     ControlState,
@@ -80,12 +81,13 @@ _BODY_RECORDS: dict[str, type[BodyRecord]] = {
 _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
 _NESTED: dict[str, Any] = {
     "joints": JointState, "pose": GazeState, "target": Target, "gaze": GazeCommand,
-    "guard_result": GuardResult, "client_control": ControlState,
-    "conversation": ConversationState,
+    "guard_result": GuardResult,
 }  # fmt: skip
 _NOTHING = {
-    "client_control": list(NO_CLIENT_CONTROL), "conversation": list(NO_CONVERSATION),
-}  # fmt: skip
+    "client_control": msgspec.to_builtins(NO_CLIENT_CONTROL),
+    "conversation": msgspec.to_builtins(NO_CONVERSATION),
+    "tracks": [],
+}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
@@ -117,11 +119,8 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
         if not target[name]:
             del target[name]
     for name, nothing in _NOTHING.items():
-        if list(data[name].values()) == nothing:
+        if data[name] == nothing:
             del data[name]
-    data["tracks"] = [_name_fields(TrackState, one) for one in data["tracks"]]
-    if not data["tracks"]:
-        del data["tracks"]
     del data["parking"]
     before = [
         {"what": what, **_name_fields(_BODY_RECORDS[what], one)} for what, one in data["before"]
@@ -168,16 +167,12 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         tuple(data["desired_rad"]),
         _build(GuardResult, guard_result),
         tuple(data["events"]),
-        tuple([command_from_json(command) for command in data["commands"]]),
+        tuple([check_command(one) for one in msgspec.convert(data["commands"], list[AnyCommand])]),
         data["stopped"],
         data["controlled_by"],
-        _build(ControlState, data["client_control"])
-        if "client_control" in data
-        else NO_CLIENT_CONTROL,
-        tuple([_build(TrackState, one) for one in data.get("tracks", ())]),
-        conversation=_build(ConversationState, data["conversation"])
-        if "conversation" in data
-        else NO_CONVERSATION,
+        msgspec.convert(data.get("client_control", {}), ControlState),
+        msgspec.convert(data.get("tracks", ()), tuple[TrackState, ...]),
+        conversation=msgspec.convert(data.get("conversation", {}), ConversationState),
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)

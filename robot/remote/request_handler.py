@@ -6,8 +6,6 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
-from functools import partial
 from math import degrees
 from pathlib import Path
 
@@ -16,18 +14,11 @@ from gazerig.robot.control.command_handler import (
     CommandHandler,
     CommandTarget,
     ParamAccess,
-    ParamsChanged,
-    ParamsSaved,
     PathGuard,
-    PendingCommand,
-    QuestionAnswer,
-    RequestResult,
     Speaker,
-    as_changes,
 )
 from gazerig.robot.control.feedback_basis import estimated_joints
-from gazerig.robot.control.head_state import as_json as state_as_json
-from gazerig.robot.control.head_state import head_state
+from gazerig.robot.control.head_state import HeadReport, head_state
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
@@ -38,10 +29,19 @@ from gazerig.robot.control.tick_text import (
     tick_control_source,
 )
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.command_json import set_client
-from gazerig.robot.model.commands import Command
+from gazerig.robot.model.commands import ClientCommand, Command, Request, set_client
 from gazerig.robot.model.control_source import control_sentence
-from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.requests import (
+    Character,
+    Fault,
+    Hello,
+    Revert,
+    Set,
+    State,
+    Status,
+    read_request,
+)
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.socket_io import VERSION
 
@@ -50,6 +50,7 @@ _TAKEN_UP_S = 1.0
 _WORDS = 20
 """Number of recent messages in the status."""
 
+REAL = "only servos emulated byte by byte accept fault commands: gazerig run --mock, without --bus ideal"
 _HANGS = (
     f"the control loop has not executed it within {_TAKEN_UP_S:g} s: it hangs, "
     "starts or ends; use the emergency stop if anything moves"
@@ -86,14 +87,13 @@ class LoopMonitor:
             waits -= 1
         return self._feed.ticks >= wanted
 
-    def state(self, after: int) -> dict[str, object]:
+    def state(self, after: int) -> HeadReport:
         """Return the newest tick, None before the first, and events numbered above ``after``."""
         tick = self._feed.newest
-        events = [asdict(one) for one in self._feed.events(after)]
-        state = state_as_json(head_state(tick)) if tick else None
-        return {"state": state, "events": events, "number": self._feed.number}
+        state = head_state(tick) if tick else None
+        return HeadReport(state, self._feed.events(after), self._feed.number)
 
-    def as_json(self) -> dict[str, object]:
+    def status(self) -> dict[str, object]:
         """Return the newest tick as plain values: degrees, seconds, text."""
         tick = self._feed.newest
         if tick is None:
@@ -107,7 +107,7 @@ class LoopMonitor:
             "stopped": tick.stopped,
             "controlled_by": tick.controlled_by,
             "control_text": control_text(tick),
-            "conversation": tick.conversation._asdict(),
+            "conversation": tick.conversation,
             "control_kind": leads.kind,
             "control_sentence": control_sentence(leads, tick.t_s),
             "headline": does.headline,
@@ -130,17 +130,8 @@ class LoopMonitor:
             "phase": does.phase,
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
             "estimated": list(estimated_joints(tick)),
-            "reckoned": list(estimated_joints(tick)),  # the former key, for compatibility
             "said": [event.text for event in self._feed.messages()[-_WORDS:]],
         }
-
-
-class _CommandRefused(ValueError):
-    """The robot has received a command and refused it."""
-
-    def __init__(self, reply: CommandReply) -> None:
-        super().__init__(reply.refused)
-        self.reply = reply
 
 
 class RequestHandler:
@@ -174,85 +165,67 @@ class RequestHandler:
         paths: PathGuard | None = None,
         voice: Speaker | None = None,
     ) -> None:
-        self._params = params
-        self._pulse = pulse
-        self._changing = changing
+        self._params, self._pulse, self._paths = params, pulse, paths
+        self._changing, self._fault = changing, fault
         self._about = dict(about)
-        self._handler, self._network = (
-            CommandHandler(
-                robot,
-                params,
-                self._status,
-                refusals,
-                saved,
-                rules,
-                fixed=fixed,
-                state=pulse.state,
-                fault=fault,
-                voice=voice,
-            )
-            for rules in (None, paths)
-        )
+        self._handler = CommandHandler(robot, params, refusals, saved, fixed, voice)
         self._unsaved = -1, 0
 
-    def answer(self, request: object, peer: str = "") -> dict[str, object]:
+    def answer(self, message: object, peer: str = "") -> dict[str, object]:
         """Execute one request; return {"ok": result} or {"refused": every broken rule}.
 
         Args:
-            request: Request {"do": verb, ...}. Its "tag" is returned with the answer; the page's
+            message: Request {"do": verb, ...}. Its "tag" is returned with the answer; the page's
                 process marks requests of the network by "network": true.
             peer: Client at the other end, e.g. "process 123", "" if unknown.
         """
         tag: dict[str, object] = {}
-        handler = self._handler
-        if isinstance(request, dict):
-            tag = {key: request[key] for key in ("tag",) if key in request}
-            handler = self._network if request.get("network") is True else handler
-            request = {key: request[key] for key in request if key not in ("tag", "network")}
+        paths = None
+        if isinstance(message, dict):
+            message = dict(message)
+            paths = self._paths if message.pop("network", None) is True else None
+            tag = {"tag": message.pop("tag")} if "tag" in message else {}
         try:
-            match request:
-                case {"do": "hello", "version": int(version), **rest} if not rest:
-                    return {"ok": self._greeting(version), **tag}
-            done = handler.handle(request, partial(_set_client, peer))
-            return {"ok": self._outcome_json(done), **tag}
-        except _CommandRefused as error:
-            return {"refused": str(error), "reply": error.reply.as_json(), **tag}
-        except handler.refusals as error:
+            request = read_request(message)
+            if peer and isinstance(request, ClientCommand):
+                # The process is added: a client cannot pose as another one or the page.
+                who = f"{request.who} ({peer})" if request.who else peer
+                request = set_client(request, who)
+            return {**self._execute(request, paths), **tag}
+        except self._handler.refusals as error:
             return {"refused": str(error), **tag}
 
-    def _greeting(self, version: int) -> dict[str, object]:
-        """Return the greeting of the rig.
-
-        Raises:
-            ValueError: The client has another version of the messages.
-        """
-        if version != VERSION:
-            raise ValueError(
-                f"version {version} of the messages: this rig has {VERSION}; "
-                "update gazerig or the program"
-            )
-        return {"version": VERSION, **self._about}
-
-    def _outcome_json(self, outcome: RequestResult) -> object:
-        """Return an outcome as JSON after the loop has executed it."""
-        match outcome:
-            case QuestionAnswer(value):
-                return value
-            case ParamsChanged(notes):
-                return self._wait_until_applied(notes)
-            case ParamsSaved(saved):
-                backup = None if saved.backup is None else str(saved.backup)
-                changes = as_changes(saved.changes)
-                return {"path": str(saved.path), "backup": backup, "changes": changes}
-            case PendingCommand(_, ticket):
-                if ticket is None:
-                    return self._wait_until_applied(())
-                reply = ticket.wait(_TAKEN_UP_S)
-                if reply is None:
-                    raise ValueError(_HANGS)
-                if reply.refused:
-                    raise _CommandRefused(reply)
-                return {"notes": [], "reply": reply.as_json()}
+    def _execute(self, request: Request, paths: PathGuard | None) -> dict[str, object]:
+        """Execute a request, and wait until the loop has done it."""
+        match request:
+            case Hello(version):
+                if version != VERSION:
+                    raise ValueError(
+                        f"version {version} of the messages: this rig has {VERSION}; "
+                        "update gazerig or the program"
+                    )
+                return {"ok": {"version": VERSION, **self._about}}
+            case Status():
+                return {"ok": self._status()}
+            case State(after):
+                return {"ok": self._pulse.state(after)}
+            case Fault(text):
+                if self._fault is None:
+                    raise ValueError(REAL)
+                return {"ok": self._fault(text)}
+        done = self._handler.handle(request, paths)
+        if isinstance(done, Ticket):
+            reply = done.wait(_TAKEN_UP_S)
+            if reply is None:
+                raise ValueError(_HANGS)
+            if reply.refused:
+                return {"refused": reply.refused, "reply": reply}
+            return {"ok": {"notes": (), "reply": reply}}
+        if isinstance(request, Command | Set | Revert | Character):
+            if not self._pulse.wait_for_commands():
+                raise ValueError(_HANGS)
+            return {"ok": {"notes": done or ()}}
+        return {"ok": done}
 
     def _status(self) -> dict[str, object]:
         version = self._params.version if self._params is not None else 0
@@ -260,24 +233,9 @@ class RequestHandler:
             unsaved = self._params.unsaved() if self._params is not None else ()
             self._unsaved = version, len(tuple(unsaved))
         about = {**self._about, **self._changing(), "version": version, "unsaved": self._unsaved[1]}
-        return {**about, **self._pulse.as_json()}
-
-    def _wait_until_applied(self, notes: tuple[str, ...]) -> dict[str, object]:
-        """Wait for the tick that applies the values; return the notes for the user."""
-        if not self._pulse.wait_for_commands():
-            raise ValueError(_HANGS)
-        return {"notes": list(notes)}
+        return {**about, **self._pulse.status()}
 
 
-def _set_client(peer: str, command: Command) -> Command:
-    """Return a command with the client's process: it cannot pose as another one or the page."""
-    who = str(getattr(command, "who", ""))
-    return set_client(command, f"{who} ({peer})" if who else peer) if peer else command
-
-
-def is_stop(request: object) -> bool:
-    """Return whether a request is a stop, which nothing may delay."""
-    match request:
-        case {"do": "stop"}:
-            return True
-    return False
+def is_stop(message: object) -> bool:
+    """Return whether a message is a stop, which nothing may delay."""
+    return isinstance(message, dict) and message.get("do") == "stop"

@@ -5,14 +5,15 @@ head; other users and other computers may not.
 """
 
 import contextlib
-import json
 import os
 import socket
 import stat
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, Self
+
+import msgspec
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model.clock import RealClock
@@ -29,20 +30,6 @@ _CHUNK_BYTES = 1 << 16
 _LONGEST_S = 1e6
 
 
-def parse_json(text: str | bytes) -> Any:
-    """Return the value of a JSON text.
-
-    Raises:
-        ValueError: it is not JSON; NaN and Infinity are not allowed.
-        RecursionError: it is nested too deep.
-    """
-
-    def refuse(word: str) -> NoReturn:
-        raise ValueError(f"{word} is not a number in JSON")
-
-    return json.loads(text, parse_constant=refuse)
-
-
 def parse_line(line: bytes) -> Any:
     """Return the value of a line.
 
@@ -50,7 +37,7 @@ def parse_line(line: bytes) -> Any:
         MalformedMessage: it is not JSON.
     """
     try:
-        return parse_json(line)
+        return msgspec.json.decode(line)
     except RecursionError:
         raise MalformedMessage("nested too deeply", over=False) from None
     except ValueError as error:
@@ -253,10 +240,10 @@ class Wire:
         """Send one value.
 
         Raises:
-            ValueError: it cannot be written as JSON, e.g. infinity.
+            ValueError: it cannot be written as JSON.
             OSError: the other end is gone, or accepts nothing for ``within_s``.
         """
-        line = json.dumps(value, allow_nan=False, separators=(",", ":")).encode() + b"\n"
+        line = msgspec.json.encode(value, enc_hook=_to_plain) + b"\n"
         self._writing_end.settimeout(within_s)
         self._writing_end.sendall(line)
 
@@ -322,3 +309,8 @@ class Wire:
         if not data:
             raise EOFError
         return data
+
+
+def _to_plain(value: Any) -> Any:
+    """Return a path as text, and a NumPy array or number as a list or a Python number."""
+    return str(value) if isinstance(value, Path) else value.tolist()

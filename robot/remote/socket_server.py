@@ -16,8 +16,8 @@ from collections.abc import Callable, Container
 from pathlib import Path
 from typing import NamedTuple
 
-from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.requests import ORDERS, REQUESTS
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.excess import (
     CLOSED,
@@ -270,7 +270,7 @@ class RemoteServer:
             while not excess.is_over and self._receive(wire, peer, ahead, excess):
                 pass
             if excess.is_over:
-                ahead.refuse(CLOSED, QUESTIONS | CHANGES | ORDERS)
+                ahead.refuse(CLOSED, REQUESTS)
                 ahead.add_answer({"refused": CLOSED})
                 self._receive_for(REST_S, wire, peer, ahead, excess)
         finally:

@@ -63,7 +63,7 @@ def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, s
             t_s = clock.now_s()
             while number + 1 < len(due) and t_s >= due[number + 1] - 1e-9:
                 number += 1
-                made.robot.command(LookAt(points[number], "a bench", stay=True))
+                made.robot.command(LookAt(points[number], who="a bench", stay=True))
             tick = made.robot.tick(t_s, t_s - last_s)
             last_s = t_s
             if number >= 0:

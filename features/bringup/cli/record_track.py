@@ -44,6 +44,7 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.cli.tracks import FolderOption, print_track_fit
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import Play
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -168,7 +169,7 @@ def _record_live(
             raise SetupError(
                 f"no joint {unknown[0]!r}; joints of the head: {', '.join(there.joints)}"
             )
-        track = head.play(play).track if play else None
+        track = head.send(Play(play)).track if play else None
         owned = {joint for one in read().tracks if not one.end_reason for joint in one.owns}
         wanted = joints or [one for one in there.joints if one not in owned]
         say(f"recording {', '.join(wanted)}; Enter ends it (within {seconds:g} s)")

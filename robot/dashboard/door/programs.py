@@ -19,9 +19,9 @@ from contextlib import suppress
 from typing import Any
 
 import aiohttp
+import msgspec
 from aiohttp import web
 
-from gazerig.robot.control.command_handler import ORDERS
 from gazerig.robot.dashboard.door.admission import API
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
 from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
@@ -35,9 +35,10 @@ from gazerig.robot.dashboard.requests.rig_relay import (
     StateFeed,
 )
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
-from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED, Resume, Stop
+from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED, ClientCommand, Resume, Stop
 from gazerig.robot.model.outcome import command_outcome
 from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.model.requests import ORDERS
 from gazerig.robot.remote.excess import (
     CLOSED,
     REST_S,
@@ -47,7 +48,7 @@ from gazerig.robot.remote.excess import (
     find_stop,
 )
 from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
-from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
+from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION
 
 BASE = f"{API}v{VERSION}"
 MOST_PROGRAMS = 32
@@ -94,7 +95,7 @@ def parse_message(data: str | bytes) -> dict[str, Any]:
     if len(data) > REQUEST_BYTES:
         raise MessageRefused(f"longer than {REQUEST_BYTES} bytes", 413)
     try:
-        found = parse_json(data)
+        found = msgspec.json.decode(data)
     except RecursionError:
         raise MessageRefused("nested too deep") from None
     except ValueError as error:
@@ -303,7 +304,7 @@ class ProgramRoutes:
         answer = await self._send_to_rig(message)
         match answer:
             case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in _NO_OUTCOME:
-                answer |= await self._outcome(message, CommandReply.from_json(reply), wait_s)
+                answer |= await self._outcome(message, msgspec.convert(reply, CommandReply), wait_s)
         status = _STATUS[next(key for key in _STATUS if key in answer)]
         return self._answer(answer, 429 if answer.get("refused") == BUSY else status)
 
@@ -478,7 +479,7 @@ class ProgramRoutes:
             program.queue_answer(message, answer, asyncio.get_running_loop().time())
             match answer:
                 case {"ok": {"reply": dict(reply)}}:
-                    found = CommandReply.from_json(reply)
+                    found = msgspec.convert(reply, CommandReply)
                     program.hold(message, found)
                     if "tag" in message and message["do"] not in _NO_OUTCOME:
                         program.follow(message["tag"], found)
@@ -529,7 +530,7 @@ def _add_client(
     websocket: name of the websocket for a stop or a resume; who stopped resumes over the same one
     """
     kind = ORDERS.get(str(message.get("do")))
-    if kind is None or "who" not in kind._fields:
+    if kind is None or not issubclass(kind, ClientCommand):
         return message
     name = "".join(filter(str.isprintable, str(message.get("who") or "a program")))
     here = f", {websocket}" if websocket and kind in (Stop, Resume) else ""
@@ -581,10 +582,10 @@ def description_page(description: Mapping[str, Any]) -> str:
         for method, what in methods.items()
     ]
     messages = [
-        (name, ", ".join(key for key in one["properties"] if key not in ("do", "tag", "who")),
+        (one["title"], ", ".join(key for key in one["properties"] if key not in ("do", "tag", "who")),
          one["description"].partition("\n")[0])
-        for name, one in description["components"]["schemas"].items()
-        if "do" in one.get("properties", {})
+        for one in description["components"]["schemas"].values()
+        if "do" in one["properties"]
     ]  # fmt: skip
     info = description["info"]
     return (

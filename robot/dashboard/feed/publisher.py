@@ -11,9 +11,11 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from math import inf
 
+import msgspec
+
 from gazerig.drivers.process.passed_image import copy_image
 from gazerig.drivers.types import Detections
-from gazerig.robot.control.command_handler import ParamAccess, to_plain
+from gazerig.robot.control.command_handler import ParamAccess
 from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.feed.live_feed import (
@@ -74,9 +76,9 @@ class ParamFeed:
         # Before reading, so that a change in the meantime is sent next.
         self._version = self._tuning.version
         if first:
-            params = [to_plain(param._asdict()) for param in self._tuning.parameters()]
+            params = self._tuning.parameters()
             for start in range(0, len(params), _PIECE):
-                self._due.append(PARAMS + json.dumps(params[start : start + _PIECE]).encode())
+                self._due.append(PARAMS + msgspec.json.encode(params[start : start + _PIECE]))
         now = dict(self._tuning.values())
         gone = object()
         changed = [key for key, value in now.items() if self._known.get(key, gone) != value]
@@ -88,7 +90,7 @@ class ParamFeed:
             "characters": sorted(self._tuning.characters()),
         }
         for start in range(0, max(1, len(changed)), _PIECE):
-            piece = {key: to_plain(now[key]) for key in changed[start : start + _PIECE]}
+            piece = {key: now[key] for key in changed[start : start + _PIECE]}
             self._due.append(VALUES + json.dumps({**state, "values": piece}).encode())
 
 

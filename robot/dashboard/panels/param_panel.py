@@ -11,6 +11,8 @@ from html import escape
 from math import floor, isclose, log10
 from typing import cast
 
+import msgspec
+
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Checkbox, Choice, Slider, TextField
@@ -227,7 +229,7 @@ class ParamPanels:
         """Add parameters that can be tuned."""
         with self._lock:
             for data in params:
-                param = Parameter.from_json(data)
+                param = msgspec.convert(data, Parameter)
                 self._params[param.key] = param
             for panel in self._panels.values():
                 panel.offer(self._params)

@@ -5,12 +5,18 @@ import json
 import threading
 from collections.abc import Callable, Mapping
 
+import msgspec
+
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.robot.dashboard.requests.inbox import BEAT, MESSAGE_BYTES, PICTURE, request_message
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.command_json import as_json
-from gazerig.robot.model.commands import COMMANDS, Command, ControlCommand
-from gazerig.robot.remote.socket_io import parse_json
+from gazerig.robot.model.commands import (
+    COMMANDS,
+    ClientCommand,
+    Command,
+    ControlCommand,
+    set_client,
+)
 
 DOOR = "door"
 """Name of the sender for the stop button and clicks in the image."""
@@ -21,7 +27,7 @@ UNCONFIRMED = (
     "only the websocket of a program that stopped the head needs none"
 )
 _LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
-_SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
+_SAY_WHO = tuple(name for name, kind in COMMANDS.items() if issubclass(kind, ClientCommand))
 """Commands with the name of the client."""
 _PER_S, _BURST = 100.0, 200.0
 """Rate limit of all browsers together; dragging sends about 20 changes a second."""
@@ -47,8 +53,8 @@ class Outbox:
         """Send a command; return False if the rig does not accept it now."""
         if isinstance(command, ControlCommand):
             self._leads(self.name(who))
-            command = command._replace(who=self.name(who))
-        return self.ask(as_json(command), who)
+            command = set_client(command, self.name(who))
+        return self.forward(msgspec.json.encode(command), who)
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:
         """Send a request; ``who`` is returned with the reply."""
@@ -89,7 +95,7 @@ def add_client(body: bytes | str, who: str) -> dict[str, object] | None:
         who: name of the browser; it replaces a name in the request
     """
     try:
-        asked = parse_json(body)
+        asked = msgspec.json.decode(body)
     except (ValueError, RecursionError):
         return None
     if not isinstance(asked, dict):

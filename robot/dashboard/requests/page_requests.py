@@ -2,22 +2,24 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.control.command_handler import (
-    CommandHandler,
-    ParamAccess,
-    ParamsChanged,
-    ParamsSaved,
-    PathGuard,
-    PendingCommand,
-    QuestionAnswer,
-)
+from gazerig.robot.control.command_handler import CommandHandler, ParamAccess, PathGuard
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.command_json import set_client
-from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume, Stop
+from gazerig.robot.model.commands import (
+    ClientCommand,
+    Command,
+    ControlCommand,
+    LookAt,
+    Request,
+    Resume,
+    Stop,
+    set_client,
+)
 from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.model.requests import Character, Differs, Revert, Save, Set, read_request
 
 _REPLY_S = 1.0
 _STOP_S = 0.8
@@ -61,9 +63,8 @@ class PageRequestHandler:
         saved: Callable[[Path], None] | None = None,
         paths: PathGuard | None = None,
     ) -> None:
-        self._handler = CommandHandler(
-            _CommandSink(command), params, refusals=refusals, saved=saved, paths=paths
-        )
+        self._handler = CommandHandler(_CommandSink(command), params, refusals, saved)
+        self._paths = paths
         self._point = point
         self._steer = steer
         self._depth, self._talk = depth, talk
@@ -79,26 +80,8 @@ class PageRequestHandler:
 
     def _do(self, data: Mapping[str, object]) -> str | None:
         match data:
-            case {"do": str(verb)}:
-                match self._handler.handle(data, _add_client):
-                    case PendingCommand() as given:
-                        return self._reply_text(given)
-                    case ParamsSaved(saved):
-                        backup = saved.backup
-                        kept = f", what was there is in {backup}" if backup is not None else ""
-                        return f"saved in {saved.path}{kept}"
-                    case ParamsChanged(notes):
-                        if verb == "set":
-                            notes = tuple(note for note in notes if _LATER in note)
-                        quiet = {
-                            "revert": "all is as in the file again",
-                            "character": f"the character is {data.get('name')}",
-                        }
-                        return "\n".join(notes) or quiet.get(verb)
-                    case QuestionAnswer(list(found)) if verb == "differs":
-                        lines = [f"{c['key']}: {c['new']} (default {c['old']})" for c in found]
-                        return "\n".join(lines) or "all is as by default"
-                return None  # the page receives these in other messages
+            case {"do": _}:
+                return self._execute(read_request(data))
             case {"pick": {"x": int() | float() as x, "y": int() | float() as y, **rest}}:
                 if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
                     raise ValueError(
@@ -108,7 +91,7 @@ class PageRequestHandler:
                 if point is None:
                     return "refused: there is no camera image to look into yet"
                 who = str(rest.get("who") or PAGE)
-                return self._reply_text(self._handler.queue_command(LookAt(point, who)))
+                return self._execute(LookAt(point, who=who))
             case {"steer": str(way)} if self._steer is not None:
                 return self._steer(way)
             case {"show": {"depth": bool(on)}} if self._depth is not None:
@@ -118,12 +101,31 @@ class PageRequestHandler:
                 return self._talk()
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} is not available here")
 
-    def _reply_text(self, given: PendingCommand) -> str | None:
-        """Return a command's restrictions as text, None if there are none or no client waits."""
-        waits = isinstance(given.command, ControlCommand | Resume | Stop)
-        if given.ticket is None or not waits:
-            return None
-        reply = given.ticket.wait(_STOP_S if isinstance(given.command, Stop) else _REPLY_S)
+    def _execute(self, request: Request) -> str | None:
+        """Execute a request; return the message for the user, None if there is none."""
+        if isinstance(request, ClientCommand) and not request.who:
+            request = set_client(request, PAGE)
+        done: Any = self._handler.handle(request, self._paths)
+        match request:
+            case ControlCommand() | Resume() | Stop() if done is not None:
+                return self._reply_text(done, _STOP_S if isinstance(request, Stop) else _REPLY_S)
+            case Save():
+                kept = f", what was there is in {done.backup}" if done.backup is not None else ""
+                return f"saved in {done.path}{kept}"
+            case Set():
+                return "\n".join(note for note in done if _LATER in note) or None
+            case Revert():
+                return "\n".join(done) or "all is as in the file again"
+            case Character(name):
+                return "\n".join(done) or f"the character is {name}"
+            case Differs():
+                lines = [f"{one.key}: {one.new} (default {one.old})" for one in done]
+                return "\n".join(lines) or "all is as by default"
+        return None  # the page receives the other answers in other messages
+
+    def _reply_text(self, ticket: Ticket, within_s: float) -> str | None:
+        """Return a command's restrictions as text, None if there are none."""
+        reply = ticket.wait(within_s)
         if reply is None:
             return "the control loop has not taken it up: it hangs, starts or ends"
         if reply.refused:
@@ -155,8 +157,3 @@ class _CommandSink:
     def tracks(self) -> tuple[TrackInfo, ...]:
         """Return no tracks: the page receives their names separately."""
         return ()
-
-
-def _add_client(command: Command) -> Command:
-    """Return a command with its client: the browser's name, or the page."""
-    return command if getattr(command, "who", PAGE) else set_client(command, PAGE)

@@ -5,7 +5,6 @@ state is read at the highest requested rate and distributed to all programs.
 """
 
 import asyncio
-import json
 import queue
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -13,10 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.robot.control.command_handler import CHANGES
-from gazerig.robot.control.head_state import tracks_from_json
-from gazerig.robot.model.control_source import ControlState
+import msgspec
+
 from gazerig.robot.model.outcome import Progress
+from gazerig.robot.model.requests import SLOW
 from gazerig.robot.remote.client import CONNECT_S
 from gazerig.robot.remote.excess import TOO_MANY
 from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, connect_to_socket
@@ -71,7 +70,7 @@ class RigRelay:
 
     def _exchange(self, path: Path, request: Mapping[str, object]) -> Answer:
         """Exchange one request and answer; called by a thread."""
-        within_s = _FILES_S if request.get("do") in (*CHANGES, "say") else _ANSWER_S
+        within_s = _FILES_S if request.get("do") in SLOW else _ANSWER_S
         # The rig may have closed this connection as the least recently active one.
         for first in (True, False):
             wire = None
@@ -81,13 +80,11 @@ class RigRelay:
                 wire = wire or Wire(connect_to_socket(path, CONNECT_S), ANSWER_BYTES)
                 wire.write(request, CONNECT_S)
                 answer = wire.read(within_s, within_s)
-            except (OSError, EOFError, ValueError) as error:
+            except (OSError, EOFError, MalformedMessage) as error:
                 if wire is not None:
                     wire.close()
                 if first and isinstance(error, EOFError | ConnectionError):
                     continue
-                if isinstance(error, ValueError) and not isinstance(error, MalformedMessage):
-                    return {"refused": "not finite numbers"}  # JSON's 1e999 is infinite
                 return {"failed": NO_RIG}
             self._wires.put(wire)
             return answer if isinstance(answer, dict) else {"failed": NO_RIG}
@@ -159,14 +156,10 @@ class StateFeed:
                 self._after = max([event["number"] for event in events], default=known)
             case _:  # the rig is busy, starting or has ended
                 return None
-        progress = Progress(
-            ControlState(**state["client_control"]),
-            tracks_from_json(state),
-            state["controlled_by"],
-        )
+        progress = msgspec.convert(state, Progress)
         lines = tuple(_line({"event": event}) for event in events)
         return HeadNews(_line({"state": state}), lines, progress)
 
 
 def _line(value: object) -> str:
-    return json.dumps(value, separators=(",", ":"))
+    return msgspec.json.encode(value).decode()

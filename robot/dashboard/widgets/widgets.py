@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, TypeVar
 
+import msgspec
+
 from gazerig.robot.dashboard.widgets.widget import (
     Buttons,
     Chart,
@@ -25,7 +27,6 @@ from gazerig.robot.dashboard.widgets.widget import (
     WidgetPlace,
     WidgetPublisher,
 )
-from gazerig.robot.remote.socket_io import parse_json
 
 W = TypeVar("W", bound=Widget)
 Make = Callable[[WidgetPublisher, WidgetPlace, str, dict[str, object]], W]
@@ -412,7 +413,7 @@ class Widgets:
         Input that is not valid is refused by a message to that client.
         """
         try:
-            self._take(client, parse_json(text))
+            self._take(client, msgspec.json.decode(text))
         except (ValueError, RecursionError) as error:
             self.notify(str(error), client.name, refused=True)
 
