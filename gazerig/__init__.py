@@ -63,12 +63,7 @@ _HOME = {
 }
 """Name -> module, imported at first use: a short command must not wait for all of them."""
 
-__all__ = [  # noqa: F822
-    "CHARACTERS_PER_S", "ConfigError", "Error", "GazeReading", "Head", "HeadEnded", "HeadEvent",
-    "HeadPose", "HeadState", "JointReading", "JointSolution", "NotFound", "Order", "Outcome",
-    "Person", "Refused", "SetupError", "SimulatedHead", "connect", "forward", "inverse", "load_rig",
-    "open",
-]  # fmt: skip
+__all__ = sorted(_HOME)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:

@@ -139,13 +139,9 @@ class AsyncHead:
 
     async def states(self, rate_hz: float = 50.0) -> AsyncIterator[HeadState]:
         """Iterate over the newest states; those that are not read in time are dropped."""
-        last_s = float("-inf")
+        states = self._connected.states(rate_hz)
         while True:
-            state = await self.state()
-            if state.t_s > last_s:
-                last_s = state.t_s
-                yield state
-            await asyncio.sleep(1.0 / rate_hz)
+            yield await asyncio.to_thread(next, states)
 
     async def events(
         self, *, kinds: Container[EventKind] = ("message",)

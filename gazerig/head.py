@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
-from functools import partial
 from math import radians
 from pathlib import Path
 from types import TracebackType
@@ -18,6 +17,7 @@ from gazerig.robot.control.head_state import (
     JointReading,
     Person,
 )
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import (
     FAR_M,
     Ask,
@@ -68,6 +68,8 @@ class Head(ABC):
     rig: str
     _who = "the program"
     _stay = True
+    _poll_s = 0.004
+    _clock = RealClock()
 
     @abstractmethod
     def __enter__(self) -> Self:
@@ -245,7 +247,7 @@ class Head(ABC):
 
     def say(
         self, what: str | Path | Iterable[bytes], *, rate_hz: int = 16000, channels: int = 1,
-        volume: float = 1.0, sway: bool = True, spoken: Iterable[tuple[str, float]] = (),
+        volume: float = 1.0, sway: bool = True,
     ) -> Order:  # fmt: skip
         """Say a sound file, a text, or a stream, with the mouth of a rig that has one.
 
@@ -259,7 +261,6 @@ class Head(ABC):
             channels: number of channels of a stream, 1 or 2.
             volume: factor 0..1; with 0, only the mouth moves, to a stream that is heard elsewhere.
             sway: whether the head sways slightly; for a file or a text.
-            spoken: phonemes or words of a file with their begins in seconds, for closed lips.
 
         Raises:
             Refused: it cannot be said; the message names the file or program and the remedy.
@@ -269,7 +270,7 @@ class Head(ABC):
         text = str(what)
         if Path(text).suffix.lower() in KINDS and Path(text).is_file():
             text = str(Path(text).absolute())
-        return self._send(Say(text, volume, sway, tuple(spoken)))
+        return self._send(Say(text, volume, sway))
 
     def _say_stream(
         self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float
@@ -279,16 +280,14 @@ class Head(ABC):
             ahead_s = self._say_piece(piece, rate_hz, channels, volume)
             if ahead_s > STREAM_AHEAD_S:
                 self.sleep(ahead_s - STREAM_AHEAD_S)
-        self._end_stream(rate_hz, channels)
+        self._say_piece(b"", rate_hz, channels, volume, last=True)
         return Order(self, CommandReply)
 
     @abstractmethod
-    def _say_piece(self, piece: bytes, rate_hz: int, channels: int, volume: float) -> float:
+    def _say_piece(
+        self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
+    ) -> float:
         """Say a piece of a stream; return the length that has not been heard, s."""
-
-    @abstractmethod
-    def _end_stream(self, rate_hz: int, channels: int) -> None:
-        """Mark the end of a stream."""
 
     def converse(self, mode: str) -> Order:
         """Look away and blink as speakers or listeners do.
@@ -343,8 +342,9 @@ class Head(ABC):
         Raises:
             Refused: a value is invalid.
         """
-        pairs = tuple((word, start_s) for word, start_s in words)
-        return self._send(Talk("speaking", person, seconds, text, pairs, str(sound), self._stay))
+        return self._send(
+            Talk("speaking", person, seconds, text, tuple(words), str(sound), self._stay)
+        )
 
     def interrupt(self) -> Order:
         """Return to the face at once and listen: the partner has interrupted speech or thought."""
@@ -454,7 +454,17 @@ class Head(ABC):
             from gazerig.errors import Refused
 
             raise Refused(f"rate_hz {rate_hz:g}: above 0")
-        return self._states(1.0 / rate_hz, seconds)
+        last_s, end_s = float("-inf"), float("inf")
+        while True:
+            state = self.state
+            if seconds is not None and end_s == float("inf"):
+                end_s = state.t_s + seconds
+            if state.t_s >= end_s:
+                return
+            if state.t_s > last_s:
+                last_s = state.t_s
+                yield state
+            self._pause(lambda: False, 1.0 / rate_hz)
 
     def events(
         self, timeout_s: float | None = None, *, kinds: Container[EventKind] = ("message",)
@@ -469,6 +479,10 @@ class Head(ABC):
                 never.
         """
         number = 0
+
+        def has_events() -> bool:
+            return any(event.kind in kinds for event in self._events(number))
+
         while True:
             for event in self._events(number):
                 number = event.number
@@ -476,8 +490,8 @@ class Head(ABC):
                     yield event
             if timeout_s == 0.0:
                 return
-            self._pause(partial(self._has_events, number, kinds), timeout_s or 3600.0)
-            if timeout_s is not None and not self._has_events(number, kinds):
+            self._pause(has_events, timeout_s or 3600.0)
+            if timeout_s is not None and not has_events():
                 return
 
     def sleep(self, seconds: float) -> None:
@@ -492,33 +506,15 @@ class Head(ABC):
     def _progress(self) -> Progress:
         """Return the owner of gaze and joints, and the tracks."""
 
-    @abstractmethod
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         """Wait by the head's clock until a condition is true, at most ``seconds``.
 
         Raises:
             HeadEnded: the head has ended in the meantime.
         """
-
-    def _release_control(self) -> None:
-        """Let the head choose its targets again, without waiting for the reply."""
-        self._send(LookAt(None))
-
-    def _states(self, every_s: float, seconds: float | None) -> Iterator[HeadState]:
-        last_s, end_s = float("-inf"), float("inf")
-        while True:
-            state = self.state
-            if seconds is not None and end_s == float("inf"):
-                end_s = state.t_s + seconds
-            if state.t_s >= end_s:
-                return
-            if state.t_s > last_s:
-                last_s = state.t_s
-                yield state
-            self._pause(lambda: False, every_s)
-
-    def _has_events(self, after: int, kinds: Container[EventKind]) -> bool:
-        return any(event.kind in kinds for event in self._events(after))
+        end_s = self._clock.now_s() + seconds
+        while not until() and (now_s := self._clock.now_s()) < end_s:
+            self._clock.sleep_until(min(now_s + self._poll_s, end_s))
 
     @abstractmethod
     def _events(self, after: int) -> tuple[HeadEvent, ...]:

@@ -28,12 +28,10 @@ from gazerig.robot.control.line_queue import LineQueue
 from gazerig.robot.control.loop import TickLoop
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Say, Value, set_client
 from gazerig.robot.model.outcome import Progress
 
 _LOG = logging.getLogger("gazerig")
-_POLL_S = 0.004
 _ENDED = "the program"
 
 
@@ -104,13 +102,11 @@ class LocalHead(Head):
 
     def _send(self, command: Command) -> Order:
         robot = self._active_run().assembly.robot
-        try:
+        with _raising_refused():
             command = set_client(command, self._who)
             if isinstance(command, Say):
                 command = self._voice().prepare(command)
             ticket = robot.command(command)
-        except (ValueError, SoundError) as error:
-            raise Refused(str(error)) from None
         order = Order(self, lambda: ticket.wait(0.0))
         self._feed.follow(order._update_outcome)
         return order
@@ -135,14 +131,14 @@ class LocalHead(Head):
         assert voice is not None, "only a run without a program has none"
         return voice
 
-    def _say_piece(self, piece: bytes, rate_hz: int, channels: int, volume: float) -> float:
-        try:
+    def _say_piece(
+        self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
+    ) -> float:
+        if last:
+            self._voice().finish()
+            return 0.0
+        with _raising_refused():
             return self._voice().feed(piece, rate_hz, channels, volume)
-        except (ValueError, SoundError) as error:
-            raise Refused(str(error)) from None
-
-    def _end_stream(self, rate_hz: int, channels: int) -> None:
-        self._voice().finish()
 
     def _compose(self) -> session.ComposedRun:
         if self._composed is not None:
@@ -180,7 +176,6 @@ class RunningHead(LocalHead):
         self._started, self._finished = threading.Event(), threading.Event()
         self._failure: BaseException | None = None
         self._pid = os.getpid()
-        self._clock = RealClock()
         self.closing = False
         self._ended_by = ""
 
@@ -238,13 +233,7 @@ class RunningHead(LocalHead):
         self._interrupts.request(reason)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        end_s = self._clock.now_s() + seconds
-        while not until():
-            self._active_run()
-            now_s = self._clock.now_s()
-            if now_s >= end_s:
-                return
-            self._clock.sleep_until(min(now_s + _POLL_S, end_s))
+        super()._pause(lambda: until() or not self._active_run(), seconds)
 
     def _run(self, composed: session.ComposedRun) -> None:
         """Run from torque on to torque off; the target of the loop's thread."""
@@ -381,10 +370,8 @@ class SimulatedHead(LocalHead):
         self, pieces: Iterable[bytes], rate_hz: int, channels: int, volume: float
     ) -> Order:
         """Say the whole stream; its pieces are read first, as time does not pass meanwhile."""
-        try:
+        with _raising_refused():
             speech = self._voice().prepare_stream(tuple(pieces), rate_hz, channels, self._who)
-        except (ValueError, SoundError) as error:
-            raise Refused(str(error)) from None
         return self._send(speech)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
@@ -402,8 +389,8 @@ class SimulatedHead(LocalHead):
 
 @contextlib.contextmanager
 def _raising_refused() -> Any:
-    """Raise ``Refused`` when parameters refuse a request."""
+    """Raise ``Refused`` when the head refuses a request."""
     try:
         yield
-    except (ConfigError, ValueError, OSError) as error:
+    except (ConfigError, SoundError, ValueError, OSError) as error:
         raise Refused(str(error)) from None

@@ -3,23 +3,13 @@
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 from gazerig.robot.model.outcome import Outcome, Progress, command_outcome
 from gazerig.robot.model.reply import CommandReply
 
-
-class OrderHost(Protocol):
-    """A head that accepts orders."""
-
-    def _progress(self) -> Progress:
-        """Return the owner of gaze and joints, and the tracks."""
-
-    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Wait by the head's clock until a condition is true, at most ``seconds``."""
-
-    def _release_control(self) -> None:
-        """Let the head choose its targets again."""
+if TYPE_CHECKING:
+    from gazerig.head import Head
 
 
 class Order:
@@ -37,7 +27,7 @@ class Order:
     """
 
     def __init__(
-        self, host: OrderHost, read_reply: Callable[[], CommandReply | None], within_s: float = 1.0
+        self, host: "Head", read_reply: Callable[[], CommandReply | None], within_s: float = 1.0
     ) -> None:
         self._host, self._read_reply, self._within_s = host, read_reply, within_s
         self._reply: CommandReply | None = None
@@ -108,7 +98,7 @@ class Order:
     def end(self) -> None:
         """Give up control, if the order still has it."""
         if self.active:
-            self._host._release_control()
+            self._host.look_freely()
 
     def __enter__(self) -> Self:
         """Return the order itself."""

@@ -1,6 +1,6 @@
 """A head that runs in another program of the same user."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -9,12 +9,9 @@ from gazerig.errors import HeadEnded, NotFound
 from gazerig.head import Head
 from gazerig.order import Order
 from gazerig.robot.control.head_state import HeadEvent, HeadState
-from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Value, as_value
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import RequestRejected, RobotClient, connect_to_all
-
-_POLL_S = 0.02
 
 
 class RemoteHead(Head):
@@ -27,11 +24,11 @@ class RemoteHead(Head):
     """
 
     _stay = False
+    _poll_s = 0.02
 
     def __init__(self, client: RobotClient) -> None:
         self._client = client
         self._who = client.who
-        self._clock = RealClock()
         self.rig = str(client.status()["rig"])
         self.pid = client.pid
 
@@ -76,23 +73,14 @@ class RemoteHead(Head):
         """Return behaviours, conversation modes and lid states; the active one is the first."""
         return self._client.menus()
 
-    def _say_piece(self, piece: bytes, rate_hz: int, channels: int, volume: float) -> float:
-        return self._client.say_piece(piece, rate_hz, channels, volume=volume)
-
-    def _end_stream(self, rate_hz: int, channels: int) -> None:
-        self._client.say_piece(b"", rate_hz, channels, last=True)
+    def _say_piece(
+        self, piece: bytes, rate_hz: int, channels: int, volume: float, last: bool = False
+    ) -> float:
+        return self._client.say_piece(piece, rate_hz, channels, last, volume)
 
     def _progress(self) -> Progress:
         state = self.state
         return Progress(state.client_control, state.tracks, state.controlled_by)
-
-    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        end_s = self._clock.now_s() + seconds
-        while not until():
-            now_s = self._clock.now_s()
-            if now_s >= end_s:
-                return
-            self._clock.sleep_until(min(now_s + _POLL_S, end_s))
 
     def _events(self, after: int) -> tuple[HeadEvent, ...]:
         return self._client.state(after)[1]

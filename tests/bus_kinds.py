@@ -1,8 +1,9 @@
-"""Every kind of servo bus of ours over every twin, with the same few servos."""
+"""Every kind of servo bus of ours, with the same few servos."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
@@ -28,32 +29,7 @@ from gazerig.sim_mock.devices import (
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import (
-    SHARES,
-    Absence,
-    BusBench,
-    BusUnderTest,
-    Fault,
-    InProcessBench,
-    Wires,
-    starts_of,
-)
-from gazerig.testing.bus_bench import create_in_process_bench as bench_in_process
-
-PLACES: dict[str, dict[str, tuple[int, ...]]] = {
-    "dynamixel": {"dynamixel": (0, 1, 2, 3)},
-    "feetech": {"feetech": (0, 1, 2, 3)},
-    "scs": {"scs": (0, 1, 2, 3)},
-    "maestro": {"maestro": (0, 1, 2, 3)},
-    "pca9685": {"pca9685": (0, 1, 2, 3)},
-    # Neighbours are on different buses, so that a mistaken place shows.
-    "mixed": {"dynamixel": (0, 3), "feetech": (1, 4), "maestro": (2, 5)},
-}
-"""Kind -> the buses that it is made of -> the places of their servos in the whole."""
-KINDS = tuple(PLACES)
-TWINS = ("in-process", "pty")
-ON_EITHER = [(kind, twin) for kind in KINDS for twin in TWINS]
-"""Each kind over both; a servo that another process emulates may answer late."""
+from gazerig.testing.bus_suite import START, BusBench, BusUnderTest, create_bench
 
 
 def _patience(patient: bool, give_up_s: float) -> dict[str, Any]:
@@ -61,10 +37,10 @@ def _patience(patient: bool, give_up_s: float) -> dict[str, Any]:
     return {"give_up_s": give_up_s, **({"reply_timeout_ms": 200.0} if patient else {})}
 
 
-def _smart(model: str) -> Callable[[BusPort, Sequence[ServoConfig], bool, float], ServoBus]:
-    def make(
-        port: BusPort, setups: Sequence[ServoConfig], patient: bool, give_up_s: float
-    ) -> ServoBus:
+def _smart(
+    model: str, patient: bool
+) -> Callable[[BusPort, Sequence[ServoConfig], float], ServoBus]:
+    def make(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
         timeouts = _patience(patient, give_up_s)
         if patient:
             timeouts["prompt_timeout_ms"] = 200.0
@@ -79,41 +55,33 @@ def _smart(model: str) -> Callable[[BusPort, Sequence[ServoConfig], bool, float]
     return make
 
 
-def _maestro(
-    port: BusPort, setups: Sequence[ServoConfig], patient: bool, give_up_s: float
-) -> ServoBus:
-    return MaestroBus(port, setups, MaestroParams(**_patience(patient, give_up_s), stagger_ms=0.0))
+def _maestro(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
+    return MaestroBus(port, setups, MaestroParams(give_up_s=give_up_s, stagger_ms=0.0))
 
 
-def _pca9685(
-    port: BusPort, setups: Sequence[ServoConfig], patient: bool, give_up_s: float
-) -> ServoBus:
-    return Pca9685Bus(port, setups, Pca9685Params(**_patience(patient, give_up_s), stagger_ms=0.0))
+def _pca9685(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
+    return Pca9685Bus(port, setups, Pca9685Params(give_up_s=give_up_s, stagger_ms=0.0))
 
 
-def _maestro_pulses_on(bench: BusBench, name: str) -> None:
-    port = bench.wires.ports[name]
-    assert port.setBaudRate(115_200)
-    targets = bench.steps([SHARES[p % 4] for p in range(bench.count)])
+def _maestro_pulses_on(bench: BusBench) -> None:
+    assert bench.port.setBaudRate(115_200)
     codec = MaestroCodec("compact", 12, False, 12)
-    for place in bench.buses[name]:
-        port.write(codec.target(bench.setups[place].id, targets[place]))
+    for setup, target in zip(bench.setups, bench.steps(START), strict=True):
+        bench.port.write(codec.target(setup.id, target))
     bench.wait(0.3)
-    port.closePort()
+    bench.port.closePort()
 
 
-def _pca9685_pulses_on(bench: BusBench, name: str) -> None:
-    port = bench.wires.ports[name]
-    board = Pca9685Board(port, Pca9685Params())
-    assert port.setBaudRate(115_200)
-    targets = bench.steps([SHARES[p % 4] for p in range(bench.count)])
-    channels = [Channel(bench.setups[place]) for place in bench.buses[name]]
-    for place, channel in zip(bench.buses[name], channels, strict=True):
-        channel.start(targets[place], bench.now_s())
+def _pca9685_pulses_on(bench: BusBench) -> None:
+    board = Pca9685Board(bench.port, Pca9685Params())
+    assert bench.port.setBaudRate(115_200)
+    channels = [Channel(setup) for setup in bench.setups]
+    for channel, target in zip(channels, bench.steps(START), strict=True):
+        channel.start(target, bench.now_s())
     assert board.send_limits(channels, confirmed=True)
     board.send_goals(channels)
     bench.wait(0.3)
-    port.closePort()
+    bench.port.closePort()
 
 
 def _line(name: str, starts: Mapping[int, float]) -> Emulated:
@@ -123,7 +91,7 @@ def _line(name: str, starts: Mapping[int, float]) -> Emulated:
         # The board's own ranges are as wide as such servos go.
         hobby = [HobbySpec(c, x, min_steps=2000, max_steps=10_000) for c, x in starts.items()]
         return MaestroLine(12, servos=tuple(hobby))
-    specs = tuple(ServoSpec(i, OF[name].model, round(x)) for i, x in starts.items())
+    specs = tuple(ServoSpec(i, _SMART[name][0], round(x)) for i, x in starts.items())
     return DynamixelLine(specs) if name == "dynamixel" else FeetechLine(specs)
 
 
@@ -131,60 +99,39 @@ def _device(name: str) -> Callable[[Mapping[int, float], Callable[[], float]], D
     return lambda starts, now_s: build(_line(name, starts), now_s)
 
 
-_OVERLOAD = Fault("overload {id}", "overload")
-OF: dict[str, BusUnderTest] = {
-    "dynamixel": BusUnderTest(
-        "dynamixel", "xl330-m077", 1000, 3000, 4000.0, _smart("xl330-m077"), _device("dynamixel"),
-        fault=_OVERLOAD,
-    ),
-    "feetech": BusUnderTest(
-        "feetech", "sts3215", 1000, 3000, 3000.0, _smart("sts3215"), _device("feetech"),
-        fault=_OVERLOAD,
-    ),
-    "scs": BusUnderTest(
-        "scs", "scs0009", 200, 900, 1500.0, _smart("scs0009"), _device("scs"), fault=_OVERLOAD
-    ),
-    "maestro": BusUnderTest(
-        "maestro", "hobby", 4400, 7600, 12_000.0, _maestro, _device("maestro"), board=True,
-        fault=Fault("error protocol", "serial protocol error", board="board 12"),
-        absence=Absence("set mode mute", "set mode usb-dual-port", "no Maestro answers"),
-        pulses_on=_maestro_pulses_on,
-    ),
-    "pca9685": BusUnderTest(
-        "pca9685", "hobby", 4400, 7600, 12_000.0, _pca9685, _device("pca9685"), board=True,
-        # 4096 counts a period are 4.9 us each at 50 Hz.
-        grain_steps=20,
-        # It finds no errors; that it restarts again and again is a fault of its channels.
-        fault=Fault("brown-out", "restarts again", times=4),
-        absence=Absence("absent on", "absent off", "no PCA9685 answers at 0x40"),
-        pulses_on=_pca9685_pulses_on,
-    ),
-}  # fmt: skip
-"""Our kinds by the names of ``PLACES``."""
+def _kind(name: str, patient: bool = False) -> BusUnderTest:
+    device = _device(name)
+    if name in _SMART:
+        model, low, high, speed = _SMART[name]
+        return BusUnderTest(model, low, high, speed, _smart(model, patient), device)
+    make, pulses_on = _BOARDS[name]
+    return BusUnderTest("hobby", 4400, 7600, 12_000.0, make, device, True, pulses_on)
 
 
-def in_process(kind: str) -> InProcessBench:
+_SMART = {
+    "dynamixel": ("xl330-m077", 1000, 3000, 4000.0),
+    "feetech": ("sts3215", 1000, 3000, 3000.0),
+    "scs": ("scs0009", 200, 900, 1500.0),
+}
+"""Model, range and speed of smart servos."""
+_BOARDS = {"maestro": (_maestro, _maestro_pulses_on), "pca9685": (_pca9685, _pca9685_pulses_on)}
+KINDS = (*_SMART, *_BOARDS)
+
+
+def in_process(name: str) -> BusBench:
     """Make a kind's bench in this process, on a clock that waiting moves."""
-    return bench_in_process(OF, PLACES[kind])
-
-
-def line(kind: str, name: str) -> Emulated:
-    """Return what is emulated on one bus of a kind."""
-    return _line(name, starts_of(OF[name], PLACES[kind][name]))
+    return create_bench(_kind(name))
 
 
 @contextmanager
-def twin_of(kind: str, place: str) -> Iterator[BusBench]:
-    """Return a kind's servos ``in-process`` or behind a ``pty``."""
-    if place == "in-process":
-        yield in_process(kind).bench
-        return
+def behind_a_terminal(name: str) -> Iterator[BusBench]:
+    """Yield smart servos that another process emulates, and that may answer late."""
+    kind = _kind(name, patient=True)
     with PtyBuses() as server:
-        paths = server.start({name: line(kind, name) for name in PLACES[kind]})
-        ports = {name: BlockingPort(path) for name, path in paths.items()}
-        wires = Wires(ports, time.monotonic, time.sleep, server.command)
+        path = server.start({name: _line(name, kind.starts_steps)})[name]
+        port = BlockingPort(path)
         try:
-            yield BusBench(OF, PLACES[kind], wires, patient=True)
+            command = partial(server.command, bus=name)
+            yield BusBench(kind, port, time.monotonic, time.sleep, command)
         finally:
-            for port in ports.values():
-                port.closePort()
+            port.closePort()

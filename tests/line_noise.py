@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi, sin
 
+from feedback_rows import Row, rows
+
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import DriverError
@@ -25,7 +27,6 @@ from gazerig.sim_mock.devices import (
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import Row, rows
 
 TICK_S = 0.005
 IDS = (1, 2, 3, 4, 5, 6)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from branch import Branch
+from feedback_rows import rows
 from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
@@ -22,7 +23,6 @@ from gazerig.drivers.types import LimpableBus
 from gazerig.robot.app.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
-from gazerig.testing.bus_bench import rows
 
 SLOW_DEG_S = 4.0
 PATIENCE_S = 30.0

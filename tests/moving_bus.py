@@ -2,8 +2,9 @@
 
 from typing import Any
 
+from feedback_rows import rows
+
 from gazerig.drivers.types import ServoBus
-from gazerig.testing.bus_bench import rows
 
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")

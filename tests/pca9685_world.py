@@ -2,12 +2,13 @@
 
 from typing import Any
 
+from feedback_rows import rows
+
 from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge
-from gazerig.testing.bus_bench import rows
 
 SPEED_STEPS_S = 4000.0
 GRAIN = 20

@@ -3,9 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
+from fault_machine import LINE, Case, lasting_cases
+
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
-from gazerig.testing.fault_machine import LINE, Case, lasting_cases
 
 PACKETS = [
     *lasting_cases(

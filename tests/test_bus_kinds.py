@@ -1,31 +1,28 @@
-"""Promises of every kind of servo bus, over both twins: the suite that packages run on theirs."""
+"""Promises of every kind of servo bus: the suite that packages run on theirs."""
+
+from collections.abc import Iterator
 
 import pytest
-from bus_kinds import KINDS, ON_EITHER, in_process, twin_of
+from bus_kinds import KINDS, behind_a_terminal, in_process
 
-from gazerig.testing import BusLossSuite, BusSuite
+from gazerig.testing import BusBench, BusSuite
 
 
 class TestEveryKind(BusSuite):
-    @pytest.fixture(params=ON_EITHER, ids="-".join)
-    def twin(self, request):
-        with twin_of(*request.param) as made:
-            yield made
-
     @pytest.fixture(params=KINDS)
-    def another(self, request):
-        return lambda: in_process(request.param)
+    def bench(self, request: pytest.FixtureRequest) -> BusBench:
+        return in_process(request.param)
 
 
-# Every kind of servo bus without a servo, a port or a supply, over both twins
+@pytest.mark.pty
+class TestBehindATerminal:
+    @pytest.fixture(params=["dynamixel", "feetech"])
+    def bench(self, request: pytest.FixtureRequest) -> Iterator[BusBench]:
+        with behind_a_terminal(request.param) as bench:
+            yield bench
 
-
-class TestEveryKindOfLoss(BusLossSuite):
-    @pytest.fixture(params=ON_EITHER, ids="-".join)
-    def twin(self, request):
-        with twin_of(*request.param) as made:
-            yield made
-
-    @pytest.fixture(params=KINDS)
-    def another(self, request):
-        return lambda: in_process(request.param)
+    bus = BusSuite.bus
+    recover = BusSuite.recover
+    test_goals = BusSuite.test_goals_are_followed_and_told
+    test_release = BusSuite.test_release_takes_the_torque_of_all
+    test_unplugged = BusSuite.test_an_unplugged_port_comes_back_and_holds

@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from copied import copied
+from fault_machine import Case, Machine, pair_of
 from mixed_rig import mixed_rig
 from struck_rigs import CASES, RIGS, VOLTS, quick, rig_of
 
@@ -12,8 +13,6 @@ import gazerig.robot.app.run_bus as run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
-from gazerig.testing.fault_machine import Case, Machine, pair_of
-from gazerig.testing.fault_suite import FaultSuite
 
 LEFT = {
     "dynamixel": {
@@ -23,6 +22,9 @@ LEFT = {
     "feetech": {"overheat {i}", "collide {i}", "reset {i}"},
 }  # fmt: skip
 """After these a servo is left, as only a person can help; everything else passes."""
+
+
+STRUCK_S = 0.6
 
 
 @cache
@@ -38,34 +40,22 @@ def started(rig):
     return machine
 
 
-class _OfKind(FaultSuite):
-    kind = ""
-
-    @pytest.fixture
-    def rig(self):
-        return of_kind(self.kind)[0]
-
-    @pytest.fixture
-    def machine(self):
-        machine = copied(of_kind(self.kind)[1])
-        machine.volts = VOLTS[self.kind]
-        return machine
-
-
-class TestDynamixel(_OfKind):
-    kind, cases, left = "dynamixel", CASES["dynamixel"], frozenset(LEFT["dynamixel"])
-
-
-class TestFeetech(_OfKind):
-    kind, cases, left = "feetech", CASES["feetech"], frozenset(LEFT["feetech"])
-
-
-class TestMaestro(_OfKind):
-    kind, cases = "maestro", CASES["maestro"]
-
-
-class TestPca9685(_OfKind):
-    kind, cases = "pca9685", CASES["pca9685"]
+@pytest.mark.parametrize(
+    ("kind", "case"),
+    [(kind, case) for kind in CASES for case in CASES[kind]],
+    ids=lambda value: value if isinstance(value, str) else value.name,
+)
+def test_whatever_befalls_a_bus_ends_well(kind, case):
+    """Every tick checks the true servos: goals in the limits, positions in the range, speeds."""
+    machine = copied(of_kind(kind)[1])
+    machine.volts = VOLTS[kind]
+    outcome = machine.apply_fault(*pair_of(machine.rig, kind), case, STRUCK_S)
+    assert outcome.survived, outcome
+    assert (outcome.end == "left, named") == (case.name in LEFT.get(kind, ())), outcome
+    # A write to an adapter that accepts no bytes times out after 0.25 s.
+    assert outcome.longest_s < (0.3 if "block" in case.name else 0.1)
+    machine.body.stop()
+    assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
 
 
 def test_a_servo_that_cannot_be_set_up_again_is_named_and_keeps_no_other_waiting():

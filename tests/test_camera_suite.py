@@ -1,6 +1,5 @@
 """Promises of every camera to the loop, on ours: the suite that packages run on theirs."""
 
-import threading
 import time
 from typing import Any
 
@@ -17,12 +16,11 @@ from gazerig.testing.camera_suite import of_source
 
 
 class Video4Linux:
-    """A capture device that can be pulled out, or hold up who reads it."""
+    """A capture device that can be pulled out."""
 
     def __init__(self, file):
-        self.file, self.grabs, self.held = file, 0, threading.Event()
+        self.file, self.grabs = file, 0
         self.restore()
-        self.held.set()
 
     def lose(self):
         self.file.unlink()
@@ -34,7 +32,6 @@ class Video4Linux:
         return self.file.exists()
 
     def grab(self):
-        self.held.wait(60.0)
         time.sleep(0.001)
         self.grabs += 1
         return self.file.exists()
@@ -58,7 +55,7 @@ class TestWebcam(CameraSuite):
         device: Any = Video4Linux(tmp_path / "video0")
         return of_source(
             lambda: Webcam(device.file, capture=lambda name: device),
-            device.lose, device.restore, device.held.clear, device.held.set,
+            device.lose, device.restore,
         )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 import pytest
 from fakes.dynamixels import Rig
+from feedback_rows import rows
 from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -12,7 +13,6 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import rows
 
 
 @pytest.fixture

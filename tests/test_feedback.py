@@ -3,11 +3,11 @@
 from math import inf, isnan
 
 import pytest
+from feedback_rows import Row, feedback_of, rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.types import Feedback, ServoConfig
-from gazerig.testing.bus_bench import Row, feedback_of, rows
 
 
 def row(steps, at_s, torque=True, rearmed=False):

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from copied import copied
+from feedback_rows import rows
 from moving_bus import IDS, NAMES
 from present import present
 from sts_rig import Rig
@@ -16,7 +17,6 @@ from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.torque import read_positions
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import rows
 
 
 @pytest.fixture(scope="module")

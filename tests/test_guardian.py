@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from feedback_rows import rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop_deaths import PATIENCE_S, driven
@@ -31,7 +32,6 @@ from gazerig.robot.guardian.heartbeat import (
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
 from gazerig.robot.model.joint import JointParams
-from gazerig.testing.bus_bench import rows
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 

@@ -1,10 +1,9 @@
 """Noise to and fro on every kind of bus; the long form is tests/attack/line_noise.py."""
 
 import pytest
+from feedback_rows import rows
 from line_noise import Noisy
 from present import present
-
-from gazerig.testing.bus_bench import rows
 
 SMART = ("dynamixel", "dynamixel direct", "feetech")
 

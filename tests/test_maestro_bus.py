@@ -3,13 +3,13 @@
 from typing import Any
 
 import pytest
+from feedback_rows import rows
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
-from gazerig.testing.bus_bench import rows
 
 CENTRE = 6000
 SPEED = 12_000.0

@@ -5,11 +5,11 @@ from math import nan
 from typing import Any
 
 import pytest
+from feedback_rows import Row, feedback_of, rows
 
 from gazerig.drivers.bus.multi_bus import AGAIN_S, IN_A_ROW, BusShare, MultiBus
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.types import BusHealth, ServoConfig
-from gazerig.testing.bus_bench import Row, feedback_of, rows
 
 WANTED = tuple(ServoConfig(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
 

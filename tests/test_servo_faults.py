@@ -14,11 +14,11 @@ import sts_rig
 from copied import copied
 from dynamixel_rig import WAYS
 from dynamixel_rig import Rig as DynamixelRig
+from feedback_rows import rows
 from moving_bus import IDS, LONGEST_S, NAMES
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
-from gazerig.testing.bus_bench import rows
 
 RIGS: dict[str, Callable[[], Any]] = {
     **{f"dynamixel {way}": partial(DynamixelRig, *chosen) for way, chosen in WAYS.items()},

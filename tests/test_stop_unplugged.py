@@ -16,22 +16,19 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Resume, Stop
 from gazerig.sim_mock.device import Device
-from gazerig.testing.bus_bench import BusBench
+from gazerig.testing import BusBench
 
 RIGS = ("feetech", "mixed")
 
 
 @pytest.fixture
 def twin(request: pytest.FixtureRequest) -> BusBench:
-    return in_process(request.param).bench
+    return in_process(request.param)
 
 
 @pytest.mark.parametrize("twin", KINDS, indirect=True)
 def test_what_could_not_be_released_is_when_the_port_is_back(twin: BusBench) -> None:
-    twin.pulses_on()
-    bus = twin.bus(give_up_s=1.0)
-    bus.open()
-    bus.enable_torque()
+    bus = twin.hold(give_up_s=1.0)
     twin.run(bus, 0.1)
     twin.command("unplug")
     with pytest.raises(BusLost):
@@ -58,9 +55,8 @@ def test_what_could_not_be_released_is_when_the_port_is_back(twin: BusBench) -> 
 
 @pytest.mark.parametrize("twin", KINDS, indirect=True)
 def test_torque_that_came_on_only_here_and_there_is_taken_off(twin: BusBench) -> None:
-    twin.pulses_on()
-    bus = twin.bus()
-    bus.open()
+    bus = twin.hold()
+    bus.disable_torque()
     twin.run(bus, 0.1)
     twin.command("unplug")
     with pytest.raises(BusLost):

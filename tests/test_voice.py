@@ -154,7 +154,7 @@ def test_clients_of_the_network_may_name_sounds_of_the_folders_only(
 
 
 BAD: list[Any] = [
-    Say("a", volume=1.5), Say(3), Say("a", spoken=(("a", -1.0),)),  # type: ignore[arg-type]
+    Say("a", volume=1.5), Say(3),  # type: ignore[arg-type]
     Speak("", 1e9), Speak("", float("nan")), Speak("", 1.0, "mouth", ((0.1, 2.0),)),
     Speak("", 1.0, sway_deg=90.0),
 ]  # fmt: skip

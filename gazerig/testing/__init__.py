@@ -6,19 +6,10 @@ program itself never imports this package.
 
 import pytest
 
-pytest.register_assert_rewrite(
-    "gazerig.testing.bus_suite",
-    "gazerig.testing.bus_lost_suite",
-    "gazerig.testing.camera_suite",
-    "gazerig.testing.fault_suite",
-)
+pytest.register_assert_rewrite("gazerig.testing.bus_suite", "gazerig.testing.camera_suite")
 
-from gazerig.testing.bus_bench import Absence as Absence  # noqa: E402
-from gazerig.testing.bus_bench import BusBench as BusBench  # noqa: E402
-from gazerig.testing.bus_bench import BusUnderTest as BusUnderTest  # noqa: E402
-from gazerig.testing.bus_bench import Fault as Fault  # noqa: E402
-from gazerig.testing.bus_lost_suite import BusLossSuite as BusLossSuite  # noqa: E402
+from gazerig.testing.bus_suite import BusBench as BusBench  # noqa: E402
 from gazerig.testing.bus_suite import BusSuite as BusSuite  # noqa: E402
+from gazerig.testing.bus_suite import BusUnderTest as BusUnderTest  # noqa: E402
 from gazerig.testing.camera_suite import CameraBench as CameraBench  # noqa: E402
 from gazerig.testing.camera_suite import CameraSuite as CameraSuite  # noqa: E402
-from gazerig.testing.fault_suite import FaultSuite as FaultSuite  # noqa: E402

@@ -3,36 +3,204 @@
 A package runs it on its own bus with a short class:
 
     class TestMyBus(BusSuite):
-        under_test = BusUnderTest("mine", "my-servo", 100, 900, 400.0, make, device)
+        under_test = BusUnderTest("my-servo", 100, 900, 400.0, make, device)
 """
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import nan
+from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.types import ServoBus
-from gazerig.testing.bus_bench import (
-    PLACES,
-    BusBench,
-    BusUnderTest,
-    InProcessBench,
-    are_healthy,
-    create_in_process_bench,
-    held_bus,
-    present,
-    rows,
-)
+from gazerig.drivers.errors import BusLost, ServoMissing
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.in_process_port import InProcessPort
 
-ANY = st.integers(-(2**40), 2**40) | st.floats(allow_nan=True, allow_infinity=True)
-FAULTS = ("", "lose all count 2", "delay all 15 count 3", "corrupt all count 3", "unplug for 0.05")
+_TICK_S = 0.01
+_NAMES = ("eye", "jaw", "neck", "lid")
+_IDS = (3, 1, 11, 7)
+START = (0.4, 0.5, 0.65, 0.55)
+"""Initial positions of the servos, as shares of their range."""
+AWAY = (0.2, 0.8, 0.3, 0.7)
+_NEAR_SHARE = 0.012
+"""Largest distance from the goal due to friction and dead bands, as a share of the range."""
 
 
-class BusBenches:
-    """The benches on which the suites run; gazerig tests several, a package tests one.
+@dataclass(frozen=True)
+class BusUnderTest:
+    """One kind of bus and its emulated device with four servos.
+
+    Attributes:
+        model: model of its servos.
+        low, high: their range in these tests, steps.
+        speed_steps_s: their speed limit; the servos must be able to reach it.
+        make: creates the bus from a port, configurations, and the seconds without any answer after
+            which it gives up.
+        device: creates the emulated device from the servos' initial steps by id, and a clock. It
+            understands the commands of ``gazerig.sim_mock.faults``: ``status``, ``unplug``,
+            ``plug``, ``lose``, ``clear`` and ``brown-out``.
+        board: servos are channels of a board that does not measure their positions; faults affect
+            the whole board.
+        pulses_on: makes a board hold its servos before the test; receives the bench.
+    """
+
+    model: str
+    low: int
+    high: int
+    speed_steps_s: float
+    make: Callable[[BusPort, Sequence[ServoConfig], float], ServoBus]
+    device: Callable[[Mapping[int, float], Callable[[], float]], Device]
+    board: bool = False
+    pulses_on: "Callable[[BusBench], None] | None" = None
+
+    @property
+    def setups(self) -> tuple[ServoConfig, ...]:
+        """Return the configurations of the servos."""
+        rest = (self.low + self.high) // 2 if self.board else None
+        return tuple(
+            ServoConfig(
+                servo_id, self.model, self.low, self.high, self.speed_steps_s, name, rest_steps=rest
+            )
+            for servo_id, name in zip(_IDS, _NAMES, strict=True)
+        )
+
+    @property
+    def starts_steps(self) -> dict[int, float]:
+        """Return the initial positions of the servos by id."""
+        return {
+            s.id: self.low + x * (self.high - self.low)
+            for s, x in zip(self.setups, START, strict=True)
+        }
+
+
+class BusBench:
+    """The servos of one kind of bus, and actions of a test on them.
+
+    Positions and goals are shares of each servo's range, 0..1 within its limits.
+
+    Args:
+        kind: the kind.
+        port: the bus's port.
+        now_s: clock.
+        wait: waits for some seconds.
+        command: runs a fault command.
+    """
+
+    def __init__(
+        self,
+        kind: BusUnderTest,
+        port: BusPort,
+        now_s: Callable[[], float],
+        wait: Callable[[float], None],
+        command: Callable[[str], str],
+    ) -> None:
+        self.kind, self.port, self.setups = kind, port, kind.setups
+        self.now_s, self.wait, self.command = now_s, wait, command
+
+    def bus(self, setups: Sequence[ServoConfig] = (), give_up_s: float = 60.0) -> ServoBus:
+        """Create the bus."""
+        return self.kind.make(self.port, setups or self.setups, give_up_s)
+
+    def hold(self, setups: Sequence[ServoConfig] = (), give_up_s: float = 60.0) -> ServoBus:
+        """Return a bus that holds every servo in its position."""
+        if self.kind.pulses_on is not None:
+            self.kind.pulses_on(self)
+        bus = self.bus(setups, give_up_s)
+        bus.open()
+        bus.enable_torque()
+        bus.events()
+        return bus
+
+    def steps(self, shares: Sequence[float]) -> list[int]:
+        """Convert shares of the range to steps."""
+        return [round(self.kind.low + x * (self.kind.high - self.kind.low)) for x in shares]
+
+    def are_near(self, steps: Sequence[float], shares: Sequence[float]) -> bool:
+        """Return whether all servos are near their goals."""
+        most = _NEAR_SHARE * (self.kind.high - self.kind.low)
+        return all(abs(a - b) <= most for a, b in zip(steps, self.steps(shares), strict=True))
+
+    # --- the servos themselves, without the driver
+
+    def _reports(self) -> list[dict[str, Any]]:
+        servos = {one["id"]: one for one in json.loads(self.command("status"))["servos"]}
+        return [servos[setup.id] for setup in self.setups]
+
+    def true_steps(self) -> list[float]:
+        """Return the true positions."""
+        return [
+            float(one["place"] if "place" in one else one["position"]) for one in self._reports()
+        ]
+
+    def true_goals_steps(self) -> list[int | None]:
+        """Return the true goals, None for a servo without a goal."""
+        return [one.get("target", one.get("goal")) or None for one in self._reports()]
+
+    def holding(self) -> list[bool]:
+        """Return which servos truly hold their position."""
+        return [bool(one.get("target", one.get("torque"))) for one in self._reports()]
+
+    def brown_out(self) -> None:
+        """Restart the first servo, or the whole board."""
+        self.command("brown-out" if self.kind.board else f"brown-out {self.setups[0].id}")
+
+    # --- ticks
+
+    def run(self, bus: ServoBus, seconds: float, goals: Sequence[float] = ()) -> Feedback:
+        """Tick every 10 ms, with goals in shares; return the last feedback."""
+        end_s = self.now_s() + seconds - 1e-9
+        while True:
+            feedback = bus.read(self.now_s())
+            if goals:
+                bus.write(self.steps(goals))
+            if self.now_s() >= end_s:
+                return feedback
+            self.wait(_TICK_S)
+
+    def run_until(
+        self, bus: ServoBus, done: Callable[[Feedback], bool], goals: Sequence[float] = START
+    ) -> Feedback:
+        """Tick until a condition is true; return the feedback at that time."""
+        end_s = self.now_s() + 8.0
+        while self.now_s() < end_s:
+            if done(feedback := self.run(bus, 0.0, goals)):
+                return feedback
+            self.wait(_TICK_S)
+        raise AssertionError(f"not in 8 s: {feedback}, {bus.faults()}, {bus.events()}")
+
+    def go(self, bus: ServoBus, goals: Sequence[float]) -> None:
+        """Move the servos to goals, and check that they truly get there."""
+        self.run_until(bus, lambda f: self.are_near(f.position_steps, goals), goals)
+        self.run(bus, 0.3, goals)
+        assert self.are_near(self.true_steps(), goals)
+
+
+def create_bench(kind: BusUnderTest) -> BusBench:
+    """Return a bench in this process, on a clock that advances only by waiting."""
+    now = [50.0]
+
+    def sleep_until(t_s: float) -> None:
+        now[0] = max(now[0], t_s)
+
+    device = kind.device(kind.starts_steps, lambda: now[0])
+    port = InProcessPort(device, None, "the port under test", sleep_until)
+    return BusBench(
+        kind, port, lambda: now[0], lambda s: sleep_until(now[0] + s), device.faults.command
+    )
+
+
+def _are_healthy(feedback: Feedback) -> bool:
+    """Return whether all servos have answered with their torque on."""
+    return not feedback.missing and all(feedback.torque)
+
+
+class BusSuite:
+    """Opening, holding, following, limits, release; and what is lost and comes back.
 
     under_test: the kind of bus
     """
@@ -40,240 +208,209 @@ class BusBenches:
     under_test: BusUnderTest | None = None
 
     @pytest.fixture
-    def another(self) -> Callable[[], InProcessBench]:
-        """Return a function that creates another bench in this process."""
-        kind = self.under_test
-        assert kind is not None, "set under_test, or define your own fixture another"
-        return lambda: create_in_process_bench({kind.name: kind}, {kind.name: PLACES})
+    def bench(self) -> BusBench:
+        """Return the bench in this process."""
+        assert self.under_test is not None, "set under_test, or define your own fixture bench"
+        return create_bench(self.under_test)
 
     @pytest.fixture
-    def here(self, another: Callable[[], InProcessBench]) -> BusBench:
-        """Return a bench in this process: for long tests, and for tests that need no terminal."""
-        return another().bench
-
-    @pytest.fixture
-    def twin(self, here: BusBench) -> BusBench:
-        """Return each available bench: in this process, or behind a terminal."""
-        return here
-
-    @pytest.fixture
-    def held(self, twin: BusBench) -> Iterator[ServoBus]:
-        """Return the bus of ``twin``, which holds every servo in its position."""
-        yield from held_bus(twin)
-
-    @pytest.fixture
-    def held_here(self, here: BusBench) -> Iterator[ServoBus]:
-        """Return the bus of ``here``, which holds every servo in its position."""
-        yield from held_bus(here)
-
-
-class BusSuite(BusBenches):
-    """Opening, holding, following, limits, invalid goals and release."""
-
-    # --- open, engage, read, write, release
-
-    def test_open_finds_all_and_nothing_moves(self, twin):
-        twin.pulses_on()
-        bus = twin.bus()
-        before = twin.true_shares()
-        bus.open()
-        readings = rows(bus.read(twin.now_s()))
-        assert twin.are_near(twin.measured_shares(readings), twin.start_shares())
-        # A Maestro that already sends pulses continues; no other servo holds its position.
-        assert [present(r).torque for r in readings] == [
-            twin.is_board(p) for p in range(twin.count)
-        ]
-        bus.write(twin.steps(twin.away_shares()))
-        twin.run(bus, 0.1, twin.away_shares())
-        assert twin.are_near(twin.true_shares(), before)
+    def bus(self, bench: BusBench) -> Iterator[ServoBus]:
+        """Return the bus, which holds every servo in its position."""
+        bus = bench.hold()
+        yield bus
+        bus.disable_torque()
         bus.close()
 
-    def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(self, here, held_here):
-        here.run(held_here, 0.05)
-        before_s = here.now_s()
-        readings = rows(held_here.read(before_s))
-        assert here.are_near(here.measured_shares(readings), here.start_shares())
-        assert all(before_s <= present(r).at_s <= here.now_s() for r in readings)
-        assert [present(r).measured for r in readings] == [
-            not here.is_board(p) for p in range(here.count)
-        ]
-        assert not any(present(r).fault or present(r).rearmed for r in readings)
+    # --- open, torque on, read, write, release
 
-    def test_engage_holds_every_servo_where_it_is(self, here):
-        here.pulses_on()
-        bus = here.bus()
+    def test_nothing_moves_before_the_torque_is_on(self, bench):
+        bus = bench.bus()
         bus.open()
-        before = here.true_shares()
-        goals = bus.enable_torque()
-        assert here.are_near(here.shares(goals), before)
+        assert not any(bus.read(bench.now_s()).torque)
+        bench.run(bus, 0.1, AWAY)
+        assert bench.are_near(bench.true_steps(), START)
+        bus.close()
+
+    def test_torque_on_holds_every_servo_where_it_is(self, bench):
+        bus = bench.hold()
         for _ in range(10):
-            readings = here.run(bus, 0.02)
-            assert here.are_near(here.true_shares(), before)
-        assert are_healthy(readings)
-        assert here.holding() == [True] * here.count
+            feedback = bench.run(bus, 0.02)
+            assert bench.are_near(bench.true_steps(), START)
+        assert _are_healthy(feedback) and all(bench.holding())
         bus.disable_torque()
         bus.close()
 
-    def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(self, here):
-        bus = here.bus()
-        bus.open()
-        before = here.true_shares()
-        bus.enable_torque()
-        hobby = [here.is_board(p) for p in range(here.count)]
-        wanted = [0.5 if one else at for one, at in zip(hobby, before, strict=True)]
-        here.run(bus, 0.3, wanted)
-        assert here.are_near(here.true_shares(), wanted)
-        told = bus.events()
-        limp = [
-            line for line in told if "had no pulses: they move to their goals immediately" in line
-        ]
-        assert len(limp) == any(hobby)
-        for place, setup in enumerate(here.setups):
-            assert not any(hobby) or hobby[place] == (servo_label(setup) in limp[0])
-        bus.disable_torque()
-        bus.close()
+    def test_goals_are_followed_and_told(self, bench, bus):
+        bench.go(bus, AWAY)
+        before_s, health = bench.now_s(), bus.health()
+        feedback = bench.run(bus, 0.0, AWAY)
+        assert _are_healthy(feedback) and bench.are_near(feedback.position_steps, AWAY)
+        assert all(before_s <= at_s <= bench.now_s() for at_s in feedback.at_s)
+        assert not any((*feedback.fault, *feedback.rearmed)) and bus.faults() == ()
+        assert health.errors == {} and bus.health().tx_bytes > health.tx_bytes > 0
 
-    def test_goals_are_followed_and_told(self, twin, held):
-        readings = twin.run_until(
-            held,
-            lambda r: twin.are_near(twin.measured_shares(r), twin.away_shares()),
-            twin.away_shares(),
-            timeout_s=5.0,
-        )
-        twin.run(held, 0.3, twin.away_shares())
-        assert twin.are_near(twin.true_shares(), twin.away_shares())
-        assert are_healthy(readings)
+    def test_goals_are_clipped_to_the_limits(self, bench, bus):
+        bench.run(bus, 2.0, (-40.0, 60.0, -1e-3, 1.001))
+        assert bench.are_near(bench.true_steps(), (0.0, 1.0, 0.0, 1.0))
+        low, high = bench.kind.low, bench.kind.high
+        assert all(low <= goal <= high for goal in bench.true_goals_steps())
 
-    def test_goals_are_clipped_to_the_limits(self, here, held_here):
-        ends = [(-40.0, 60.0, -1e-3, 1.001)[place % 4] for place in range(here.count)]
-        inside = [min(1.0, max(0.0, end)) for end in ends]
-        here.run_until(
-            held_here, lambda r: here.are_near(here.measured_shares(r), inside), ends, timeout_s=5.0
-        )
-        here.run(held_here, 0.3, ends)
-        assert here.are_near(here.true_shares(), inside)
-        for place, (goal, wanted) in enumerate(
-            zip(here.true_goals_steps(), here.steps(inside), strict=True)
-        ):
-            assert abs(goal - wanted) <= here.kinds[here.on[place]].grain_steps
-
-    def test_what_is_no_number_is_refused_and_nothing_is_sent(self, here, held_here):
-        here.run(held_here, 0.05, here.start_shares())
-        before = held_here.health().tx_bytes
-        for place in range(here.count):
-            goals = here.steps(here.away_shares())
-            goals[place] = nan
+    def test_what_is_no_number_is_refused_and_nothing_is_sent(self, bench, bus):
+        bench.run(bus, 0.05, START)
+        before = bus.health().tx_bytes
+        goals = bench.steps(AWAY)
+        for place in range(len(goals)):
             with pytest.raises(ValueError, match="not a number"):
-                held_here.write(goals)
-        for wrong in (goals[:-1], [*goals, goals[0]]):
-            with pytest.raises(ValueError):
-                held_here.write(wrong)
-        assert held_here.health().tx_bytes == before
-        here.run(held_here, 0.2)
-        assert here.are_near(here.true_shares(), here.start_shares())
+                bus.write([*goals[:place], nan, *goals[place + 1 :]])
+        with pytest.raises(ValueError):
+            bus.write(goals[:-1])
+        assert bus.health().tx_bytes == before
 
-    def test_release_takes_the_torque_of_all_and_is_confirmed(self, twin, held):
-        twin.run(held, 0.05)
-        assert all(twin.holding())
-        held.disable_torque()
-        assert twin.holding() == [False] * twin.count
-        readings = twin.run(held, 0.1, twin.away_shares())
-        assert not any(r.torque for r in readings)
-        assert twin.are_near(twin.true_shares(), twin.start_shares())
-        assert "refused" not in held.health().errors
-        # A busy machine may delay the emulator, which is not a fault of the bus.
-        assert [
-            line for line in held.events() if not line.startswith("this computer was busy")
-        ] == []
+    def test_release_takes_the_torque_of_all(self, bench, bus):
+        bench.run(bus, 0.05)
+        bus.disable_torque()
+        assert not any(bench.holding())
+        feedback = bench.run(bus, 0.1, AWAY)
+        assert not any(feedback.torque) and bench.are_near(bench.true_steps(), START)
 
-    def test_a_bus_is_opened_again_and_closed_twice(self, here):
-        bus = here.bus()
+    def test_a_bus_is_opened_again_and_closed_twice(self, bench):
+        bus = bench.hold()
         for _ in range(2):
-            here.pulses_on()
-            bus.open()
-            bus.enable_torque()
-            assert here.are_near(
-                here.measured_shares(rows(bus.read(here.now_s()))), here.start_shares()
-            )
             bus.disable_torque()
             bus.close()
             bus.close()
+            bus.open()
+        bus.close()
 
-    def test_bytes_are_counted_and_no_errors(self, here, held_here):
-        before = held_here.health()
-        here.run(held_here, 0.1, here.start_shares())
-        after = held_here.health()
-        assert after.tx_bytes > before.tx_bytes > 0
-        assert after.rx_bytes > before.rx_bytes > 0
-        assert after.errors == {}
-        assert held_here.faults() == ()
-
-    # --- other limits
-
-    def test_retune_waits_for_the_next_torque(self, here):
-        here.pulses_on()
-        bus = here.bus()
-        bus.open()
-        bus.enable_torque()
-        narrow = [
-            s._replace(min_steps=at - 40, max_steps=at + 40)
-            for s, at in zip(here.setups, here.steps([0.5] * here.count), strict=True)
-        ]
-        bus.retune(narrow)
-        here.run(bus, 1.5, here.away_shares())
-        assert here.are_near(here.true_shares(), here.away_shares())
+    def test_new_limits_count_from_the_next_torque_on(self, bench, bus):
+        middle = (bench.kind.low + bench.kind.high) // 2
+        low, high = middle - 40, middle + 40
+        bus.retune([s._replace(min_steps=low, max_steps=high) for s in bench.setups])
+        bench.run(bus, 1.5, AWAY)
+        assert bench.are_near(bench.true_steps(), AWAY)
         bus.disable_torque()
-        goals = bus.enable_torque()
-        for setup, goal in zip(narrow, goals, strict=True):
-            assert setup.min_steps <= goal <= setup.max_steps
-        here.run(bus, 1.0, here.away_shares())
-        for setup, goal in zip(narrow, here.true_goals_steps(), strict=True):
-            assert setup.min_steps <= goal <= setup.max_steps
+        assert all(low <= goal <= high for goal in bus.enable_torque())
+        bench.run(bus, 1.0, AWAY)
+        assert all(low <= goal <= high for goal in bench.true_goals_steps())
         with pytest.raises(ValueError, match="ids and models must not change"):
-            bus.retune([s._replace(id=s.id + 1) for s in narrow])
-        with pytest.raises(ValueError, match="ids and models must not change"):
-            bus.retune(narrow[:-1])
+            bus.retune([s._replace(id=s.id + 1) for s in bench.setups])
 
-    # --- properties
+    # --- absent servos and ports
 
-    def test_a_goal_between_two_steps_is_rounded(self, another):
-        twin = another().bench
-        twin.pulses_on()
-        bus = twin.bus()
-        bus.open()
-        bus.enable_torque()
-        bus.read(twin.now_s())
-        middle = [(setup.min_steps + setup.max_steps) // 2 for setup in twin.setups]
-        bus.write([steps + 0.4 for steps in middle])
-        twin.wait(0.02)
-        for place in twin.smart_indices():
-            assert twin.true_goals_steps()[place] == middle[place]
+    def test_open_names_the_servo_that_is_missing(self, bench):
+        if bench.kind.board:
+            return
+        *others, last = bench.setups
+        with pytest.raises(ServoMissing, match=f"{last.name} .*99. does not answer") as caught:
+            bench.bus([*others, last._replace(id=99)]).open()
+        assert bench.port.port_name in str(caught.value) and "\n" not in str(caught.value)
+        bus = bench.bus()
+        bus.open()  # the port is free
+        bus.close()
 
-    @settings(
-        max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-    )
-    @given(data=st.data())
-    def test_no_goal_outside_the_limits_ever_reaches_a_servo(self, another, data):
-        inside = another()
-        twin = inside.bench
-        twin.pulses_on()
-        bus = twin.bus()
-        bus.open()
-        bus.enable_torque()
-        every = data.draw(
-            st.lists(st.lists(ANY, min_size=twin.count, max_size=twin.count), max_size=6)
-        )
-        twin.command(data.draw(st.sampled_from(FAULTS)) or "clear")
-        for goals in every:
-            bus.read(twin.now_s())
-            before = len(inside.sent)
-            try:
-                bus.write(goals)
-            except ValueError:
-                assert any(goal != goal for goal in goals)
-                assert len(inside.sent) == before
-            for setup, goal in zip(twin.setups, twin.true_goals_steps(), strict=True):
-                assert goal is None or setup.min_steps <= goal <= setup.max_steps
-            twin.wait(0.02)
-        # No servo goes beyond, except by its own inertia.
-        assert all(-0.02 <= share <= 1.02 for share in twin.true_shares())
+    def test_one_silent_servo_costs_only_itself(self, bench, bus):
+        if bench.kind.board:
+            return
+        bench.command(f"lose {bench.setups[0].id}")
+        bench.run_until(bus, lambda f: f.missing == (0,))
+        for _ in range(20):
+            assert bench.run(bus, 0.01, START).missing == (0,)
+        bench.run(bus, 2.0, START)
+        told = bus.events()
+        assert any(servo_label(bench.setups[0]) in line for line in told), told
+        bench.command("clear")
+        bench.run_until(bus, _are_healthy)
+        assert bench.are_near(bench.true_steps(), START)
+
+    def test_no_read_takes_long_while_nobody_answers(self, bench):
+        bus = bench.hold(give_up_s=2.0)
+        bench.run(bus, 0.5, START)
+        bench.command("lose all")
+        spent = []
+        with pytest.raises(BusLost, match="answered for 2"):
+            for _ in range(1000):
+                began_s = bench.now_s()
+                bus.read(began_s)
+                spent.append(bench.now_s() - began_s)
+                bus.write(bench.steps(START))
+                bench.wait(_TICK_S)
+        assert max(spent) < 0.1
+
+    # --- a lost port, a restart
+
+    def test_an_unplugged_port_comes_back_and_holds(self, bench, bus):
+        bench.run(bus, 0.1, START)
+        bench.command("unplug")
+        bench.run_until(bus, lambda f: len(f.missing) == len(bench.setups))
+        bench.run(bus, 0.2, AWAY)  # a planner continues for a while
+        bench.command("plug")
+        self.recover(bench, bus, range(len(bench.setups)))
+        told = bus.events()
+        assert any(line.startswith("port lost: ") for line in told)
+        assert any(line.startswith("port back after ") for line in told)
+
+    def test_a_port_that_stays_away_is_given_up_and_told_at_release(self, bench):
+        bus = bench.hold(give_up_s=1.0)
+        bench.command("unplug")
+        with pytest.raises(BusLost, match="has been gone for 1.[012] s"):
+            bench.run(bus, 3.0, START)
+        with pytest.raises(BusLost, match="is gone.*cut the servo power"):
+            bus.disable_torque()
+        bench.command("plug")
+        bus.disable_torque()
+        assert not any(bench.holding())
+        bus.close()
+
+    def test_a_servo_that_restarts_is_held_where_it_is(self, bench, bus):
+        bench.run(bus, 0.2, START)
+        bench.brown_out()
+        self.recover(bench, bus, range(len(START)) if bench.kind.board else (0,))
+        assert all(bench.holding()) and bus.faults() == ()
+        assert any("restarted: set up again" in line for line in bus.events())
+        bench.go(bus, AWAY)
+
+    @pytest.mark.parametrize("befalls", ["", "unplug for 0.2", "brown-out"])
+    def test_no_servo_is_faster_than_it_was_set_up(self, bench, befalls):
+        """Only the limit of the servo or its board restrains a goal that is suddenly far away."""
+        slow = [s._replace(max_speed_steps_s=0.2 * s.max_speed_steps_s) for s in bench.setups]
+        bus = bench.hold(slow)
+        bench.run(bus, 0.3, START)
+        if befalls == "brown-out":
+            bench.brown_out()
+        elif befalls:
+            bench.command(befalls)
+        if befalls:
+            bench.run_until(bus, lambda f: bool(f.missing or any(f.rearmed)))
+            bench.run_until(bus, _are_healthy)
+        before_s, before = bench.now_s(), bench.true_steps()
+        for _ in range(30):
+            bench.run(bus, 0.0, [0.95] * 4)
+            bench.wait(0.02)
+            now_s, now = bench.now_s(), bench.true_steps()
+            most = 1.2 * slow[0].max_speed_steps_s * (now_s - before_s) + 12.0
+            assert all(abs(b - a) <= most for a, b in zip(before, now, strict=True))
+            before_s, before = now_s, now
+        bench.go(bus, [0.95] * 4)
+
+    def recover(self, bench: BusBench, bus: ServoBus, gone: Sequence[int]) -> None:
+        """Tick until all hold again, with distant goals until a servo reports its position.
+
+        No servo that was gone may move until then.
+        """
+        goals: list[float] = [0.9 if p in gone else START[p] for p in range(len(START))]
+        rearmed: set[int] = set()
+        end_s = bench.now_s() + 8.0
+        while True:
+            feedback = bus.read(bench.now_s())
+            for place in [p for p, again in enumerate(feedback.rearmed) if again]:
+                rearmed.add(place)
+                goals[place] = START[place]
+            true = bench.true_steps()
+            assert bench.are_near([true[p] for p in gone], [START[p] for p in gone])
+            if rearmed == set(gone) and _are_healthy(feedback):
+                break
+            assert bench.now_s() < end_s, (rearmed, bus.events())
+            bus.write(bench.steps(goals))
+            bench.wait(_TICK_S)
+        bench.run(bus, 0.3, goals)
+        assert bench.are_near(bench.true_steps(), START)

@@ -139,7 +139,7 @@ class RunVoice:
         if what.lower().endswith(KINDS):
             sound = check_sound(self._find(what, confined), MAX_SPEECH_S)
             samples = read_samples(sound).astype(np.float64)
-            keys = self._mouth(samples, len(samples) / sound.duration_s, command.spoken)
+            keys = self._mouth(samples, len(samples) / sound.duration_s)
             speech = self._speak(sound.path, sound.duration_s, keys)
             if sound.note:
                 self._lines.append(f"{sound.path}: {sound.note}")
@@ -183,7 +183,7 @@ class RunVoice:
         return Speak(path, duration_s, level, keys, SWAY_DEG)
 
     def _mouth(
-        self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]]
+        self, samples: Floats, rate_hz: float, spoken: Sequence[tuple[str, float]] = ()
     ) -> tuple[MouthKey, ...]:
         """Return the keys of the mouth, () if the rig has none."""
         rig = self._rig()

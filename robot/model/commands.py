@@ -276,13 +276,11 @@ class Say(ClientCommand, frozen=True):
         what: A file, by its ending (.wav, .flac, .mp3, .ogg), or a text.
         volume: Factor 0..1.
         sway: Whether the head sways.
-        spoken: (phoneme or word, begin in s) of the file, if known.
     """
 
     what: str
     volume: _Share = 1.0
     sway: bool = True
-    spoken: tuple[tuple[str, _SpeechTime], ...] = ()
 
 
 class Speak(ClientCommand, frozen=True):

@@ -26,14 +26,14 @@ from resource import RUSAGE_SELF, getrusage
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import fault_machine  # noqa: E402
 import struck_rigs  # noqa: E402
+from fault_machine import NEAR_RAD, ROOM_RAD, Case, Machine, RuleViolation  # noqa: E402
 from struck_rigs import CASES, VOLTS, quick  # noqa: E402
 
 from gazerig.drivers.errors import DriverError  # noqa: E402
 from gazerig.robot.model.types import JointState  # noqa: E402
 from gazerig.sim_mock.smart_servo.chain import ServoChain  # noqa: E402
-from gazerig.testing import fault_machine  # noqa: E402
-from gazerig.testing.fault_machine import NEAR_RAD, ROOM_RAD, Case, Machine, RuleViolation  # noqa: E402
 
 SEEN_RAD = 0.004
 ROOM_C, ROOM_V = 2.0, 0.15

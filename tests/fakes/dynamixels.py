@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from feedback_rows import rows
+
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import BusLost
@@ -10,7 +12,6 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import rows
 
 IDS = (1, 2, 3)
 

@@ -73,14 +73,6 @@ LINE = [
 ]  # fmt: skip
 """Faults of any line."""
 
-RESTARTS = [
-    Case(("brown-out {i}",)),
-    Case(("brown-out {i}", "brown-out {j}")),
-    Case(("lose {i}", "brown-out {i}")),
-    Case(("unplug", "brown-out {i}"), ("plug",)),
-]
-"""Faults of servos that restart individually."""
-
 
 class FaultOutcome(NamedTuple):
     """How a fault ended.
