@@ -25,7 +25,8 @@ from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
 from gazerig.robot.dashboard.door.browsers import TabLimits
 from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES
-from gazerig.robot.dashboard.requests.outbox import TokenBucket, add_client
+from gazerig.robot.dashboard.requests.outbox import add_client
+from gazerig.robot.remote.excess import TokenBucket
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ from gazerig.robot.remote.client import (
     connect_to_all,
 )
 from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
-from gazerig.robot.remote.socket_server import RemoteServer, RequestRate
+from gazerig.robot.remote.socket_server import RemoteServer
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -463,7 +463,7 @@ def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
     rig: RobotClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig.get(RATE)  # let in with the usual rate
-    monkeypatch.setattr(server_module, "EACH", RequestRate(1e-6, 0.0))
+    monkeypatch.setattr(server_module, "EACH", (1e-6, 0.0))
     with RobotClient.connect() as greedy:  # its greeting takes all
         with pytest.raises(RequestRejected, match="too many requests: try again in"):
             greedy.get()

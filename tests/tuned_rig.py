@@ -30,7 +30,6 @@ from gazerig.robot.control.loop import run as run_loop
 from gazerig.robot.model import commands
 from gazerig.robot.remote import socket_server
 from gazerig.robot.remote.live_server import LiveServer
-from gazerig.robot.remote.socket_server import RequestRate
 
 PACE_S = 0.01  # real seconds a tick
 
@@ -45,7 +44,7 @@ def serve(path: Path) -> None:
     commands.MIN_HOLD_S = commands.MIN_RESUME_GAP_S = 0.0  # time is slow here
     # What takes time for the loop's sake is tested where it is done: shares of the processor,
     # files that are read in another process, and a file that is looked at twice a second.
-    socket_server.EACH = socket_server.ALL = RequestRate(1.0, 60.0)
+    socket_server.EACH = socket_server.ALL = (1.0, 60.0)
     over: list[str] = []
     signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
     with ideal_buses():

@@ -1,6 +1,7 @@
-"""Excess of messages on one connection: those beyond a rate are refused, then it is closed."""
+"""Rates of messages: those beyond a rate are refused, then the connection is closed."""
 
 import re
+import threading
 
 EXCESS_S, MOST_EXCESS = 1.0, 200
 """A connection is closed if more messages than this are refused as too many in this time."""
@@ -43,3 +44,33 @@ class ExcessCount:
         if self._count and now_s - self._began_s >= EXCESS_S:
             self.is_over = self.is_over or self._count > MOST_EXCESS
             self._count = 0
+
+
+class TokenBucket:
+    """Token bucket with a rate per second and a burst; thread-safe."""
+
+    def __init__(self, per_s: float, burst: float) -> None:
+        self._per_s, self._burst = per_s, burst
+        self._left, self._at_s = burst, -1.0
+        self._lock = threading.Lock()
+
+    def take(self, now_s: float, amount: float = 1.0) -> bool:
+        """Take tokens; return whether any token was left before."""
+        if self.wait_s(now_s) > 0.0:
+            return False
+        self.spend(amount)
+        return True
+
+    def spend(self, amount: float) -> None:
+        """Take tokens even if none is left."""
+        with self._lock:
+            self._left -= amount
+
+    def wait_s(self, now_s: float) -> float:
+        """Return the time until a token is available, s."""
+        with self._lock:
+            if self._at_s >= 0.0:
+                gained = max(0.0, now_s - self._at_s) * self._per_s
+                self._left = min(self._burst, self._left + gained)
+            self._at_s = now_s
+            return 0.0 if self._left > 0.0 else (1e-9 - self._left) / self._per_s

@@ -8,11 +8,10 @@ found the same, and a missing file when it is missing for several checks.
 """
 
 import contextlib
-import hashlib
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
@@ -28,71 +27,35 @@ from gazerig.robot.remote.socket_server import RemoteServer
 
 EVERY_S = 0.5
 _LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing
-_SAME_LOOKS = 1
-"""Checks that must find the same as the one before."""
-_SAME_LOOKS_CUT = 5
-"""Such checks for a text without a final line end, which is probably not complete yet."""
-_MISSING_LOOKS = 6
-"""Checks in a row with a missing or empty file before it counts as missing."""
+_LOOKS = 2
+"""Checks in a row that must find the same content before it is read."""
+_LOOKS_CUT = 6
+"""Such checks of a missing file, or one without a final line end, which is probably not whole."""
 
 
-class FileState(NamedTuple):
-    """State of a file at one check.
-
-    Attributes:
-        mtime_ns: Time of the last change, ns.
-        size: Size, bytes.
-        digest: SHA-256 of its bytes.
-        whole: Whether its last line has an end.
-    """
-
-    mtime_ns: int
-    size: int
-    digest: bytes
-    whole: bool
-
-
-def read_file_state(path: Path) -> FileState | None:
-    """Return the state of a file; None if it cannot be read: absent, empty or not permitted."""
+def read_content(path: Path) -> bytes:
+    """Return the content of a file, b"" if it cannot be read: absent, empty or not permitted."""
     try:
-        stat, data = path.stat(), read_limited(path, _LARGEST)
+        return read_limited(path, _LARGEST)
     except OSError:
-        return None
-    if not data:
-        return None
-    return FileState(
-        stat.st_mtime_ns, len(data), hashlib.sha256(data).digest(), data.endswith(b"\n")
-    )
+        return b""
 
 
-class Debouncer:
-    """Detects when a file has new content that no longer changes."""
+class WatchedFile:
+    """Detects when a file has new content that no longer changes; b"" is that of no file."""
 
-    def __init__(self, first: FileState | None) -> None:
-        self.mark_known(first)
+    def __init__(self, content: bytes) -> None:
+        self._known = self._last = content
+        self._looks = 0
 
-    def mark_known(self, now: FileState | None) -> None:
-        """Treat the present content of the file as read."""
-        self._known = now.digest if now is not None else b""
-        self._last = now
-        self._same = 0
-        self._missing = 0
-
-    def update(self, now: FileState | None) -> bool:
-        """Add a state of the file; return whether the file, new or missing, should be read."""
-        self._same = self._same + 1 if now == self._last else 0
-        self._last = now
-        if now is None:
-            self._missing += 1
-            gone = self._missing == _MISSING_LOOKS
-            # A file that appears again is read, even with the same content.
-            self._known = b"" if gone else self._known
-            return gone
-        self._missing = 0
-        enough = _SAME_LOOKS if now.whole else _SAME_LOOKS_CUT
-        if self._same < enough or now.digest == self._known:
+    def update(self, content: bytes) -> bool:
+        """Add a content of the file; return whether the file, new or missing, should be read."""
+        self._looks = self._looks + 1 if content == self._last else 1
+        self._last = content
+        enough = _LOOKS if content.endswith(b"\n") else _LOOKS_CUT
+        if content == self._known or self._looks < enough:
             return False
-        self._known = now.digest
+        self._known = content
         return True
 
 
@@ -113,7 +76,7 @@ class FileWatch:
         self._files = files
         self._changed = changed
         self._lock = threading.Lock()
-        self._watched: dict[Path, Debouncer] = {}
+        self._watched: dict[Path, WatchedFile] = {}
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="file watch", daemon=True)
 
@@ -137,22 +100,20 @@ class FileWatch:
         same = path.resolve()
         with self._lock:
             known = [one for one in self._watched if one.resolve() == same]
-            for watched in known:
-                self._watched[watched].mark_known(read_file_state(watched))
-            if not known:
-                self._watched[path] = Debouncer(read_file_state(path))
+            for watched in known or [path]:
+                self._watched[watched] = WatchedFile(read_content(watched))
 
     def look(self) -> None:
         """Check all files once and report those that are new or stay missing."""
         with self._lock:
             files = dict.fromkeys(self._files())
             self._watched = {
-                path: self._watched.get(path) or Debouncer(read_file_state(path)) for path in files
+                path: self._watched.get(path) or WatchedFile(read_content(path)) for path in files
             }
             new = [
                 path
-                for path, settling in self._watched.items()
-                if settling.update(read_file_state(path))
+                for path, watched in self._watched.items()
+                if watched.update(read_content(path))
             ]
         # Not under the lock: the receiver may wait for a thread that saves.
         for path in new:

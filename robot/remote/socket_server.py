@@ -25,6 +25,7 @@ from gazerig.robot.remote.excess import (
     STOPPED,
     TOO_MANY,
     ExcessCount,
+    TokenBucket,
     find_stop,
 )
 from gazerig.robot.remote.request_handler import RequestHandler, is_stop
@@ -36,50 +37,8 @@ from gazerig.robot.remote.socket_io import (
     parse_line,
 )
 
-
-class RequestRate(NamedTuple):
-    """Share of one processor, and the largest burst, s."""
-
-    share: float
-    burst_s: float
-
-
-EACH = RequestRate(0.06, 0.2)
-ALL = RequestRate(0.1, 0.4)
-
-
-class ProcessorBudget:
-    """Token bucket of processor time.
-
-    Args:
-        rate: Share and size of the bucket.
-        now_s: Time of the start, at which it is full, s.
-    """
-
-    def __init__(self, rate: RequestRate, now_s: float) -> None:
-        self._rate = rate
-        self._left_s = rate.burst_s
-        self._at_s = now_s
-        self._lock = threading.Lock()
-
-    def spend(self, used_s: float, now_s: float) -> None:
-        """Deduct processor time that was used, even if none is left."""
-        with self._lock:
-            self._fill(now_s)
-            self._left_s -= used_s
-
-    def wait_s(self, now_s: float) -> float:
-        """Return the time until the bucket is no longer empty, s."""
-        with self._lock:
-            self._fill(now_s)
-            return max(0.0, -self._left_s / self._rate.share)
-
-    def _fill(self, now_s: float) -> None:
-        gained = self._rate.share * max(0.0, now_s - self._at_s)
-        self._left_s = min(self._rate.burst_s, self._left_s + gained)
-        self._at_s = now_s
-
-
+EACH, ALL = (0.06, 0.2), (0.1, 0.4)
+"""Share of one processor that one program may use, and all together; and the largest burst, s."""
 _REST_S = 2.0
 """Timeout of the rest of a request, s."""
 _TAKES_S = 2.0
@@ -177,7 +136,7 @@ class RemoteServer:
         self._requests = requests
         self._say = say
         self._clock = RealClock()
-        self._budget = ProcessorBudget(ALL, self._clock.now_s())
+        self._budget = TokenBucket(*ALL)
         self.path: Path | None = None
         self._listener: Listener | None = None
         self._lock = threading.Lock()
@@ -329,7 +288,7 @@ class RemoteServer:
 
     def _answer_all(self, wire: Wire, peer: str, ahead: "RequestsAhead") -> None:
         """Answer the requests of one program in their order."""
-        own = ProcessorBudget(EACH, self._clock.now_s())
+        own = TokenBucket(*EACH)
         try:
             while (waiting := ahead.take()) is not None:
                 answer = waiting.answer
@@ -338,9 +297,8 @@ class RemoteServer:
                 began_s = time.thread_time()
                 if not self._answer(wire, answer or self._execute(waiting.request, peer)):
                     return
-                used_s, now_s = time.thread_time() - began_s, self._clock.now_s()
-                own.spend(used_s, now_s)
-                self._budget.spend(used_s, now_s)
+                for budget in (own, self._budget):
+                    budget.spend(time.thread_time() - began_s)
         finally:
             # A client that has closed, or reads nothing, may have sent a stop before.
             ahead.wait_for_end(REST_S)
@@ -358,7 +316,7 @@ class RemoteServer:
             self._say(f"remote control: {request!r:.200} failed: {failed}")
             return {"failed": failed}
 
-    def _delay(self, own: ProcessorBudget) -> str:
+    def _delay(self, own: TokenBucket) -> str:
         """Delay a program that uses too much time; return the reason if it is refused."""
         now_s = self._clock.now_s()
         wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))

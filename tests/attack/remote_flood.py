@@ -21,7 +21,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_server as server
 from gazerig.robot.remote.live_server import LiveServer
-from gazerig.robot.remote.socket_server import ALL, EACH, RequestRate
+from gazerig.robot.remote.socket_server import ALL, EACH
 
 FLOODS = {
     "nothing": "",
@@ -118,7 +118,7 @@ def main(seconds: float) -> None:
         os.environ["XDG_RUNTIME_DIR"] = folder
         print(f"{'flood':10} {'allowed':>8} {'Hz':>7} {'slots lost':>10} {'stop ms':>8}")
         for what in FLOODS:
-            for limits in ((EACH, ALL), (RequestRate(9.0, 9.0), RequestRate(9.0, 9.0))):
+            for limits in ((EACH, ALL), ((9.0, 9.0), (9.0, 9.0))):
                 server.EACH, server.ALL = limits
                 rate, lost, took_ms = flooded(what, seconds, 4)
                 share = f"{limits[1].share:.0%}" if limits[1] is ALL else "all"

@@ -37,7 +37,6 @@ from gazerig.robot.dashboard.door.viser_server import VIEW, ViewProxy, view_clie
 from gazerig.robot.dashboard.requests.outbox import (
     ASKED_BYTES,
     UNCONFIRMED,
-    TokenBucket,
     add_client,
     encode_request,
     takes_control,
@@ -45,6 +44,7 @@ from gazerig.robot.dashboard.requests.outbox import (
 from gazerig.robot.dashboard.requests.rig_relay import RigRelay
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
+from gazerig.robot.remote.excess import TokenBucket
 
 MOST_LINES = 32
 """Largest number of tabs whose stop button receives the state of the rig."""

@@ -3,18 +3,17 @@
 GET  /api/v1/state          newest state
 POST /api/v1/do             one message; an order's answer has its outcome
 GET  /api/v1/socket         websocket: messages in both directions, states, events
-GET  /api/v1/openapi.json   description; /api/v1/ shows it as a page
+GET  /api/v1/openapi.json   description
 """
 
 import asyncio
 import fcntl
-import html
 import json
 import os
 import struct
 import termios
 from collections import deque
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -25,7 +24,7 @@ from aiohttp import web
 from gazerig.robot.dashboard.door.admission import API
 from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
 from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
-from gazerig.robot.dashboard.requests.outbox import UNCONFIRMED, TokenBucket, takes_control
+from gazerig.robot.dashboard.requests.outbox import UNCONFIRMED, takes_control
 from gazerig.robot.dashboard.requests.rig_relay import (
     BUSY,
     NEWEST,
@@ -45,6 +44,7 @@ from gazerig.robot.remote.excess import (
     STOPPED,
     TOO_MANY,
     ExcessCount,
+    TokenBucket,
     find_stop,
 )
 from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
@@ -268,7 +268,6 @@ class ProgramRoutes:
         router.add_post(f"{BASE}/do", self._post)
         router.add_get(f"{BASE}/socket", self._socket)
         router.add_get(f"{BASE}/openapi.json", self._openapi)
-        router.add_get(f"{BASE}/", self._page)
         router.add_route("*", API + "{path:.*}", self._not_found)
 
     def refuse(self, text: str, status: int = 403) -> web.Response:
@@ -337,12 +336,6 @@ class ProgramRoutes:
 
     async def _openapi(self, request: web.Request) -> web.Response:
         return self._answer(api_description(BASE), 200)
-
-    async def _page(self, request: web.Request) -> web.Response:
-        policy = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
-        page = description_page(api_description(BASE))
-        headers = {**self._headers, **policy}
-        return web.Response(text=page, content_type="text/html", headers=headers)
 
     async def _not_found(self, request: web.Request) -> web.Response:
         text = f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/"
@@ -572,31 +565,3 @@ def _refuse_commands(program: ProgramSocket, orders: "asyncio.Queue[dict[str, An
 
 def _tag(message: Mapping[str, object]) -> dict[str, object]:
     return {"tag": message["tag"]} if "tag" in message else {}
-
-
-def description_page(description: Mapping[str, Any]) -> str:
-    """Return the description of the interface as a page."""
-    rows = [
-        (f"{method.upper()} {path}", what["summary"])
-        for path, methods in description["paths"].items()
-        for method, what in methods.items()
-    ]
-    messages = [
-        (one["title"], ", ".join(key for key in one["properties"] if key not in ("do", "tag", "who")),
-         one["description"].partition("\n")[0])
-        for one in description["components"]["schemas"].values()
-        if "do" in one["properties"]
-    ]  # fmt: skip
-    info = description["info"]
-    return (
-        f"<!doctype html><meta charset=utf-8><title>{html.escape(info['title'])}</title>"
-        "<style>body{font:16px sans-serif;margin:2em;max-width:60em}td{padding:.2em 1em .2em 0;"
-        "vertical-align:top}</style>"
-        f"<h1>{html.escape(info['title'])}</h1><p>{html.escape(info['description'])} "
-        "<a href=openapi.json>openapi.json</a></p>"
-        f"<table>{_rows(rows)}</table><h2>Messages</h2><table>{_rows(messages)}</table>"
-    )
-
-
-def _rows(rows: Iterable[Iterable[str]]) -> str:
-    return "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}' for cell in row)}" for row in rows)

@@ -9,8 +9,8 @@ import aiohttp
 from aiohttp import web
 
 from gazerig.drivers.camera.double_buffer import MOST_BYTES
-from gazerig.robot.dashboard.requests.outbox import TokenBucket
 from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
+from gazerig.robot.remote.excess import TokenBucket
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
 """Rate limit of one browser's messages; dragging with two hands sends about 60 a second."""

@@ -27,8 +27,8 @@ from gazerig.robot.dashboard.door.sockets import (
     relay_out,
     until_one_ends,
 )
-from gazerig.robot.dashboard.requests.outbox import TokenBucket
 from gazerig.robot.dashboard.requests.pointer_to_look import ViewCamera
+from gazerig.robot.remote.excess import TokenBucket
 
 BROWSER_HEADER = "X-Gazerig-Browser"
 """Header with the name of a websocket's browser."""

@@ -17,6 +17,7 @@ from gazerig.robot.model.commands import (
     ControlCommand,
     set_client,
 )
+from gazerig.robot.remote.excess import TokenBucket
 
 DOOR = "door"
 """Name of the sender for the stop button and clicks in the image."""
@@ -115,26 +116,3 @@ def takes_control(asked: Mapping[str, object]) -> bool:
 def encode_request(asked: Mapping[str, object]) -> bytes:
     """Return a request as JSON without blanks, its "do" first."""
     return json.dumps(asked, separators=(",", ":")).encode()
-
-
-class TokenBucket:
-    """Token bucket with a rate per second and a burst."""
-
-    def __init__(self, per_s: float, burst: float) -> None:
-        self._per_s, self._burst = per_s, burst
-        self._left, self._at_s = burst, -1.0
-
-    def take(self, now_s: float, amount: float = 1.0) -> bool:
-        """Take tokens; return whether any token was left before."""
-        if self.wait_s(now_s) > 0.0:
-            return False
-        self._left -= amount
-        return True
-
-    def wait_s(self, now_s: float) -> float:
-        """Return the time until a token is available, s."""
-        if self._at_s >= 0.0:
-            gained = max(0.0, now_s - self._at_s) * self._per_s
-            self._left = min(self._burst, self._left + gained)
-        self._at_s = now_s
-        return 0.0 if self._left > 0.0 else (1e-9 - self._left) / self._per_s

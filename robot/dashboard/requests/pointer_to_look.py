@@ -12,10 +12,10 @@ from typing import NamedTuple
 from gazerig.gaze.angles import add, dot, norm, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.dashboard.requests.outbox import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import OPPONENT_BOX_M
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.remote.excess import TokenBucket
 
 PER_S, BURST = 40.0, 40.0
 """Rate limit of points of all browsers together; one sends 20 a second."""
