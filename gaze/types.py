@@ -176,13 +176,13 @@ class Salience(NamedTuple):
 
     id: int
     kind: str
-    translation: float
-    looming: float
-    rotation: float
-    onset: float
-    rule: float
-    habituation: float
-    total: float
+    translation: float = 0.0
+    looming: float = 0.0
+    rotation: float = 0.0
+    onset: float = 0.0
+    rule: float = 0.0
+    habituation: float = 1.0
+    total: float = 0.0
 
 
 class Target(NamedTuple):

@@ -1,6 +1,6 @@
 """Bodies about a head that attends to them."""
 
-from math import inf, radians
+from math import radians
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -66,12 +66,9 @@ def salience(
     v_eye: Vec3 = (0.0, 0.0, 0.0),
     gaze: Vec3 = (1.0, 0.0, 0.0),
     in_view: bool = True,
-    limit: float = inf,
 ) -> Terms:
-    n = len(seen)
-    limits = [limit] * n
-    rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, [in_view] * n, limits, [1.0] * n)
-    return Terms(*np.array(rows).reshape(-1, 5).T)
+    rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, [in_view] * len(seen))
+    return Terms(*(np.array([getattr(row, name) for row in rows]) for name in Terms._fields))
 
 
 def attention(

@@ -16,7 +16,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from gazerig.gaze.angles import add, scale, sub
-from gazerig.gaze.attention.bottom_up import BottomUp, SalienceRow
+from gazerig.gaze.attention.bottom_up import OWN_MOTION, BottomUp
 from gazerig.gaze.attention.face_memory import FaceMemory
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
 from gazerig.gaze.attention.idle import Idle
@@ -61,10 +61,6 @@ _LOOKS_ELSEWHERE = 0.6
 """Share of its salience that a face keeps while the person neither looks at the head nor speaks."""
 _SPEAKERS = 0.88
 """Share of the looks at several people that speaking people get (Vertegaal et al. 2001)."""
-_OWN_MOTION = 0.3
-"""Share of their motion that a person's own hands and clothes keep, unless they are raised to the
-face or reach out; the rest is added to the face.
-"""
 _NEARNESS = 0.5
 """Exponent with which the weight of several people decreases with distance."""
 _STAY = 1.25**_NEARNESS
@@ -307,7 +303,8 @@ class Attention:
         seen = are_visible(rows, state)
         gaze = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         v_eye = self._eye_velocity(eye, t_s)
-        motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, *self._motion_limits(rows))
+        raised, own = self._persons.raised, self._persons.parts if self._social else {}
+        motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, raised, own)
         rule_target = self.top_down.step(rows, seen)
         factors = [*map(mul, self._habituation.step(rows, eye, attended, t_s), worth)]
         if not self.top_down.plans:  # fists must be watched
@@ -324,19 +321,21 @@ class Attention:
                 rule[row], factors[row] = rule_target.salience, share
             if rule_target.p_world_m is not None:
                 amount = rule_target.salience
-                point = [
-                    Salience(NO_BODY, rule_target.kind, 0.0, 0.0, 0.0, 0.0, amount, 1.0, amount)
-                ]
+                point = [Salience(NO_BODY, rule_target.kind, rule=amount, total=amount)]
+        # The motion of a person's own body counts in the next decision.
+        self._gestures = {}
+        for one in motion:
+            if (owner := own.get(one.id)) is not None:
+                moved = (one.total - one.onset) * (1.0 / OWN_MOTION - 1.0)
+                self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
         saliences = [
-            Salience(
-                id, kind, one.translation, one.looming, one.rotation, one.onset, wanted, factor,
-                max(one.total, wanted) * factor if there else -inf,
+            one._replace(
+                rule=wanted,
+                habituation=factor,
+                total=max(one.total, wanted) * factor if there else -inf,
             )
-            for id, kind, one, wanted, factor, there in zip(
-                ids, bodies.kinds, motion, rule, factors, seen, strict=True
-            )
-        ]  # fmt: skip
-        self._record_gestures(ids, motion)
+            for one, wanted, factor, there in zip(motion, rule, factors, seen, strict=True)
+        ]
         return _Comparison(bodies, saliences + point, rule_target)
 
     def _worth(self, percept: Percept, ids: tuple[int, ...]) -> list[float]:
@@ -360,25 +359,6 @@ class Attention:
         if self._share is not None and partner and (self._share > 0.0 or reported or not found):
             return partner, self._share or share
         return found, share
-
-    def _motion_limits(self, rows: BodyRows) -> tuple[list[float], list[float]]:
-        """Return the limit of each body's motion, and the share of it that counts."""
-        persons = self._persons
-        most = [
-            self._bottom_up.limit(hand=kind == "hand" and id in persons.raised)
-            for id, kind in zip(rows.ids, rows.kinds, strict=True)
-        ]
-        own = persons.parts if self._social else ()
-        return most, [_OWN_MOTION if id in own else 1.0 for id in rows.ids]
-
-    def _record_gestures(self, ids: tuple[int, ...], motion: list[SalienceRow]) -> None:
-        """Record the motion of each person's own body, which counts in the next decision."""
-        self._gestures = {}
-        for id, one in zip(ids, motion, strict=True):
-            owner = self._persons.parts.get(id) if self._social else None
-            if owner is not None:
-                moved = (one.total - one.onset) * (1.0 / _OWN_MOTION - 1.0)
-                self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
 
     def _rule_shares(
         self, rule_target: RuleTarget, rows: BodyRows, worth: list[float], eye: Vec3, t_s: float

@@ -25,12 +25,12 @@ Bodies are computed one by one in plain arithmetic: for the few that a frame sho
 than calls of NumPy.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import exp, expm1, inf, sqrt
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
-from gazerig.gaze.types import BodyRows, Vec3
+from gazerig.gaze.types import BodyRows, Salience, Vec3
 from gazerig.params import Bounds
 
 _BLINK_S = 0.3
@@ -48,6 +48,10 @@ _ROTATION_RAD_S = 3.0
 """Angular speed about the line of sight that gives salience 1."""
 _MOST, _MOST_OF_HAND = 0.35, 0.9
 """Salience that motion alone cannot exceed, and that of a hand raised to the face."""
+OWN_MOTION = 0.3
+"""Share of their motion that a person's own hands and clothes keep, unless they are raised to the
+face or reach out; the rest is added to the face.
+"""
 _SMOOTHING_S = 0.1
 """Time constant of the low-pass filter of salience."""
 _ONSET_S, _RECOVERY_S = 0.5, 2.0
@@ -68,16 +72,6 @@ class BottomUpParams:
         "motion that gives salience 1: rad/s across the line of sight, and the part of the distance per second along it"] = 0.5
     onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just entered or begun to move; 0: none"] = 1.0
     # fmt: on
-
-
-class SalienceRow(NamedTuple):
-    """Amount of attention of one body, term by term; total: the compared amount."""
-
-    translation: float
-    looming: float
-    rotation: float
-    onset: float
-    total: float
 
 
 def motion_terms(v: Sequence[float], w: Sequence[float], e: Sequence[float]) -> Vec3:
@@ -117,9 +111,6 @@ def saturate(slide: float, loom: float, spin: float, most: float, worth: float) 
     exempt = min(max(loom, _FAST), _FASTEST) - _FAST
     total = slide + abs(loom) - max(loom - _FAST, 0.0) + spin
     return worth * (exempt - expm1(-total / most) * most)
-
-
-_UNSEEN = SalienceRow(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -164,12 +155,6 @@ class BottomUp:
         self._onset_s = -inf
         self._started_s = inf
 
-    def limit(self, hand: bool = False) -> float:
-        """Return the limit of motion; inf: no limit, as in the paper's own form."""
-        if self._params.form == "literal":
-            return inf
-        return _MOST_OF_HAND if hand else _MOST
-
     def step(
         self,
         rows: BodyRows,
@@ -178,9 +163,9 @@ class BottomUp:
         v_world_eye_m_s: Vec3,
         gaze_world: Vec3,
         seen: Sequence[bool],
-        most: Sequence[float],
-        worth: Sequence[float],
-    ) -> list[SalienceRow]:
+        raised: Collection[int] = (),
+        own: Collection[int] = (),
+    ) -> list[Salience]:
         """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
         It must also be called without bodies; otherwise the next body does not count as new.
@@ -192,15 +177,15 @@ class BottomUp:
             v_world_eye_m_s: velocity of the eye itself; the literal form ignores it.
             gaze_world: gaze direction, any length; only the literal form needs it.
             seen: which bodies are in view.
-            most: limit of each body's motion.
-            worth: share of each body's motion that counts.
+            raised: ids of raised hands.
+            own: ids of people's own hands and clothes, of whose motion only a share counts.
         """
         par, states = self._params, self._states
         if par.form == "none":
-            return [_UNSEEN] * len(rows.ids)
+            return [Salience(*body) for body in zip(rows.ids, rows.kinds, strict=True)]
         self._shift_times(t_s)
         fresh = -expm1((self._onset_s - t_s) / _RECOVERY_S)
-        new, gain = 0.0, 1.0
+        new, gain, most = 0.0, 1.0, inf
         if par.form == "retinal":
             new, gain = par.onset_salience, 1.0 - exp(min(0.0, self._at_s - t_s) / _SMOOTHING_S)
         found = []
@@ -209,7 +194,7 @@ class BottomUp:
             if not seen[i]:
                 if state is not None:
                     state.slide = state.loom = state.spin = 0.0
-                found.append(_UNSEEN)
+                found.append(Salience(id, rows.kinds[i]))
                 continue
             slide, loom, spin = self._motion(rows, i, p_world_eye_m, v_world_eye_m_s, gaze_world)
             if state is None or t_s - state.seen_s > _BLINK_S:
@@ -223,8 +208,10 @@ class BottomUp:
             state.loom = loom = state.loom + gain * (loom - state.loom)
             state.spin = spin = state.spin + gain * (spin - state.spin)
             moved = slide + abs(loom) + spin
+            if par.form == "retinal":
+                most = _MOST_OF_HAND if id in raised and rows.kinds[i] == "hand" else _MOST
             if (
-                most[i] < inf
+                most < inf
                 and moved > _MOVES
                 and not state.moves
                 and t_s - max(state.entered_s, self._started_s) > _SETTLED_S
@@ -233,8 +220,9 @@ class BottomUp:
                 state.onset = fresh
             state.moves = moved > (_STILL_BELOW if state.moves else _MOVES)
             onset = state.onset * new * exp((state.entered_s - t_s) / _ONSET_S)
-            total = saturate(slide, loom, spin, most[i], worth[i]) + onset
-            found.append(SalienceRow(slide, abs(loom), spin, onset, total))
+            worth = OWN_MOTION if id in own else 1.0
+            total = saturate(slide, loom, spin, most, worth) + onset
+            found.append(Salience(id, rows.kinds[i], slide, abs(loom), spin, onset, total=total))
         self._at_s = t_s
         if len(states) > 2 * len(rows.ids) + _SPARE:
             self._states = {id: one for id, one in states.items() if t_s - one.seen_s <= _BLINK_S}

@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import dist, exp, hypot, inf
 
-from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.field_of_view import OWN
-from gazerig.gaze.types import Percept, Vec3
+from gazerig.gaze.types import Percept, Vec3, vec
 
 NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
 TRAITS = (NEAREST, WAVING, LOOKING, NEWEST)
@@ -50,15 +50,27 @@ _GONE_S = 120.0
 
 
 @dataclass(slots=True)
+class _Person:
+    """A person: times of appearance, last sight and last wave; share of time with gestures."""
+
+    came_s: float
+    seen_s: float
+    waved_s: float = -inf
+    gestures: float = 0.0
+
+
+@dataclass(slots=True)
 class _Hand:
     """Motion of a body other than a face: its side, and the times of its changes of side.
 
+    sank_s: last motion down
     repeats: number of changes of side soon after another one; it decays over time
     """
 
     side: float = 0.0
     turned_s: list[float] = field(default_factory=list)
     seen_s: float = -inf
+    sank_s: float = -inf
     repeats: float = 0.0
 
 
@@ -70,7 +82,6 @@ class Persons:
             bodies that reach out towards the head or are raised to the face.
         raised: ids of bodies that move within a person's reach at the height of the face; without
             hands of a person who gestures and does not wave, as signs also reach the face.
-        sinking: ids of hands that move down or have just done so.
         speaking: ids of the people in view who speak.
     """
 
@@ -79,16 +90,11 @@ class Persons:
 
     def reset(self) -> None:
         """Forget all people."""
-        self._came_s: dict[int, float] = {}
-        self._seen_s: dict[int, float] = {}
-        self._waved_s: dict[int, float] = {}
+        self._people: dict[int, _Person] = {}
         self._hands: dict[int, _Hand] = {}
-        self._gestures: dict[int, float] = {}
         self.parts: dict[int, int] = {}
         self.raised: set[int] = set()
-        self.sinking: set[int] = set()
         self.speaking: frozenset[int] = frozenset()
-        self._sank_s: dict[int, float] = {}
         self._spoke_s = -inf
         self._looking: frozenset[int] = frozenset()
         self._nearest = -1
@@ -101,40 +107,44 @@ class Persons:
             percept: percept of the frame.
             p_world_eye_m: position of the eye.
         """
-        bodies, before_s, self._at_s = percept.bodies, self._at_s, percept.captured_s
-        rows = bodies.p_world_m.tolist()
+        bodies, dt_s, self._at_s = (
+            percept.bodies,
+            percept.captured_s - self._at_s,
+            percept.captured_s,
+        )
+        rows = [vec(p) for p in bodies.p_world_m]
         faces = {
-            id: (x, y, z)
-            for id, kind, (x, y, z) in zip(bodies.ids, bodies.kinds, rows, strict=True)
+            id: p
+            for id, kind, p in zip(bodies.ids, bodies.kinds, rows, strict=True)
             if kind == "face"
         }
         for id in faces:
-            self._came_s.setdefault(id, self._at_s)
-            self._seen_s[id] = self._at_s
+            self._people.setdefault(id, _Person(self._at_s, self._at_s)).seen_s = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self.speaking = frozenset(face.id for face in percept.faces if face.speaks)
         if self.speaking:
             self._spoke_s = self._at_s
         for hand in self._hands.values():
-            hand.repeats *= exp(-max(0.0, self._at_s - before_s) / _KNOWN_S)
-        self._update_nearest(faces, p_world_eye_m)
+            hand.repeats *= exp(-max(0.0, dt_s) / _KNOWN_S)
+        away = {id: dist(p, p_world_eye_m) for id, p in faces.items()}
+        nearest = min(away, key=lambda one: away[one], default=-1)
+        if nearest < 0 or away.get(self._nearest, inf) > _CLEARLY_NEARER * away[nearest]:
+            self._nearest = nearest
         self.parts, self.raised = {}, set()
         moving: set[int] = set()
         for row, id in enumerate(bodies.ids):
             if faces and id not in faces and bodies.kinds[row] != OWN:
-                x, y, z = rows[row]
-                vx, vy, vz = bodies.v_world_m_s[row].tolist()
-                low_of = self._update_part(id, (x, y, z), faces, p_world_eye_m)
-                self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
-                if bodies.kinds[row] == "hand" and hypot(vx, vy, vz) > _GESTURES_M_S:
+                vx, vy, vz = v = vec(bodies.v_world_m_s[row])
+                low_of = self._update_part(id, rows[row], faces, p_world_eye_m)
+                hand = self._update_hand(id, rows[row], v, faces, p_world_eye_m)
+                if bodies.kinds[row] == "hand" and norm(v) > _GESTURES_M_S:
                     moving.add(low_of)
                     if -vz > max(_GESTURES_M_S, hypot(vx, vy)):
-                        self._sank_s[id] = self._at_s
-        self.sinking = set(self._ids_within(self._sank_s, _SANK_S))
-        share = min(1.0, (self._at_s - before_s) / _GESTURES_S)
+                        hand.sank_s = self._at_s
+        share = min(1.0, dt_s / _GESTURES_S)
         for id in faces:
-            now = self._gestures.get(id, 0.0)
-            self._gestures[id] = now + share * ((id in moving) - now)
+            person = self._people[id]
+            person.gestures += share * ((id in moving) - person.gestures)
         self._drop_old()
 
     def ids_with_trait(self, trait: str) -> frozenset[int]:
@@ -143,14 +153,18 @@ class Persons:
         Args:
             trait: one of TRAITS.
         """
+        people = self._people
         if trait == LOOKING:
             return self._looking
         if trait == WAVING:
-            return self._ids_within(self._waved_s, _WAVED_S)
+            return frozenset(id for id in people if self._waves(id))
         if trait == NEAREST:
             return frozenset((self._nearest,)) if self._nearest >= 0 else frozenset()
-        latest_s = max(self._came_s.values(), default=-inf)
-        return frozenset(id for id, at_s in self._came_s.items() if latest_s - at_s < _TOGETHER_S)
+        latest_s = max((one.came_s for one in people.values()), default=-inf)
+        return frozenset(id for id, one in people.items() if latest_s - one.came_s < _TOGETHER_S)
+
+    def _waves(self, id: int) -> bool:
+        return self._at_s - self._people[id].waved_s <= _WAVED_S
 
     @property
     def may_speak_unseen_s(self) -> float:
@@ -163,29 +177,30 @@ class Persons:
             return -inf
         return max(self._spoke_s, self._at_s - _BEGINS_S)
 
-    def _update_nearest(self, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
-        """Update the nearest person; another one must be clearly nearer."""
-        away = {id: dist(p, p_eye) for id, p in faces.items()}
-        id = min(away, key=lambda one: away[one], default=-1)
-        if id < 0 or away.get(self._nearest, inf) > _CLEARLY_NEARER * away[id]:
-            self._nearest = id
-
     def _update_hand(
-        self,
-        id: int,
-        place: Vec3,
-        velocity_m_s: tuple[float, float],
-        faces: Mapping[int, Vec3],
-        p_eye: Vec3,
-    ) -> None:
+        self, id: int, place: Vec3, v_m_s: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3
+    ) -> _Hand:
         """Update a hand, and its waving person: the one with the nearest face."""
+        hand = self._hands.setdefault(id, _Hand())
+        hand.seen_s = self._at_s
         # Sideways as seen from the eye: level, and across the direction to the hand.
         ahead, aside = place[0] - p_eye[0], place[1] - p_eye[1]
         away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
-        if self._has_turned(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
+        across_m_s = (v_m_s[1] * ahead - v_m_s[0] * aside) / away
+        if abs(across_m_s) < _WAVES_M_S or across_m_s * hand.side > 0.0:
+            return hand
+        turned, hand.side = hand.side != 0.0, across_m_s
+        if not turned:
+            return hand
+        hand.turned_s = [at for at in hand.turned_s if self._at_s - at <= _TURNS_WITHIN_S]
+        hand.turned_s.append(self._at_s)
+        if len(hand.turned_s) >= _TURNS:
+            if id in self.raised:
+                hand.repeats += 1.0
             owner = min(faces, key=lambda face: dist(faces[face], place))
             if _is_raised(place, faces[owner]) and dist(faces[owner], place) < _ARM_M:
-                self._waved_s[owner] = self._at_s
+                self._people[owner].waved_s = self._at_s
+        return hand
 
     def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> int:
         """Update the owner of a body part: the person nearest to its line of sight.
@@ -204,30 +219,12 @@ class Persons:
         if beside[owner] >= _ARM_M:
             return -1
         high = _is_raised(place, faces[owner])
-        gestures = self._gestures.get(owner, 0.0) > _GESTURES and owner not in self.ids_with_trait(
-            WAVING
-        )
-        if high and not gestures:
+        if high and (self._people[owner].gestures <= _GESTURES or self._waves(owner)):
             self.raised.add(id)
         elif away > _HELD_OUT * dist(faces[owner], p_eye):
             self.parts[id] = owner
             return -1 if high else owner
         return -1
-
-    def _has_turned(self, id: int, across_m_s: float) -> bool:
-        """Return whether a hand has just changed sides in a wave."""
-        hand = self._hands.setdefault(id, _Hand())
-        hand.seen_s = self._at_s
-        if abs(across_m_s) < _WAVES_M_S or across_m_s * hand.side > 0.0:
-            return False
-        turned, hand.side = hand.side != 0.0, across_m_s
-        if not turned:
-            return False
-        hand.turned_s = [at for at in hand.turned_s if self._at_s - at <= _TURNS_WITHIN_S]
-        hand.turned_s.append(self._at_s)
-        if id in self.raised and len(hand.turned_s) >= _TURNS:
-            hand.repeats += 1.0
-        return len(hand.turned_s) >= _TURNS
 
     def weaken_known(
         self, factors: list[float], ids: Sequence[int], repeats: bool, sinks: bool
@@ -244,23 +241,18 @@ class Persons:
             sinks: whether motion down does.
         """
         for row, id in enumerate(ids):
-            if sinks and id in self.sinking:
-                factors[row] = 0.0
             hand = self._hands.get(id)
-            if repeats and hand is not None and hand.repeats > 1.0:
+            if hand is not None and sinks and self._at_s - hand.sank_s <= _SANK_S:
+                factors[row] = 0.0
+            if hand is not None and repeats and hand.repeats > 1.0:
                 factors[row] *= _KNOWN ** (hand.repeats - 1.0)
-
-    def _ids_within(self, at_s: Mapping[int, float], lasts_s: float) -> frozenset[int]:
-        return frozenset(id for id, one_s in at_s.items() if self._at_s - one_s <= lasts_s)
 
     def _drop_old(self) -> None:
         """Drop people and hands that have not been visible for a long time."""
-        gone = [id for id, seen_s in self._seen_s.items() if self._at_s - seen_s > _GONE_S]
-        for id in gone:
-            del self._seen_s[id], self._came_s[id]
-            self._waved_s.pop(id, None)
-            self._gestures.pop(id, None)
-        if len(self._hands) > len(self._seen_s):
+        self._people = {
+            id: one for id, one in self._people.items() if self._at_s - one.seen_s <= _GONE_S
+        }
+        if len(self._hands) > len(self._people):
             self._hands = {
                 id: hand for id, hand in self._hands.items() if self._at_s - hand.seen_s < _WAVED_S
             }
