@@ -47,6 +47,7 @@ bench: $(VENV)/.installed-dev
 
 # The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.
 docs: $(VENV)/.installed-docs
+	$(BIN)/python docs/make_parameters.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 
 figures: $(VENV)/.installed-dev

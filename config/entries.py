@@ -9,21 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.reader import ReaderError
 
-from gazerig.config.bounds import Step
-from gazerig.config.export import abbreviate, suggestion_text
 from gazerig.config.faults import ConfigFault
+from gazerig.config.validation import Step, abbreviate, suggestion_text
 from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
 
 Scalar = str | int | float | bool | None
 
 _DEPTH = 40  # levels; a rig has about 5, a recursive file would never end
 _VALUES = 20_000  # nested aliases would grow without limit
-_LARGEST = 1_000_000  # bytes; a rig has about 34 000
+_LARGEST = 400_000  # bytes; a rig has about 34 000, and more would be parsed for seconds
 _QUOTED = re.compile(r" *('[^']*'|\"[^\"]*\")")  # text quoted in a parser's message
 
 
@@ -95,7 +93,7 @@ def parse(
 ) -> Entry | None:
     """Return the top entry of a file's text, None if it is unusable; see ``read``."""
     try:
-        node = compose_yaml(text)
+        node = _compose(text)
     except RecursionError:
         faults.append(ConfigFault(file, None, "", "", _TOO_DEEP))
         return None
@@ -114,51 +112,21 @@ def parse(
         rule = f"is not such a configuration: it has none of the keys {', '.join(known)}"
         faults.append(ConfigFault(file, _line(node), "", "", rule))
         return None
-    root, found = _entries_of(file, text)
-    faults += found
-    return root
-
-
-class _TooMany(MarkedYAMLError):
-    """A file has more nodes than any configuration."""
-
-
-class _BoundedComposer(Composer):
-    """A composer with a limit on the number of nodes, which take most of the loading time."""
-
-    _composed = 0
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        self._composed += 1
-        if self._composed > 2 * _VALUES:  # keys are nodes too
-            raise _TooMany(problem_mark=self.parser.peek_event().start_mark)
-        return super().compose_node(parent, index)
+    return _Reader(file, faults).read_top(node)
 
 
 @lru_cache(maxsize=64)
-def compose_yaml(text: str) -> Node | None:
+def _compose(text: str) -> Node | None:
     """Return YAML parsed to nodes, which have line numbers and are never modified.
 
     The parser takes nearly all the time of loading, and tuning, saving and checking a rig load the
     same layers again.
     """
     yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = _BoundedComposer
     yaml.max_depth = _DEPTH
     yaml.composer.warn_double_anchors = False  # YAML 1.2 allows an anchor to be redefined
     node: Node | None = yaml.compose(text)
     return node
-
-
-@lru_cache(maxsize=64)
-def _entries_of(file: str, text: str) -> tuple[Entry | None, tuple[ConfigFault, ...]]:
-    """Return the top mapping of a text as an entry (None if it is too large), and its faults.
-
-    The result is cached for the next load of the same file: entries and nodes are never modified.
-    """
-    node, faults = compose_yaml(text), list[ConfigFault]()
-    assert isinstance(node, MappingNode)
-    return _Reader(file, faults).read_top(node), tuple(faults)
 
 
 def _read_error(path: Path, error: OSError) -> str:
@@ -188,8 +156,6 @@ def _syntax_fault(file: str, text: str, error: Exception) -> ConfigFault:
         words = _remove_quotes(" ".join(str(error).split()))
         return ConfigFault(file, None, "", "", f"not valid YAML: {words}")
     mark = error.problem_mark
-    if isinstance(error, _TooMany):
-        return ConfigFault(file, mark.line + 1, "", "", _TOO_MANY)
     words = _remove_quotes(", ".join(filter(None, (error.context, error.problem))))
     if "max_depth" in words:
         return ConfigFault(file, mark.line + 1, "", "", _TOO_DEEP, mark.column + 1)

@@ -6,22 +6,31 @@ to change.
 """
 
 import contextlib
+import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import MISSING, asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from gazerig.config.bounds import Shape, Step, fill_stand_ins, shapes_of, validate
 from gazerig.config.entries import Entry as Entry
 from gazerig.config.entries import read
-from gazerig.config.export import Violation, abbreviate, suggestion_text, violation
 from gazerig.config.faults import ConfigError as ConfigError
 from gazerig.config.faults import ConfigFault as ConfigFault
-from gazerig.config.plugin_sections import extend_type
+from gazerig.config.plugin_sections import put_plugins, take_plugins
+from gazerig.config.rig import Rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.config.shipped_files import shipped_names as shipped_names
+from gazerig.config.validation import (
+    Step,
+    Violation,
+    abbreviate,
+    fill,
+    suggestion_text,
+    validate,
+)
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import RIGS, TRACKS, yaml_files
+from gazerig.params import Declaration, declarations
 
 T = TypeVar("T")
 _GROUPS = {"rigs": RIGS, "tracks": TRACKS}
@@ -34,6 +43,12 @@ RIGS_FOLDER, TRACKS_FOLDER = SHIPPED / "rigs", SHIPPED / "tracks"
 
 _FILES_BESIDE, _MESHES = "track_files", "meshes"
 """Keys of a rig with file paths, relative to the folder of the file that contains them."""
+_LONGEST_TEXT = 400  # characters; names and paths
+_UNPRINTABLE = ("Cc", "Cs", "Zl", "Zp")
+"""Categories of Unicode: control characters, surrogates and line ends."""
+_TURNS = (
+    "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # directional formatting characters
+)
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
 
@@ -73,7 +88,7 @@ def load(
     """
     files = (*defaults, path)
     faults: list[ConfigFault] = []
-    known = tuple(shapes_of(cast(Any, into)))
+    known = tuple(declarations(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
     whole = [_resolve_paths(layer) for layer in layers if layer is not None]
     if len(whole) < len(files):  # the content of a missing layer is unknown
@@ -91,25 +106,63 @@ def load(
 
 
 def validate_entries(
-    into: type[T], root: Entry, checks: Sequence[Callable[[T], Iterable[tuple[str, str]]]] = ()
+    into: type[T], root: Entry, checks: Sequence[Check[T]] = ()
 ) -> tuple[T | None, list[ConfigFault]]:
     """Return the frozen dataclass of merged entries, None if impossible, and every fault.
 
     Findings of checks are faults too, so a valid dataclass may have faults.
     """
-    into, problems = extend_type(into, root.to_plain())
-    if problems:
-        return None, [_to_fault(root, _contradiction(root, *one)) for one in problems]
-    value, errors = validate(into, root.to_plain())
-    complaints = [violation(into, error) for error in errors]
-    if value is not None:
-        complaints += [_contradiction(root, *found) for c in checks for found in c(value)]
-    else:
-        wrong = {error["loc"] for error in errors if error["type"] != "value_error"}
-        complaints += [
-            _contradiction(root, *found) for found in _certain_findings(root, into, wrong, checks)
-        ]
-    return value, [_to_fault(root, one) for one in complaints]
+    outcome = validate_rules(into, root.to_plain(), checks)
+    value, found = outcome
+    return value, [_to_fault(root, one) for one in found]
+
+
+def validate_rules(
+    into: type[T], data: dict[str, Any], checks: Sequence[Check[T]]
+) -> tuple[T | None, list[Violation]]:
+    """Return the frozen dataclass of plain values, None if impossible, and every violation.
+
+    If fields are faulty, each check finds what it can before it reads one of them.
+    """
+    if strange := list(_strange_texts(data, ())):
+        return None, strange
+    given = data
+    data, plugins, found = take_plugins(data) if issubclass(into, Rig) else (data, [], [])
+    valid, errors = validate(into, data)
+    found += errors
+    if valid is not None and not found:
+        value = put_plugins(valid, plugins)
+        return value, [_contradiction(given, *one) for check in checks for one in check(value)]
+    faulty = {path for one in found for path in (one.path, one.meant) if path}
+    partial = fill(Declaration("params", params=into), data, {*faulty, *(p.key for p in plugins)})
+    for check in checks:
+        with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError):
+            for key, rule in check(partial):
+                steps = _steps(key)
+                if not any(steps[: len(path)] == tuple(map(str, path)) for path in faulty):
+                    found.append(_contradiction(given, key, rule))
+    return None, found
+
+
+def _strange_texts(value: Any, path: tuple[Step, ...]) -> Iterator[Violation]:
+    """Find texts that cannot be displayed, written to a file or distinguished from others."""
+    for text in (value, *path[-1:]):
+        if isinstance(text, str) and (rule := _strange_text(text)):
+            yield Violation(path, "", rule)
+    if isinstance(value, dict | tuple):
+        for step, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _strange_texts(inner, (*path, step))
+
+
+def _strange_text(text: str) -> str:
+    """Return why a text is not accepted, "" if it is."""
+    if len(text) > _LONGEST_TEXT:
+        return f"is longer than {_LONGEST_TEXT} characters; shorten it"
+    if not text.isascii() or not text.isprintable():
+        for char in text:
+            if unicodedata.category(char) in _UNPRINTABLE or char in _TURNS:
+                return f"contains U+{ord(char):04X}, which cannot be shown; remove it"
+    return ""
 
 
 def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
@@ -219,25 +272,21 @@ def _merge(low: Entry, high: Entry, into: type | None = None) -> Entry:
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
         return high
     over = dict(low.value)
-    shapes = shapes_of(into) if into is not None else {}
+    declared = declarations(into) if into is not None else {}
     for key, entry in high.value.items():
-        shape = shapes.get(key)
-        below = low.value.get(key) or _default_mapping(into, key, shape, entry)
-        over[key] = entry
-        if below is not None:
-            over[key] = _merge(below, entry, shape.params if shape is not None else None)
+        params = declared[key].params if key in declared else None
+        below = low.value.get(key)
+        if below is None and into is not None and key in declared:
+            below = _default_mapping(into, key, declared[key], entry)
+        over[key] = entry if below is None else _merge(below, entry, params)
     return Entry(over, low.file, low.line)
 
 
-def _default_mapping(
-    into: type | None, key: str, shape: Shape | None, above: Entry
-) -> Entry | None:
+def _default_mapping(into: type, key: str, declared: Declaration, above: Entry) -> Entry | None:
     """Return the default at a key of a dataclass if it is a mapping, otherwise None."""
-    if into is None or shape is None:
-        return None
-    if shape.params is not None:
+    if declared.params is not None:
         return Entry({}, above.file, above.line)
-    if shape.inner is None or shape.inner.params is None:
+    if declared.inner is None or declared.inner.params is None:
         return None
     made = cast(Any, into).__dataclass_fields__[key].default_factory
     values = made() if made is not MISSING else {}
@@ -261,32 +310,9 @@ def _to_fault(root: Entry, violation: Violation) -> ConfigFault:
     return ConfigFault(entry.file, entry.line, key, violation.value, violation.rule)
 
 
-def _contradiction(root: Entry, key: str, rule: str) -> Violation:
+def _contradiction(data: Any, key: str, rule: str) -> Violation:
     """Return a finding of a check as a violation."""
-    stands = root.nearest(_steps(key)).value
-    return Violation(
-        _steps(key), "" if isinstance(stands, dict | tuple) else abbreviate(stands), rule
-    )
-
-
-def _certain_findings(
-    root: Entry, into: type[T], wrong: set[tuple[Step, ...]], checks: Sequence[Check[T]]
-) -> list[tuple[str, str]]:
-    """Return the findings of the checks that hold for any correct values of the faulty fields."""
-    # An unknown key may be a misspelt one, or one that must not exist.
-    low, *others = (
-        fill_stand_ins(into, root.to_plain(), wrong, high, misspelt)
-        for high, misspelt in ((False, True), (True, True), (False, False))
-    )
-    found: list[tuple[str, str]] = []
-    for check in checks:
-        also = [set(_findings_until_failure(check, other)) for other in others]
-        found += [one for one in _findings_until_failure(check, low) if all(one in a for a in also)]
-    named = [tuple(map(str, path)) for path in wrong]
-    return [one for one in found if not any(_steps(one[0])[: len(p)] == p for p in named)]
-
-
-def _findings_until_failure(check: Check[T], value: T) -> Iterator[tuple[str, str]]:
-    """Return the findings of a check until a placeholder value makes it fail."""
-    with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        yield from check(value)
+    for step in _steps(key):
+        if isinstance(data, dict):
+            data = data.get(step, data)
+    return Violation(_steps(key), "" if isinstance(data, dict | tuple) else abbreviate(data), rule)

@@ -1,17 +1,15 @@
-"""Sections of plug-ins, and the type of a rig that uses some of them.
+"""Sections of other packages' buses, cameras, detectors and attention rules in a rig.
 
-A rig file that uses another package's bus, camera, detector or attention rule has a section with
-that part's name, which is checked like ours. Its type is ``Rig`` with these sections added. A rig
-without such parts is a plain ``Rig``, for which nothing is looked up.
+Such a section has the part's name and is checked like ours, by the part's own dataclass. It is held
+in ``plugins`` of the section around it.
 """
 
 import dataclasses
-import re
-from collections.abc import Callable, Iterable, Mapping
-from functools import cache
-from typing import Annotated, Any, NamedTuple, TypeVar, cast
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar, cast
 
-from gazerig.config.rig import BusConfig, GazeConfig, Rig
+from gazerig.config.rig import Rig
+from gazerig.config.validation import Path, Violation, abbreviate, validate
 from gazerig.drivers.bus.servo_models import add_models
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import (
@@ -28,12 +26,10 @@ from gazerig.drivers.plugins import (
     load,
     registrations,
 )
-from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.params import Choices
+from gazerig.params import declarations
 
 T = TypeVar("T")
 
-_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _PARTS: dict[str, Any] = {
     BUS: BusPlugin,
     CAMERA: CameraPlugin,
@@ -42,172 +38,103 @@ _PARTS: dict[str, Any] = {
 }
 
 
-class NamedPlugins(NamedTuple):
-    """Parts of other packages that a rig uses, by group."""
+class PluginSection(NamedTuple):
+    """A checked section, which was taken from a rig's data.
 
-    bus: tuple[str, ...] = ()
-    detector: tuple[str, ...] = ()
-    attention: tuple[str, ...] = ()
-    camera: tuple[str, ...] = ()
-
-
-NONE = NamedPlugins()
-
-
-class Problem(NamedTuple):
-    """A part that cannot be used: dotted key, and the reason."""
-
-    key: str
-    rule: str
-
-
-def extend_type(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
-    """Return the type for a rig's data, and the problems of parts that cannot be used.
-
-    Args:
-        into: ``Rig``; any other type is returned unchanged.
-        data: plain values, some of which may be checked already.
+    key: path of the key that names the part; above: path of the section around it
     """
-    if not issubclass(into, Rig):
-        return into, ()
-    found: dict[str, list[str]] = {BUS: [], DETECTOR: [], ATTENTION: [], CAMERA: []}
-    problems = []
-    for group, key, name in _named_plugins(data):
-        if is_ours(group, name) or name in found[group]:
-            continue
+
+    key: Path
+    above: Path
+    name: str
+    params: object
+
+
+def take_plugins(
+    data: dict[str, Any],
+) -> tuple[dict[str, Any], list[PluginSection], list[Violation]]:
+    """Take the sections of plug-ins out of a rig's plain values.
+
+    Returns:
+        The other values, the sections, and the violations of those that cannot be used.
+    """
+    taken, found = list[PluginSection](), list[Violation]()
+    for group, above, key, name in list(_named_plugins(data)):
+        path = (*above, key)
+        data, given = _without(data, above, key, name)
         try:
-            _section(group, name)
+            params = _section_type(group, name)
         except PluginError as error:
-            # A name that no package registers violates its key's rule, which lists the known names.
-            if any(one.name == name for one in registrations(group)):
-                problems.append(Problem(key, str(error)))
-            elif group != CAMERA:
-                found[group].append("")
+            found.append(Violation(path, abbreviate(name), str(error)))
             continue
-        found[group].append(name)
-    named = NamedPlugins(
-        *(tuple(sorted(set(found[g]))) for g in (BUS, DETECTOR, ATTENTION, CAMERA))
-    )
-    return cast(type[T], rig_type(named)), tuple(problems)
+        value, wrong = validate(params, given)
+        found += [one._replace(path=(*above, name, *one.path)) for one in wrong]
+        taken.append(PluginSection(path, above, name, value))
+    return data, taken, found
 
 
-def _named_plugins(data: Any) -> Iterable[tuple[str, str, str]]:
-    """Return group, key and name of each part that a rig uses."""
-    buses = _at(data, "buses")
-    chosen = [
-        (BUS, "bus.kind", _at(data, "bus", "kind")),
-        *(
-            (BUS, f"buses.{name}.kind", _at(bus, "kind"))
-            for name, bus in (buses.items() if isinstance(buses, Mapping) else ())
-        ),
-        (DETECTOR, "detector.kind", _at(data, "detector", "kind")),
-        (ATTENTION, "gaze.chooser", _at(data, "gaze", "chooser")),
-    ]
-    if isinstance(data, Mapping):
-        known = {field.name for field in dataclasses.fields(Rig)}
-        chosen += [(CAMERA, key, key) for key in data if isinstance(key, str) and key not in known]
-    yield from ((group, key, name) for group, key, name in chosen if isinstance(name, str))
+def _without(data: dict[str, Any], above: Path, *keys: str) -> tuple[dict[str, Any], Any]:
+    """Return the values without keys of a section, and the value of the last of these keys."""
+    if above:
+        step = str(above[0])
+        inner, taken = _without(data[step], above[1:], *keys)
+        return {**data, step: inner}, taken
+    return {k: one for k, one in data.items() if k not in keys}, data.get(keys[-1], {})
 
 
-def _at(value: Any, *path: str) -> Any:
-    for step in path:
-        value = value.get(step) if isinstance(value, Mapping) else getattr(value, step, None)
+def put_plugins(value: T, taken: list[PluginSection]) -> T:
+    """Return the rig with the sections of its plug-ins."""
+    for one in taken:
+        value = _put(value, one.above, one)
     return value
 
 
-@cache
-def rig_type(named: NamedPlugins) -> type[Rig]:
-    """Return the type of a rig with sections of some parts; for an empty name, only the choices.
+def _put(value: Any, above: Path, section: PluginSection) -> Any:
+    if above and isinstance(value, Mapping):
+        return {**value, above[0]: _put(value[above[0]], above[1:], section)}
+    if above:
+        step = str(above[0])
+        return dataclasses.replace(value, **{step: _put(getattr(value, step), above[1:], section)})
+    key = str(section.key[-1])
+    named = {} if key == section.name else {key: section.name}
+    return dataclasses.replace(
+        value, plugins={**value.plugins, section.name: section.params}, **named
+    )
+
+
+def _named_plugins(data: Any) -> Iterator[tuple[str, Path, str, str]]:
+    """Yield the group of each plug-in, the path of the section around its own, its key and name."""
+    buses = data.get("buses")
+    places: list[tuple[str, Path, str]] = [
+        (BUS, ("bus",), "kind"),
+        *((BUS, ("buses", name), "kind") for name in (buses if isinstance(buses, dict) else ())),
+        (DETECTOR, ("detector",), "kind"),
+        (ATTENTION, ("gaze",), "chooser"),
+    ]
+    for group, above, key in places:
+        holder = data
+        for step in above:
+            holder = holder.get(step) if isinstance(holder, dict) else None
+        name = holder.get(key) if isinstance(holder, dict) else None
+        if isinstance(name, str) and not is_ours(group, name):
+            yield group, above, key, name
+    for name in data.keys() - declarations(Rig).keys():
+        if any(one.name == name for one in registrations(CAMERA)):
+            yield CAMERA, (), name, name
+
+
+def _section_type(group: str, name: str) -> type:
+    """Return the dataclass of a part's section.
 
     Raises:
-        PluginError: a part cannot be used.
+        PluginError: the part cannot be used.
     """
-    if named == NONE:
-        return Rig
-    bus = _with_sections(BusConfig, BUS, "kind", named.bus)
-    detector = _with_sections(FaceDetectorParams, DETECTOR, "kind", named.detector)
-    gaze = _with_sections(GazeConfig, ATTENTION, "chooser", named.attention)
-    says = {field.name: _description(Rig, field.name) for field in dataclasses.fields(Rig)}
-    fields: list[tuple[str, Any, Any]] = [
-        ("bus", Annotated[bus, says["bus"]], dataclasses.field()),
-        (
-            "buses",
-            Annotated[Mapping[str, bus], says["buses"]],  # type: ignore[valid-type]
-            dataclasses.field(default_factory=dict, kw_only=True),
-        ),
-        ("detector", Annotated[detector, says["detector"]], _default(detector)),
-        ("gaze", Annotated[gaze, says["gaze"]], _default(gaze)),
-        *(_section(CAMERA, name) for name in named.camera),
-    ]
-    return _create_type(Rig, fields, (rig_type, named))
-
-
-@cache
-def _with_sections(base: type[T], group: str, key: str, names: tuple[str, ...]) -> type[T]:
-    if not names:
-        return base
-    known = Choices(*dict.fromkeys(one.name for one in registrations(group)))
-    declared = next(f for f in dataclasses.fields(cast(Any, base)) if f.name == key)
-    fields = [
-        (
-            key,
-            Annotated[str, known, _description(base, key)],
-            dataclasses.field(default=declared.default),
-        ),
-        *(_section(group, name) for name in names if name),
-    ]
-    return _create_type(base, fields, (_with_sections, base, group, key, names))
-
-
-def _section(group: str, name: str) -> tuple[str, Any, Any]:
-    """Return the field of a part's section."""
     label = find(group, name).label
     part = load(group, name, _PARTS[group])
-    if not _NAME.fullmatch(name):
-        raise PluginError(f"{label} needs another name: lower-case letters, digits and _")
     if not (isinstance(part.params, type) and dataclasses.is_dataclass(part.params)):
         raise PluginError(f"{label}: params is not a dataclass")
     if isinstance(part, BusPlugin):
-        if "baud" not in {field.name for field in dataclasses.fields(part.params)}:
+        if "baud" not in declarations(part.params):
             raise PluginError(f"{label}: its params need a field baud")
         add_models(name, part.models, part.moves, label)
-    says = f"settings of {label}"
-    return name, Annotated[part.params, says], _default(part.params)
-
-
-def _default(params: type) -> Any:
-    try:
-        params()
-    except TypeError:  # a field of it has no default
-        return dataclasses.field(kw_only=True)
-    return dataclasses.field(default_factory=params, kw_only=True)
-
-
-def _description(params: type, name: str) -> str:
-    from gazerig.params import declarations
-
-    return declarations(params)[name].description
-
-
-def _create_type(
-    base: type[T], fields: list[tuple[str, Any, Any]], source: tuple[Any, ...]
-) -> type[T]:
-    """Return a dataclass with more fields; its values can be sent to another process.
-
-    source: the function of this module that creates it, and its arguments
-    """
-    make, *given = source
-
-    def reduced(value: Any) -> Any:
-        kept = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-        return _restore, (make, tuple(given), kept)
-
-    made = dataclasses.make_dataclass(
-        base.__name__, fields, bases=(base,), frozen=True, namespace={"__reduce__": reduced}
-    )
-    made.__module__, made.__doc__ = base.__module__, base.__doc__
-    return cast(type[T], made)
-
-
-def _restore(make: Callable[..., type], given: tuple[Any, ...], kept: dict[str, Any]) -> Any:
-    return make(*given)(**kept)
+    return cast(type, part.params)

@@ -1,6 +1,7 @@
 """Content of a rig file: the Params of every package, in one place.
 
-Bounds are with the values; the rules between sections are in gazerig.config.schema.
+Bounds are with the values; ``plugins`` holds the sections of other packages' parts by their names
+(gazerig.config.plugin_sections). The rules between sections are in gazerig.config.schema.
 """
 
 from collections.abc import Mapping
@@ -31,7 +32,7 @@ from gazerig.gaze.oculomotor.pursuit import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.gaze.track.level import LevelParams
-from gazerig.params import Bounds, Choices, Unit
+from gazerig.params import Bounds, Choices, Unit, Unlisted
 from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.frames import CameraParams
@@ -68,12 +69,13 @@ class BusConfig:
     feetech: Annotated[FeetechParams, "Feetech STS settings, for kind feetech"] = field(default_factory=FeetechParams)
     maestro: Annotated[MaestroParams, "Pololu Maestro settings, for kind maestro"] = field(default_factory=MaestroParams)
     pca9685: Annotated[Pca9685Params, "PCA9685 settings, for kind pca9685"] = field(default_factory=Pca9685Params)
+    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True)
     # fmt: on
 
     @property
     def section(self) -> Any:
         """Return the parameters of its kind."""
-        return getattr(self, self.kind)
+        return self.plugins.get(self.kind) or getattr(self, self.kind)
 
     @property
     def baud(self) -> int:
@@ -142,6 +144,7 @@ class GazeConfig:
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
     mouth: Annotated[MouthParams, "motion while the head speaks"] = field(default_factory=MouthParams)
     oculomotor: Annotated[OculomotorParams, "coordination of saccades, pursuit and head"] = field(default_factory=OculomotorParams)
+    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True)
     # fmt: on
 
 
@@ -189,6 +192,7 @@ class Rig:
         "values 0..1 that a program sets many times per second, such as a jaw's opening from loudness"] = field(default_factory=dict)
     doors: Annotated[tuple[str, ...],
         "voice stacks that take part, each in a process of its own: NAME [ADDRESS] [--bind HOST:PORT], as for gazerig door"] = ()
+    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True)
     # fmt: on
 
     @property

@@ -15,7 +15,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gazerig.config.bounds import shapes_of
 from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import EditRefused, Value, edit_text, format_value
@@ -23,6 +22,7 @@ from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.drivers.process.own_folder import OwnFolder
+from gazerig.params import declarations
 from gazerig.robot.model.parameter import ParamChange, SavedFile
 
 Check = Callable[[str], Any]
@@ -143,7 +143,7 @@ def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
 ) -> tuple[bytes | None, bytes, tuple[ParamChange, ...]]:
     """Return the file's text (None without a file), its new text, and the difference."""
-    known = tuple(shapes_of(into))
+    known = tuple(declarations(into))
     if base is None:
         before = read_yaml(target, known)  # rejects a file that is not YAML, with the line
         base = target.read_bytes()

@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from gazerig.config.bounds import Shape, shape_at
-from gazerig.config.entries import compose_yaml
+from gazerig.config.entries import _compose
 from gazerig.config.load import load
 from gazerig.config.parameters import to_plain
 from gazerig.config.schema import load_walk
 from gazerig.config.tracks import TrackSet, load_track, track_name, track_path
+from gazerig.params import Declaration
 
 Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
 WIDTH = 100
@@ -98,7 +98,7 @@ def format_value(value: Value) -> str:
 
 def _top_node(text: str) -> MappingNode:
     """Return the top node of the text; nodes have positions and are not changed."""
-    node = compose_yaml(text)
+    node = _compose(text)
     if not isinstance(node, MappingNode):
         raise EditRefused("the top level is not a mapping; write 'key: value' lines")
     return node
@@ -229,7 +229,10 @@ def _add_comment(body: str, description: str, indent: str) -> list[str]:
 
 def comment(into: type, steps: list[str]) -> str:
     """Return unit, range and meaning of the key at a path; "" if no such key exists."""
-    shape = shape_at(Shape("params", params=into), steps)
+    shape: Declaration | None = Declaration("params", params=into)
+    for step in steps:
+        if shape is not None:
+            shape = shape.below(step)
     if shape is None:
         return ""
     inner = shape.inner or shape

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.config.bounds import shapes_of
-from gazerig.config.export import suggestion_text
 from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped_path
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.config.tracks import load_track, shipped_tracks, track_name, track_path
+from gazerig.config.validation import suggestion_text
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
@@ -27,6 +26,7 @@ from gazerig.gaze.track.animation import AnimationTables
 from gazerig.gaze.track.level import LevelRange
 from gazerig.gaze.track.pose_offset import NO_OFFSET
 from gazerig.gaze.types import PARTS
+from gazerig.params import declarations
 from gazerig.robot.model.coupling import pair_setups, unreachable_text
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
@@ -79,7 +79,7 @@ def layers_of(
             rig cannot be read.
     """
     layers = [rig_path(name_or_path)]
-    rig = read_yaml(layers[0], tuple(shapes_of(Rig)))
+    rig = read_yaml(layers[0], tuple(declarations(Rig)))
     for key, given in (("profile", profile), ("character", character)):
         named = given or rig.data.get(key)
         if not isinstance(named, str) or (key == "character" and named == NO_CHARACTER):

@@ -1,18 +1,18 @@
-"""Write docs/parameters.md from the declarations: python docs/make_parameters.py."""
+"""Write docs/parameters.md from the declarations; ``make docs`` does."""
 
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import format_value
+from gazerig.params import Declaration, declarations
 
 PAPER = Path(__file__).parent / "parameters.md"
 _HEAD = """# Every parameter of a rig
 
-Written by `python docs/make_parameters.py` from the declarations in the code, the same that the loader,
+Written by `make docs` from the declarations in the code, the same that the loader,
 the page and `gazerig ctl set` read. A star stands for a name that you choose: a joint's, a rule's, a bus's.
 A default is the program's own; the shipped rigs and profiles set their values over it, and a dash
 means that a rig file must give one. [tuning.md](tuning.md) describes how to change them while the head moves
@@ -43,7 +43,7 @@ def _rows(params: type, above: str, listed: dict[type, str]) -> Iterator[tuple[s
         return
     nested: list[tuple[str, type]] = []
     defaults = {f.name: _default(f) for f in fields(params)}
-    for name, shape in shapes_of(params).items():
+    for name, shape in declarations(params).items():
         key = f"{above}.{name}" if above else name
         inner = shape.inner if shape.form == "mapping" else None
         if shape.params is not None:
@@ -70,10 +70,8 @@ def _default(field: Any) -> str:
     return _cell(format_value(value))
 
 
-def _limits(shape: Shape) -> str:
-    inner = shape
-    while inner.inner is not None:
-        inner = inner.inner
+def _limits(shape: Declaration) -> str:
+    inner = shape.innermost
     limits = ", ".join(map(str, inner.choices))
     if inner.low is not None and inner.high is not None:
         limits = f"{inner.low:.12g}..{inner.high:.12g}"

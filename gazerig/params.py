@@ -3,14 +3,15 @@
     comfort_deg: Annotated[float, Bounds(0, 90), "comfortable eccentricity of an eye"] = 8.0
     profile: Annotated[Literal["min_jerk", "main_sequence"], "profile of saccades"] = "min_jerk"
 
-The configuration, live tuning, the page and the documents read this line.
-Every part of the program may import this module; it needs the standard library only.
+The configuration, live tuning, the page and the documents read this line; pydantic validates the
+dataclass itself. Every part of the program may import this module; it needs the standard library
+only.
 """
 
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, Literal
 
@@ -54,15 +55,27 @@ class Bounds:
     low: float
     high: float
 
+    def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> Any:
+        """Return the schema of the type with these bounds."""
+        schema = handler(kind)
+        for number in _numbers(schema):
+            bound = int if number["type"] == "int" else float
+            number |= {"ge": bound(self.low), "le": bound(self.high)}
+        return schema
+
 
 @dataclasses.dataclass(frozen=True, slots=True, init=False)
 class Choices:
-    """Allowed values, or allowed values of every item, if a Literal cannot list them."""
+    """Allowed values, if a Literal cannot list them."""
 
     values: tuple[object, ...]
 
     def __init__(self, *values: object) -> None:
         object.__setattr__(self, "values", values)
+
+    def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> Any:
+        """Return the schema of these values."""
+        return {"type": "literal", "expected": list(self.values)}
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -73,35 +86,67 @@ class Unit:
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Declaration:
-    """One parameter as declared.
+class Unlisted:
+    """Marks a mapping that no file contains."""
 
-    kind: type annotation without its metadata
-    bounds: bounds of the number, or of the numbers in it; None without bounds
-    choices: the allowed values, () if all are allowed
+    def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> Any:
+        """Return the schema of an empty mapping, which is the field's default."""
+        return {"type": "dict", "max_length": 0}
+
+
+Form = Literal[
+    "number", "whole", "bool", "text", "choice", "list", "row", "mapping", "params", "value"
+]
+_PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Declaration:
+    """A parameter as declared, or an item of one.
+
+    inner: items of a list or mapping
+    items: each item of a row, which is a list of different values
+    params: the dataclass, for form "params"
+    optional: null is allowed
+    low, high: bounds of a number, None without bounds
+    choices: the allowed values of form "choice"; beside form "params", those allowed in its place
+    length: number of items of a list, None for any
     unit: e.g. "deg/s", "" for a bare number
     """
 
-    name: str
-    kind: Any
-    bounds: Bounds | None
-    choices: tuple[object, ...]
-    unit: str
-    description: str
+    form: Form
+    inner: "Declaration | None" = None
+    items: "tuple[Declaration, ...]" = ()
+    params: type | None = None
+    optional: bool = False
+    choices: tuple[Any, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    length: int | None = None
+    unit: str = ""
+    description: str = ""
+
+    @property
+    def innermost(self) -> "Declaration":
+        """Return the items of nested lists and mappings, or itself."""
+        return self if self.inner is None else self.inner.innermost
+
+    def below(self, step: str | int) -> "Declaration | None":
+        """Return the declaration one step of a path below, None if no such key exists."""
+        if self.params is not None:
+            return declarations(self.params).get(str(step))
+        return self.items[int(step)] if self.items else self.inner
 
 
 @cache
 def declarations(params: type) -> dict[str, Declaration]:
-    """Return the declaration of every field of a Params dataclass, by name, in order.
-
-    Raises:
-        TypeError: the metadata of a field is of an unknown kind.
-    """
+    """Return the declaration of every field of a Params dataclass, by name, in order."""
     hints = typing.get_type_hints(params, include_extras=True)
+    fields = {f.name: hints[f.name] for f in dataclasses.fields(params) if f.init}
     return {
-        f.name: _declaration(f"{params.__qualname__}.{f.name}", f.name, hints[f.name])
-        for f in dataclasses.fields(params)
-        if f.init
+        name: _declaration(hint, Declaration("value", unit=unit_of(name)))
+        for name, hint in fields.items()
+        if Unlisted() not in typing.get_args(hint)
     }
 
 
@@ -115,35 +160,59 @@ def unit_of(name: str) -> str:
     return next((UNITS[suffix] for suffix in _LONGEST_FIRST if name.endswith(suffix)), "")
 
 
-def _declaration(place: str, name: str, hint: Any) -> Declaration:
-    noted = typing.get_origin(hint) is typing.Annotated
-    kind, *notes = typing.get_args(hint) if noted else (hint,)
-    found: dict[type, Any] = {type(note): note for note in notes}
-    if strange := found.keys() - {str, Bounds, Choices, Unit}:
-        names = ", ".join(sorted(one.__name__ for one in strange))
-        raise TypeError(f"{place}: {names}: expected Bounds, Choices, Unit or a description")
-    if len(found) < len(notes):
-        raise TypeError(f"{place}: two metadata entries of the same kind")
-    nested = dataclasses.is_dataclass(_innermost(kind))
-    return Declaration(
-        name,
-        kind,
-        found.get(Bounds),
-        found[Choices].values if Choices in found else _literals(kind),
-        found[Unit].name if Unit in found else "" if nested else unit_of(name),
-        found.get(str, ""),
-    )
+def _declaration(hint: Any, above: Declaration) -> Declaration:
+    """Read a type annotation; unit, description and bounds are those above unless it has its own.
+
+    Raises:
+        TypeError: a configuration value cannot have this type.
+    """
+    origin, args = typing.get_origin(hint), typing.get_args(hint)
+    if origin is typing.Annotated:
+        for note in args[1:]:
+            match note:
+                case Bounds():
+                    above = dataclasses.replace(above, low=note.low, high=note.high)
+                case Choices():
+                    above = dataclasses.replace(above, choices=note.values)
+                case Unit():
+                    above = dataclasses.replace(above, unit=note.name)
+                case str():
+                    above = dataclasses.replace(above, description=note)
+        return _declaration(args[0], above)
+    if origin in (typing.Union, types.UnionType):
+        optional = type(None) in args
+        first, *others = [kind for kind in args if kind is not type(None)]
+        made = _declaration(first, above)
+        literals = tuple(value for kind in others for value in typing.get_args(kind))
+        return dataclasses.replace(made, optional=optional, choices=(*made.choices, *literals))
+    plain = dataclasses.replace(above, low=None, high=None, choices=())
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return dataclasses.replace(plain, form="params", params=hint, unit="")
+    if origin is tuple:
+        if len(set(args)) > 1 and args[-1] is not ...:
+            row = tuple(_declaration(kind, above) for kind in args)
+            return dataclasses.replace(plain, form="row", items=row)
+        length = None if args[-1] is ... else len(args)
+        items = _declaration(args[0], above)
+        return dataclasses.replace(plain, form="list", inner=items, length=length)
+    if origin in (dict, Mapping):
+        return dataclasses.replace(plain, form="mapping", inner=_declaration(args[1], above))
+    if origin is Literal or above.choices:
+        return dataclasses.replace(plain, form="choice", choices=above.choices or args)
+    if hint in (float, int):
+        return dataclasses.replace(above, form=_PLAIN[hint])
+    if hint is object or hint in _PLAIN:
+        return dataclasses.replace(plain, form=_PLAIN.get(hint, "value"))
+    raise TypeError(f"a configuration value cannot have the type {hint}")
 
 
-def _literals(kind: Any) -> tuple[object, ...]:
-    """Return the values of a Literal, alone or as an item of a tuple or a mapping."""
-    innermost = _innermost(kind)
-    return typing.get_args(innermost) if typing.get_origin(innermost) is Literal else ()
-
-
-def _innermost(kind: Any) -> Any:
-    """Return the innermost type of optionals, tuples and mappings."""
-    origin, args = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (typing.Union, types.UnionType, tuple):
-        return _innermost(args[0])
-    return _innermost(args[1]) if origin in (dict, Mapping) else kind
+def _numbers(schema: Any) -> Iterator[Any]:
+    """Yield the schemas of numbers in pydantic's schema of optionals, tuples and mappings."""
+    match schema:
+        case {"type": "float" | "int"}:
+            yield schema
+        case {"type": "tuple", "items_schema": [*items]}:
+            for item in items:
+                yield from _numbers(item)
+        case {"schema": inner} | {"values_schema": inner}:
+            yield from _numbers(inner)

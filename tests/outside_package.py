@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from textwrap import dedent
 
-from gazerig.config import plugin_sections as sections
 from gazerig.drivers import plugins
 from gazerig.drivers.bus import servo_models
 
@@ -56,13 +55,8 @@ def on_path(folder: Path) -> Iterator[Path]:
 
 def _forget() -> None:
     """Forget what was loaded: another test has other packages of the same names."""
-    for cache in (
-        plugins._load_cached,
-        plugins._package_parts,
-        sections.rig_type,
-        sections._with_sections,
-    ):
-        cache.cache_clear()
+    plugins._load_cached.cache_clear()
+    plugins._package_parts.cache_clear()
     for name in set(servo_models.SERVOS) - OURS:
         del servo_models.SERVOS[name]
     servo_models._ALSO_MOVED.clear()

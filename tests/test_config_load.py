@@ -178,10 +178,7 @@ rig.yaml:5: joints.roll.id: '6' is text, wanted a whole number, 0 to 252; remove
 rig.yaml:5: joints.roll.low_deg: True is a truth value, wanted a number in deg
 rig.yaml:6: joints.lid_left.id: missing; wanted a whole number, 0 to 252 (servo id)
 rig.yaml:7: joints.lid_right: low_deg must be below high_deg
-rig.yaml:8: joints.lid_right.id: id 5 is also that of tilt
 rig.yaml:10: joints.lid_right.low_deg: duplicate key, first in line 9
-rig.yaml:11: joints.eye_left.id: id 4 is also that of pan
-rig.yaml:13: joints.eye_right.id: id 5 is also that of tilt
 rig.yaml:14: camera.fps: 3.5 is a number, wanted a whole number, 1 to 120 Hz
 rig.yaml:14: camera.offset_m: has length 2, wanted 3
 rig.yaml:16: spare.fps: 9999 is above 120 (unit Hz)

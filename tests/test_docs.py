@@ -1,7 +1,6 @@
 """What README and docs name is there: keys, files, links, functions, tests."""
 
 import ast
-import importlib.util
 import re
 from collections.abc import Iterator
 from dataclasses import fields
@@ -13,9 +12,8 @@ from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, spans
 from ruamel.yaml import YAML
 
 import gazerig
-from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.load import ConfigError, shipped_names
-from gazerig.config.parameters import NEXT_TICK, apply_changes, parameters, value_of
+from gazerig.config.parameters import apply_changes, value_of
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
@@ -24,6 +22,7 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.gaze.track.track import LID_GROUPS, KeyFrame, Track
+from gazerig.params import Declaration, declarations
 from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.model.joint import JointParams
@@ -54,17 +53,17 @@ def keys() -> set[str]:
     """Return every key of a rig file and every choice there is for one."""
     found = set(shipped_names("rigs"))
 
-    def walk(shape: Shape) -> None:
+    def walk(shape: Declaration) -> None:
         found.update(str(choice) for choice in shape.choices)
         if shape.params is not None:
-            for name, field in shapes_of(shape.params).items():
+            for name, field in declarations(shape.params).items():
                 found.add(name)
                 walk(field)
         elif shape.inner is not None:
             walk(shape.inner)
 
-    walk(Shape("params", params=Rig))
-    walk(Shape("params", params=Track))
+    walk(Declaration("params", params=Rig))
+    walk(Declaration("params", params=Track))
     for rig in rigs():
         found |= set(rig.joints)
     return found
@@ -82,10 +81,10 @@ def is_key(dotted: str) -> bool:
 
 
 def test_keys_named_are_keys() -> None:
-    sections = set(shapes_of(Rig))
+    sections = set(declarations(Rig))
     for paper in PAPERS:
         if paper == PARAMETERS:
-            continue  # compared with the declarations below
+            continue  # generated
         for span in spans(paper):
             key = re.match(r"([a-z_]+(?:\.[a-z_0-9]+)+)(: \S+)?$", span)
             if key and key[1].split(".")[0] in sections and not key[1].endswith((".py", ".yaml")):
@@ -110,59 +109,33 @@ def test_values_set_in_the_papers_are_allowed(desk_rig: Rig) -> None:
             assert is_key(words.split()[1]), words
 
 
-def test_what_waits_for_the_next_start_is_told(desk_rig: Rig) -> None:
-    text = (ROOT / "docs/tuning.md").read_text(encoding="utf-8")
-    every = parameters(desk_rig, desk_rig)
-    later = [knob.key for knob in every if knob.live != NEXT_TICK]
-    assert f"all keys of the desk rig but {len(later)}, which are marked" in text
-    rows = text.split("| keys | wait")[1].split("\n\n")[0].splitlines()[2:]
-    reported = {key for row in rows for key in re.findall(r"`([a-z_.]+)`", row)}
-    for key in later:
-        parts = key.split(".")
-        own = parts[2] if parts[0] == "joints" else parts[0]
-        assert {own, key} & reported, key
-    for key in reported:
-        assert any(key in (other, *other.split(".")) for other in [*later, "buses"]), key
-
-
-def test_the_list_of_parameters_is_that_of_the_declarations() -> None:
-    path = ROOT / "docs" / "make_parameters.py"
-    spec = importlib.util.spec_from_file_location("make_parameters", path)
-    assert spec is not None and spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    assert PARAMETERS.read_text(encoding="utf-8") == made.text(), (
-        "run python docs/make_parameters.py"
-    )
-
-
 def test_yaml_shown_has_keys_that_there_are() -> None:
     shown = [YAML(typ="safe").load(block.text) for block in blocks("yaml")]
     assert len(shown) >= 2
     for data in shown:
-        if set(data) <= set(shapes_of(Track)):
-            _fits(Shape("params", params=Track), data, "track")
+        if set(data) <= set(declarations(Track)):
+            _fits(Declaration("params", params=Track), data, "track")
             continue
         if "people" in data:
-            _fits(Shape("params", params=script.SceneScript), data, "world")
+            _fits(Declaration("params", params=script.SceneScript), data, "world")
             continue
         if "conditions" in data or "items" in data:
             form = design.StudyDesign if "conditions" in data else design.Questionnaire
-            _fits(Shape("params", params=form), data, form.__name__)
+            _fits(Declaration("params", params=form), data, form.__name__)
             continue
         for key, value in data.items():
-            if key in shapes_of(Rig):
-                _fits(shapes_of(Rig)[key], value, key)
+            if key in declarations(Rig):
+                _fits(declarations(Rig)[key], value, key)
             else:
                 assert key in keys(), key
-                _fits(Shape("params", params=JointParams), value, key)
+                _fits(Declaration("params", params=JointParams), value, key)
 
 
-def _fits(shape: Shape, value: Any, place: str) -> None:
+def _fits(shape: Declaration, value: Any, place: str) -> None:
     if shape.params is not None:
         for key, item in value.items():
-            assert key in shapes_of(shape.params), f"{place}.{key}"
-            _fits(shapes_of(shape.params)[key], item, f"{place}.{key}")
+            assert key in declarations(shape.params), f"{place}.{key}"
+            _fits(declarations(shape.params)[key], item, f"{place}.{key}")
     elif isinstance(value, list) and shape.inner is not None:
         for item in value:
             _fits(shape.inner, item, place)
@@ -357,8 +330,8 @@ def test_the_glossary_has_a_line_for_every_section_of_gaze() -> None:
     terms = [row[0].removeprefix("| ") for row in rows]
     assert terms == sorted(terms, key=str.lower) and len(set(terms)) == len(terms)
     # The sections whose names are terms of the field; the others are plain words.
-    sections = {field.name for field in fields(GazeConfig)} - {
-        "chooser", "attention", "idle", "breathing", "lids", "mouth", "oculomotor",
+    sections = declarations(GazeConfig).keys() - {
+        "chooser", "attention", "idle", "lids", "mouth", "oculomotor",
     }  # fmt: skip
     named = set(re.findall(r"`gaze\.(\w+)", text)) | {"tracks" for term in terms if term == "track"}
     assert sections <= named

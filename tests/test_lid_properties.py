@@ -33,10 +33,10 @@ def admissible() -> st.SearchStrategy[LidParams]:
     for name, item in declarations(LidParams).items():
         if item.choices:
             ranges[name] = st.sampled_from(item.choices)
-        elif item.bounds is None:
+        elif item.low is None or item.high is None:
             ranges[name] = st.booleans()
         else:
-            ranges[name] = st.floats(item.bounds.low, item.bounds.high)
+            ranges[name] = st.floats(item.low, item.high)
     return st.builds(LidParams, **ranges)
 
 

@@ -1,11 +1,11 @@
 """One line declares a parameter; its unit is in its name."""
 
-from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.schema import Rig
+from gazerig.params import Declaration, declarations
 
 
-def shapes(params: type) -> list[Shape]:
-    found = list(shapes_of(params).values())
+def shapes(params: type) -> list[Declaration]:
+    found = list(declarations(params).values())
     for shape in list(found):
         inner = shape.inner or shape
         if inner.params is not None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 
-from gazerig.config.bounds import validate
+from gazerig.config.validation import validate
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointState

@@ -105,7 +105,7 @@ def test_yaml_is_bounded_in_size_and_in_what_it_stands_for(tmp_path: Path) -> No
     file = tmp_path / "big.yaml"
     with file.open("wb") as big:
         big.truncate(100_000_000)
-    assert "larger than the 1 MB" in refused(lambda: load_rig(str(file)))
+    assert "larger than the" in refused(lambda: load_rig(str(file)))
     bomb = "name: &a0 [1]\n" + "".join(
         f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(12)
     )

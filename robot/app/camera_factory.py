@@ -332,7 +332,7 @@ def frame_orientation(camera: CameraParams) -> FrameOrientation:
 
 def _package_camera_params(rig: Rig, name: str) -> object:
     """Return the parameters of a package's camera: the rig's section of its name, or defaults."""
-    section = getattr(rig, name, None)
+    section = rig.plugins.get(name)
     if section is not None:
         return section
     try:

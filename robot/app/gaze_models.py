@@ -91,7 +91,7 @@ def target_chooser(rig: Rig, own: TargetChooser) -> TargetChooser:
     if is_ours(ATTENTION, name):
         return own
     part = load(ATTENTION, name, AttentionPlugin)
-    rule = create(ATTENTION, name, part, getattr(rig.gaze, name))
+    rule = create(ATTENTION, name, part, rig.gaze.plugins[name])
     label = find(ATTENTION, name).label
     if not callable(getattr(rule, "choose", None)):
         raise PluginError(f"{label} created a {type(rule).__name__}, which has no method choose")

@@ -25,7 +25,6 @@ from gazerig.config.parameters import (
     start_note,
     value_of,
     values,
-    values_after,
 )
 from gazerig.config.parameters import parameters as described
 from gazerig.config.rig import Rig
@@ -232,7 +231,7 @@ class ParamStore:
                 with contextlib.suppress(ConfigError):
                     self._reload()
             state = self._state
-            wanted = flatten_changes(state.rig, differences(state.saved, state.rig))
+            wanted = flatten_changes(differences(state.saved, state.rig))
             # These do not fit in a single line.
             faults = [
                 ConfigFault(
@@ -327,7 +326,7 @@ class ParamStore:
             return ()
         self._state = state._replace(
             rig=rig if found else before.rig,
-            values=values_after(before.values, before.rig, rig) if found else before.values,
+            values=values(rig) if found else before.values,
             version=before.version + 1,
         )
         return tuple(f"{k} = {_text(v)}{start_note(k)}" for k, v in found.items())
@@ -340,7 +339,7 @@ def _defaults(rig: Rig) -> Rig:
 
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
     """Return each value that differs, as YAML; was: former values."""
-    found = flatten_changes(after, differences(before, after))
+    found = flatten_changes(differences(before, after))
     return tuple(
         ParamChange(key, _text(was[key]) if key in was else None, _text(value))
         for key, value in found.items()

@@ -48,7 +48,7 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
     if is_ours(DETECTOR, params.kind):
         detector = cast(FaceDetector, part.make(params))
     else:
-        detector = create(DETECTOR, params.kind, part, getattr(params, params.kind))
+        detector = create(DETECTOR, params.kind, part, params.plugins[params.kind])
     if all(file.state() == "there" for file in (FACE_LANDMARK, IRIS_LANDMARK)):
         from gazerig.drivers.vision.face.mesh import MeshedDetector
 

@@ -1,9 +1,10 @@
 """Parameters of every detector of faces, people and palms."""
 
-from dataclasses import dataclass
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
-from gazerig.params import Bounds, Choices
+from gazerig.params import Bounds, Choices, Unlisted
 
 MIN_FACE_PX = 24
 """Smallest face height that is detected, in pixels of the scaled-down frame."""
@@ -24,4 +25,5 @@ class FaceDetectorParams:
         "searches per second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0
     hands_hz: Annotated[float, Bounds(0, 30),
         "searches per second for palms of the nearest person; 0: none; needs gazerig models fetch hands and gazerig[people]"] = 5.0
+    plugins: Annotated[Mapping[str, Any], Unlisted()] = field(default_factory=dict, kw_only=True, hash=False)
     # fmt: on

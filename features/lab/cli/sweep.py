@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gazerig.config.export import suggestion_text
+from gazerig.config.validation import suggestion_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
 from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions

@@ -165,4 +165,4 @@ def yaml_snippet(options: RunOptions, point: Point) -> str:
     """
     plain = load_rig(options.rig, NO_CHARACTER, options.profile)
     whole = load_rig(options.rig, options.character, options.profile)
-    return changes_text(flatten_changes(whole, differences(plain, whole)) | dict(point))
+    return changes_text(flatten_changes(differences(plain, whole)) | dict(point))

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import BinaryIO
 
 import gazerig
-from gazerig.config.export import abbreviate
 from gazerig.config.parameters import to_plain
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text, tracks_text, walk_text
+from gazerig.config.validation import abbreviate
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.lab.sweep.axes import Axis, Point

@@ -6,9 +6,8 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
-from gazerig.config.bounds import fill_stand_ins, validate
-from gazerig.config.export import violation
-from gazerig.params import Bounds, Choices
+from gazerig.config.validation import fill, validate
+from gazerig.params import Bounds, Choices, Declaration
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +47,7 @@ def refused(data: dict[str, Any]) -> list[str]:
     """Judge an Eye and give its faults as "path: rule"."""
     value, errors = validate(Eye, {"id": 1, **data})
     assert (value is None) == bool(errors)
-    complaints = [violation(Eye, error) for error in errors]
-    return [f"{'.'.join(map(str, c.path))}: {c.rule}" for c in complaints]
+    return [f"{'.'.join(map(str, c.path))}: {c.rule}" for c in errors]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +85,6 @@ def test_right_values_are_taken(data: dict[str, Any]) -> None:
         ),
         ({"side": "up"}, "side: 'up' is not one of 'left', 'right'"),
         ({"baud": 9600}, "baud: 9600 is a whole number, wanted one of 57600, 1000000"),
-        ({"baud": 57_600.0}, "baud: 57600.0 is a number, wanted one of 57600, 1000000"),
         ({"offset_m": (1, 2)}, "offset_m: has length 2, wanted 3"),
         ({"offset_m": (1, 2, 3, 4)}, "offset_m: has length 4, wanted 3"),
         ({"offset_m": 1}, "offset_m: 1 is a whole number, wanted a list of 3, each a number in m"),
@@ -132,7 +129,7 @@ def test_wrong_values_are_refused_in_words(data: dict[str, Any], fault: str) -> 
 
 def test_a_missing_key_is_named_with_its_range_and_meaning() -> None:
     _, errors = validate(Eye, {})
-    assert [violation(Eye, error).rule for error in errors] == [
+    assert [error.rule for error in errors] == [
         "missing; wanted a whole number, 0 to 252 (servo id)"
     ]
 
@@ -143,18 +140,13 @@ def test_a_default_outside_its_own_bounds_is_found() -> None:
         rate_hz: Annotated[float, Bounds(0, 200)] = 500.0
 
     _, errors = validate(Slip, {})
-    assert [violation(Slip, error).rule for error in errors] == ["500.0 is above 200 (unit Hz)"]
+    assert [error.rule for error in errors] == ["500.0 is above 200 (unit Hz)"]
 
 
-def test_beside_an_unknown_key_what_is_absent_may_have_been_meant() -> None:
-    low, high = (
-        fill_stand_ins(
-            Eye, {"id": 1, "lid": {"shut": 60, "blinks": True}}, {("lid", "shut")}, end, True
-        )
-        for end in (False, True)
-    )
-    assert (low.lid.shut_ms, high.lid.shut_ms) == (40.0, 200.0)
-    assert (low.lid.blinks, high.lid.blinks) == (True, True)
-    data = {"id": 1, "lid": {"shut": 60, "blinks": True}}
-    absent = fill_stand_ins(Eye, data, {("lid", "shut")}, False, misspelt=False)
-    assert absent.lid.shut_ms == Lid().shut_ms
+def test_a_value_beside_faults_ends_the_rules_that_read_them() -> None:
+    data = {"id": 1, "lid": {"shut": 60, "blinks": True}, "gains": {"a": 0.5}}
+    eye = fill(Declaration("params", params=Eye), data, {("lid", "shut_ms"), ("gains", "a")})
+    assert (eye.id, eye.lid.blinks, eye.lid.open_ms) == (1, True, 150.0)
+    for read in (lambda: eye.lid.shut_ms > 50.0, lambda: eye.gains["a"] in (0.5,)):
+        with pytest.raises((AttributeError, TypeError)):
+            read()
