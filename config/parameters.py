@@ -23,8 +23,18 @@ NEXT_START = "next start"
 
 LIVE_LIMITS = ("min_deg", "max_deg", "max_speed_deg_s", "max_accel_deg_s2")
 """Keys of a joint that a running rig applies."""
-_LIVE = ("guard.*", "tracker.*", "sound.device", *(f"joints.*.{name}" for name in LIVE_LIMITS))
-"""Keys that a running rig applies, besides those of gaze; it reads all others when it starts."""
+_LIVE = (
+    "character",
+    "guard.*",
+    "tracker.*",
+    "loop.*",
+    "sound.device",
+    *(f"joints.*.{name}" for name in LIVE_LIMITS),
+)
+"""Keys that a running rig applies, besides those of gaze; it reads all others when it starts.
+
+The program itself slows the loop when the computer has become too busy.
+"""
 
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:

@@ -1,9 +1,6 @@
 """A running head whose parameters are changed."""
 
-from collections import deque
-from collections.abc import Mapping
 from math import isfinite, pi
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +9,7 @@ from desk import GAZE_JOINTS
 from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.live_params import rig_in_effect
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Value
@@ -39,7 +37,8 @@ class Running(NamedTuple):
 
     def tune(self, changes: dict[str, Value]) -> None:
         base = self.rig
-        self.made.robot.command(self.made.live_params.prepare(base, apply_changes(base, changes)))
+        rig = rig_in_effect(base, apply_changes(base, changes))
+        self.made.robot.command(self.made.live_params.prepare(base, rig))
 
 
 def started(scene: str = "visitor", rig: Rig | None = None) -> Running:
@@ -111,66 +110,3 @@ class Judge:
             for goal, low, high in zip(sent, bus._lowest, bus._highest, strict=True):
                 assert low - 1 <= goal <= high + 1  # rounding; the bus clips that
             self.steps, self.speed = steps, speed
-
-
-# State of the running parts, which is not a parameter.
-STATE = {
-    "_motion", "_limits", "_gentle", "_gentle_until_s", "waiting", "outside", "_set_up",
-    "_next_s", "_until_s", "_search_until_s", "_redraw", "_left", "_shown", "_retuned_s",
-    "_rng", "_droop_from", "_droop_to", "_droop_since_s", "_offset_rad", "_started", "_ready",
-    "_part", "_at", "_keeper", "_counting", "_shift", "_heated", "_outside_s", "_last",
-    "_behaviour", "bus", "_nothing",
-}  # fmt: skip
-
-PLAIN = {str, int, float, bool, type(None)}
-
-
-def inside(thing: Any, path: str, seen: dict[int, Any]) -> dict[str, Any]:
-    """Return path -> value of all parameters that a part holds, functions with what they hold."""
-    out: dict[str, Any] = {}
-    _fill(out, thing, path, seen)
-    return out
-
-
-def _fill(out: dict[str, Any], thing: Any, path: str, seen: dict[int, Any]) -> None:
-    if isinstance(thing, str | int | float | bool | None | type):
-        out[path] = thing
-        return
-    if id(thing) in seen or isinstance(thing, np.random.Generator):
-        return  # told already; kept in ``seen``, so that no other thing gets its id
-    seen[id(thing)] = thing
-    if isinstance(thing, np.ndarray):
-        # Whole maps of what is seen: as bytes (0 added: -0.0 equals 0.0), as lists take long.
-        numbers = thing.tolist() if thing.dtype.hasobject else (thing + 0).tobytes()
-        out[path] = thing.shape, thing.dtype.str, numbers
-        return
-    if isinstance(thing, Mapping):
-        items = [(str(key), item) for key, item in thing.items()]
-    elif isinstance(thing, set | frozenset):
-        out[path] = sorted(map(str, thing))
-        return
-    elif isinstance(thing, list | tuple | deque):
-        items = [(str(i), item) for i, item in enumerate(thing)]
-    elif isinstance(thing, FunctionType):
-        out[path] = thing.__qualname__
-        _fill(out, [cell.cell_contents for cell in thing.__closure__ or ()], path, seen)
-        return
-    elif hasattr(thing, "__dict__"):
-        items = [(k, v) for k, v in vars(thing).items() if k not in STATE]
-    else:
-        return
-    for key, item in items:
-        if type(item) in PLAIN:  # two million of them in a run of the tests
-            out[f"{path}.{key}"] = item
-        else:
-            _fill(out, item, f"{path}.{key}", seen)
-
-
-def fresh(rig: Rig) -> Assembly:
-    return assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-
-
-def put(made: Assembly, rig: Rig) -> tuple[str, ...]:
-    """Apply a rig immediately."""
-    live = made.live_params
-    return live(live.prepare(live.rig, rig), 0.0)

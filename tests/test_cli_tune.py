@@ -97,7 +97,7 @@ def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None
 
 def test_what_takes_effect_later_is_said() -> None:
     done = gazerig("ctl", "set", "bus.port", "/dev/ttyUSB7")
-    assert "bus.port = /dev/ttyUSB7 (next start)" in done.stdout
+    assert "bus.port = /dev/ttyUSB7 (at the next start)" in done.stdout
 
 
 @pytest.mark.parametrize(

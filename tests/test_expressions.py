@@ -10,9 +10,7 @@ from expressive_rig import expressive_rig, faults, started
 from fakes.runs import ticks
 
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
-from gazerig.gaze.track.expression import Expressions
 from gazerig.gaze.track.level import HOLD_S, LevelParams
-from gazerig.gaze.track.pose_offset import NO_OFFSET
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.rig_limits import pose_offset
 from gazerig.robot.control.tick import Tick
@@ -103,24 +101,6 @@ def test_a_level_adds_to_an_expression(made: Assembly) -> None:
         made.robot.command(SetLevel("mouth", 1.0))
         last = ticks(made, 1)[-1]
     assert desired_deg(made, last)["jaw"] == pytest.approx(16.0)
-
-
-def test_a_retuned_table_moves_the_face_without_a_jump() -> None:
-    high = NO_OFFSET._replace(joints_rad=(0.2,))
-    faces = Expressions({"happy": high}, 0.5, 1)
-    faces.express("happy")
-    t, angles = 0.0, []
-    for k in range(400):
-        if k == 150:
-            faces.retune({"happy": high._replace(joints_rad=(0.1,))}, 0.4)
-        if k == 180:
-            faces.retune({}, 0.4)
-        t += DT
-        angles.append(faces.step(t).joints_rad[0])
-    steps = [abs(b - a) for a, b in zip(angles, angles[1:], strict=False)]
-    assert angles[149] == pytest.approx(0.2) and angles[-1] == 0.0
-    assert max(steps) <= PEAK_SPEED * 0.2 / 0.4 * DT
-    assert faces.names == () and faces.name == "neutral"
 
 
 def test_a_rig_with_a_face_keeps_all_rules() -> None:

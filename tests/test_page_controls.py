@@ -172,7 +172,7 @@ class OneParam(StandIn):
             raise Refused("a.b: 99 is above 10")
         self.value = changes["a.b"]
         self.version += 1
-        return ("a.b = 2", "a.c = 3 (next start: it is so)")
+        return ("a.b = 2", "a.c = 3 (at the next start)")
 
     def save(self, path: Path | None = None) -> Saved:
         self.saved_as = path
@@ -262,7 +262,7 @@ def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
 def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:
     words = heard.hear({"do": "set", "changes": {"a.b": [1, 2]}})
     assert heard.tuning.value == (1, 2)
-    assert words == "a.c = 3 (next start: it is so)"  # what did work is seen in the controls
+    assert words == "a.c = 3 (at the next start)"  # what did work is seen in the controls
     assert heard.hear({"do": "set", "changes": {"a.b": 99}}) == "refused: a.b: 99 is above 10"
     assert heard.hear({"do": "character", "name": "mad"}) == "refused: unknown character mad"
     assert heard.hear({"do": "revert"}) is not None and heard.tuning.value == 1.0

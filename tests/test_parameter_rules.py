@@ -34,6 +34,8 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
     live = {parameter.key for parameter in knobs} - waiting
     assert {key for key in live if not key.startswith(("gaze.", "guard.", "tracker."))} == {
         "sound.device",
+        "character",
+        "loop.rate_hz",
         *(f"joints.{name}.{key}" for name in desk_rig.joints for key in LIVE_LIMITS),
     }
     assert {key for key in waiting if key.startswith(("gaze.", "guard.", "tracker."))} == {

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -11,7 +10,7 @@ import pytest
 from retuned_run import DT_S, Judge, Running, started
 
 from gazerig.config.load import ConfigError, shipped_names, shipped_path
-from gazerig.config.parameters import NEXT_START, parameters, value_of
+from gazerig.config.parameters import NEXT_TICK, parameters, value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.model.commands import AnyCommand, Jog, Resume, Stop, Tune, Value
 from gazerig.robot.model.parameter import Parameter
@@ -72,10 +71,8 @@ def walk(tmp_path: Path) -> str:
 
 
 def live_knobs() -> tuple[Parameter, ...]:
-    # A character acts by its values, which the store of parameters changes together with its name.
     rig = load_rig("desk")
-    knobs = [k for k in parameters(rig, rig) if k.key != "character"]
-    return tuple(k for k in knobs if k.live != NEXT_START)
+    return tuple(knob for knob in parameters(rig, rig) if knob.live == NEXT_TICK)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -112,22 +109,14 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
 # A running head with a changed range
 
 
-def test_a_running_head_keeps_its_joints(desk_rig: Rig) -> None:
-    joints = {name: joint for name, joint in desk_rig.joints.items() if name != "neck_roll"}
-    with pytest.raises(ConfigError, match="joints: neck_roll: a running head keeps its joints"):
-        started().made.live_params.prepare(desk_rig, replace(desk_rig, joints=joints))
-
-
 def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
     running = started()
     running.go(10)
-    running.tune({"guard.soft_start_speed_deg_s": 50.0, "bus.port": "/dev/ttyACM0"})
+    running.tune({"gaze.lids.close_ms": 90.0, "bus.port": "/dev/ttyACM0"})
     tick = running.go(1)
-    changes = (("bus.port", "/dev/ttyACM0"), ("guard.soft_start_speed_deg_s", 50.0))
-    assert tick.commands == (Tune(changes),)
-    assert running.made.live_params.rig.guard.soft_start_speed_deg_s == 50.0
-    assert tick.events[1] == "tuned: guard.soft_start_speed_deg_s = 50.0"
-    assert "next start" in tick.events[0]
+    assert tick.commands == (Tune((("gaze.lids.close_ms", 90.0),)),)
+    assert running.rig.gaze.lids.close_ms == 90.0 and running.rig.bus == load_rig("desk").bus
+    assert tick.events == ("tuned: gaze.lids.close_ms = 90.0",)
 
 
 def test_an_order_that_crossed_processes_is_checked_in_its_tick() -> None:

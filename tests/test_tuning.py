@@ -56,7 +56,7 @@ def test_set_puts_all_in_force_with_one_order() -> None:
     lines = bench.tuning.set({"gaze.lids.close_ms": 90, "bus.port": "/dev/ttyACM1"})
     assert len(bench.orders) == 1 and bench.made.live_params.rig.gaze.lids.close_ms == 90.0
     assert "gaze.lids.close_ms = 90.0" in lines
-    assert "bus.port = /dev/ttyACM1 (next start)" in lines
+    assert "bus.port = /dev/ttyACM1 (at the next start)" in lines
     assert bench.tuning.version == 1
     assert bench.tuning.get("gaze.lids.close")["gaze.lids.close_ms"] == 90.0
     assert {c.key: (c.old, c.new) for c in bench.tuning.unsaved()} == {

@@ -1,7 +1,7 @@
 """Application of changed parameters to the running parts, between two ticks and without a jump.
 
 Each part has a ``retune`` that takes its parameters and keeps its state. Only parts whose
-parameters differ are changed. A parameter that cannot change during a run (see
+parameters differ are changed. A key that a running rig does not apply (see
 gazerig.config.parameters) keeps its value until the next start.
 """
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from gazerig.config.faults import ConfigError, ConfigFault
+from gazerig.config.faults import ConfigError
 from gazerig.config.parameters import LIVE_LIMITS, apply_changes, differences, start_note
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
@@ -38,7 +38,6 @@ from gazerig.robot.control.body import Body
 from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.frames import CameraMount, CameraParams
-from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles
@@ -91,21 +90,40 @@ _ALIKE = (
 """Sections of the gaze parameters whose part of the same name needs no other parameters."""
 
 
+def rig_in_effect(running: Rig, wanted: Rig) -> Rig:
+    """Return a running rig with those values of another that it applies before its next start."""
+    joints = {
+        name: replace(joint, **{key: getattr(wanted.joints[name], key) for key in LIVE_LIMITS})
+        for name, joint in running.joints.items()
+        if name in wanted.joints
+    }
+    return replace(
+        running,
+        character=wanted.character,
+        gaze=replace(wanted.gaze, chooser=running.gaze.chooser, plugins=running.gaze.plugins),
+        guard=wanted.guard,
+        tracker=wanted.tracker,
+        loop=wanted.loop,
+        sound=replace(running.sound, device=wanted.sound.device),
+        joints={**running.joints, **joints},
+    )
+
+
 class LiveParams:
     """Applies changes to the parts of a robot; a gazerig.robot.control.loop.Robot's ``tune``.
 
-    rig: the present rig
+    rig: the rig in effect
+
+    Args:
+        parts: The parts.
+        rig: The rig at the start.
+        camera: Returns the present lens and placement of the camera.
     """
 
-    def __init__(self, parts: Components, rig: Rig, placed: Callable[[], CameraParams]) -> None:
-        """Remember the parts.
-
-        placed: returns the present lens and placement of the camera
-        """
+    def __init__(self, parts: Components, rig: Rig, camera: Callable[[], CameraParams]) -> None:
         self.rig = rig
         self.parts = parts
-        self._placed = placed
-        self._started = rig
+        self._camera = camera
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _PreparedChange] = {}
 
@@ -122,7 +140,7 @@ class LiveParams:
     @property
     def camera(self) -> CameraParams:
         """Return the present lens and placement of the camera."""
-        return self._placed()
+        return self._camera()
 
     @property
     def horizontal_field_deg(self) -> float:
@@ -130,9 +148,9 @@ class LiveParams:
         return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
-        """Return the command that changes one rig into another, which is checked; for any thread.
+        """Return the command that changes one rig in effect into another; for any thread.
 
-        The tick that applies it need not check it. base: the present rig when the command arrives
+        The tick that applies it need not check it. base: the rig in effect when it arrives
 
         Raises:
             gazerig.config.load.ConfigError: the walk that the rig names is invalid.
@@ -149,14 +167,20 @@ class LiveParams:
         ready = self._ready.pop(id(command.changes), None)
         if ready is None or ready.changes is not command.changes or ready.base is not self.rig:
             try:
-                ready = _prepare_change(
-                    command, self.rig, apply_changes(self.rig, dict(command.changes))
-                )
+                wanted = apply_changes(self.rig, dict(command.changes))
+                ready = _prepare_change(command, self.rig, rig_in_effect(self.rig, wanted))
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         before, self.rig = self.rig, ready.rig
-        walk = ready.walk or self._walk
-        new, parts, was, now = ready.rig, self.parts, before.gaze, ready.rig.gaze
+        self._apply_to_gaze(before, ready.rig, ready.walk or self._walk)
+        said = self._apply_to_machine(before, ready.rig)
+        return (
+            *(f"tuned: {key} = {value}{start_note(key)}" for key, value in command.changes),
+            *said,
+        )
+
+    def _apply_to_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
+        parts, was, now = self.parts, old.gaze, new.gaze
         for name in _ALIKE:
             if getattr(now, name) != getattr(was, name):
                 getattr(parts, name).retune(getattr(now, name))
@@ -165,72 +189,49 @@ class LiveParams:
             parts.conversation.retune(*looks_away)
         if now.scanpath != was.scanpath or walk != self._walk:
             parts.scanpath.retune(now.scanpath, walk)
-        bounds = (new.joints, new.ranges) != (before.joints, before.ranges)
-        if now.oculomotor != was.oculomotor or (bounds and eye_limits(new) != eye_limits(before)):
+        self._walk = walk
+        bounds = new.joints != old.joints
+        if now.oculomotor != was.oculomotor or bounds:
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
-        if now.head != was.head or (bounds and head_limits(new) != head_limits(before)):
+        if now.head != was.head or bounds:
             parts.head.retune(now.head, *head_limits(new))
         parts.tracks.retune(lid_spans(new), now.oculomotor.eye_lag_ms / 1e3)
-        self._walk = walk
-        said = self._apply_to_machine(before, new)
-        return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)
 
     def _apply_to_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
-        parts = self.parts
-        said: tuple[str, ...] = ()
-        if (new.joints, new.guard) != (old.joints, old.guard):
-            said = self._apply_joints(old, new)
-        if new.ranges != old.ranges:
-            parts.guard.start_gently()  # desired angles jump
-        if new.loop.rate_hz != old.loop.rate_hz:
-            parts.guard.set_period(1.0 / new.loop.rate_hz)
-        parts.tracker.params = new.tracker
-        return said
-
-    def _apply_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
-        """Apply joint limits to body and guard.
+        """Apply limits of joints, guard and tracker.
 
         Returns the changes that are applied at the next setup of the servos.
         """
-        parts, joints, before = self.parts, self._with_limits(new), self._with_limits(old)
+        parts = self.parts
         gentle_deg_s = new.guard.soft_start_speed_deg_s
-        others = (joints, gentle_deg_s) != (before, old.guard.soft_start_speed_deg_s)
-        if others:
-            parts.body.retune(joints, gentle_deg_s)
-        if new.guard != old.guard or limits(joints) != limits(before):
-            parts.guard.retune(new.guard, limits(joints))
-        if not others:
-            return ()
+        set_up = new.joints != old.joints or gentle_deg_s != old.guard.soft_start_speed_deg_s
+        if set_up:
+            parts.body.retune(new.joints, gentle_deg_s)
+        if set_up or new.guard != old.guard:
+            parts.guard.retune(new.guard, limits(new.joints))
+        if new.loop.rate_hz != old.loop.rate_hz:
+            parts.guard.set_period(1.0 / new.loop.rate_hz)
+        parts.tracker.params = new.tracker
         more = [
             name
             for name, desired, most in zip(
-                parts.body.names, limits(joints), parts.body.configured_limits(), strict=True
+                parts.body.names, limits(new.joints), parts.body.configured_limits(), strict=True
             )
             if desired.low_rad < most.low_rad - 1e-6
             or desired.high_rad > most.high_rad + 1e-6
             or desired.speed_rad_s > most.speed_rad_s + 1e-6
         ]
-        if not more:
+        if not (set_up and more):
             return ()
         return (f"{', '.join(more)}: the full range and speed apply after a stop and a resume",)
-
-    def _with_limits(self, rig: Rig) -> dict[str, JointParams]:
-        """Return the joints of the start with the limits of a rig."""
-        return {
-            name: replace(first, **{key: getattr(rig.joints[name], key) for key in LIVE_LIMITS})
-            for name, first in self._started.joints.items()
-        }
 
 
 def _prepare_change(command: Tune, base: Rig, rig: Rig) -> _PreparedChange:
     """Build a checked change, with a new face walk if that has changed.
 
     Raises:
-        ConfigError: a joint is gone, or the walk is invalid.
+        ConfigError: the walk is invalid.
     """
-    if gone := ", ".join(base.joints.keys() - rig.joints.keys()):
-        rule = f"{gone}: a running head keeps its joints: end it, then start it with this file"
-        raise ConfigError([ConfigFault("", None, "joints", "", rule)])
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
     return _PreparedChange(command.changes, base, rig, walk)

@@ -40,7 +40,7 @@ from gazerig.config.save import rig_file
 from gazerig.config.save_text import EditRefused, format_value
 from gazerig.config.schema import NO_CHARACTER, load_rig
 from gazerig.config.subprocess_call import in_subprocess
-from gazerig.robot.app.live_params import LiveParams
+from gazerig.robot.app.live_params import LiveParams, rig_in_effect
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandTaker
@@ -52,6 +52,7 @@ class _RigState(NamedTuple):
     """State at one moment, replaced as a whole.
 
     saved: rig of the files, with the options; rig: the present one
+    in_effect: the one that the running parts have
     name: the given name or path of the rig
     character: the command line's character; None: the rig's
     files: present files, with their contents at the last valid read
@@ -60,6 +61,7 @@ class _RigState(NamedTuple):
 
     saved: Rig
     rig: Rig
+    in_effect: Rig
     name: str
     character: str | None
     files: RigFiles
@@ -106,7 +108,7 @@ class ParamStore:
         read, files = read_all(RigLayers(rig, character, profile))
         whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
-        self._state = _RigState(whole, whole, rig, character, files, found, found, 0)
+        self._state = _RigState(whole, whole, whole, rig, character, files, found, found, 0)
         self._described = described(whole, self._defaults)
         # The folder of a shipped rig belongs to the package and contains no user files.
         at_home = rig in shipped_names("rigs")
@@ -320,12 +322,16 @@ class ParamStore:
         """Apply a checked rig, and return the changes."""
         before = self._state
         found = differences(before.rig, rig)
-        if found:
-            self._command(self._live_params.prepare(before.rig, rig))
-        elif state == before:
+        if not found and state == before:
             return ()
+        in_effect = rig_in_effect(before.in_effect, rig)
+        if in_effect == before.in_effect:
+            in_effect = before.in_effect
+        else:
+            self._command(self._live_params.prepare(before.in_effect, in_effect))
         self._state = state._replace(
             rig=rig if found else before.rig,
+            in_effect=in_effect,
             values=values(rig) if found else before.values,
             version=before.version + 1,
         )

@@ -20,8 +20,8 @@ class LimpJoints:
     """
 
     def __init__(self, after_s: Sequence[float | None]) -> None:
-        self.reset()
         self._after_s = {i: one for i, one in enumerate(after_s) if one is not None}
+        self.reset()
 
     def reset(self) -> None:
         """Let all joints have torque."""

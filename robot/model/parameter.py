@@ -21,7 +21,7 @@ class Parameter(Struct, frozen=True):
         choices: Allowed values, empty if any value of its kind is allowed.
         kind: number, whole, bool, text, choice, list or mapping.
         default: Value in the rig of defaults.
-        live: "next tick", or "next start: " and the reason why a running rig cannot apply it.
+        live: "next tick", or "next start" if a running rig does not apply it.
         optional: Whether null is allowed.
         length: Number of items of a list, None if any.
         items: Kind of the items.
