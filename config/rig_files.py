@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.config.load import ConfigError, ConfigFault, shipped_names
+from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.config.rig import Rig
-from gazerig.config.save import copy_shipped, rig_file, save
+from gazerig.config.save import rig_file, save
 from gazerig.config.schema import layers_of, load_rig
 from gazerig.drivers.files.file_input import kind_of, read_limited
 from gazerig.robot.model.parameter import SavedFile
@@ -59,34 +59,6 @@ def read_all(layers: RigLayers) -> tuple[Rig, RigFiles]:
     return load_rig(*layers), RigFiles(paths, texts)
 
 
-def save_over(
-    layers: RigLayers, good: bytes, wanted: Mapping[str, Any], now: datetime
-) -> tuple[SavedFile, RigFiles]:
-    """Write values into a rig's file; character and profile must not override any of them.
-
-    Args:
-        layers: The rig's file, and the files merged over it.
-        good: Last text of the file without a fault; it replaces a text that has faults now.
-        wanted: Values by dotted key.
-        now: Time for the backup's name.
-
-    Returns:
-        The written file, and the present files of the rig.
-
-    Raises:
-        gazerig.config.load.ConfigError: see gazerig.config.save.save.
-    """
-    check = partial(load_rig, character=layers.character, profile=layers.profile)
-    base = None
-    try:
-        load_rig(*layers)
-    except ConfigError:
-        base = good
-    saved = save(Path(layers.name), wanted, now, check, Rig, base)
-    paths = tuple(layers_of(*layers))
-    return saved, RigFiles(paths, _texts(paths))
-
-
 def refuse_copy(to: str) -> None:
     """Check that a rig can be copied to a path, without opening anything.
 
@@ -106,39 +78,38 @@ def refuse_copy(to: str) -> None:
         raise ConfigError([ConfigFault(to, None, "", "", rule)])
 
 
-def save_copy(
-    layers: RigLayers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
+def save_layers(
+    layers: RigLayers, good: bytes, to: str | None, wanted: Mapping[str, Any], now: datetime
 ) -> tuple[SavedFile, RigFiles]:
-    """Write values into a new copy of a rig's file; after a failure the copy does not exist.
+    """Write values into a rig's file; character and profile must not override any of them.
+
+    Args:
+        layers: The rig's file, and the files merged over it.
+        good: Last text of the file without a fault; it replaces a text that has faults now.
+        to: A new file for this text and the values; None: the rig's own.
+        wanted: Values by dotted key.
+        now: Time for the backup's name.
 
     Returns:
-        What ``save_over`` returns.
+        The written file, and the present files of the rig.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is not a
             YAML file.
     """
-    refuse_copy(to)
-    if layers.name in shipped_names("rigs"):
-        copy_shipped(layers.name, to)
+    base = None
+    if to is not None:
+        refuse_copy(to)
+        base, layers = good, layers._replace(name=to)
     else:
         try:
-            with Path(to).open("xb") as new:
-                new.write(good)
-        except OSError as error:
-            rule = f"cannot be written: {error.strerror}; check it and its folder"
-            raise ConfigError([ConfigFault(to, None, "", "", rule)]) from error
-    try:
-        return save_over(layers._replace(name=to), good, wanted, now)
-    except ConfigError as error:
-        os.unlink(to)
-        source = str(rig_file(layers.name))
-        raise ConfigError(
-            f
-            if f.file != to
-            else ConfigFault(source, f.line, f.key, f.value, f"{f.rule}; {to} was not created")
-            for f in error.faults
-        ) from None
+            load_rig(*layers)
+        except ConfigError:
+            base = good
+    check = partial(load_rig, character=layers.character, profile=layers.profile)
+    saved = save(rig_file(layers.name), wanted, now, check, Rig, base)
+    paths = tuple(layers_of(*layers))
+    return saved, RigFiles(paths, _texts(paths))
 
 
 def _texts(paths: tuple[Path, ...]) -> tuple[bytes, ...]:

@@ -1,11 +1,14 @@
 """Writing values into a user's YAML file, atomically and with a backup.
 
-The new text is checked as a separate file before it atomically replaces the old one. The old file
-stays in the folder; its name then contains the time.
+Comments and the order of keys stay (ruamel's round trip). The new text is checked as a separate
+file before it atomically replaces the old one. The old file stays in the folder; its name then
+contains the time.
 """
 
 import contextlib
+import io
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -15,18 +18,28 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped_path
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import CommentMark
+from ruamel.yaml.tokens import CommentToken
+
+from gazerig.config.entries import parse
+from gazerig.config.load import ConfigError, ConfigFault, read_yaml, shipped_path
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import EditRefused, Value, edit_text, format_value
+from gazerig.config.save_text import EditRefused, Value, format_value
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.params import declarations
 from gazerig.robot.model.parameter import ParamChange, SavedFile
 
 Check = Callable[[str], Any]
 """Loads a file by its path and returns its value; raises gazerig.config.load.ConfigError."""
+
+_LARGEST = 1_000_000  # bytes
+_ANY_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+_BYTE_ORDER_MARK = "\ufeff"
+_ABSENT: Any = object()
 
 
 def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> SavedFile:
@@ -62,13 +75,12 @@ def save(
 ) -> SavedFile:
     """Write values at dotted key paths into a YAML file, and keep the old file as a backup.
 
-    Missing keys are added with a comment. Comments, order, style and anchors are unchanged. The
-    file is replaced only after ``check`` has loaded the new one with every value. After any error
-    the file is unchanged.
+    The file is replaced only after ``check`` has loaded the
+    new one with every value. After any error the file is unchanged.
 
     now: time for the backup's name, ``rig.yaml.bak-20260131-235959``
     check: loads a file by its path, like ``gazerig.config.schema.load_rig``
-    into: the Params dataclass of the file, whose fields describe added keys
+    into: the Params dataclass of the file
     base: text for the values instead of that of a file that has faults or does not exist
 
     Raises:
@@ -76,14 +88,10 @@ def save(
             rejected, or another layer overrides it.
     """
     target = Path(os.path.realpath(path))
-    # An update of the package would overwrite a file inside it.
-    package = Path(os.path.realpath(SHIPPED))
-    if package in target.parents:
-        raise _fault(
-            target,
-            "is part of the program and is never changed: copy it "
-            f"(cp {target} my{target.name}) and use the copy",
-        )
+    if Path(os.path.realpath(SHIPPED)) in target.parents:
+        # An update of the package would overwrite it.
+        rule = "is part of the program and is never changed: copy it"
+        raise _fault(target, f"{rule} (cp {target} my{target.name}) and use the copy")
     before, text, found = _proposal(target, changes, into, base)
     if text == before:
         return SavedFile(target, None, ())
@@ -91,25 +99,21 @@ def save(
         try:
             loaded = check(str(fresh))
         except ConfigError as error:
-            named = [
+            raise ConfigError(
                 replace(f, file=str(target) if f.file == str(fresh) else f.file)
                 for f in error.faults
-            ]
-            raise ConfigError(named) from None
+            ) from None
         for key, value in changes.items():
             held = _value_at(loaded, key)
-            if held is not _ABSENT and isinstance(value, list | tuple):
-                held, value = list(held), list(value)
-            if held is not _ABSENT and held != value:
-                raise _fault(
-                    target,
-                    f"{key} stays {held} with any value in this file: a later layer sets it",
-                    key,
-                )
-        if _read_content(target) != before:
+            wanted = tuple(value) if isinstance(value, list) else value
+            if held is not _ABSENT and held != wanted:
+                rule = f"{key} stays {held} with any value in this file: a later layer sets it"
+                raise _fault(target, rule, key)
+        if _read(target) != before:
             raise _fault(target, "was changed by another program meanwhile; try again")
-        backup = _backup(target, before, now) if before is not None else None
+        backup = None
         if before is not None:
+            backup = _backup(target, before, now)
             shutil.copymode(target, fresh)
         os.replace(fresh, target)
     return SavedFile(target, backup, found)
@@ -143,58 +147,152 @@ def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
 ) -> tuple[bytes | None, bytes, tuple[ParamChange, ...]]:
     """Return the file's text (None without a file), its new text, and the difference."""
-    known = tuple(declarations(into))
     if base is None:
-        before = read_yaml(target, known)  # rejects a file that is not YAML, with the line
-        base = target.read_bytes()
-        raw: bytes | None = base
-    else:
-        raw, before = _read_content(target), _document(base)
-    mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
+        read_yaml(target, tuple(declarations(into)))  # rejects a file that is not YAML
+    raw = _read(target)
+    good = base if base is not None else raw or b""
+    text = good.decode("utf-8")
     try:
-        text = edit_text(before.text, changes, into)
-        # Aliases of an anchor would change unnoticed.
-        kept, fresh = _leaves(before.data), _leaves(_document(text.encode()).data)
-        for key in sorted({*kept, *fresh}):
-            requested = key in changes or any(c.startswith(f"{key}.") for c in changes)
-            if not requested and kept.get(key, _ABSENT) != fresh.get(key, _ABSENT):
-                raise EditRefused(
-                    f"{key} would also change, because an anchor (&) connects it to "
-                    f"{', '.join(changes)}; write its value in full first"
-                )
+        written = _edit_text(text, changes)
+        before, after = _plain(target, text), _plain(target, written)
+        old = {key: _value_at(before, key) for key in changes}
+        found = tuple(
+            ParamChange(
+                key, None if old[key] is _ABSENT else format_value(old[key]), format_value(value)
+            )
+            for key, value in changes.items()
+            if old[key] is _ABSENT or format_value(old[key]) != format_value(value)
+        )
+        for key in _different(before, after):
+            # Aliases of an anchor would change unnoticed.
+            if not any(f"{key}.".startswith(f"{c}.") or c.startswith(f"{key}.") for c in changes):
+                named = ", ".join(changes)
+                rule = f"would also change, because an anchor (&) connects it to {named}"
+                raise EditRefused(f"{key} {rule}; write its value in full first")
     except EditRefused as error:
         raise _fault(target, str(error)) from None
-    old = {key: _value_at(before.data, key) for key in changes}
-    found = tuple(
-        ParamChange(
-            key, None if old[key] is _ABSENT else format_value(old[key]), format_value(value)
-        )
-        for key, value in changes.items()
-        if old[key] is _ABSENT or format_value(old[key]) != format_value(value)
+    return raw, written.encode() if found else good, found
+
+
+def _plain(target: Path, text: str) -> Any:
+    root = parse(str(target), text.removeprefix(_BYTE_ORDER_MARK), [])
+    return {} if root is None else root.to_plain()
+
+
+def _different(before: Any, after: Any, key: str = "") -> Iterator[str]:
+    """Yield the dotted paths of all values that differ."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        for step in {**before, **after}:
+            below = f"{key}.{step}" if key else step
+            yield from _different(before.get(step, _ABSENT), after.get(step, _ABSENT), below)
+    elif before != after:
+        yield key
+
+
+# --- text
+
+
+def _yaml() -> YAML:
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 10_000  # lines of the file are not wrapped
+    yaml.representer.add_representer(
+        type(None), lambda to, _: to.represent_scalar("tag:yaml.org,2002:null", "null")
     )
-    return raw, mark + text.encode() if found else base, found
+    return yaml
 
 
-def _read_content(target: Path) -> bytes | None:
+def _edit_text(text: str, changes: Mapping[str, Value]) -> str:
+    """Return the text with other values at dotted key paths and with added missing keys.
+
+    Raises:
+        EditRefused: a value cannot be written at its place.
+    """
+    newline = "\r\n" if "\r\n" in text else "\n"
+    lines = text.removeprefix(_BYTE_ORDER_MARK).replace("\r\n", "\n")
+    indent = re.search(r"^( +)[^\s#-]", lines, re.MULTILINE)
+    dash = re.search(r"^( *)[^\s#-].*:(?: *#.*)?\n\1( *)- ", lines, re.MULTILINE)
+    offset = len(dash[2]) if dash else 0
+    yaml = _yaml()
+    yaml.indent(mapping=len(indent[1]) if indent else 2, sequence=offset + 2, offset=offset)
+    yaml.explicit_start = lines.startswith("---")
+    root = yaml.load(lines)
+    for key, value in changes.items():
+        _set(root, key, value)
+    out = io.StringIO()
+    yaml.dump(root, out)
+    mark = _BYTE_ORDER_MARK if text.startswith(_BYTE_ORDER_MARK) else ""
+    return mark + out.getvalue().replace("\n", newline)
+
+
+def _set(root: CommentedMap, key: str, value: Value) -> None:
+    """Set the value at a dotted path; add missing mappings above it."""
+    written = _yaml().load(format_value(value))
+    *over, last = key.split(".")
+    holder: Any = root
+    for depth, step in enumerate(over):
+        if holder.get(step) is None:
+            for inner in reversed([*over[depth + 1 :], last]):
+                written = CommentedMap({inner: written})
+            _add(holder, step, written)
+            return
+        holder = holder[step]
+        if not isinstance(holder, CommentedMap):
+            raise EditRefused(f"{key}: {'.'.join(over[: depth + 1])} is not a mapping; change it")
+    held = holder.get(last)
+    if isinstance(held, CommentedMap):
+        raise EditRefused(f"{key} is a mapping; name one of its keys")
+    if last not in holder:
+        _add(holder, last, written)
+    elif isinstance(held, CommentedSeq) and isinstance(written, CommentedSeq):
+        if len(held) == len(written):
+            for i, item in enumerate(written):  # the comments of the items stay
+                held[i] = item
+        elif held.fa.flow_style():
+            holder[last] = written
+        else:
+            raise EditRefused(f"{key} is spread over several lines; write it on one line first")
+    else:
+        holder[last] = written
+
+
+def _add(holder: CommentedMap, key: str, value: Any) -> None:
+    """Add a key at the end of a mapping, before the comments of what follows it."""
+    below = "" if holder.fa.flow_style() or key in holder else _take_comments_below(holder)
+    holder[key] = value
+    while isinstance(holder[key], CommentedMap):
+        holder, key = holder[key], next(iter(holder[key]))
+    if below:
+        holder.ca.items[key] = [None, None, CommentToken(f"\n{below}", CommentMark(0), None), None]
+
+
+def _take_comments_below(node: Any) -> str:
+    """Return the comments and empty lines below the last value of a mapping, and remove them."""
+    while node:
+        last = next(reversed(node)) if isinstance(node, CommentedMap) else len(node) - 1
+        inner = node[last]
+        if not isinstance(inner, CommentedMap | CommentedSeq) or inner.fa.flow_style():
+            tokens = node.ca.items.get(last)
+            place = 2 if isinstance(node, CommentedMap) else 0
+            if not tokens or tokens[place] is None:
+                return ""
+            line, _, below = tokens[place].value.partition("\n")
+            tokens[place].value = f"{line}\n"
+            return str(below)
+        node = inner
+    return ""
+
+
+# --- files
+
+
+def _read(target: Path) -> bytes | None:
     """Return a file's content, None without a file."""
     with _convert_os_errors(target):
         try:
             return read_limited(target, _LARGEST)
         except FileNotFoundError:
             return None
-
-
-def _document(text: bytes) -> Document:
-    """Return a text parsed as a separate file."""
-    with OwnFolder("config") as folder:
-        file = Path(folder) / "new.yaml"
-        file.write_bytes(text)
-        return read_yaml(file)
-
-
-_LARGEST = 100_000_000  # bytes of a file that is kept as a backup
-_ABSENT: Any = object()
-_ANY_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
 def _value_at(value: Any, key: str) -> Any:
@@ -205,16 +303,6 @@ def _value_at(value: Any, key: str) -> Any:
         else:
             value = getattr(value, step, _ABSENT)
     return value
-
-
-def _leaves(value: Any, path: str = "") -> dict[str, Any]:
-    """Return all values except non-empty mappings by dotted path."""
-    if not isinstance(value, dict) or not value:
-        return {path: value}
-    found: dict[str, Any] = {}
-    for key, item in value.items():
-        found |= _leaves(item, f"{path}.{key}" if path else key)
-    return found
 
 
 @contextlib.contextmanager
@@ -256,9 +344,8 @@ def _convert_os_errors(target: Path) -> Iterator[None]:
     except FileExistsError:
         raise _fault(target, "already exists and is not overwritten; choose another name") from None
     except OSError as error:
-        raise _fault(
-            target, f"cannot be written: {error.strerror}; check it and its folder"
-        ) from error
+        rule = f"cannot be written: {error.strerror}; check it and its folder"
+        raise _fault(target, rule) from error
 
 
 def _fault(target: Path, rule: str, key: str = "") -> ConfigError:

@@ -33,8 +33,7 @@ from gazerig.config.rig_files import (
     RigLayers,
     read_all,
     refuse_copy,
-    save_copy,
-    save_over,
+    save_layers,
 )
 from gazerig.config.save import rig_file
 from gazerig.config.save_text import EditRefused, format_value
@@ -249,13 +248,9 @@ class ParamStore:
             if faults:
                 raise ConfigError(faults)
             layers, good = self._layers(state), state.files.own_text
-            target = rig_file(state.name)
-            if copied:
-                done = self._elsewhere(save_copy, layers, good, str(path), wanted, self._now())
-                state = state._replace(name=str(path))
-            else:
-                layers = layers._replace(name=str(target))
-                done = self._elsewhere(save_over, layers, good, wanted, self._now())
+            to = str(path) if copied else None
+            done = self._elsewhere(save_layers, layers, good, to, wanted, self._now())
+            state = state._replace(name=to or state.name)
             saved: SavedFile
             saved, files = done
             if "character" in wanted:
