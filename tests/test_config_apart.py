@@ -11,7 +11,7 @@ import pytest
 from gazerig.config.load import ConfigError
 from gazerig.config.save import copy_shipped, save_rig
 from gazerig.config.schema import load_rig
-from gazerig.config.subprocess_call import in_subprocess
+from gazerig.robot.app.subprocess_call import in_subprocess
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -76,6 +76,6 @@ def test_a_process_that_fails_is_an_error_in_one_line(
         in_subprocess(fails)
     with pytest.raises(ConfigError, match="process for ends: ended unexpectedly: -9"):
         in_subprocess(ends)
-    monkeypatch.setattr("gazerig.config.subprocess_call._LONGEST_S", 0.5)
+    monkeypatch.setattr("gazerig.robot.app.subprocess_call._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):
         in_subprocess(sleeps)

@@ -38,8 +38,8 @@ from gazerig.config.rig_files import (
 from gazerig.config.save import rig_file
 from gazerig.config.save_text import EditRefused, format_value
 from gazerig.config.schema import NO_CHARACTER, load_rig
-from gazerig.config.subprocess_call import in_subprocess
 from gazerig.robot.app.live_params import LiveParams, rig_in_effect
+from gazerig.robot.app.subprocess_call import in_subprocess
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandTaker

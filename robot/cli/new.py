@@ -10,7 +10,9 @@ from typing import Annotated
 import typer
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.new_rig import (
+from gazerig.drivers.errors import SetupError, install_command
+from gazerig.drivers.files.file_output import refuse_existing, write_file
+from gazerig.robot.cli.new_rig import (
     BOARDS,
     CAMERAS,
     MECHANISMS,
@@ -19,8 +21,6 @@ from gazerig.config.new_rig import (
     rig_text,
     usual_port,
 )
-from gazerig.drivers.errors import SetupError, install_command
-from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, finish_lines, say
 
 app = typer.Typer()

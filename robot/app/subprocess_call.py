@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 _LOG = logging.getLogger("gazerig.config")
 _LONGEST_S = 30.0
-_MODULE = "gazerig.config.subprocess_call"
+_MODULE = "gazerig.robot.app.subprocess_call"
 
 
 def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
