@@ -241,9 +241,6 @@ class DetectionInCamera(NamedTuple):
     thickness_m: for a moving thing, diameter of the largest disc within its patch, at its distance;
         from_side: the patch extends beyond the left or right edge of the image
     clothing: for a person, colours of the clothes, None if they are not visible
-    box_m: for a face, size of its box at its distance: the square root of its area
-    lower_face: for a face, width of the mouth over the distance of the eyes, times the position of
-        the nose between eyes and mouth as a share; otherwise 0
     """
 
     kind: str
@@ -271,8 +268,6 @@ class DetectionInCamera(NamedTuple):
     from_side: bool = False
     upper_m: tuple[float, float, float] | None = None
     clothing: Clothing | None = None
-    box_m: float = 0.0
-    lower_face: float = 0.0
 
 
 class LocatedFrame(NamedTuple):

@@ -100,13 +100,3 @@ def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(
 ) -> None:
     patch = replace(BALL, box_px=(9.0, 9.0, 50.0, height_px), area_px=area_px)
     assert present(frame_locator.thing_in_camera(patch)).compact is compact
-
-
-def test_the_lower_half_of_a_face_with_a_hand_before_its_mouth_is_smaller() -> None:
-    right_eye, left_eye, nose, right, left = FACE.landmarks_px
-    covered = np.array([right_eye, left_eye, nose, 0.75 * right + 0.25 * left, left])
-    whole, hidden = (
-        LOCATOR(picture(1, faces=(replace(FACE, landmarks_px=points),))).faces[0].lower_face
-        for points in (FACE.landmarks_px, covered)
-    )
-    assert hidden == pytest.approx(0.75 * whole, rel=0.02)

@@ -340,31 +340,6 @@ def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tra
     assert one.p_world_m[2] == pytest.approx(before, abs=0.05)
 
 
-def _seen_with_a_hand(jumps: float, from_frame: int) -> tuple[float, int]:
-    """Return by what part a face 2 m away is misplaced at most, and how often it is covered.
-
-    jumps: standard deviation of its lower half, as a part
-    from_frame: from when on a hand is before the mouth, and the face looks 1.3 times as far away
-    """
-    rng, tracker, off, covered = np.random.default_rng(0), Tracker(), 0.0, 0
-    for k in range(180):
-        lower, farther = (0.7, 1.3) if k >= from_frame else (1.0, 1.0)
-        found = replace(across(0.0, 2.0 * farther), along_sd_m=0.2, box_m=0.13 * farther)
-        found = replace(found, lower_face=lower * (1.0 + rng.normal(0.0, jumps)))
-        (one,) = tracker.step([found], CAMERA, k / 30)
-        off, covered = (
-            max(off, abs(one.filter.range_m / 2.0 - 1.0)),
-            covered + (one.covered_frames > 0),
-        )
-    return off, covered
-
-
-def test_a_hand_before_the_mouth_moves_nobody_and_points_that_jump_are_no_hand() -> None:
-    off, covered = _seen_with_a_hand(0.02, 150)
-    assert off < 0.05 and covered == 30
-    assert _seen_with_a_hand(0.15, 180)[1] == 0
-
-
 def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker: Tracker) -> None:
     moving = replace(face(2.0, 0.9, "thing"), mark=7)
     (thing,) = tracker.step([moving], CAMERA, 0.0)

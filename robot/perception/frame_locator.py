@@ -187,11 +187,6 @@ class FrameLocator:
             gaze,
             signs=signs,
             clothing=face.clothing,
-            box_m=sqrt(max(face.box_px[2] * face.box_px[3], 0.0))
-            / focal_px
-            * share
-            * pose.p_camera_m[2],
-            lower_face=_lower_face(face),
         )
 
     def _person(
@@ -269,17 +264,6 @@ def _point_at_depth(at_px: tuple[float, float], z_m: float, lens: Intrinsics) ->
     """Return the position of a pixel at a depth along the optical axis."""
     x, y, z = rays(np.array([at_px]), lens)[0].tolist()
     return scale((x, y, z), z_m)
-
-
-def _lower_face(face: DetectedFace) -> float:
-    """Return the size of a face's lower half relative to its eyes; see ``DetectionInCamera``."""
-    (ax, ay), (bx, by), (x, y), (cx, cy), (dx, dy) = face.landmarks_px.tolist()
-    middle_x, middle_y = 0.5 * (ax + bx), 0.5 * (ay + by)
-    eyes, mouth = hypot(bx - ax, by - ay), hypot(dx - cx, dy - cy)
-    tall = hypot(0.5 * (cx + dx) - middle_x, 0.5 * (cy + dy) - middle_y)
-    if not (eyes > 0.0 and tall > 0.0):
-        return 0.0
-    return mouth / eyes * hypot(x - middle_x, y - middle_y) / tall
 
 
 def _is_face_of(person: DetectedPerson, face: DetectedFace) -> bool:

@@ -129,8 +129,6 @@ _COLOURS_GAIN, _UNFIT_GAIN = 0.15, 0.005
 _LIKE = 0.9
 # A person who was not seen for longer than this was out of sight.
 _GAP_S = 0.12
-# Relative standard deviation of the lower half of a face in one frame.
-_SHAPE_SD = 0.1
 
 
 @dataclass(slots=True)
@@ -196,7 +194,6 @@ class LocalisedDetection:
     thickness_m: of a moving thing, diameter of the largest disc within its patch, at its distance;
         from_side: whether the patch continues beyond the left or right edge of the image
     clothing: of a person, colours of the clothes, None if not visible
-    box_m, lower_face: of a face, as in ``DetectionInCamera``
     """
 
     kind: str
@@ -224,8 +221,6 @@ class LocalisedDetection:
     from_side: bool = False
     upper_m: Vec3 | None = None
     clothing: Clothing | None = None
-    box_m: float = 0.0
-    lower_face: float = 0.0
 
 
 @dataclass(slots=True, eq=False)
@@ -245,10 +240,6 @@ class BodyTrack:
     clothes: of a person, learned clothes
     returned_person: the person whose number a new track has received, None for a new number;
         is_number_final: whether the number is final because the clothes are known
-    box_m, lower_face: as in a detection, usual values of the face
-    uncovered_frames: number of frames with them; lower_var: relative variance between frames
-    covered_frames: number of frames with a covered lower half of the face
-    covered_s: capture time of the last of them; cover_share: factor of the distance since then
     """
 
     id: int
@@ -268,13 +259,6 @@ class BodyTrack:
     clothes: KnownClothes = field(default_factory=KnownClothes)
     returned_person: SeenPerson | None = None
     is_number_final: bool = False
-    box_m: float = 0.0
-    lower_face: float = 0.0
-    lower_var: float = _SHAPE_SD * _SHAPE_SD
-    uncovered_frames: int = 0
-    covered_frames: int = 0
-    covered_s: float = -inf
-    cover_share: float = 1.0
 
     @property
     def p_world_m(self) -> Vec3:
@@ -334,6 +318,4 @@ def place_in_world(
         found.from_side,
         None if upper is None else add(p_world_m, rotate(R_world_camera, upper)),
         found.clothing,
-        found.box_m,
-        found.lower_face,
     )

@@ -26,7 +26,7 @@ from gazerig.robot.perception.data_association import (
     clothing_costs,
     pair_costs,
 )
-from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, view_and_range
+from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, view_and_range
 from gazerig.robot.perception.returning_people import SeenPerson, find_returned
 from gazerig.robot.perception.track import (
     FACE,
@@ -161,14 +161,6 @@ _PROVED = 3
 # A person in fewer frames than this may be a false detection, whose number is reused. Number of
 # frames with clothes after which the number is final. Largest number of stored people who left.
 _KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
-# The lower half of a face is covered if it is smaller than this fraction of its usual size, and by
-# this number of standard deviations of a frame.
-_COVERED, _COVERED_SDS = 0.8, 4.0
-# Number of uncovered frames needed before, and gain of learning the usual size. Largest factor of a
-# cover on the distance, and its learning gain, which is higher at first.
-_BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 8, 0.03, 1.5, 0.03
-# Guessed points jump: a face counts as covered for this time after the last covered frame.
-_COVERED_S = 0.3
 
 
 class Tracker:
@@ -315,7 +307,6 @@ class Tracker:
             faced_s=t_s if detection.R_world_face is not None else -inf,
         )
         self._learn_size(track, detection, 1.0)
-        _learn_shape(track, detection)
         track.clothes.learn(detection.clothing)
         _correct_velocity(track, detection)
         if track.is_person:
@@ -369,12 +360,6 @@ class Tracker:
     ) -> None:
         """Update a track with a detection."""
         place = correct_distance(track, detection, p_camera)
-        covered = _is_covered(track, detection)
-        if covered:
-            place = _covered_position(track, detection, place, p_camera)
-        else:
-            track.covered_frames, track.cover_share = 0, 1.0
-            _learn_shape(track, detection)
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
         if track.is_person:
@@ -394,8 +379,7 @@ class Tracker:
                 track.R_world_face, track.face_length = R, detection.face_length
             else:
                 track.R_world_face = blend(before, R, _TURN_GAIN)
-                if not covered:
-                    track.face_length += _GAIN * (detection.face_length - track.face_length)
+                track.face_length += _GAIN * (detection.face_length - track.face_length)
         self._learn_size(track, detection, _GAIN)
         track.detection = detection
 
@@ -416,50 +400,6 @@ def _person(track: BodyTrack) -> SeenPerson:
         size = before.face_size if size is None else size
         worn = before.colours if worn is None else worn
     return SeenPerson(track.id, track.p_world_m, track.seen_s, size, worn)
-
-
-def _is_covered(track: BodyTrack, found: LocalisedDetection) -> bool:
-    """Return whether the lower half of a face is covered, e.g. by a hand, which falsifies its size.
-
-    The network places hidden points nearer to the visible ones, so the face seems farther away.
-    """
-    if found.depth_measured or track.uncovered_frames < _BARE or not found.lower_face > 0.0:
-        return False
-    # The points of a far face jump more than those of a near one.
-    least = min(_COVERED, 1.0 - _COVERED_SDS * sqrt(track.lower_var))
-    if found.lower_face < (0.5 + 0.5 * least if track.covered_frames else least) * track.lower_face:
-        track.covered_s = track.at_s
-    return track.at_s - track.covered_s <= _COVERED_S
-
-
-def _covered_position(
-    track: BodyTrack, found: LocalisedDetection, place: Vec3, p_camera: Vec3
-) -> Vec3:
-    """Return the position of a covered face: its last distance, corrected for its motion since.
-
-    Half of the correction is from its points and half from its box, whose error is opposite.
-    """
-    measured = sub(place, p_camera)
-    share = sqrt(track.box_m / found.box_m)
-    now = track.filter.range_m / (share * max(norm(measured), NEAREST_M))
-    track.covered_frames += 1
-    gain = max(1.0 / track.covered_frames, _COVER_GAIN)
-    track.cover_share += gain * (min(max(now, 1.0 / _MOST_OFF), _MOST_OFF) - track.cover_share)
-    return add(p_camera, scale(measured, share * track.cover_share))
-
-
-def _learn_shape(track: BodyTrack, found: LocalisedDetection) -> None:
-    """Learn the sizes of the box and the lower half of a face while nothing covers it."""
-    if not (found.box_m > 0.0 and found.lower_face > 0.0):
-        return
-    track.uncovered_frames += 1
-    gain = max(1.0 / track.uncovered_frames, _SHAPE_GAIN)
-    track.box_m += gain * (found.box_m - track.box_m)
-    off = found.lower_face - track.lower_face
-    track.lower_face += gain * off
-    gain = max(1.0 / (track.uncovered_frames + _BARE), _SHAPE_GAIN)
-    if track.uncovered_frames > 1:
-        track.lower_var += gain * ((off / track.lower_face) ** 2 - track.lower_var)
 
 
 def _is_another_now(track: BodyTrack, renamed: set[int]) -> bool:
