@@ -17,22 +17,23 @@ OWN = "own"
 """Kind of bodies that belong to the robot itself and are never targets."""
 
 
-def are_visible(bodies: BodyRows, state: GazeState) -> list[bool]:
-    """Return whether each body's centre is in the field of at least one eye.
+def visible_bodies(bodies: BodyRows, state: GazeState) -> dict[int, str]:
+    """Return id and kind of the bodies whose centre is in the field of at least one eye.
 
     Args:
         bodies: the bodies.
         state: head and eyes.
     """
     left, right = eye_axes(state, left=True), eye_axes(state, left=False)
-    return [
-        kind != OWN
+    return {
+        id: kind
+        for id, p, kind in zip(bodies.ids, bodies.p_world_m, bodies.kinds, strict=True)
+        if kind != OWN
         and (
             _is_inside(p, state.p_world_eye_left_m, left, left=True)
             or _is_inside(p, state.p_world_eye_right_m, right, left=False)
         )
-        for p, kind in zip(bodies.p_world_m, bodies.kinds, strict=True)
-    ]
+    }
 
 
 def _is_inside(p: list[float], p_eye: Vec3, axes: Mat3, left: bool) -> bool:

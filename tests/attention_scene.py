@@ -67,7 +67,7 @@ def salience(
     gaze: Vec3 = (1.0, 0.0, 0.0),
     in_view: bool = True,
 ) -> Terms:
-    rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, [in_view] * len(seen))
+    rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, seen.ids if in_view else ())
     return Terms(*(np.array([getattr(row, name) for row in rows]) for name in Terms._fields))
 
 

@@ -10,7 +10,7 @@ from attention_scene import FACE, attention, body, looking, percept, salience, w
 
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
 from gazerig.gaze.attention.top_down import Rule, TopDownParams
-from gazerig.gaze.field_of_view import are_visible
+from gazerig.gaze.field_of_view import visible_bodies
 from gazerig.gaze.types import Bodies, Percept
 
 
@@ -60,13 +60,13 @@ def test_pulls_rise_with_the_time_constant() -> None:
 def test_field_of_both_eyes(yaw: float, pitch: float, seen: bool) -> None:
     y, p = radians(yaw), radians(pitch)
     far = (100 * np.cos(p) * np.cos(y), 100 * np.cos(p) * np.sin(y), 100 * np.sin(p))
-    assert are_visible(bodies(body(1, "x", far)).rows(), looking()) == [seen]
+    assert bool(visible_bodies(bodies(body(1, "x", far)).rows(), looking())) is seen
 
 
 def test_field_turns_with_the_eyes() -> None:
     behind = bodies(body(1, "x", (-0.5, 100.0, 0.0))).rows()
-    assert are_visible(behind, looking(40.0)) == [True]
-    assert are_visible(behind, looking(-40.0)) == [False]
+    assert visible_bodies(behind, looking(40.0)) == {1: "x"}
+    assert visible_bodies(behind, looking(-40.0)) == {}
 
 
 def test_the_face_wins_over_a_resting_hand_and_loses_to_a_waving_one() -> None:
@@ -159,12 +159,12 @@ def test_what_only_one_eye_sees_is_seen() -> None:
     left = (100 * cos(radians(80)), 100 * sin(radians(80)), 0.0)
     right = (left[0], -left[1], 0.0)
     both = bodies(body(1, "x", left), body(2, "x", right)).rows()
-    assert are_visible(both, looking()) == [True, True]
+    assert visible_bodies(both, looking()).keys() == {1, 2}
     # With the left eye turned in, nothing sees the left body any more, and vice versa.
     turned = looking()._replace(eye_left_rad=(radians(-30), 0.0))
-    assert are_visible(both, turned) == [False, True]
+    assert visible_bodies(both, turned).keys() == {2}
     turned = looking()._replace(eye_right_rad=(radians(30), 0.0))
-    assert are_visible(both, turned) == [True, False]
+    assert visible_bodies(both, turned).keys() == {1}
 
 
 def test_ones_own_body_is_not_looked_at_however_it_moves() -> None:

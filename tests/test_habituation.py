@@ -63,7 +63,7 @@ def stays_s(targets: list[Target]) -> list[float]:
 
 
 def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> list[float]:
-    return model.step(seen.rows(), EYE, attended, t_s)
+    return [*model.step(seen.rows(), EYE, attended, t_s).values()]
 
 
 def test_interest_falls_while_attended_and_recovers_otherwise() -> None:
@@ -90,12 +90,11 @@ def test_interest_outlives_an_absence() -> None:
 def test_a_rule_keeps_its_floor_of_interest() -> None:
     """A second of looking, at a body of half the weight, is a lead of two."""
     model = Habituation(HabituationParams(rule_floor=0.6, decay_rate_1_s=0.3), NO_STAYS)
-    assert model.share([1, 2], [1.0, 0.5], 1, 0.0) == pytest.approx([1.0, 1.0], abs=0.01)
-    assert model.share([1, 2], [1.0, 0.5], 2, 1.0)[0] == 1.0
-    assert model.share([1, 2], [1.0, 0.5], -1, 1.0)[1] == pytest.approx(
-        0.6 + 0.4 * exp(-0.6), abs=0.01
-    )
-    assert model.share([2], [0.5], 2, 9.0) == [1.0]  # one alone is not left for habituation
+    two = {1: 1.0, 2: 0.5}
+    assert model.share(two, 1, 0.0) == pytest.approx({1: 1.0, 2: 1.0}, abs=0.01)
+    assert model.share(two, 2, 1.0)[1] == 1.0
+    assert model.share(two, -1, 1.0)[2] == pytest.approx(0.6 + 0.4 * exp(-0.6), abs=0.01)
+    assert model.share({2: 0.5}, 2, 9.0) == {2: 1.0}  # one alone is not left for habituation
 
 
 @pytest.mark.parametrize(("aside_deg", "age_s"), [(0.0, 0.0), (4.0, 0.0), (4.0, 1.5), (20.0, 0.0)])

@@ -170,9 +170,9 @@ def test_e76_glances_go_to_what_is_in_view_and_to_what_was_there_lately() -> Non
     for k in range(30_000):
         t = k * DT
         if k < 20_000:
-            model.record_seen(list(THINGS), list(THINGS.values()), t)
+            model.record_seen(THINGS, t)
         elif k == 20_000:
-            model.record_seen((), (), t)
+            model.record_seen({}, t)
         now = model.step(t)
         for name, place in THINGS.items():
             on[name] += norm(sub(now.p_world_m, place)) < 1e-6 and k < 20_000
@@ -186,7 +186,7 @@ def test_no_glance_jumps_to_a_place_far_aside() -> None:
     model, far = idle(3), (0.8, -0.95, 0.2)  # 50 deg
     found = []
     for k in range(40_000):
-        model.record_seen((4, 5), ((1.0, -0.5, 0.2), far), k * DT)
+        model.record_seen({4: (1.0, -0.5, 0.2), 5: far}, k * DT)
         found.append(model.step(k * DT))
     sizes = [step_deg(a, b) for a, b in pairwise(found) if a.id != b.id]
     assert max(sizes) <= 33.0
@@ -196,14 +196,14 @@ def test_no_glance_jumps_to_a_place_far_aside() -> None:
 def test_a_thing_that_no_longer_moves_is_not_searched_for() -> None:
     model = idle(2)
     model.remember(seen()._replace(kind="thing"))
-    model.record_seen((3,), ((1.0, 0.2, 0.2),), 0.5)
+    model.record_seen({3: (1.0, 0.2, 0.2)}, 0.5)
     assert {t.kind for t in run(model, 0.5, 6.0)} == {"rest", "glance"}
 
 
 def test_more_things_than_can_be_remembered_push_out_the_oldest() -> None:
     model = idle(2)
     for name in range(100):
-        model.record_seen((name,), ((1.0, 0.001 * name, 0.2),), 0.0)
+        model.record_seen({name: (1.0, 0.001 * name, 0.2)}, 0.0)
     assert len(model._seen) == 16 and 99 in model._seen and 0 not in model._seen
 
 

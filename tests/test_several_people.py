@@ -28,27 +28,27 @@ def test_e88_of_people_unlike_the_nearer_get_more_and_nobody_nothing() -> None:
 
 
 def test_surpluses_grow_with_the_looks_and_are_those_over_the_one_looked_at_least() -> None:
-    shared = sharing()
-    assert shared.surpluses([1, 2, 3], [1.0, 1.0, 1.0], -1, 0.0) == [0.0, 0.0, 0.0]
-    assert shared.surpluses([1, 2, 3], [1.0, 1.0, 1.0], 2, 0.5) == pytest.approx([0.0, 0.5, 0.0])
+    shared, three = sharing(), dict.fromkeys((1, 2, 3), 1.0)
+    assert shared.surpluses(three, -1, 0.0) == {1: 0.0, 2: 0.0, 3: 0.0}
+    assert shared.surpluses(three, 2, 0.5) == pytest.approx({1: 0.0, 2: 0.5, 3: 0.0})
     # A new person is behind no one; the heaviest of similar ones comes first.
-    assert shared.surpluses([2, 4], [0.5, 1.0], 4, 0.5)[1] == 0.0
-    surpluses = shared.surpluses([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
-    assert surpluses[2] == 0.0 and surpluses[0] == pytest.approx(0.4) and 0.45 < surpluses[1] < 0.5
+    assert shared.surpluses({2: 0.5, 4: 1.0}, 4, 0.5)[4] == 0.0
+    found = shared.surpluses({1: 1.0, 2: 0.5, 4: 1.0}, 1, 0.9)
+    assert found[4] == 0.0 and found[1] == pytest.approx(0.4) and 0.45 < found[2] < 0.5
 
 
 def test_a_look_at_a_body_of_half_the_weight_counts_twice() -> None:
-    shared = sharing()
-    shared.surpluses([1, 2], [1.0, 0.5], -1, 0.0)
-    shared.surpluses([1, 2], [1.0, 0.5], 1, 1.0)
-    assert shared.surpluses([1, 2], [1.0, 0.5], 2, 1.5)[0] == pytest.approx(0.0, abs=0.1)
+    shared, two = sharing(), {1: 1.0, 2: 0.5}
+    shared.surpluses(two, -1, 0.0)
+    shared.surpluses(two, 1, 1.0)
+    assert shared.surpluses(two, 2, 1.5)[1] == pytest.approx(0.0, abs=0.1)
 
 
 def test_surpluses_are_bounded_fade_and_are_forgotten() -> None:
-    shared, all_three, alike = sharing(), [1, 2, 3], [1.0, 1.0, 1.0]
+    shared, three = sharing(), dict.fromkeys((1, 2, 3), 1.0)
     for k in range(100):
-        surpluses = shared.surpluses(all_three, alike, 1, 0.5 * k)
-    assert surpluses == [8.0, 0.0, 0.0]
-    assert 0.0 < shared.surpluses(all_three, alike, -1, 60.0)[0] < 3.0
+        found = shared.surpluses(three, 1, 0.5 * k)
+    assert found == {1: 8.0, 2: 0.0, 3: 0.0}
+    assert 0.0 < shared.surpluses(three, -1, 60.0)[1] < 3.0
     shared.reset(60.0)
-    assert shared.surpluses(all_three, alike, -1, 60.0) == [0.0, 0.0, 0.0]
+    assert shared.surpluses(three, -1, 60.0) == {1: 0.0, 2: 0.0, 3: 0.0}

@@ -8,9 +8,9 @@ which the paper's comparison needs: so the gaze does not leave a single person b
 several people share it.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import dist, inf
-from operator import mul
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -23,10 +23,9 @@ from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.attention.reaction import Reaction
 from gazerig.gaze.attention.top_down import RuleTarget, TopDown
-from gazerig.gaze.field_of_view import are_visible, line_of_sight
+from gazerig.gaze.field_of_view import line_of_sight, visible_bodies
 from gazerig.gaze.types import (
     Bodies,
-    BodyRows,
     GazeState,
     Percept,
     Salience,
@@ -91,13 +90,6 @@ class _Comparison(NamedTuple):
     bodies: Bodies
     saliences: list[Salience]
     rule_target: RuleTarget | None
-
-    @property
-    def best(self) -> int:
-        """Return the row with the largest total, -1 without any visible one."""
-        totals = [one.total for one in self.saliences]
-        most = max(totals, default=-inf)
-        return totals.index(most) if most > -inf else -1
 
     def target(self, row: int, captured_s: float, plan: str) -> Target:
         """Return the target of a row, with its reason."""
@@ -259,23 +251,26 @@ class Attention:
         trait = self.top_down.rule.person
         self.top_down.named_ids = self._persons.ids_with_trait(trait) if trait else _NO_ONE
         made = self._compare(percept, bodies, state, t_s)
-        best = made.best
+        total = [one.total for one in made.saliences]
+        best = max(range(len(total)), key=total.__getitem__, default=-1)
         if best < 0 or self._is_faint(made.saliences[best]):
             self._reaction.drop()
-            seen = [row for row in range(len(bodies)) if made.saliences[row].total > -inf]
-            places = [vec(bodies.p_world_m[row]) for row in seen]
-            self._idle.record_seen([bodies.ids[row] for row in seen], places, t_s)
+            seen = [row for row in range(len(bodies)) if total[row] > -inf]
+            self._idle.record_seen(
+                {bodies.ids[row]: vec(bodies.p_world_m[row]) for row in seen}, t_s
+            )
             return None
         changed = self._behaviour != self.top_down.behaviour
         if changed:
             self._behaviour, self._changed_s = self.top_down.behaviour, t_s
         present, row = self._target_row(made), best
         if present is not None:
-            favoured = made.saliences[present].total * self._params.hysteresis_ratio
-            row = present if made.saliences[best].total < favoured else best
-        named = made.rule_target is not None and row in made.rule_target.rows
+            favoured = total[present] * self._params.hysteresis_ratio
+            row = present if total[best] < favoured else best
+        id = made.saliences[row].id
+        named = made.rule_target is not None and id in made.rule_target.ids
         if named:
-            self._habituation.start_stay(bodies.ids[row])
+            self._habituation.start_stay(id)
         plan = self.top_down.plan_text
         winner = made.target(row, captured_s, plan)
         # A change of behaviour waits neither for a reaction nor for the end of a fixation.
@@ -289,65 +284,62 @@ class Attention:
         return self._target and self._target._replace(plan=plan)
 
     def _is_faint(self, best: Salience) -> bool:
-        """Return whether the most salient one is a thing that gets only glances: gaze is idle."""
+        """Return whether nothing is visible but things that get only glances: gaze is idle."""
         faint = best.total < self._bottom_up.least_salience
-        return faint and best.kind != "face" and best.id != NO_BODY
+        return best.total == -inf or (faint and best.kind != "face" and best.id != NO_BODY)
 
     def _compare(
         self, percept: Percept, bodies: Bodies, state: GazeState, t_s: float
     ) -> _Comparison:
         """Return the saliences that the decision compares."""
-        eye, rows = state.p_world_head_m, bodies.rows()
-        ids, attended = bodies.ids, self._identity[1]
-        worth = self._worth(percept, ids)
-        seen = are_visible(rows, state)
+        eye, rows, attended = state.p_world_head_m, bodies.rows(), self._identity[1]
+        seen = visible_bodies(rows, state)
         gaze = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
         v_eye = self._eye_velocity(eye, t_s)
         raised, own = self._persons.raised, self._persons.parts if self._social else {}
         motion = self._bottom_up.step(rows, eye, t_s, v_eye, gaze, seen, raised, own)
-        rule_target = self.top_down.step(rows, seen)
-        factors = [*map(mul, self._habituation.step(rows, eye, attended, t_s), worth)]
-        if not self.top_down.plans:  # fists must be watched
-            self._persons.weaken_known(factors, ids, self._habituation.is_on, self._social)
-        rule = [0.0] * len(ids)
-        point = []
-        if rule_target is not None:
-            if self._share is not None and self.top_down.rule.kind == "face":
-                urgent = _URGENT if t_s - self._reported_s < _TURNS_S else 1.0
-                least = _IN_CONVERSATION * urgent
-                rule_target = rule_target._replace(salience=max(rule_target.salience, least))
-            shares = self._rule_shares(rule_target, rows, worth, eye, t_s)
-            for row, share in zip(rule_target.rows, shares, strict=True):
-                rule[row], factors[row] = rule_target.salience, share
-            if rule_target.p_world_m is not None:
-                amount = rule_target.salience
-                point = [Salience(NO_BODY, rule_target.kind, rule=amount, total=amount)]
-        # The motion of a person's own body counts in the next decision.
-        self._gestures = {}
-        for one in motion:
-            if (owner := own.get(one.id)) is not None:
-                moved = (one.total - one.onset) * (1.0 / OWN_MOTION - 1.0)
-                self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
-        saliences = [
-            one._replace(
-                rule=wanted,
-                habituation=factor,
-                total=max(one.total, wanted) * factor if there else -inf,
-            )
-            for one, wanted, factor, there in zip(motion, rule, factors, seen, strict=True)
-        ]
-        return _Comparison(bodies, saliences + point, rule_target)
-
-    def _worth(self, percept: Percept, ids: tuple[int, ...]) -> list[float]:
-        """Return a further factor of each body: of faces that look elsewhere."""
         elsewhere = {
             face.id
             for face in percept.faces
             if self._social and face.looks_at_head is False and not face.speaks
         }
-        return [_LOOKS_ELSEWHERE if id in elsewhere else 1.0 for id in ids]
+        worth = {id: _LOOKS_ELSEWHERE if id in elsewhere else 1.0 for id in rows.ids}
+        left = self._habituation.step(rows, eye, attended, t_s)
+        factors = {id: one * worth[id] for id, one in left.items()}
+        if not self.top_down.plans:  # fists must be watched
+            self._persons.weaken_known(factors, self._habituation.is_on, self._social)
+        rule_target, rule = self.top_down.step(seen), 0.0
+        shares: dict[int, float] = {}
+        point = []
+        if rule_target is not None:
+            rule = rule_target.salience
+            if self._share is not None and self.top_down.rule.kind == "face":
+                urgent = _URGENT if t_s - self._reported_s < _TURNS_S else 1.0
+                rule = max(rule, _IN_CONVERSATION * urgent)
+            if rule_target.p_world_m is not None:
+                point = [Salience(NO_BODY, rule_target.kind, rule=rule, total=rule)]
+            else:
+                away = {
+                    id: max(dist(p, eye), 1e-3)
+                    for id, p in zip(rows.ids, rows.p_world_m, strict=True)
+                    if id in rule_target.ids
+                }
+                shares = self._rule_shares(away, worth, t_s)
+        # The motion of a person's own body counts in the next decision.
+        self._gestures = {}
+        saliences = []
+        for one in motion:
+            if (owner := own.get(one.id)) is not None:
+                moved = (one.total - one.onset) * (1.0 / OWN_MOTION - 1.0)
+                self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
+            factor, wanted = shares.get(one.id, factors[one.id]), 0.0
+            if one.id in shares:
+                wanted = rule
+            total = max(one.total, wanted) * factor if one.id in seen else -inf
+            saliences.append(one._replace(rule=wanted, habituation=factor, total=total))
+        return _Comparison(bodies, saliences + point, rule_target)
 
-    def _favoured(self, ids: list[int], t_s: float) -> tuple[frozenset[int], float]:
+    def _favoured(self, ids: Iterable[int], t_s: float) -> tuple[frozenset[int], float]:
         """Return the people who have a share of the looks together, and that share.
 
         A mouth shows late who speaks, so a partner just reported is favoured above speakers.
@@ -361,44 +353,34 @@ class Attention:
         return found, share
 
     def _rule_shares(
-        self, rule_target: RuleTarget, rows: BodyRows, worth: list[float], eye: Vec3, t_s: float
-    ) -> list[float]:
-        """Return the factor 0..1 of each body that a rule selects, 1 for the strongest."""
-        wanted, habituation = rule_target.rows, self._habituation
-        if not wanted:
-            return []
-        named = [rows.ids[row] for row in wanted]
-        mine = [worth[row] * (1.0 + self._gestures.get(rows.ids[row], 0.0)) for row in wanted]
-        weights = mine
-        if self._social:
-            away = [max(dist(rows.p_world_m[row], eye), 1e-3) for row in wanted]
-            nearest = min(away)
-            weights = [
-                (nearest / one) ** _NEARNESS * own for one, own in zip(away, mine, strict=True)
-            ]
-        weights = self._favour_speakers(named, weights, t_s)
-        factors = habituation.share(named, weights, self._identity[1], t_s)
-        stay = _STAY if self._social else 1.0
-        shares = [
-            factor * one * (stay if id == habituation.stays_at else 1.0)
-            for id, factor, one in zip(named, factors, mine, strict=True)
-        ]
-        if t_s - self._turned_s < _TURNS_S and (favoured := self._favoured(named, t_s)[0]):
-            shares = [one if id in favoured else 0.0 for id, one in zip(named, shares, strict=True)]
-        most = max(*shares, 1e-9)
-        return [one / most for one in shares]
+        self, away_m: Mapping[int, float], worth: Mapping[int, float], t_s: float
+    ) -> dict[int, float]:
+        """Return the factor 0..1 of each body that a rule selects, 1 for the strongest.
 
-    def _favour_speakers(self, ids: list[int], weights: list[float], t_s: float) -> list[float]:
-        """Return the weights of people, in which those who may speak have their share."""
-        speaking, share = self._favoured(ids, t_s)
-        spoken = sum(one for id, one in zip(ids, weights, strict=True) if id in speaking)
-        mute = sum(weights) - spoken
-        if share == 0.0 or spoken <= 0.0 or mute <= 0.0:
-            return weights
-        ratio = max(1.0, share / (1.0 - share) * mute / spoken)
-        return [
-            ratio * one if id in speaking else one for id, one in zip(ids, weights, strict=True)
-        ]
+        away_m: their distances by id
+        worth: further factor of each body
+        """
+        mine = {id: worth[id] * (1.0 + self._gestures.get(id, 0.0)) for id in away_m}
+        weights, stay = mine, 1.0
+        if self._social:
+            nearest, stay = min(away_m.values()), _STAY
+            weights = {id: (nearest / away_m[id]) ** _NEARNESS * one for id, one in mine.items()}
+        # Those who may speak have their share.
+        favoured, share = self._favoured(mine, t_s)
+        spoken = sum(one for id, one in weights.items() if id in favoured)
+        mute = sum(weights.values()) - spoken
+        if share > 0.0 and spoken > 0.0 and mute > 0.0:
+            ratio = max(1.0, share / (1.0 - share) * mute / spoken)
+            weights = {id: one * ratio if id in favoured else one for id, one in weights.items()}
+        factors = self._habituation.share(weights, self._identity[1], t_s)
+        stays_at = self._habituation.stays_at
+        shares = {
+            id: factors[id] * one * (stay if id == stays_at else 1.0) for id, one in mine.items()
+        }
+        if favoured and t_s - self._turned_s < _TURNS_S:
+            shares = {id: one if id in favoured else 0.0 for id, one in shares.items()}
+        most = max(*shares.values(), 1e-9)
+        return {id: one / most for id, one in shares.items()}
 
     def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
         """Return the velocity of the eyes by the head's motion since the last decision, m/s."""
@@ -410,10 +392,12 @@ class Attention:
     def _target_row(self, made: _Comparison) -> int | None:
         """Return the row of the present target, None if it has disappeared."""
         kind, id = self._identity
-        for row, one in enumerate(made.saliences):
-            if one.id == id and one.total > -inf and (id != NO_BODY or one.kind == kind):
-                return row
-        return None
+        there = (
+            row
+            for row, one in enumerate(made.saliences)
+            if one.id == id and one.total > -inf and (id != NO_BODY or one.kind == kind)
+        )
+        return next(there, None)
 
 
 def _terms(salience: Salience) -> str:

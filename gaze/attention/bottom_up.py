@@ -162,7 +162,7 @@ class BottomUp:
         t_s: float,
         v_world_eye_m_s: Vec3,
         gaze_world: Vec3,
-        seen: Sequence[bool],
+        seen: Collection[int],
         raised: Collection[int] = (),
         own: Collection[int] = (),
     ) -> list[Salience]:
@@ -176,7 +176,7 @@ class BottomUp:
             t_s: time of the frame.
             v_world_eye_m_s: velocity of the eye itself; the literal form ignores it.
             gaze_world: gaze direction, any length; only the literal form needs it.
-            seen: which bodies are in view.
+            seen: ids of the bodies in view.
             raised: ids of raised hands.
             own: ids of people's own hands and clothes, of whose motion only a share counts.
         """
@@ -191,7 +191,7 @@ class BottomUp:
         found = []
         for i, id in enumerate(rows.ids):
             state = states.get(id)
-            if not seen[i]:
+            if id not in seen:
                 if state is not None:
                     state.slide = state.loom = state.spin = 0.0
                 found.append(Salience(id, rows.kinds[i]))

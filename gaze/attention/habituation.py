@@ -17,7 +17,7 @@ heavier bodies, are shorter for more bodies, and total times are in proportion t
 matching law (Herrnstein 1961).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import acos, exp, log, radians, sqrt
 from typing import Annotated, Literal, NamedTuple
@@ -121,14 +121,14 @@ class Habituation:
 
     def step(
         self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
-    ) -> list[float]:
-        """Return the factor 0..1 of each body's salience.
+    ) -> dict[int, float]:
+        """Return the factor 0..1 of each body's salience by its id.
 
         attended_id: id of the gaze target since the previous step; -1 for none
         """
         par, dt_s, self._at_s = self.params, max(0.0, t_s - self._at_s), t_s
         if isinstance(par, str):
-            return [1.0] * len(rows.ids)
+            return dict.fromkeys(rows.ids, 1.0)
         # The factor of the attended body falls, those of the rest rise.
         risen = _RECOVERY_1_S * dt_s
         attended = max(0.0, self._habituation.pop(attended_id, 1.0) - par.decay_rate_1_s * dt_s)
@@ -138,66 +138,61 @@ class Habituation:
         if attended_id >= 0 and attended < 1.0:
             self._habituation[attended_id] = attended
         self._left = [one for one in self._left if t_s - one.at_s < 4.0 * _RETURN_S]
-        return [
-            self._habituation.get(id, 1.0)
+        return {
+            id: self._habituation.get(id, 1.0)
             * (1.0 if id == attended_id else self._return_factor(p, p_world_eye_m, t_s))
             for id, p in zip(rows.ids, rows.p_world_m, strict=True)
-        ]
+        }
 
-    def share(
-        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
-    ) -> list[float]:
+    def share(self, weights: Mapping[int, float], attended_id: int, t_s: float) -> dict[int, float]:
         """Return the factor 0..1 of each of several bodies that a rule selects.
 
         A single body keeps 1: habituation does not make the gaze leave a rule's only body.
 
         Args:
-            ids: the bodies that share the gaze.
-            weights: weight of each; viewing times are in proportion to them.
+            weights: weight of each by its id; viewing times are in proportion to them.
             attended_id: id of the gaze target since the previous step; -1 for none.
             t_s: present time, seconds.
         """
         par = self.params
         if isinstance(par, str):
-            return [1.0] * len(ids)
-        surpluses = self.surpluses(ids, weights, attended_id, t_s)
-        if len(ids) <= _FEW and self.stays_at in ids:
-            surpluses[ids.index(self.stays_at)] -= self._stay_s
-        return [
-            par.rule_floor + (1.0 - par.rule_floor) * exp(-par.decay_rate_1_s * max(0.0, one))
-            for one in surpluses
-        ]
+            return dict.fromkeys(weights, 1.0)
+        surpluses = self.surpluses(weights, attended_id, t_s)
+        if len(weights) <= _FEW and self.stays_at in weights:
+            surpluses[self.stays_at] -= self._stay_s
+        return {
+            id: par.rule_floor + (1.0 - par.rule_floor) * exp(-par.decay_rate_1_s * max(0.0, one))
+            for id, one in surpluses.items()
+        }
 
     def surpluses(
-        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
-    ) -> list[float]:
+        self, weights: Mapping[int, float], attended_id: int, t_s: float
+    ) -> dict[int, float]:
         """Return the surplus of each body in seconds, 0 for the least viewed one.
 
         Args:
-            ids: the bodies that share the gaze now. A new one starts without a deficit.
-            weights: weight of each, above 0; only their ratios matter.
+            weights: weight of each body that shares the gaze now, above 0; only their ratios
+                matter. A new body starts without a deficit.
             attended_id: the target since the last step; -1 for none.
             t_s: present time, seconds.
         """
         dt_s, self._shared_s = max(0.0, t_s - self._shared_s), t_s
-        if len(ids) <= 1:
-            return [0.0] * len(ids)
-        most = max(*weights, 1e-9)
-        surpluses = []
-        for id, weight in zip(ids, weights, strict=True):
+        if len(weights) <= 1:
+            return dict.fromkeys(weights, 0.0)
+        most = max(*weights.values(), 1e-9)
+        surpluses = {}
+        for id, weight in weights.items():
             share = max(weight / most, 1e-3)
             known = self._surpluses.get(id)
             if known is None:
                 surplus = _FIRST_S * (1.0 - share)
             else:
                 surplus = known.surplus_s * exp((known.at_s - t_s) / _FADES_S)
-            surpluses.append(surplus + (dt_s / share if id == attended_id else 0.0))
-        least = min(surpluses)
-        surpluses = [min(surplus - least, _LARGEST_S) for surplus in surpluses]
-        self._surpluses.update(
-            (id, _Surplus(surplus, t_s)) for id, surplus in zip(ids, surpluses, strict=True)
-        )
-        if len(self._surpluses) > 2 * len(ids):
+            surpluses[id] = surplus + (dt_s / share if id == attended_id else 0.0)
+        least = min(surpluses.values())
+        surpluses = {id: min(one - least, _LARGEST_S) for id, one in surpluses.items()}
+        self._surpluses |= {id: _Surplus(one, t_s) for id, one in surpluses.items()}
+        if len(self._surpluses) > 2 * len(weights):
             self._surpluses = {
                 k: one for k, one in self._surpluses.items() if t_s - one.at_s < _KEPT_S
             }

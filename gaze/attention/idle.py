@@ -17,7 +17,7 @@ glance is a shift of gaze. The resting point is "rest" with id -1. Directions ar
 above the neck base at the resting height.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, degrees, exp, hypot, inf, log, pi, radians, sin, sqrt
 from typing import Annotated
@@ -131,10 +131,10 @@ class Idle:
         if target.id >= 0:
             self._remember_place(target.id, target.p_world_m, target.at_s)
 
-    def record_seen(self, ids: Sequence[int], p_world_m: Sequence[Vec3], t_s: float) -> None:
-        """Record the bodies in view, salient or not."""
-        self._in_view = frozenset(ids)
-        for id, place in zip(ids, p_world_m, strict=True):
+    def record_seen(self, places: Mapping[int, Vec3], t_s: float) -> None:
+        """Record the bodies in view by their ids, salient or not."""
+        self._in_view = frozenset(places)
+        for id, place in places.items():
             self._remember_place(id, place, t_s)
 
     def forget_places(self) -> None:

@@ -9,7 +9,7 @@ is the one with the face nearest to it. Each further change of side of a hand at
 motion less new: people look less and less at repeated motion (Neo & Chua 2006).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import dist, exp, hypot, inf
 
@@ -226,26 +226,23 @@ class Persons:
             return -1 if high else owner
         return -1
 
-    def weaken_known(
-        self, factors: list[float], ids: Sequence[int], repeats: bool, sinks: bool
-    ) -> None:
+    def weaken_known(self, factors: dict[int, float], repeats: bool, sinks: bool) -> None:
         """Lower the factors of hands that repeat their motion or move down.
 
         The first change of side soon after another is still new. A hand that moves down has no
         salience: it is at the end of its gesture.
 
         Args:
-            factors: factor of each body, changed in place.
-            ids: ids of the bodies.
+            factors: factor of each body by its id, changed in place.
             repeats: whether repeated motion counts for less.
             sinks: whether motion down does.
         """
-        for row, id in enumerate(ids):
-            hand = self._hands.get(id)
-            if hand is not None and sinks and self._at_s - hand.sank_s <= _SANK_S:
-                factors[row] = 0.0
-            if hand is not None and repeats and hand.repeats > 1.0:
-                factors[row] *= _KNOWN ** (hand.repeats - 1.0)
+        for id in factors.keys() & self._hands.keys():
+            hand = self._hands[id]
+            if sinks and self._at_s - hand.sank_s <= _SANK_S:
+                factors[id] = 0.0
+            if repeats and hand.repeats > 1.0:
+                factors[id] *= _KNOWN ** (hand.repeats - 1.0)
 
     def _drop_old(self) -> None:
         """Drop people and hands that have not been visible for a long time."""

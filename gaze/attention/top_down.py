@@ -10,13 +10,13 @@ With an action planner (gazerig.gaze.attention.action_planner) the behaviour fol
 percept. A user's choice overrides it until they return to the planner (``PLANNED``).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, NamedTuple
 
 from gazerig.gaze.attention.action_planner import ACTIONS, ActionPlanner
 from gazerig.gaze.attention.persons import TRAITS
-from gazerig.gaze.types import BodyRows, Percept, Vec3
+from gazerig.gaze.types import Percept, Vec3
 from gazerig.params import Bounds
 
 _ID, _PERSON, _POINT = "id", "person", "point"
@@ -115,13 +115,13 @@ class TopDownParams:
 class RuleTarget(NamedTuple):
     """Targets of the present rule.
 
-    rows: rows of the selected bodies; none for a place
+    ids: the selected bodies; none for a place
     salience, behaviour: the rule's constant and name
     p_world_m, v_world_m_s: the selected place and its velocity; None for bodies
     kind: kind of the place
     """
 
-    rows: list[int]
+    ids: Collection[int]
     salience: float
     behaviour: str
     p_world_m: Vec3 | None = None
@@ -210,22 +210,21 @@ class TopDown:
         if self._by_user:
             self.behaviour = behaviour
 
-    def step(self, bodies: BodyRows, seen: list[bool]) -> RuleTarget | None:
+    def step(self, seen: Mapping[int, str]) -> RuleTarget | None:
         """Return the rule's targets among the bodies in view, None without any.
 
-        seen: which bodies are in view
+        seen: id and kind of the bodies in view
         """
         rule, plan, at = self.rule, self._planner.plan, (self.rule.salience, self.behaviour)
         if self.plans and rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
-            return RuleTarget([], *at, plan.p_world_m, plan.v_world_m_s, ATTACK_TARGET)
+            return RuleTarget((), *at, plan.p_world_m, plan.v_world_m_s, ATTACK_TARGET)
         if rule.point_world_m is not None:
-            return RuleTarget([], *at, rule.point_world_m)
-        number = rule.body_id
-        if self.plans and rule.look_at == GUARD_TARGET:
-            number = plan.body_id
-        named: Sequence[object] = bodies.kinds if number is None else bodies.ids
-        wanted = rule.kind if number is None else number
-        rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
-        if self.named_ids:
-            rows = [i for i in rows if bodies.ids[i] in self.named_ids] or rows
-        return RuleTarget(rows, *at) if rows else None
+            return RuleTarget((), *at, rule.point_world_m)
+        guarded = self.plans and rule.look_at == GUARD_TARGET
+        number = plan.body_id if guarded else rule.body_id
+        if number is None:
+            ids = [id for id, kind in seen.items() if kind == rule.kind]
+        else:
+            ids = [number] if number in seen else []
+        named = [id for id in ids if id in self.named_ids]
+        return RuleTarget(named or ids, *at) if ids else None
