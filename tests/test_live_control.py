@@ -58,7 +58,7 @@ class Rig:
         self.tuning = FileOnly(self.path)
         self.said: list[str] = []
         self.live = LiveServer(
-            Robot(),
+            Robot(),  # type: ignore[arg-type]
             self.tuning,  # type: ignore[arg-type]
             (ConfigError,),
             SimulatedClock(),

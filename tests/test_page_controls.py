@@ -50,7 +50,7 @@ from gazerig.robot.dashboard.requests.page_requests import PAGE, PageRequestHand
 from gazerig.robot.dashboard.widgets.widget import Slider, TextField
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value, set_client
-from gazerig.robot.model.parameter import JsonValue, Parameter
+from gazerig.robot.model.parameter import Parameter
 
 
 @contextmanager
@@ -408,7 +408,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
     ("kind", "value"),
     [("number", 1e-7), ("number", 3.0), ("whole", 7), ("text", "a b"), ("list", [1.0, 2.5])],
 )
-def test_what_is_written_is_read_again(kind: str, value: JsonValue) -> None:
+def test_what_is_written_is_read_again(kind: str, value: Any) -> None:
     param = structs.replace(PARAM, kind=kind, default=value)
     assert parse_value(param, format_value(param, value)) == value
 

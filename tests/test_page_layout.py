@@ -53,7 +53,7 @@ def snapshot(state: str) -> Snapshot:
     words = control_sentence(leader, 12.0)
     headline = words if leader.overrides_gaze else "looks at person 3 (left eye)"
     changes = {"headline": headline, **CHANGES.get(state, {})}
-    return replace(SNAPSHOT, t_s=12.0, control_source=leader, control_sentence=words, **changes)
+    return replace(SNAPSHOT, t_s=12.0, control_source=leader, **changes)
 
 
 class Shown:

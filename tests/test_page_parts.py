@@ -204,7 +204,7 @@ def looking(t_s: float, name: str = "face 1: nose", part: str | None = "N") -> S
         snapshot(t_s), p_world_head_m=(0.0, 0.0, 0.0),
         p_world_eyes_m=((0.0, 0.03, 0.0), (0.0, -0.03, 0.0)), p_world_target_m=(1.0, 0.0, 0.0),
         target_name=name, phase="fixate", faces=(face,), target_kind=name.split()[0],
-        target_id=1, target_part=part,
+        target_part=part,
     )  # fmt: skip
 
 

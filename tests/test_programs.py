@@ -174,7 +174,7 @@ def test_orders_have_outcomes(rig: Rig) -> None:
     status, answer = rig.post({"do": "look_at_person", "id": 99})
     assert status == 409 and "99" in answer["refused"] and answer["reply"]["refused"]
     assert "outcome" not in rig.post({"do": "play", "track": "nod"}, "?wait_s=0")[1]
-    assert "neck_yaw" in rig.post({"do": "status"})[1]["ok"]["joints_deg"]
+    assert "neck_yaw" in rig.post({"do": "status"})[1]["ok"]["joints"]
 
 
 def test_orders_over_the_websocket_have_outcomes_by_tag(rig: Rig) -> None:

@@ -22,6 +22,7 @@ from branch import Branch
 from remote_rig import BLINKS, RATE, Beat, Broken, SecondTuning, hung_up, server_closed
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.control.command_handler import CommandHandler
 from gazerig.robot.model import commands, lease
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Value
@@ -68,7 +69,8 @@ def errors() -> list[str]:
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
     tuning = SecondTuning(beat.robot.command)  # type: ignore[arg-type]
     about = {"rig": "desk", "pid": os.getpid()}
-    requests = RequestHandler(beat.robot, tuning, beat.pulse, about, (Broken,))
+    handler = CommandHandler(beat.robot.command, tuning, (Broken,), menus=beat.robot.menus)
+    requests = RequestHandler(handler, beat.pulse, about)
     server = RemoteServer(requests, errors.append)
     server.open()
     with RobotClient.connect() as connected:
@@ -88,8 +90,12 @@ def test_the_socket_is_the_owners_alone(rig: RobotClient, folder: Path) -> None:
 
 
 def open_server() -> RemoteServer:
-    beat_less = RequestHandler(None, None, LoopMonitor(RealClock()), {"rig": "other"})  # type: ignore[arg-type]
-    return RemoteServer(beat_less, lambda _: None)
+    return RemoteServer(beatless(), lambda _: None)
+
+
+def beatless() -> RequestHandler:
+    handler = CommandHandler(lambda command: None, None)
+    return RequestHandler(handler, LoopMonitor(RealClock()), {"rig": "other"})
 
 
 def test_close_removes_it_and_hangs_up(folder: Path) -> None:
@@ -150,8 +156,7 @@ def test_another_user_is_kept_out(folder: Path) -> None:
 
 def listens() -> None:
     """Have a socket until standard input ends."""
-    pulse = LoopMonitor(RealClock())
-    server = RemoteServer(RequestHandler(None, None, pulse, {"rig": "other"}), print)  # type: ignore[arg-type]
+    server = RemoteServer(beatless(), print)
     server.open()
     print("open", flush=True)
     sys.stdin.read()
@@ -256,13 +261,13 @@ def test_what_has_no_json_is_refused_before_it_is_sent(rig: RobotClient, value: 
 
 def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
     rig.send(LookAt((1.0, 0.2, 0.1), stay=True))
-    assert rig.status()["why"].endswith("makes it look at 1 0.2 0.1")
-    assert rig.status()["control_kind"] == "person"
+    assert rig.status()["gaze"]["reason"].endswith("makes it look at 1 0.2 0.1")
+    assert rig.status()["control_source"]["kind"] == "person"
     assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
     rig.look_freely()
-    assert rig.status()["control_kind"] == "gaze" and "makes it" not in rig.status()["why"]
+    assert rig.status()["control_source"]["kind"] == "gaze"
     rig.send(Jog((("neck_yaw", radians(10.0)),), stay=True))
-    desired = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].desired_rad, strict=True))
+    desired = dict(zip(rig.status()["joints"], beat.ticks[-1].desired_rad, strict=True))
     assert desired["neck_yaw"] == pytest.approx(radians(10.0))
     rig.send(Jog(()))
     menus = rig.menus()

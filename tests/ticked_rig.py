@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.cli.tune import app
+from gazerig.robot.control.command_handler import CommandHandler
 from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import Ticket
@@ -23,7 +24,11 @@ class TickedRig:
     def __init__(self, made: Assembly) -> None:
         self.made, self.pulse = made, LoopMonitor(made.clock)
         self.commands: list[Command] = []
-        self.handler = RequestHandler(self, None, self.pulse, {})
+        self.handler = RequestHandler(
+            CommandHandler(self.command, None, menus=self.menus, tracks=self.tracks),
+            self.pulse,
+            {},
+        )
         self.answer: object = None
 
     def command(self, command: Command) -> Ticket:

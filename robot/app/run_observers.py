@@ -26,6 +26,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.app.voice import RunVoice
+from gazerig.robot.control.command_handler import accept_only_stops
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text, slower_rate
 from gazerig.robot.control.observers import Observers, failure_text
@@ -38,8 +39,7 @@ from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
 from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
 from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
-from gazerig.robot.model.commands import Command, Resume, Stop, Tune
-from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.client import rig_name
@@ -122,7 +122,6 @@ class RunObservers:
                 assembly.clock,
                 about,
                 say,
-                self._timing.figures,
                 assembly.inject_fault,
                 lambda: {"page": self._page.url() if self._page is not None else None},
                 tuning.confined,
@@ -165,7 +164,9 @@ class RunObservers:
     def _make_page(self, address: tuple[str, int], token: str) -> PageProcess:
         command, steer = self._made.robot.command, self._steer
         page_requests = PageRequestHandler(
-            command if steer is None else stop_only_handler(command),
+            command
+            if steer is None
+            else accept_only_stops(command, f"the buttons of {STEER!r} steer the head now"),
             params=self._tuning,
             point=self._picking.point,
             steer=steer.press if steer is not None else None,
@@ -390,16 +391,3 @@ class RunObservers:
         if self._lent != (lent := getattr(self._made.robot.camera, "lent", False)):
             self._lent = lent
             self._publisher.resend_geometry()
-
-
-def stop_only_handler(command: CommandTaker) -> CommandTaker:
-    """Return a handler that accepts only stop and resume; other commands raise ValueError."""
-
-    def take(asked: Command) -> Ticket | None:
-        if not isinstance(asked, Stop | Resume):
-            raise ValueError(
-                f"the buttons of {STEER!r} steer the head now; otherwise only stop and resume work"
-            )
-        return command(asked)
-
-    return take

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from math import degrees
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +10,6 @@ import typer
 from typer.core import TyperGroup
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.cli import animation as cli_animation
@@ -64,45 +64,6 @@ def complete_key(incomplete: str) -> list[str]:
 
         desk = load_rig("desk")
         return [param.key for param in parameters(desk, desk) if param.key.startswith(incomplete)]
-
-
-def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete keys, and values of the previous key."""
-    given = context.params.get("pairs") or []
-    if len(given) % 2 == 0:
-        return complete_key(incomplete)
-    try:
-        with RobotClient.connect() as rig:
-            (param,) = (one for one in rig.parameters(given[-1]) if one.key == given[-1])
-    except (DriverError, ValueError):
-        return []
-    values = ("true", "false") if param.kind == "bool" else tuple(map(_value_text, param.choices))
-    return [value for value in values if value.startswith(incomplete)]
-
-
-def complete_character(incomplete: str) -> list[str]:
-    """Complete a shipped character."""
-    return [name for name in shipped_names("characters") if name.startswith(incomplete)]
-
-
-def complete_menu(incomplete: str) -> list[str]:
-    """Complete a menu of the running rig."""
-    return [menu for menu in _menus() if menu.startswith(incomplete)]
-
-
-def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete choices of the menu before it."""
-    choices = _menus().get(context.params.get("menu") or "", ())
-    return [choice for choice in choices if choice.startswith(incomplete)]
-
-
-def _menus() -> dict[str, tuple[str, ...]]:
-    """Return the menus of the running rig, none without one, as a shell shows no errors."""
-    try:
-        with RobotClient.connect() as rig:
-            return rig.menus()
-    except DriverError:
-        return {}
 
 
 @ctl.command()
@@ -168,7 +129,6 @@ def put(
         typer.Argument(
             metavar="KEY VALUE [KEY VALUE ...]",
             help="Values as in the YAML: 0.5, true, markov, [1, 2].",
-            autocompletion=complete_pair,
         ),
     ],
     pid: PidOption = None,
@@ -221,7 +181,10 @@ def revert(pid: PidOption = None) -> None:
 @ctl.command()
 def character(
     name: Annotated[
-        str, typer.Argument(help="Name of a shipped character.", autocompletion=complete_character)
+        str,
+        typer.Argument(
+            help="Name of a shipped character.",
+        ),
     ],
     pid: PidOption = None,
 ) -> None:
@@ -235,11 +198,11 @@ def character(
 def ask(
     menu: Annotated[
         str | None,
-        typer.Argument(help="Without it, all menus are listed.", autocompletion=complete_menu),
+        typer.Argument(help="Without it, all menus are listed."),
     ] = None,
     choice: Annotated[
         str | None,
-        typer.Argument(help="Without it, its choices are listed.", autocompletion=complete_choice),
+        typer.Argument(help="Without it, its choices are listed."),
     ] = None,
     pid: PidOption = None,
 ) -> None:
@@ -319,12 +282,14 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         lines.append(f"STOPPED, torque off: {now['stopped']}; gazerig ctl resume continues")
     if now["age_s"] > _OLD_S:
         lines.append(f"the loop is delayed: the following data are {now['age_s']:.1f} s old")
-    joints = ", ".join(f"{name} {deg:.1f}" for name, deg in now["joints_deg"].items())
-    unsaved = now["unsaved"]
+    joints = ", ".join(
+        f"{name} {degrees(one['measured_rad']):.1f}" for name, one in now["joints"].items()
+    )
+    unsaved, gaze = now["unsaved"], now["gaze"]
     return [
         *lines,
-        *([f"controlled by {now['control_text']}"] if now["control_text"] else []),
-        f"looks at: {now['target']} - {now['why']} ({now['phase']})",
+        *([f"controlled by {now['controlled_by']}"] if now["controlled_by"] else []),
+        f"looks at: {gaze['target']} - {gaze['reason']} ({gaze['phase']})",
         *_talk_lines(now),
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         *(f"camera: {text}" for text in now.get("camera", ())),

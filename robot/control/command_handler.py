@@ -10,9 +10,9 @@ from typing import Protocol
 
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.track_choices import TrackInfo
-from gazerig.robot.model.commands import Command, Request, Say, Speak, Value, as_value
+from gazerig.robot.model.commands import Command, Request, Resume, Say, Speak, Stop, Value, as_value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
-from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.model.requests import (
     Character,
     Characters,
@@ -121,45 +121,45 @@ class Speaker(Protocol):
         ...
 
 
-class CommandTarget(Protocol):
-    """A robot that takes commands, such as ``gazerig.robot.control.loop.Robot``."""
+def accept_only_stops(command: CommandTaker, reason: str) -> CommandTaker:
+    """Return a taker of stop and resume; it refuses other commands with the reason."""
 
-    def command(self, command: Command) -> Ticket | None:
-        """Queue a command for the next tick; raise ValueError if it breaks a rule."""
-        ...
+    def take(asked: Command) -> Ticket | None:
+        if not isinstance(asked, Stop | Resume):
+            raise ValueError(f"{reason}: only stop and resume are accepted")
+        return command(asked)
 
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return the menus."""
-        ...
-
-    def tracks(self) -> Sequence[TrackInfo]:
-        """Return the available tracks."""
-        ...
+    return take
 
 
 class CommandHandler:
     """The handler of all requests. All methods are thread-safe.
 
     Args:
-        robot: Executes commands.
+        command: Queues a command for the next tick.
         params: The parameters, None if they cannot be read or changed.
         refusals: Exceptions of ``params`` for a value that breaks a rule, besides ValueError;
             the attribute contains all exceptions of ``handle``.
         saved: Called with each written file.
         fixed: Reason why parameters cannot be changed.
         voice: Says sounds and texts; None if the head has no voice.
+        menus: Returns the menus.
+        tracks: Returns the available tracks.
     """
 
     def __init__(
         self,
-        robot: CommandTarget,
+        command: CommandTaker,
         params: ParamAccess | None,
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
         fixed: str = FIXED,
         voice: Speaker | None = None,
+        menus: Callable[[], Mapping[str, tuple[str, ...]]] = dict,
+        tracks: Callable[[], Sequence[TrackInfo]] = tuple,
     ) -> None:
-        self._robot, self._params, self._voice = robot, params, voice
+        self._command, self.params, self._voice = command, params, voice
+        self._menus, self._tracks = menus, tracks
         self._saved, self._fixed = saved, fixed
         self.refusals: tuple[type[Exception], ...] = (
             ValueError, DriverError, OSError, *refusals,
@@ -181,22 +181,20 @@ class CommandHandler:
         """
         match request:
             case Menus():
-                return self._robot.menus()
+                return self._menus()
             case Tracks():
-                return self._robot.tracks()
+                return self._tracks()
             case SayPiece():
                 return self._say_piece(request)
             case Say():
-                return self._robot.command(
-                    self._require_voice().prepare(request, paths is not None)
-                )
+                return self._command(self._require_voice().prepare(request, paths is not None))
             case Command():
-                return self._robot.command(request)
-        if self._params is None:
+                return self._command(request)
+        if self.params is None:
             if isinstance(request, Get | Parameters | Unsaved | Characters):
                 return {} if isinstance(request, Get) else ()
             raise ValueError(self._fixed)
-        return self._handle_params(request, self._params, paths)
+        return self._handle_params(request, self.params, paths)
 
     def _handle_params(
         self, request: Request, params: ParamAccess, paths: PathGuard | None

@@ -117,20 +117,6 @@ def _gaze_text(target: Target) -> str:
             return f"looks at a {kind}"
 
 
-def control_text(tick: Tick) -> str:
-    """Return the client's command and the gaze's distance from its point, "" without one.
-
-    e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg off: head yaw 70 of 180 deg"
-    """
-    if not tick.controlled_by:
-        return ""
-    return (
-        tick.controlled_by
-        if tick.client_control.kind == "joint"
-        else tick.controlled_by + _distance_text(tick)
-    )
-
-
 def _distance_text(tick: Tick) -> str:
     """Return the gaze's distance from the chosen point, "" if it reaches the point."""
     limited = tick.gaze.limited

@@ -5,9 +5,6 @@ from typing import Any
 
 from msgspec import Struct
 
-JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "JsonValue"]
-"""A value in JSON, with lists instead of the rig's tuples."""
-
 
 class Parameter(Struct, frozen=True):
     """A parameter of a rig with its rules and its default.

@@ -27,7 +27,7 @@ class Hello(Request, frozen=True):
 
 
 class Status(Request, frozen=True):
-    """Name, target, reason, guard, joints and last messages of the rig."""
+    """Name and state of the rig, and its last messages."""
 
 
 class State(Request, frozen=True):

@@ -310,13 +310,11 @@ class Snapshot:
         behaviour: Present behaviour.
         saliences: Saliences of the winner and the next bodies, highest first.
         perception: Age of the frame, distances and their sources, apparent motion of still things.
-        target_kind, target_id, target_part: Target as in gaze.types.Target; while a client is in
-            control, the kind of control, -1 and None.
+        target_kind, target_part: Target as in gaze.types.Target; while a client is in
+            control, the kind of control and None.
         character, conversation: Present ones, "" if unknown.
         stopped: Reason for a stop, "" while the robot moves.
-        control_text: Client in control, its command and how well the head follows; "" without one.
         control_source: Source of control.
-        control_sentence: Source of control in one sentence.
         headline: Present activity of the head in one sentence.
         frame_age_s: Age of the newest frame, None before the first.
         commanded_pose: Poses of head and eyes at the desired angles.
@@ -360,14 +358,11 @@ class Snapshot:
     perception: str = ""
     commanded_rad: JointAngles = ()
     target_kind: str = ""
-    target_id: int = -1
     target_part: str | None = None
     character: str = ""
     conversation: str = ""
     stopped: str = ""
-    control_text: str = ""
     control_source: ControlSource = ControlSource()
-    control_sentence: str = ""
     headline: str = ""
     frame_age_s: float | None = None
     commanded_pose: CommandedPose | None = None

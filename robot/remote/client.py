@@ -6,7 +6,7 @@ from gazerig.robot.remote.client import RobotClient
 with RobotClient.connect() as rig:
     rig.set_many({"gaze.lids.blinks_per_min": 12.0})
     print(rig.send(LookAt((1.0, 0.3, 0.0))).text())
-    print(rig.status()["target"])
+    print(rig.status()["headline"])
     rig.save("/home/me/my.yaml")
 """
 
@@ -265,7 +265,7 @@ class RobotClient:
         return news.state, news.events
 
     def status(self) -> dict[str, Any]:
-        """Return the rig's status: name, target, reason, guard level, joints, last messages."""
+        """Return the rig's name and process, the fields of ``HeadState``, and the last messages."""
         return self.ask(Status(), dict[str, Any])
 
     @property

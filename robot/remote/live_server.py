@@ -15,13 +15,17 @@ from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.robot.control.command_handler import CommandTarget, ParamAccess, PathGuard, Speaker
+from gazerig.robot.control.command_handler import (
+    CommandHandler,
+    ParamAccess,
+    PathGuard,
+    Speaker,
+    accept_only_stops,
+)
+from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Command, Resume, Stop
-from gazerig.robot.model.reply import CommandTaker, Ticket
-from gazerig.robot.model.types import LoopFigures
+from gazerig.robot.model.reply import CommandTaker
 from gazerig.robot.remote.request_handler import LoopMonitor, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
 
@@ -146,7 +150,6 @@ class LiveServer:
         clock: Clock of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
         say: Prints a line on the terminal.
-        timing: Returns the timing statistics of the loop.
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
@@ -155,13 +158,12 @@ class LiveServer:
 
     def __init__(
         self,
-        robot: CommandTarget,
+        robot: Robot,
         tuning: FileTuning,
         refusals: tuple[type[Exception], ...],
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
-        timing: Callable[[], LoopFigures | None] = lambda: None,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
         paths: PathGuard | None = None,
@@ -170,13 +172,14 @@ class LiveServer:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
         self._say = say
-        self._pulse = LoopMonitor(clock, timing)
+        self._pulse = LoopMonitor(clock)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
-        requests = RequestHandler(
-            robot, tuning, self._pulse, about, refusals, self._watch.saved, fault=fault,
-            changing=changing, paths=paths, voice=voice,
+        handler = CommandHandler(
+            robot.command, tuning, refusals, self._watch.saved, voice=voice, menus=robot.menus,
+            tracks=robot.tracks,
         )  # fmt: skip
+        requests = RequestHandler(handler, self._pulse, about, fault, changing, paths)
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:
@@ -252,9 +255,9 @@ class StopOnlyServer:
     ) -> None:
         self._say = say
         self._pulse = LoopMonitor(clock)
-        only = _StopOnlyRobot(command)
-        requests = RequestHandler(only, None, self._pulse, about, fixed=_FIXED)
-        self._server = RemoteServer(requests, say)
+        only = accept_only_stops(command, "it is being calibrated")
+        handler = CommandHandler(only, None, fixed=_FIXED)
+        self._server = RemoteServer(RequestHandler(handler, self._pulse, about), say)
 
     def open(self) -> None:
         """Listen to other programs; print a line if that fails."""
@@ -270,28 +273,3 @@ class StopOnlyServer:
     def close(self) -> None:
         """Close all connections."""
         self._server.close()
-
-
-class _StopOnlyRobot:
-    """Robot that executes only stop and resume."""
-
-    def __init__(self, command: CommandTaker) -> None:
-        self._command = command
-
-    def command(self, command: Command) -> Ticket | None:
-        """Queue a stop or resume.
-
-        Raises:
-            ValueError: it is another command.
-        """
-        if not isinstance(command, Stop | Resume):
-            raise ValueError("it is being calibrated: only stop and resume are accepted")
-        return self._command(command)
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return no menus."""
-        return {}
-
-    def tracks(self) -> tuple[TrackInfo, ...]:
-        """Return no tracks."""
-        return ()

@@ -6,31 +6,15 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from math import degrees
-from pathlib import Path
+from dataclasses import fields
 
-from gazerig.robot.control.command_handler import (
-    FIXED,
-    CommandHandler,
-    CommandTarget,
-    ParamAccess,
-    PathGuard,
-    Speaker,
-)
-from gazerig.robot.control.feedback_basis import estimated_joints
+from gazerig.robot.control.command_handler import CommandHandler, PathGuard
 from gazerig.robot.control.head_state import HeadReport, head_state
-from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
-from gazerig.robot.control.tick_text import (
-    camera_conditions,
-    control_text,
-    head_activity,
-    tick_control_source,
-)
+from gazerig.robot.control.tick_text import camera_conditions
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import ClientCommand, Command, Request, set_client
-from gazerig.robot.model.control_source import control_sentence
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.requests import (
     Character,
@@ -42,7 +26,6 @@ from gazerig.robot.model.requests import (
     Status,
     read_request,
 )
-from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.socket_io import VERSION
 
 _TAKEN_UP_S = 1.0
@@ -62,13 +45,10 @@ class LoopMonitor:
 
     Args:
         clock: Clock of the loop.
-        timing: Returns the timing statistics of the loop, None if unknown.
     """
 
-    def __init__(
-        self, clock: Clock, timing: Callable[[], LoopFigures | None] = lambda: None
-    ) -> None:
-        self._clock, self._timing = clock, timing
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self._feed = TickFeed()
         self._never = threading.Event()
 
@@ -94,42 +74,16 @@ class LoopMonitor:
         return HeadReport(state, self._feed.events(after), self._feed.number)
 
     def status(self) -> dict[str, object]:
-        """Return the newest tick as plain values: degrees, seconds, text."""
+        """Return the state of the head with the loop's ticks and the last messages."""
         tick = self._feed.newest
         if tick is None:
-            return {"ticks": 0, "stopped": "", "said": []}
-        does, leads = head_activity(tick), tick_control_source(tick)
-        measured = zip(tick.guard_result.joints, tick.joints.position_rad, strict=True)
+            return {"ticks": 0, "stopped": "", "said": ()}
+        state = head_state(tick)
         return {
+            **{field.name: getattr(state, field.name) for field in fields(state)},
             "ticks": self._feed.ticks,
-            "t_s": tick.t_s,
             "age_s": self._clock.now_s() - tick.t_s,
-            "stopped": tick.stopped,
-            "controlled_by": tick.controlled_by,
-            "control_text": control_text(tick),
-            "conversation": tick.conversation,
-            "control_kind": leads.kind,
-            "control_sentence": control_sentence(leads, tick.t_s),
-            "headline": does.headline,
-            "busy": busy_text(self._timing()),
-            "limited": [
-                {
-                    "axis": one.axis,
-                    "asked_deg": round(degrees(one.asked_rad), 2),
-                    "done_deg": round(degrees(one.done_rad), 2),
-                    "reason": one.reason,
-                }
-                for one in tick.gaze.limited
-            ],
-            "camera": list(camera_conditions(tick)),
-            "level": tick.guard_result.level,
-            "reasons": list(tick.guard_result.reasons),
-            "limp": list(tick.guard_result.limp),
-            "target": does.target,
-            "why": does.reason,
-            "phase": does.phase,
-            "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
-            "estimated": list(estimated_joints(tick)),
+            "camera": camera_conditions(tick),
             "said": [event.text for event in self._feed.messages()[-_WORDS:]],
         }
 
@@ -138,37 +92,26 @@ class RequestHandler:
     """Executes requests of other programs; answers {"ok": ...} or {"refused": ...}.
 
     Args:
-        robot: Executes commands.
-        params: Parameters; None if they cannot be read or changed.
+        handler: Handles all requests except those about the loop.
         pulse: State of the loop.
         about: Constant fields of the status, e.g. {"rig": name, "pid": process}.
-        refusals: Exceptions besides ValueError that ``params`` raises if a value breaks a rule.
-        saved: Called with each file that was written.
-        fixed: Reason why parameters cannot be changed, if they cannot.
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, e.g. {"page": address}.
         paths: Rules for the files that a client of the network may name; None if any.
-        voice: Says sounds and texts; None if the head has no voice.
     """
 
     def __init__(
         self,
-        robot: CommandTarget,
-        params: ParamAccess | None,
+        handler: CommandHandler,
         pulse: LoopMonitor,
         about: Mapping[str, object],
-        refusals: tuple[type[Exception], ...] = (),
-        saved: Callable[[Path], None] | None = None,
-        fixed: str = FIXED,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
         paths: PathGuard | None = None,
-        voice: Speaker | None = None,
     ) -> None:
-        self._params, self._pulse, self._paths = params, pulse, paths
+        self._handler, self._pulse, self._paths = handler, pulse, paths
         self._changing, self._fault = changing, fault
         self._about = dict(about)
-        self._handler = CommandHandler(robot, params, refusals, saved, fixed, voice)
         self._unsaved = -1, 0
 
     def answer(self, message: object, peer: str = "") -> dict[str, object]:
@@ -228,10 +171,10 @@ class RequestHandler:
         return {"ok": done}
 
     def _status(self) -> dict[str, object]:
-        version = self._params.version if self._params is not None else 0
+        params = self._handler.params
+        version = params.version if params is not None else 0
         if version != self._unsaved[0]:  # count once for a program that polls
-            unsaved = self._params.unsaved() if self._params is not None else ()
-            self._unsaved = version, len(tuple(unsaved))
+            self._unsaved = version, len(params.unsaved()) if params is not None else 0
         about = {**self._about, **self._changing(), "version": version, "unsaved": self._unsaved[1]}
         return {**about, **self._pulse.status()}
 

@@ -13,7 +13,7 @@ from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.calibration_keys import (
     split_words,
 )
-from gazerig.robot.app.run_observers import stop_only_handler
+from gazerig.robot.control.command_handler import accept_only_stops
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
@@ -165,7 +165,7 @@ def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
 
 def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
     given: list[Command] = []
-    order = stop_only_handler(given.append)
+    order = accept_only_stops(given.append, "buttons steer the head now")
     order(Stop("a test"))
     order(Resume())
     for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),)), Ask("behaviour", "guard")):

@@ -223,21 +223,6 @@ class ProgramSocket:
         return state
 
 
-_Handler = Callable[["ProgramRoutes", web.Request], Awaitable[web.StreamResponse]]
-
-
-def _answer_refusals(handler: _Handler) -> _Handler:
-    """Return a handler that answers a refused message with the reason."""
-
-    async def answer(programs: "ProgramRoutes", request: web.Request) -> web.StreamResponse:
-        try:
-            return await handler(programs, request)
-        except MessageRefused as error:
-            return programs.refuse(str(error), error.status)
-
-    return answer
-
-
 class ProgramRoutes:
     """Routes for programs; used in the door's event loop.
 
@@ -264,11 +249,25 @@ class ProgramRoutes:
     def add_to(self, router: web.UrlDispatcher, connections: Callable[[], Connections]) -> None:
         """Add the routes; ``connections`` returns those of the door, once it is open."""
         self._connections = connections
-        router.add_get(f"{BASE}/state", self._state)
-        router.add_post(f"{BASE}/do", self._post)
-        router.add_get(f"{BASE}/socket", self._socket)
-        router.add_get(f"{BASE}/openapi.json", self._openapi)
-        router.add_route("*", API + "{path:.*}", self._not_found)
+        router.add_route("*", API + "{path:.*}", self._handle)
+
+    async def _handle(self, request: web.Request) -> web.StreamResponse:
+        try:
+            match request.method, request.path.removeprefix(f"{BASE}/"):
+                case "GET", "state":
+                    return await self._state(request)
+                case "POST", "do":
+                    return await self._post(request)
+                case "GET", "socket":
+                    return await self._socket(request)
+                case "GET", "openapi.json":
+                    return self._answer(api_description(BASE), 200)
+            raise MessageRefused(
+                f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/",
+                404,
+            )
+        except MessageRefused as error:
+            return self.refuse(str(error), error.status)
 
     def refuse(self, text: str, status: int = 403) -> web.Response:
         """Return an answer that refuses a request."""
@@ -276,12 +275,10 @@ class ProgramRoutes:
 
     # --- HTTP ---------------------------------------------------------------------------
 
-    @_answer_refusals
     async def _state(self, request: web.Request) -> web.StreamResponse:
         after = int(parse_rate(request.query.get("after", f"{NEWEST}"), "after", 0, NEWEST))
         return await self._forward_request({"do": "state", "after": after})
 
-    @_answer_refusals
     async def _post(self, request: web.Request) -> web.StreamResponse:
         wait_s = parse_rate(request.query.get("wait_s", f"{WAIT_S}"), "wait_s", 0.0, MOST_WAIT_S)
         data = b""
@@ -334,19 +331,11 @@ class ProgramRoutes:
             self.feed.remove(take)
         return {"outcome": "timed out", "why": ""}
 
-    async def _openapi(self, request: web.Request) -> web.Response:
-        return self._answer(api_description(BASE), 200)
-
-    async def _not_found(self, request: web.Request) -> web.Response:
-        text = f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/"
-        return self.refuse(text, 404)
-
     def _answer(self, answer: Mapping[str, object], status: int) -> web.Response:
         return web.json_response(answer, status=status, headers=self._headers)
 
     # --- the websocket ------------------------------------------------------------------
 
-    @_answer_refusals
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" not in request.headers:
             raise MessageRefused("this is a websocket", 426)

@@ -12,9 +12,9 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick, cyclopean_direction
-from gazerig.robot.control.tick_text import control_text, head_activity, tick_control_source
+from gazerig.robot.control.tick_text import head_activity, tick_control_source
 from gazerig.robot.description.build import RigShape
-from gazerig.robot.model.control_source import control_sentence, playing
+from gazerig.robot.model.control_source import playing
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
@@ -226,12 +226,9 @@ def snapshot(
         perception=perception,
         commanded_rad=tick.guard_result.command_rad,
         target_kind=leads.kind if leads.overrides_gaze else target.kind,
-        target_id=-1 if leads.overrides_gaze else target.id,
         target_part=None if leads.overrides_gaze else target.part,
         stopped=tick.stopped,
-        control_text=control_text(tick),
         control_source=leads,
-        control_sentence=control_sentence(leads, tick.t_s),
         headline=does.headline,
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,

@@ -6,11 +6,9 @@ from typing import Any
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.command_handler import CommandHandler, ParamAccess, PathGuard
-from gazerig.robot.control.track_choices import TrackInfo
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import (
     ClientCommand,
-    Command,
     ControlCommand,
     LookAt,
     Request,
@@ -63,7 +61,7 @@ class PageRequestHandler:
         saved: Callable[[Path], None] | None = None,
         paths: PathGuard | None = None,
     ) -> None:
-        self._handler = CommandHandler(_CommandSink(command), params, refusals, saved)
+        self._handler = CommandHandler(command, params, refusals, saved)
         self._paths = paths
         self._point = point
         self._steer = steer
@@ -138,22 +136,3 @@ class PageRequestHandler:
             return None
         self._limited_s = now_s
         return reply.text()
-
-
-class _CommandSink:
-    """Robot interface of which the page only uses the commands."""
-
-    def __init__(self, take: CommandTaker) -> None:
-        self._take = take
-
-    def command(self, command: Command) -> Ticket | None:
-        """Queue a command."""
-        return self._take(command)
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return no menus: the page receives them separately."""
-        return {}
-
-    def tracks(self) -> tuple[TrackInfo, ...]:
-        """Return no tracks: the page receives their names separately."""
-        return ()
