@@ -16,9 +16,9 @@ from gazerig.gaze.attention.conversation import (
     ConversationParams,
 )
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.lids.lids import LidParams, Lids
+from gazerig.gaze.lids.blink import LidParams
+from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.track.expression import Expressions
-from gazerig.gaze.track.track import TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.command_choices import Menus
@@ -52,7 +52,7 @@ def running() -> Iterator[Running]:
 
 
 ORDERS: list[Command] = [
-    Ask("lids", "sleepy"),
+    Ask("lids", "wink left"),
     LookAt((1.0, 0.2, 0.3)),
     LookAt(None),
     Jog((("neck_yaw", 0.2), ("left_eye_pan", -0.1))),
@@ -224,7 +224,7 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there() -> None:
     blinks = {}
     for mode in ("talk", "none"):
         lids = Lids(LidParams(), np.random.default_rng(1))
-        none = TrackChoices({}, TrackPlayer(0), TrackParams(), ("eyes_pan",), {})
+        none = TrackChoices({}, TrackPlayer(0), ("eyes_pan",), {})
         unused: Any = None  # no turn is reported
         rngs = (np.random.default_rng(n) for n in (2, 3))
         params = AversionParams(), ConversationParams()
@@ -238,7 +238,7 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there() -> None:
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
     with pytest.raises(ValueError, match="available: behaviour, conversation, lids"):
         running.order(Ask("mood", "x"))
-    with pytest.raises(ValueError, match="available: awake"):
+    with pytest.raises(ValueError, match="available: wink left"):
         running.order(Ask("lids", "x"))
 
 
@@ -361,7 +361,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
     robot = running.made.robot
     with pytest.raises(ValueError, match="too many requests"):
         for _ in range(1000):
-            robot.command(Ask("lids", "awake"))
+            robot.command(Ask("lids", "wink left"))
     stop = robot.command(Stop("a hand"))
     tick = running.go(0.006)[0]
     assert tick.commands[0] == Stop("a hand") and len(tick.commands) <= 9

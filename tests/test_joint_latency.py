@@ -7,7 +7,7 @@ import pytest
 
 import gazerig
 from gazerig.config.schema import load_rig
-from gazerig.gaze.track.track import KeyFrame, Track, TrackParams
+from gazerig.gaze.track.track import KeyFrame, Track
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.control.joint_latency import JointLatency
@@ -68,7 +68,7 @@ def test_joints_of_slower_buses_begin_earlier() -> None:
         sound="it.wav",
     )
     player = TrackPlayer(len(further_joints(rig.joints)))
-    choices = TrackChoices({"it": sound}, player, TrackParams(), rig.names, lid_spans(rig))
+    choices = TrackChoices({"it": sound}, player, rig.names, lid_spans(rig))
     lead_s = [0.01] * len(rig.names)
     lead_s[rig.names.index("jaw")] = 0.05
     bounds, rest = limits(rig.joints), (0.0,) * len(rig.names)

@@ -21,7 +21,7 @@ from gazerig.gaze.mouth.mouth_keys import (
     mouth_keys,
     phoneme_closures,
 )
-from gazerig.gaze.mouth.speech_sway import sway_keys
+from gazerig.gaze.mouth.speech_track import sway_keys
 from gazerig.gaze.mouth.stream_mouth import StreamMouth
 from gazerig.gaze.types import Floats
 
@@ -49,7 +49,7 @@ def test_a_frame_has_its_time_at_every_rate_also_in_a_stream() -> None:
     whole = band_pressures(samples, rate)
     middle = np.flatnonzero(whole > 0.1).mean()
     assert frame_s(middle) == pytest.approx(50.5, abs=0.005)
-    mouth = StreamMouth(rate, -30.0)
+    mouth = StreamMouth(rate)
     for piece in np.array_split(samples, 1500):
         mouth.add(piece)
     assert mouth.opening_at(49.9) == 0.0 and mouth.opening_at(50.5) > 0.5
@@ -57,16 +57,16 @@ def test_a_frame_has_its_time_at_every_rate_also_in_a_stream() -> None:
 
 
 def test_ten_decibels_less_are_half_as_loud() -> None:
-    loud, half = openings(np.array([1.0, 10**-0.5]), 1.0, -60.0)
-    shut = 10 ** (-60 / 20 * 0.6)
-    assert loud == 1.0
+    loud, half, shut_at = openings(np.array([1.0, 10**-0.5, 10**-1.5]), 1.0)
+    shut = 10 ** (-30 / 20 * 0.6)
+    assert loud == 1.0 and shut_at == pytest.approx(0.0, abs=1e-9)
     assert half * (1 - shut) + shut == pytest.approx(0.5, abs=0.002)
 
 
 @pytest.mark.parametrize("samples", [np.zeros(RATE), np.zeros(0), np.full(RATE, 1.0)])
 def test_silence_nothing_and_a_constant_keep_the_mouth_shut(samples: Floats) -> None:
     pressures = band_pressures(samples, RATE)
-    keys = mouth_keys(openings(pressures, loud_pressure(pressures), -30.0), (), FAST)
+    keys = mouth_keys(openings(pressures, loud_pressure(pressures)), (), FAST)
     assert all(key.opening == 0.0 for key in keys)
 
 
@@ -117,10 +117,10 @@ def test_without_phonemes_short_dips_are_closures_and_a_slow_end_is_none() -> No
 def test_a_stream_opens_the_mouth_as_the_whole_sound_does() -> None:
     t_s = np.arange(3 * RATE) / RATE
     samples = tone(1000, 3.0) * (0.5 - 0.5 * np.cos(2 * np.pi * 4 * t_s))
-    mouth = StreamMouth(RATE, -30.0)
+    mouth = StreamMouth(RATE)
     for piece in np.array_split(samples, 75):
         mouth.add(piece)
-    whole = openings(band_pressures(samples, RATE), loud_pressure(samples), -30.0)
+    whole = openings(band_pressures(samples, RATE), loud_pressure(samples))
     times = [frame_s(i) for i in range(100, len(whole) - 20)]
     found = np.array([mouth.opening_at(at_s) for at_s in times])
     assert np.corrcoef(found, whole[100 : 100 + len(found)])[0, 1] > 0.95

@@ -25,7 +25,7 @@ SIZES = {
     "narrow": (1000, 700),
 }
 TABS = ("watch", "steer", "tune", "health")
-MENUS = {"track": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
+MENUS = {"track": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("wink left",)}
 LEADS = {
     "awake": ControlSource(),
     "stopped": ControlSource("stopped", "", "STOP was pressed on the page (browser 1a2b)"),

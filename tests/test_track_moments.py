@@ -10,7 +10,6 @@ from gazerig.config.schema import load_rig
 from gazerig.config.tracks import shipped_tracks
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.pose_offset import PoseOffset
-from gazerig.gaze.track.track import TrackParams
 from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
@@ -70,7 +69,7 @@ def interrupted(track: str, rig_name: str, moments: int, seed: int, dt_s: float 
     """Play a track and, at random moments, another one, the same again, or nothing."""
     rig, random = load_rig(rig_name), np.random.default_rng(seed)
     player = TrackPlayer(len(further_joints(rig.joints)))
-    choices = TrackChoices(shipped_tracks(), player, TrackParams(), rig.names, lid_spans(rig))
+    choices = TrackChoices(shipped_tracks(), player, rig.names, lid_spans(rig))
     bounds, others = limits(rig.joints), (*choices.names, track, track, "")
     at_rest = tuple([0.0] * len(rig.names))
     offsets, t, began = [player.step(0.0)] * 3, 0.0, 0

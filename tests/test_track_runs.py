@@ -24,15 +24,14 @@ POINT = (1.0, 0.0, 0.25)
 
 
 def steady(name: str) -> Rig:
-    """Return a rig without breath, sway, recentring, and eye turns of blinks."""
+    """Return a rig without drift, recentring, and eye turns of blinks."""
     rig = load_rig(name)
     gaze = rig.gaze
     gaze = replace(
         gaze,
-        breathing=replace(gaze.breathing, pitch_deg=0.0, roll_deg=0.0),
-        sway=replace(gaze.sway, yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0),
-        head=replace(gaze.head, recentre_after_ms=60_000.0),
-        lids=replace(gaze.lids, eye_down_deg=0.0, eye_nasal_deg=0.0),
+        drift="none",
+        head=replace(gaze.head, eye_only_range_deg=0.0),
+        lids=replace(gaze.lids, law="nakamoto"),
     )
     return replace(rig, gaze=gaze)
 

@@ -32,7 +32,7 @@ def fitted(track: Track, name: str = "desk", speed: float = 1.0, **at: float) ->
     joints = rig.names
     base = np.array([radians(at.get(name, 0.0)) for name in joints])
     fit = TrackFit(joints, lid_spans(rig))
-    return fit.fit("x", track_motions(track, joints), speed, base, limits(rig.joints), 0.8)
+    return fit.fit("x", track_motions(track, joints), speed, base, limits(rig.joints))
 
 
 @pytest.mark.parametrize("rig", RIGS)
