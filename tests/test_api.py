@@ -114,7 +114,7 @@ def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedH
         (lambda head: head.jog("neck_yaw", 100.0), "outside its range"),
         (lambda head: head.express("smug"), "no expression 'smug'"),
         (lambda head: head.move_opponent(0.7, 0.0, 0.0), "no opponent to move"),
-        (lambda head: head.set({"gaze.head.comfort_deg": 1e9}), "is above 90"),
+        (lambda head: head.set({"gaze.head.eye_only_range_deg": 1e9}), "is above 180"),
         (lambda head: head.get("gaze.hed"), "unknown key"),
         (lambda head: head.save(), "is part of the program and is never changed"),
         (lambda head: next(head.states(0.0)), "above 0"),
@@ -167,10 +167,10 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead) -> None:
 
 
 def test_parameters(head: gazerig.SimulatedHead, tmp_path: Path) -> None:
-    key = "gaze.head.comfort_deg"
+    key = "gaze.head.eye_only_range_deg"
     assert head.set({key: 11.0}) == (f"{key} = 11.0",)
     assert head.get(key) == {key: 11.0}
-    assert head.save(tmp_path / "mine.yaml").read_text().count("comfort_deg: 11") == 1
+    assert head.save(tmp_path / "mine.yaml").read_text().count("eye_only_range_deg: 11") == 1
     assert head.set({key: 12.0}) and head.revert() == (f"{key} = 11.0",)
 
 

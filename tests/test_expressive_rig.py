@@ -91,7 +91,7 @@ def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
 
 
 def test_a_blink_shuts_the_lids_of_a_sad_face(recorded: tuple[RunRecording, list[Tick]]) -> None:
-    made = started(apply_changes(load_rig("expressive"), {"gaze.lids.incomplete_share": 0.0}))
+    made = started(apply_changes(load_rig("expressive"), {"gaze.lids.law": "nakamoto"}))
     made.robot.command(Express("sad"))
     lid, widest, narrowest = NAMES.index("left_upper_lid"), -90.0, 90.0
     for tick in ticks(made, 3000)[201:]:

@@ -1,5 +1,6 @@
 """Lower lids: they go with the gaze and meet the upper ones in a blink."""
 
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -118,18 +119,17 @@ def test_a_wink_that_is_over_does_not_come_back_when_blinks_are_made_longer() ->
     model = lids()
     winked(model, 1.0)
     model.step(1.6, 0.0, None)
-    long = {"close_ms": 500.0, "hold_ms": 1000.0, "open_ms": 1500.0}
-    model.retune(LidParams(blinks_per_min=0.0, **long))
+    model.retune(LidParams(blinks_per_min=0.0, close_ms=500.0, hold_ms=1000.0, open_ms=1500.0))
     for k in range(1, 400):
         assert model.step(1.6 + k * DT, 0.0, None) == (0.75, 0.75, False, AWAKE, AWAKE)
 
 
 def test_a_higher_rate_begins_no_blink_within_a_blink() -> None:
-    long = {"close_ms": 500.0, "hold_ms": 1000.0, "open_ms": 1500.0}
-    model = lids(law="nakamoto", **long)
+    slow = LidParams(0.0, 500.0, 1000.0, 1500.0, law="nakamoto")
+    model = Lids(slow, np.random.default_rng(0))
     assert not model.step(0.0, 0.0, radians(90.0)).blink and model.blinks == 1
     assert model.step(0.6, 0.0, None).lower_left == 0.0
-    model.retune(LidParams(blinks_per_min=60.0, law="nakamoto", **long))  # type: ignore[arg-type]
+    model.retune(replace(slow, blinks_per_min=60.0))
     trace = [model.step(0.6 + k * DT, 0.0, None)[3] for k in range(round(2.39 / DT))]
     assert np.abs(np.diff(trace)).max() <= 2.2 / 1.5 * DT and model.blinks == 1
     assert model.step(3.02, 0.0, None) and model.blinks == 2

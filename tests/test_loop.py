@@ -48,9 +48,9 @@ def until(seconds: float) -> Callable[[float], str | None]:
 
 
 def test_it_starts_slowly_from_where_the_joints_are() -> None:
-    # The face is within comfort of the eyes, where the head stays for seconds unless told to hurry.
+    # The face is within comfort of the eyes, where the head stays unless it goes with the eyes.
     rig = load_rig("desk")
-    head = replace(rig.gaze.head, recentre_after_ms=800.0, recentre_spread_ms=0.0, comfort_deg=5.0)
+    head = replace(rig.gaze.head, eye_only_range_deg=0.0)
     rig = replace(rig, gaze=replace(rig.gaze, head=head))
     seen = ticks(made(rig=rig), 3.0)
     neck = np.degrees([tick.joints.position_rad[6] for tick in seen])

@@ -27,7 +27,7 @@ def test_e68_what_the_page_says_runs_where_it_says(claim: object) -> None:
 def test_every_row_of_the_page_is_read() -> None:
     text = PAGE.read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
-    assert len(CLAIMS) == len(rows) > 50
+    assert len(CLAIMS) == len(rows) > 40
     assert all(len(claim.cells) == (2 if claim.is_key else 3) for claim in CLAIMS)
     # Every function of it runs somewhere: none is a name that has gone.
     assert all(
@@ -97,21 +97,12 @@ def test_profiles_name_the_section_of_each_value() -> None:
         assert not bare, bare
 
 
-@pytest.mark.parametrize("conversation", ["talk", "listen", "think", None])
-def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head(
-    conversation: str | None,
-) -> None:
-    rates = {
-        **HALF_RATE,
-        "gaze.lids.blinks_per_min": 0.0,
-        "gaze.lids.conversation_per_min": 60.0,
-        "gaze.lids.gaze_evoked_blink_least_deg": 180.0,
-    }
-    options = RunOptions(
-        True, True, 0, "face-to-face", seconds=8.0, bus="ideal", conversation=conversation
-    )
+def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head() -> None:
     simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
-    figures = simulate(apply_changes(load_rig("desk"), rates), options).figures
-    blinks = figures["blinks"]
-    assert isinstance(blinks, int)
-    assert blinks >= 3 if conversation else blinks == 0
+    rig, blinks = apply_changes(load_rig("desk"), HALF_RATE), []
+    for conversation in ("talk", None):
+        options = RunOptions(
+            True, True, 0, "face-to-face", seconds=60.0, bus="ideal", conversation=conversation
+        )
+        blinks.append(simulate(rig, options).figures["blinks"])
+    assert blinks[0] > blinks[1] + 3 > 3

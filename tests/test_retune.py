@@ -35,8 +35,6 @@ def some_changes(
             yield {key: not now}
         case "choice":
             yield from ({key: choice} for choice in knob.choices if choice != now)
-        case "list" if key == "gaze.scanpath.simple_order":
-            yield {key: ("M", "N", "RE")}
         case "list" if key == "guard.collisions":
             yield {key: (COLLISION,)}
         case "list" if key.endswith("point_world_m"):
@@ -140,7 +138,7 @@ def test_orders_of_a_run_do_it_again_bit_for_bit() -> None:
         running = started("boxing")
         running.go(50)
         running.made.robot.command(
-            Tune((("joints.neck_yaw.max_deg", 5.0), ("gaze.head.align", 1.0)))
+            Tune((("joints.neck_yaw.max_deg", 5.0), ("gaze.head.goal_model", "align")))
         )
         running.go(100)
         running.made.robot.command(Tune((("gaze.scanpath.model", "random"),)))

@@ -91,7 +91,6 @@ def test_a_rig_names_its_profile_and_character(
         (r"rate_hz: 200.0", "rate_hz: 2000.0", "loop.rate_hz", "above 1000"),
         (r"interocular_mm", "interocular", "geometry", "interocular_mm"),
         (r"^    zero_step: 2048", "    zero_step: 20", "joints.left_eye_pan", "0..4095"),
-        (r"max_salience: 1.0", "max_salience: 0.1", "gaze.head", "above min_salience"),
         (r"^lid_joints:(.*\n  .*)*", "", "lid_joints.left_deg", "left_upper_lid needs it"),
         (r"left_deg: .*", "left_deg: [-25.0]", "lid_joints.left_deg", "length 1, wanted 2"),
     ],

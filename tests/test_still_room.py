@@ -35,7 +35,7 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
     """Run a rig with all of the head in each glance around."""
     patch.setattr(run_rig, "load_scene", lambda name, seed: room)
     rig = load_rig("desk")
-    head = replace(rig.gaze.head, eye_only_range_deg=6.0, head_slope=1.0)
+    head = replace(rig.gaze.head, eye_only_range_deg=6.0)
     rig = replace(
         rig,
         loop=replace(rig.loop, rate_hz=100.0),

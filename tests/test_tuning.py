@@ -273,7 +273,7 @@ def test_a_character_of_the_command_line_is_saved_only_after_it_is_chosen(mine: 
 
 
 def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> None:
-    bench = Bench(str(mine), scanpath="random", saccade="main_sequence")
+    bench = Bench(str(mine), scanpath="random", saccade="min_jerk")
     assert bench.tuning.unsaved() == ()
     bench.tuning.apply_character("bold")
     bench.tuning.set_option("loop.rate_hz", 50.0)

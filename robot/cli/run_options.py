@@ -109,9 +109,7 @@ Conversation = Annotated[
 Scanpath = Annotated[
     str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
 ]
-Saccade = Annotated[
-    str | None, typer.Option(help="Saccades: human, main_sequence, min_jerk, literal_frame.")
-]
+Saccade = Annotated[str | None, typer.Option(help="Saccades: human, min_jerk, literal_frame.")]
 Page = Annotated[
     str,
     typer.Option(

@@ -93,7 +93,7 @@ def orders(visitor: Visitor) -> None:
 
 def parameters(visitor: Visitor) -> None:
     """Changes of a parameter."""
-    post(visitor, b'{"do": "set", "changes": {"gaze.head.align": 0.7}}')
+    post(visitor, b'{"do": "set", "changes": {"gaze.head.eye_only_range_deg": 30.0}}')
 
 
 def stops(visitor: Visitor) -> None:

@@ -86,13 +86,7 @@ def _of(run: Runner, seed: int, seconds: float, interest: float, model: str) -> 
         seconds=seconds,
         overrides={
             "gaze.head.goal_model": model,
-            "gaze.head.slope_spread": 0.0,
-            # The eyes are brought back soon, so that the second shift begins from the same place.
-            "gaze.head.recentre_after_ms": 800.0,
-            "gaze.head.recentre_spread_ms": 0.0,
-            "gaze.head.recentre_speed_deg_s": 30.0,
-            "gaze.head.comfort_deg": 8.0,
-            **{f"gaze.sway.{axis}_deg": 0.0 for axis in ("yaw", "pitch", "roll")},
+            "gaze.drift": "none",
             "gaze.top_down.rules.wait.look_at": "ball",
             "gaze.top_down.rules.wait.salience": interest,
             "gaze.bottom_up.onset_salience": 0.0,

@@ -26,9 +26,10 @@ WANTED = {
     "size measured, 5th percentile, deg": (0.4, 1.5),
     "size measured, 95th percentile, deg": (0.5, 1.8),
     "farthest from the middle, 95th percentile, deg": (0.0, 1.6),
-    "hobby servos, largest re-fixation, deg": (0.0, 0.0),
+    "hobby servos, re-fixations": (0.0, 0.0),
     "smallest commanded, least of all rigs, encoder steps": (5.0, 100.0),
 }
+_LEAST_DEG = 1.15
 _EYES = {"desk": "left_eye_pan", "feetech": "left_eye_pan", "expressive": "eyes_pan"}
 
 
@@ -57,7 +58,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "farthest from the middle, 95th percentile, deg": float(
             np.percentile(np.concatenate(off), 95)
         ),
-        "hobby servos, largest re-fixation, deg": load_rig("maker").gaze.oculomotor.refixation_deg,
+        "hobby servos, re-fixations": float(load_rig("maker").gaze.oculomotor.refixations),
         "smallest commanded, least of all rigs, encoder steps": min(map(_least_steps, _EYES)),
     }
 
@@ -67,4 +68,4 @@ def _least_steps(name: str) -> float:
     rig = load_rig(name)
     joint = rig.joints[_EYES[name]]
     step_deg = 360.0 / joint.model_facts.steps_per_turn / joint.ratio
-    return rig.gaze.oculomotor.refixation_least_deg / step_deg
+    return _LEAST_DEG / step_deg

@@ -46,8 +46,8 @@ from gazerig.features.lab.sweep.worker_pool import Job, WorkerPool
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 
-COMFORT = "gaze.head.comfort_deg"
-LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
+EYES_ALONE = "gaze.head.eye_only_range_deg"
+LOW, HIGH = "joints.neck_roll.min_deg", "joints.neck_roll.max_deg"
 QUICK = ("--seconds", "1", "--bus", "ideal", "--jobs", "1")
 OPTIONS = RunOptions(mock=True, fast=True, scene="visitor", seconds=1.0, bus="ideal")
 PATIENCE_S = 120.0
@@ -67,10 +67,10 @@ def table(out: Path) -> list[dict[str, str]]:
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a sweep of two points and two seeds, one of whose points fails."""
     out = tmp_path_factory.mktemp("sweep") / "grid"
-    done = swept(out, "--set", f"{LOW}=0.2,1.5", "--set", f"{HIGH}=1.0,1.8", "--seeds", "1")
+    done = swept(out, "--set", f"{LOW}=-25.0,0.0", "--set", f"{HIGH}=0.0,25.0", "--seeds", "1")
     assert done.code == 0, done.err
     assert "4 points, 1 seeds each: 4 runs" in done.err
-    assert "failed: gaze.head.min_salience=1.5, gaze.head.max_salience=1.0, seed 0" in done.err
+    assert "failed: joints.neck_roll.min_deg=0.0, joints.neck_roll.max_deg=0.0, seed 0" in done.err
     return out
 
 
@@ -78,13 +78,13 @@ def test_a_run_that_fails_is_a_row_with_its_reason(finished: Path) -> None:
     rows = table(finished)
     levels = [(row[LOW], row[HIGH], row["seed"]) for row in rows]
     assert levels == [
-        ("0.2", "1.0", "0"),
-        ("0.2", "1.8", "0"),
-        ("1.5", "1.0", "0"),
-        ("1.5", "1.8", "0"),
+        ("-25.0", "0.0", "0"),
+        ("-25.0", "25.0", "0"),
+        ("0.0", "0.0", "0"),
+        ("0.0", "25.0", "0"),
     ]
     failed = [row["failed"] for row in rows]
-    assert failed[2] == "gaze.head: max_salience must be above min_salience"
+    assert "min_deg 0.0 must be below max_deg 0.0" in failed[2]
     assert not any(failed[:2]) and not failed[3]
     assert rows[2]["seconds"] == "" and rows[0]["seconds"] == "0.99"
     assert rows[0]["verdict.rest_error"] in ("pass", "outside", "too few events")
@@ -98,7 +98,7 @@ def test_the_picture_and_parquet_hold_the_same(finished: Path) -> None:
     columns = parquet.read_table(finished / "table.parquet").to_pydict()
     rows = table(finished)
     assert list(columns) == list(rows[0])
-    assert columns[HIGH] == [1.0, 1.8, 1.0, 1.8] and columns["seconds"][2] is None
+    assert columns[HIGH] == [0.0, 25.0, 0.0, 25.0] and columns["seconds"][2] is None
     assert columns[OUTSIDE][0] == int(rows[0][OUTSIDE])
 
 
@@ -113,7 +113,7 @@ def test_the_picture_and_parquet_hold_the_same(finished: Path) -> None:
 def test_other_arguments_are_refused_with_what_differs(
     finished: Path, words: tuple[str, ...], text: str
 ) -> None:
-    done = swept(finished, "--set", f"{LOW}=0.2,1.5", "--set", f"{HIGH}=1.0,1.8", *words)
+    done = swept(finished, "--set", f"{LOW}=-25.0,0.0", "--set", f"{HIGH}=0.0,25.0", *words)
     assert done.code == 2 and text in done.err and "another folder with --out" in done.err
 
 
@@ -132,7 +132,7 @@ def test_a_line_that_was_being_written_when_the_power_went_is_done_again(tmp_pat
 
 
 def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> None:
-    points: list[Point] = [{COMFORT: 4.0}, {COMFORT: 12.0}]
+    points: list[Point] = [{EYES_ALONE: 4.0}, {EYES_ALONE: 12.0}]
     runs = [(point, seed) for point in points for seed in (0, 1)]
     with WorkerPool(Job(OPTIONS, params_text(desk_rig)), 2, lambda: None) as pool:
         found = dict(pool.outcomes(runs))
@@ -169,7 +169,7 @@ def _zombie(pid: int) -> bool:
 @contextmanager
 def begun(out: Path) -> Iterator[Branch]:
     """Start a sweep and wait for its first run."""
-    words = ("sweep", "--out", str(out), *QUICK, "--set", f"{COMFORT}=1:80:80", "--seeds", "50")
+    words = ("sweep", "--out", str(out), *QUICK, "--set", f"{EYES_ALONE}=1:80:80", "--seeds", "50")
     pipe = subprocess.PIPE
     process = Branch(gazerig(*words), stderr=pipe, text=True)
     file = out / RUNS
@@ -228,10 +228,10 @@ def test_a_measure_outside_its_band_counts_by_its_distance() -> None:
     ("words", "text"),
     [
         ((), "nothing to vary: give --set KEY=VALUES"),
-        (("--set", f"{COMFORT}=4,8", "--show", "blink_rat"), "did you mean 'blink_rate'?"),
-        (("--set", f"{COMFORT}=4,8", "--scene", "visiter"), "unknown; scenes: "),
-        (("--set", f"{COMFORT}=4,8", "--bus", "real"), "--bus real: unknown"),
-        (("--set", f"{COMFORT}=4,8", "--conversation", "sing"), "sing"),
+        (("--set", f"{EYES_ALONE}=4,8", "--show", "blink_rat"), "did you mean 'blink_rate'?"),
+        (("--set", f"{EYES_ALONE}=4,8", "--scene", "visiter"), "unknown; scenes: "),
+        (("--set", f"{EYES_ALONE}=4,8", "--bus", "real"), "--bus real: unknown"),
+        (("--set", f"{EYES_ALONE}=4,8", "--conversation", "sing"), "sing"),
     ],
 )
 def test_what_cannot_be_run_is_refused_before_a_folder_is_made(
@@ -243,7 +243,6 @@ def test_what_cannot_be_run_is_refused_before_a_folder_is_made(
 
 
 BLINKING = "gaze.lids.blinks_per_min"
-LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
 
 
 # --- What --set takes, what is refused before anything runs, and the points that come of it
@@ -255,13 +254,13 @@ def read(*settings: str) -> list[Axis]:
 
 def test_steps_lists_and_ranges_are_read() -> None:
     steps, words, flags, reach = read(
-        f"{COMFORT}=4:16:7",
-        "gaze.saccade.profile=min_jerk, main_sequence",
-        "gaze.head.literal_reach=true,false",
+        f"{EYES_ALONE}=4:16:7",
+        "gaze.saccade.profile=min_jerk, human",
+        "gaze.oculomotor.refixations=true,false",
         f"{BLINKING}=8..30.5",
     )
     assert steps.values == (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0) and steps.unit == "deg"
-    assert words.values == ("min_jerk", "main_sequence") and flags.values == (True, False)
+    assert words.values == ("min_jerk", "human") and flags.values == (True, False)
     assert reach.is_range and (reach.low, reach.high, reach.whole) == (8.0, 30.5, False)
     assert reach.label == f"{BLINKING}, 1/min" and words.label == "gaze.saccade.profile"
 
@@ -269,19 +268,23 @@ def test_steps_lists_and_ranges_are_read() -> None:
 @pytest.mark.parametrize(
     ("setting", "error", "text"),
     [
-        ("gaze.head.comfrt_deg=4:16:7", ConfigError, "unknown key 'comfrt_deg'; did you mean"),
-        (f"{COMFORT}=4:160", ConfigError, "160.0 is above 90 (unit deg)"),
+        (
+            "gaze.head.eye_only_rnge_deg=4:16:7",
+            ConfigError,
+            "unknown key 'eye_only_rnge_deg'; did you mean",
+        ),
+        (f"{EYES_ALONE}=4:200", ConfigError, "200.0 is above 180 (unit deg)"),
         (
             "gaze.saccade.profile=1:3:3",
             SetupError,
-            "profile=human,main_sequence,min_jerk,literal_frame",
+            "profile=human,min_jerk,literal_frame",
         ),
-        (f"{COMFORT}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
-        (f"{COMFORT}=", SetupError, "not KEY=VALUES"),
-        (f"{COMFORT}=9:4:3", SetupError, "9 is not below 4"),
-        (f"{COMFORT}=4:9:1", SetupError, "1 steps; wanted 2 to"),
-        (f"{COMFORT}=4,5,4", SetupError, "a value is given twice"),
-        (f"{COMFORT}=[4", SetupError, "not valid YAML"),
+        (f"{EYES_ALONE}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
+        (f"{EYES_ALONE}=", SetupError, "not KEY=VALUES"),
+        (f"{EYES_ALONE}=9:4:3", SetupError, "9 is not below 4"),
+        (f"{EYES_ALONE}=4:9:1", SetupError, "1 steps; wanted 2 to"),
+        (f"{EYES_ALONE}=4,5,4", SetupError, "a value is given twice"),
+        (f"{EYES_ALONE}=[4", SetupError, "not valid YAML"),
         ("gaze.head=4:9:2", SetupError, "is no single value; name one, for example gaze.head."),
         ("profile=robot,mitake", SetupError, "it acts while files are read; give --profile"),
     ],
@@ -295,14 +298,14 @@ def test_what_cannot_be_a_setting_is_refused(
 
 
 def test_a_grid_has_every_combination_the_last_axis_fastest() -> None:
-    points = grid(read(f"{COMFORT}=4,6", f"{BLINKING}=10:30:3"))
+    points = grid(read(f"{EYES_ALONE}=4,6", f"{BLINKING}=10:30:3"))
     assert [tuple(point.values()) for point in points] == [
         (4, 10.0), (4, 20.0), (4, 30.0), (6, 10.0), (6, 20.0), (6, 30.0)
     ]  # fmt: skip
     with pytest.raises(SetupError, match="needs --samples N or --fit; for a grid write .*:STEPS"):
-        grid(read(f"{COMFORT}=4:16"))
+        grid(read(f"{EYES_ALONE}=4:16"))
     with pytest.raises(SetupError, match="at most 100000"):
-        grid(read(f"{COMFORT}=4:16:1000", f"{BLINKING}=1:60:1000"))
+        grid(read(f"{EYES_ALONE}=4:16:1000", f"{BLINKING}=1:60:1000"))
 
 
 OTHER_AXES = (
@@ -329,7 +332,7 @@ def test_a_latin_hypercube_falls_once_into_each_part_of_every_axis(n: int, seed:
 FITTED = (
     Axis("gaze.lids.blinks_per_min", (), 1.0, 60.0),
     Axis("gaze.lids.close_ms", (), 30.0, 300.0),
-    Axis("gaze.saccade.profile", ("min_jerk", "main_sequence", "literal_frame")),
+    Axis("gaze.saccade.profile", ("min_jerk", "human", "literal_frame")),
 )
 # --- Fitting: what counts as outside, the search, and the YAML that a run takes
 
@@ -355,7 +358,7 @@ def blinking(points: Sequence[Point]) -> list[list[Outcome]]:
     for point in points:
         rate, close, profile = point.values()
         assert isinstance(rate, float) and isinstance(close, float)
-        skew = BY_KEY["skew"].low if profile == "main_sequence" else BY_KEY["skew"].high + 1.0
+        skew = BY_KEY["skew"].low if profile == "human" else BY_KEY["skew"].high + 1.0
         found.append([outcome(point, seed, (rate + seed, close, skew)) for seed in (0, 1)])
     return found
 
@@ -365,7 +368,7 @@ def test_a_search_puts_the_measures_inside_their_bands() -> None:
     assert found.counted and set(found.counted) == set(KEYS)
     assert found.start.point == START and found.start.outside == 3.0
     assert found.best.outside == 0.0 and found.best.score == 0.0
-    assert found.best.point["gaze.saccade.profile"] == "main_sequence"
+    assert found.best.point["gaze.saccade.profile"] == "human"
     assert 60 <= len(found.trials) <= 98
 
 
@@ -382,7 +385,7 @@ def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path:
     out, key, jerky = tmp_path / "fit", "gaze.saccade.profile", tmp_path / "jerky.yaml"
     jerky.write_text(  # and so many shifts that a few seconds judge most measures
         "gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50},\n"
-        "  scanpath: {rate_scale: 4, min_dwell_ms: 40}, looks_away: none}\n"
+        "  scanpath: {rate_scale: 4, law: literal}, looks_away: none}\n"
     )
     words = (
         *("sweep", "--fit", "--out", str(out), "--seconds", "7", "--bus", "ideal", "--jobs", "1"),
