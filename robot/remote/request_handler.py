@@ -57,11 +57,16 @@ class LoopMonitor:
         """Return the function that stores the newest tick, for the loop."""
         return self._feed.update
 
-    def wait_for_commands(self) -> bool:
-        """Wait until all previous changes are applied; return whether they are."""
-        # The present tick may have read the commands already, the next one has not.
-        wanted = self._feed.ticks + 2
-        waits = int(_TAKEN_UP_S / 0.002)
+    def wait_for_commands(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
+        """Wait until all previous changes are applied; return whether they are.
+
+        Args:
+            within_s: Timeout, s.
+            ticks: Ticks to wait for; the present one may have read the commands already, the next
+                one has not.
+        """
+        wanted = self._feed.ticks + ticks
+        waits = int(within_s / 0.002)
         while self._feed.ticks < wanted and waits > 0:
             self._never.wait(0.002)
             waits -= 1
