@@ -11,7 +11,7 @@ from page_visitor import PATIENCE_S
 
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.types import SeenFace, Snapshot
 
 T = TypeVar("T")
 
@@ -37,6 +37,11 @@ SNAPSHOT = Snapshot(
     health="0 lost",
     joints=GAZE_JOINTS,
 )
+FACE = SeenFace(
+    3, (0.9, 0.1, 0.25), ((-0.98, -0.2, 0.0), (0.2, -0.98, 0.0), (0.0, 0.0, 1.0)),
+    ((0.9, 0.1, 0.25), (0.9, 0.13, 0.28)) * 4,
+)  # fmt: skip
+"""A face that looks back along the x axis, a little aside."""
 PARAM = Parameter("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 

@@ -103,7 +103,7 @@ def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(OLD, encoding="utf-8")
     reported = threading.Event()
-    watch = FileWatch(lambda: [path], lambda _: reported.set(), every_s=0.01)
+    watch = FileWatch(lambda: [path], lambda _: reported.set())
     watch.start()
     path.write_text(NEW, encoding="utf-8")
     assert reported.wait(10.0)

@@ -4,6 +4,7 @@ Its share of what the page sends fills the buffers on the way; what counts is th
 other browsers and the stop button do not notice.
 """
 
+import itertools
 import socket
 import threading
 from collections.abc import Iterator
@@ -12,15 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from page_feed import PageFeed
 from page_visitor import LOOKING, Visitor
-from shown_page import AHEAD, SNAPSHOT, wait_for
+from present import present
+from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from gazerig.gaze.types import PARTS
-from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.model.types import SeenFace
 
 OWED_BYTES = 6_000_000
 """More than Linux keeps for one connection."""
@@ -64,12 +64,6 @@ class Listener:
         self._thread.join()
 
 
-def person(number: int) -> SeenFace:
-    """One before the rig who has not been there before."""
-    parts_m = tuple((0.8, 0.01 * part, 0.15) for part in range(len(PARTS)))
-    return SeenFace(number, (0.85, 0.0, 0.15), AHEAD, parts_m)
-
-
 class Rig:
     """A page that is fed as by a running rig, and what was heard from it."""
 
@@ -79,8 +73,7 @@ class Rig:
             self.port = trial.getsockname()[1]
         self.heard: list[dict[str, object]] = []
         self.page = PageProcess("127.0.0.1", self.port, self.heard.append)
-        self.snapshot = SNAPSHOT
-        self.rounds = 0
+        self.changes: dict[str, object] = {}
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._feed)
 
@@ -92,13 +85,16 @@ class Rig:
 
     def _feed(self) -> None:
         # Noise does not compress: what the deaf browser is owed soon fills all buffers.
-        noise = np.random.default_rng(0).integers(0, 255, (8, 360, 480, 3)).astype(np.uint8)
-        jpegs = [encode(picture) for picture in noise]
-        while not self._over.wait(0.02):
-            self.rounds += 1
-            faces = (person(self.rounds // 3),)  # new ones again and again, with all their shapes
-            self.page.show(replace(self.snapshot, t_s=0.02 * self.rounds, faces=faces))
-            self.page.show_frame(jpegs[self.rounds % len(jpegs)])
+        noise = np.random.default_rng(0).integers(0, 255, (8, 400, 640, 3)).astype(np.uint8)
+        feed = PageFeed(self.page)
+        percept = present(feed.tick.percept)
+        (face,) = percept.faces
+        for number in itertools.count():
+            if self._over.wait(0.02):
+                return
+            # New people again and again, with all their shapes.
+            newer = replace(percept, faces=(replace(face, id=number // 3),))
+            feed.show(noise[number % len(noise)], percept=newer, **self.changes)
 
     def feed_no_more(self) -> None:
         self._over.set()
@@ -135,8 +131,8 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig, path:
     try:
         wait_for(lambda: reads_all.bytes > OWED_BYTES, "what one who reads gets")
         # Now as ever: others see the newest, a stop is heard, the button knows of it.
-        rig.snapshot = replace(SNAPSHOT, target_name="the target of later", stopped="a test")
-        wait_for(lambda: listener.reads("the target of later"), "the newest words")
+        rig.changes = {"stopped": "a test"}
+        wait_for(lambda: listener.reads("stopped: a test"), "the newest words")
         seen = reads_all.bytes
         wait_for(lambda: reads_all.bytes > seen, "more for who reads")
         assert visitor.ask({"do": "stop", "why": "a test"}) == 204

@@ -2,19 +2,20 @@
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
+from msgspec import structs
+from page_feed import GREY, IN_TIME, PageFeed
 from page_layout import boxes, faults, value, violations
-from shown_page import SNAPSHOT, running_page, wait_for
+from shown_page import running_page, wait_for
 
-from gazerig.robot.dashboard.feed.camera_overlay import encode
+from gazerig.robot.control.loop_timing import busy_text
+from gazerig.robot.control.tick_text import head_activity
 from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.model.control_source import ControlSource, control_sentence
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.control_source import ControlState
 
 SIZES = {
     "desk": (1600, 1000),
@@ -25,55 +26,49 @@ SIZES = {
     "narrow": (1000, 700),
 }
 TABS = ("watch", "steer", "tune", "health")
-MENUS = {"track": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("wink left",)}
-LEADS = {
-    "awake": ControlSource(),
-    "stopped": ControlSource("stopped", "", "STOP was pressed on the page (browser 1a2b)"),
-    "jogging": ControlSource("joint", "browser 1a2b", "neck_yaw at 17.2 deg", ("neck_yaw",), 0.0),
-    "led by a click": ControlSource("person", "browser 1a2b", "look at 0.9 0.1 0.25", (), 0.0),
-    "hold": ControlSource(),
-    "bus lost": ControlSource(),
-    "busy": ControlSource(),
-}
+MENUS = {"track": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
+MINUTES_S = -300.0
+CLICK = ControlState(
+    1, True, who="browser 1a2b", description="look at 0.9 0.1 0.25", since_s=MINUTES_S
+)
+HELD = structs.replace(
+    CLICK, kind="joint", description="neck_yaw at 17.2 deg", joints=("neck_yaw",)
+)
+STOP, HOLD = "STOP was pressed on the page (browser 1a2b)", "neck_pitch: no feedback for 120 ms"
+LOST = "the servo bus is lost: /dev/ttyUSB0 is not there"
 CHANGES: dict[str, dict[str, Any]] = {
-    "busy": {"busy": "the computer is too busy: 12% of ticks came late (worst 38 ms)"},
-    "stopped": {"stopped": LEADS["stopped"].description, "level": "torque_off"},
-    "hold": {"level": "hold", "reasons": ("neck_pitch: no feedback for 120 ms: all joints hold",)},
-    "bus lost": {
-        "headline": "the torque is off: the servo bus is lost: /dev/ttyUSB0 is not there",
-        "level": "torque_off",
-        "reasons": ("the servo bus is lost: /dev/ttyUSB0 is not there",),
-        "health": "bus lost: /dev/ttyUSB0 is not there, tried again every 0.5 s",
-    },
+    "awake": {},
+    "stopped": {"stopped": STOP, "level": "torque_off"},
+    "jogging": {"client_control": HELD},
+    "led by a click": {"client_control": CLICK},
+    "hold": {"level": "hold", "reasons": (f"{HOLD}: all joints hold",)},
+    "bus lost": {"level": "torque_off", "reasons": (LOST,), "critical_reasons": (LOST,)},
+    "busy": {},
 }
-
-
-def snapshot(state: str) -> Snapshot:
-    leader = LEADS[state]
-    words = control_sentence(leader, 12.0)
-    headline = words if leader.overrides_gaze else "looks at person 3 (left eye)"
-    changes = {"headline": headline, **CHANGES.get(state, {})}
-    return replace(SNAPSHOT, t_s=12.0, control_source=leader, **changes)
+"""What differs from a tick that looks at a person: of the guard's result or of the tick itself."""
+BUSY = IN_TIME._replace(late_share=0.12, latest_ms=38.0)
 
 
 class Shown:
     """A page in a browser, and what feeds it."""
 
     def __init__(self, browser: Browser, page: PageProcess) -> None:
-        self.browser, self.page = browser, page
-        self.t_s = 0.0
+        self.browser, self.feed = browser, PageFeed(page)
 
-    def state(self, name: str) -> None:
+    def state(self, name: str, image: np.ndarray | None = None) -> None:
         """Show a state and wait until the page shows it."""
-        self.t_s += 1.0
-        shot = replace(snapshot(name), t_s=self.t_s)
-        self.page.show(shot)
+        changes, timing = CHANGES[name], BUSY if name == "busy" else IN_TIME
+        guard = self.feed.tick.guard_result
+        results = {key: changes[key] for key in changes if key in guard._fields}
+        others = {key: changes[key] for key in changes if key not in guard._fields}
+        errors = {"timeout": 3} if name == "bus lost" else {}
+        self.feed.state = self.feed.state._replace(errors=errors, timing=timing)
         said = "['headline', 'busy'].map(id => document.getElementById(id).textContent)"
 
         def says() -> bool:
-            self.t_s += 0.01
-            self.page.show(replace(shot, t_s=self.t_s))
-            return bool(value(self.browser, said) == [shot.headline, shot.busy])
+            tick = self.feed.show(image, guard_result=guard._replace(**results), **others)
+            words = [head_activity(tick).headline, busy_text(timing)]
+            return bool(value(self.browser, said) == words)
 
         wait_for(says, f"the headline of {name}")
 
@@ -96,10 +91,9 @@ class Shown:
 def shown() -> Iterator[Shown]:
     with browsing(SIZES["laptop"], RARE_DRAWING) as browser, running_page() as (page, url):
         page.offer(MENUS)
-        page.show(snapshot("awake"))
-        page.show_frame(encode(np.full((400, 640, 3), (140, 120, 100), np.uint8)))
-        browser.go(url)
         shown = Shown(browser, page)
+        shown.feed.show(GREY)
+        browser.go(url)
         wait_for(lambda: value(browser, "document.querySelector('#camera img') !== null"), "it")
         yield shown
 
@@ -111,7 +105,7 @@ def size(shown: Shown, request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-@pytest.mark.parametrize("state", LEADS)
+@pytest.mark.parametrize("state", CHANGES)
 def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size: str) -> None:
     shown.state(state)
     assert faults(shown.browser) == []
@@ -164,8 +158,7 @@ def test_what_is_not_new_is_grey_and_has_its_age(shown: Shown, size: str) -> Non
     greys = itertools.cycle(range(100, 140))
 
     def fresh() -> bool:
-        shown.state("awake")
-        shown.page.show_frame(encode(np.full((400, 640, 3), next(greys), np.uint8)))
+        shown.state("awake", np.full((400, 640, 3), next(greys), np.uint8))
         return bool(value(shown.browser, script) == [[False, ""], [False, ""]])
 
     wait_for(fresh, "the new view and picture")

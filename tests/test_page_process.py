@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -16,10 +15,10 @@ from urllib.parse import urlsplit
 
 import child_processes
 import pytest
-import shown_page
+from page_feed import PageFeed
 from page_visitor import PATIENCE_S, Visitor
 from present import present
-from shown_page import AHEAD, free_port, running_page, wait_for
+from shown_page import free_port, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.page_process import (
     CANNOT_OPEN,
@@ -29,14 +28,8 @@ from gazerig.robot.dashboard.feed.page_process import (
     PageProcess,
 )
 from gazerig.robot.dashboard.requests.inbox import BEAT
-from gazerig.robot.model.types import SeenFace
 
 REPOSITORY = Path(__file__).parents[1]
-
-SNAPSHOT = replace(
-    shown_page.SNAPSHOT,
-    faces=(SeenFace(3, (0.9, 0.1, 0.25), AHEAD, ((0.9, 0.1, 0.25), (0.9, 0.15, 0.3)) * 4),),
-)
 
 
 @pytest.fixture(scope="module")
@@ -101,9 +94,8 @@ def test_page_ends_if_its_folder_is_gone(tmp_path: Path) -> None:
 
 def test_unopened_page_drops() -> None:
     page = PageProcess("127.0.0.1", 8080)
-    page.show(SNAPSHOT)
-    page.show_frame(b"jpeg")
-    assert (page.dropped, page.frames_dropped, page.url(), page.notice()) == (1, 1, None, None)
+    page.check()
+    assert not page.send(b"t") and (page.url(), page.notice()) == (None, None)
     page.close()
 
 
@@ -157,7 +149,7 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
         assert words.startswith("the page has stopped") and "started again" in words
-        page.show(SNAPSHOT)  # has no effect
+        page.check()  # has no effect
         assert wait_for(page.url, "the page") == url  # the same port and token
         assert not folder.exists() and present(page._folder).path.stat().st_mode & 0o077 == 0
         assert page_here() not in (None, first) and page.started == 2
@@ -171,6 +163,18 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         os.kill(second, signal.SIGKILL)
         wait_for(lambda: page.started == 3, "the third page")
         assert page.notice() is None
+
+
+def test_a_suspended_page_is_replaced_while_the_rig_runs() -> None:
+    with running_page() as (page, _):
+        feed = PageFeed(page)
+        os.kill(present(page._process).pid, signal.SIGSTOP)
+
+        def is_replaced() -> bool:
+            feed.show()
+            return page.started == 2
+
+        wait_for(is_replaced, "another page")
 
 
 @pytest.mark.parametrize("beats", [True, False])
@@ -193,7 +197,7 @@ def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> No
         for second in range(1, 9):
             for _ in range(10):
                 now_s[0] += 0.1
-                page.show(SNAPSHOT)
+                page.check()
             if second != 5:  # the first look counts a little more
                 assert bool(killed) == (not beats and second > 5)
             if beats:
@@ -202,7 +206,7 @@ def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> No
         now_s[0] += 3600.0  # this machine slept: the page's activity is unknown
         killed.clear()
         page._silent_s = 0.0
-        page.show(SNAPSHOT)
+        page.check()
         assert not killed
     finally:
         page.close()

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
-from shown_page import SNAPSHOT
-from test_page import face_at
+from shown_page import FACE, SNAPSHOT
 
 from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.description import person_shape
@@ -35,7 +34,7 @@ def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part
 def seen(*, hand: bool = True) -> Snapshot:
     bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),) if hand else ()
     ball = SeenBody(8, "thing", (0.6, -0.2, 0.1), 0.05)
-    return replace(SNAPSHOT, faces=(face_at((0.9, 0.1, 0.25)),), bodies=(*bodies, ball))
+    return replace(SNAPSHOT, faces=(FACE,), bodies=(*bodies, ball))
 
 
 def test_a_person_a_hand_and_a_thing_are_drawn_and_go() -> None:

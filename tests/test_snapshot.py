@@ -14,11 +14,6 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.feed.page_process import (
-    MESSAGE_BYTES,
-    decode_snapshot,
-    encode_snapshot,
-)
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot
 from gazerig.robot.safety.health import HOT_C
@@ -133,13 +128,6 @@ def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     snapshots.update(calm[3])
     after = snapshots.build(SnapshotTexts())
     assert after is not None and after.worst == "ok"
-
-
-def test_snapshots_survive_the_way_and_are_short() -> None:
-    for shot in taken():
-        message = encode_snapshot(shot)
-        assert len(message) < MESSAGE_BYTES / 20
-        assert decode_snapshot(message) == shot
 
 
 @cache

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
-from shown_page import SNAPSHOT
-from test_page import face_at
+from shown_page import FACE, SNAPSHOT
 from world_shapes import LEAVES_S, SmallWorld
 
 from gazerig.robot.dashboard.view.head_view import HeadView
@@ -44,7 +43,7 @@ def test_people_of_a_world_are_where_they_are_at_the_time() -> None:
 def test_with_a_world_what_was_seen_is_only_marked() -> None:
     server = viser.ViserServer(port=0, verbose=False)
     bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),)
-    seen = replace(SNAPSHOT, faces=(face_at((0.9, 0.1, 0.25)),), bodies=bodies)
+    seen = replace(SNAPSHOT, faces=(FACE,), bodies=bodies)
     drawn = {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/shades/3", "/shade"}
     try:
         people, head = PeopleView(server.scene), HeadView(server.scene)

@@ -58,7 +58,6 @@ def serve(path: Path) -> None:
     about = {"rig": str(path), "name": "my", "pid": os.getpid()}
     tuning = ParamStore(made.live_params, robot.command, str(path), elsewhere=here)
     live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
-    live._watch._every_s = 0.1
 
     def watch(tick: Tick) -> None:
         live.update(tick)

@@ -70,7 +70,6 @@ class PageView:
         self.emulated = False
         self.choice = ""
         widgets.on_join(self._greet)
-        self._jpeg: bytes | None = None
         self._image: ImageArray | None = None
         self._world_now: ShownWorld | None = None
         self._drawn = self._watched = False
@@ -111,7 +110,6 @@ class PageView:
                 "refused": refused_moves(self._menus, shot.joints),
                 **headline_json(shot.control_source, shot),
             })  # fmt: skip
-        self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
         self._world_now = news.world
         self._head.shape = news.shape or self._head.shape
@@ -163,15 +161,13 @@ class PageView:
             self._controls.show(self._newest)
             self._drawn = True
         self._panel.show()
-        if self._jpeg is not None:
-            self._panel.image.show(self._jpeg)
         if self._image is not None:
             self._panel.image.show(encode(self._image))
-        self._newest = self._jpeg = self._image = None
+        self._newest = self._image = None
 
     def silent(self) -> None:
         """Show that no more data arrives, together with the last data."""
-        self.show(News((), None, ended=False))
+        self.show(News((), ended=False))
         if self._drawn:
             self._panel.silence.content = no_data_text()
             self._tell({"stopped": "", "silent": True})

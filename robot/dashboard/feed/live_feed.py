@@ -34,13 +34,10 @@ from gazerig.robot.control.tick_text import health_text, perception_text
 from gazerig.robot.dashboard.feed.gaze_trail import GazeHistory, GazeTrail
 from gazerig.robot.dashboard.feed.page_process import (
     CHOICES,
-    FRAME,
     MESSAGE,
     PARAMS,
-    SNAPSHOT,
     TRACKS,
     VALUES,
-    decode_snapshot,
 )
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
@@ -388,16 +385,16 @@ class OverlayChoices:
 
 
 class News(NamedTuple):
-    """Messages that waited on the socket: all snapshots, the last frame, and whether it has closed.
+    """Messages that waited on the socket: a snapshot, a frame, and whether it has closed.
 
-    jpeg: an encoded frame; image: a frame with its detections, BGR
+    snapshots: one, or none without new ticks
+    image: a frame with its detections, BGR
     world: the simulated world around the rig, if any
     shape: geometry of the rig, if known
     others: messages that must not be lost or skipped, as (kind, content of the JSON), oldest first
     """
 
     snapshots: tuple[Snapshot, ...]
-    jpeg: bytes | None
     ended: bool
     others: tuple[tuple[bytes, object], ...] = ()
     image: ImageArray | None = None
@@ -410,9 +407,8 @@ def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
 
     live: receives the messages of a running rig
     """
-    snapshots: list[Snapshot] = []
     others: list[tuple[bytes, object]] = []
-    jpeg, ended = None, False
+    ended = False
     while not ended:
         try:
             message, fd = receive(feed, MESSAGE_BYTES, DONT_WAIT)
@@ -422,17 +418,10 @@ def read_waiting(feed: MessageLink, live: LiveFeed) -> News:
             message, fd = b"", -1
         ended = not message
         kind, body = message[:1], message[1:]
-        if kind == SNAPSHOT:
-            snapshots.append(decode_snapshot(message))
-            live.shown_s = snapshots[-1].t_s
-        elif kind == FRAME:
-            jpeg = body
-        elif kind in (CHOICES, TRACKS, PARAMS, VALUES, MESSAGE):
+        if kind in (CHOICES, TRACKS, PARAMS, VALUES, MESSAGE):
             others.append((kind, json.loads(body)))
         else:
             live.handle_message(message, fd)
-    if (newest := live.snapshot()) is not None:
-        snapshots.append(newest)
-    return News(
-        tuple(snapshots), jpeg, ended, tuple(others), live.image(), live.world(), live.shape
-    )
+    newest = live.snapshot()
+    snapshots = () if newest is None else (newest,)
+    return News(snapshots, ended, tuple(others), live.image(), live.world(), live.shape)

@@ -8,15 +8,11 @@ this side of the socket closes, so it never outlives the program, however the pr
 
 import json
 import os
-import pickle
 import secrets
 import subprocess
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
-from math import nan
-from operator import attrgetter
 from pathlib import Path
 from typing import BinaryIO
 from urllib.parse import urlsplit
@@ -35,11 +31,10 @@ from gazerig.robot.dashboard.requests.inbox import (
 )
 from gazerig.robot.dashboard.requests.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 # The first byte of a message is its kind. To the page: menus, the parameters, their values, a reply
 # or a message to all users; the messages of a running rig are in live_feed.py.
-SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE = b"s", b"p", b"c", b"k", b"v", b"w"
+CHOICES, PARAMS, VALUES, MESSAGE = b"c", b"k", b"v", b"w"
 TRACKS = b"l"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
@@ -71,44 +66,15 @@ _AGAIN_LATEST_S = 30.0
 _WELL_AFTER_S = 60.0  # after this time the wait before a restart is short again
 _TOKEN_BYTES = 16
 
-SHOWN_EVERY_S = 0.0095
-"""Snapshots less than about 10 ms apart are skipped: 100 a second show a saccade of 40 ms as a
-slope. The value is a little below 10 ms, so that rounding does not turn it into 15 ms."""
-
-# A frozen dataclass with slots is pickled field by field in Python; reading all fields in one
-# call, by names found in advance, costs a third of that.
-_PLAIN = tuple(field.name for field in fields(Snapshot) if field.name not in ("faces", "bodies"))
-_plain_values = attrgetter(*_PLAIN)
-_face_values = attrgetter(*(field.name for field in fields(SeenFace)))
-_body_values = attrgetter(*(field.name for field in fields(SeenBody)))
-
-
-def encode_snapshot(snapshot: Snapshot) -> bytes:
-    """Encode a snapshot as one message."""
-    faces = [_face_values(face) for face in snapshot.faces]
-    bodies = [_body_values(body) for body in snapshot.bodies]
-    values = (_plain_values(snapshot), faces, bodies)
-    return SNAPSHOT + pickle.dumps(values, pickle.HIGHEST_PROTOCOL)
-
-
-def decode_snapshot(message: bytes) -> Snapshot:
-    """Decode a message of ``encode_snapshot``, which must come from the parent process."""
-    values, faces, bodies = pickle.loads(memoryview(message)[1:])
-    return Snapshot(
-        **dict(zip(_PLAIN, values, strict=True)),
-        faces=tuple(SeenFace(*face) for face in faces),
-        bodies=tuple(SeenBody(*body) for body in bodies),
-    )
-
 
 class PageProcess:
     """Live page, for the control loop.
 
-    Only one thread may call ``show``; any thread may call the other methods.
+    Only one thread may call ``check``; any thread may call the other methods.
 
     A page process that dies is restarted at the same address, after a wait that grows.
 
-    dropped: snapshots and ticks that the page did not accept; frames_dropped: the same for frames
+    dropped: ticks that the page did not accept
     started: number of starts of the page; its feed starts again when this changes
     gone: whether it has ended and is not restarted
     """
@@ -156,9 +122,7 @@ class PageProcess:
         self._notices: deque[str] = deque()
         self._pending_replies: deque[bytes] = deque(maxlen=_MAX_PENDING)
         self._paying = threading.Lock()
-        self._shown_s = nan
         self.dropped = 0
-        self.frames_dropped = 0
 
     def open(self) -> str:
         """Start the page without waiting; return a message for the user."""
@@ -210,25 +174,10 @@ class PageProcess:
         self._inbox = Inbox(link, self._take, self._handle_loss, refuse)
         self._stops = StopListener(stops, stop) if stops is not None else None
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Send a snapshot; if the page does not accept it, it is dropped and counted."""
+    def check(self) -> None:
+        """End a page that hangs, and send answers that it could not accept; for the loop."""
         self._kill_if_hung()
-        if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
-            return
-        self._shown_s = snapshot.t_s
         self._flush_replies()
-        if not self.send(encode_snapshot(snapshot)):
-            self.dropped += 1
-
-    def show_frame(self, jpeg: bytes) -> None:
-        """Send an encoded camera image into which the detections are drawn."""
-        if not self.send(FRAME + jpeg):
-            self.frames_dropped += 1
-
-    def show_detections(self, message: bytes, fd: int = -1) -> None:
-        """Send the detections of a frame, with the memory of its image unless fd is -1."""
-        if not self.send(message, fd):
-            self.frames_dropped += 1
 
     def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
         """Set the menus of the page: name of the menu -> choices, the present one first."""

@@ -192,6 +192,7 @@ class Publisher:
     def take(self, batch: TickBatch) -> bool:
         """Send ticks and changes; return False if the page did not accept the ticks."""
         page, t_s = self._page, batch.newest.t_s
+        page.check()
         if not self._url_told and (url := page.url()) is not None:
             self._url_told = True
             self._tell(f"the page is at {url}")
@@ -241,11 +242,11 @@ class Publisher:
         if array is None and self._images:
             return  # its slot has been overwritten
         if array is None:
-            self._page.show_detections(frame_message(found, None, False, self.depth))
+            self._page.send(frame_message(found, None, False, self.depth))
             return
         self._images = True
         image = copy_image(array)
         try:
-            self._page.show_detections(frame_message(found, image, depth, self.depth), image.fd)
+            self._page.send(frame_message(found, image, depth, self.depth), image.fd)
         finally:
             os.close(image.fd)

@@ -1,0 +1,80 @@
+"""A running rig's ticks for a page, sent as the control loop sends them."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from present import present
+
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import run
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import TickStream
+from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
+from gazerig.robot.dashboard.feed.page_process import PageProcess
+from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.model.types import LoopFigures
+
+IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
+STATE = RunState({}, "wait", "", "shy", (None, None, 0), timing=IN_TIME)
+GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
+"""A picture of the size that the scene's camera has."""
+
+
+@cache
+def visit(name: str) -> tuple[Assembly, Tick]:
+    """Return a rig, and its tick after 1.2 s: it looks at the mouth of a person."""
+    options = RunOptions(rig=name, mock=True, fast=True, seed=0, scene="face-to-face", bus="ideal")
+    made, ticks = assemble(load_rig(name), options), list[Tick]()
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 1.2 else None, ticks.append)
+    made.robot.stop()
+    made.close()
+    return made, ticks[-1]
+
+
+class PageFeed:
+    """Sends ticks of a rig to a page.
+
+    tick: what the next ticks are made of
+    state: what ticks do not contain
+    """
+
+    def __init__(self, page: PageProcess, rig: str = "desk") -> None:
+        self._made, self.tick = visit(rig)
+        self.state = STATE
+        publisher = Publisher(page, self._rig, lambda: self.state, None, lambda line: None)
+        self._stream = TickStream(_fail, 0.0)
+        self._stream.add_sink("the page", publisher.take)
+        self._frame = 1000
+
+    def _rig(self) -> LiveRig:
+        return LiveRig(200.0, self._made.shown_rig())
+
+    def turned(self, joints_rad: Mapping[str, float]) -> Tick:
+        """Return the tick with other angles of some joints."""
+        joints, names = self.tick.joints, self.tick.guard_result.joints
+        at = [joints_rad.get(n, x) for n, x in zip(names, joints.position_rad, strict=True)]
+        joints = joints._replace(position_rad=tuple(at))
+        pose = self._made.shown_rig().kinematics.forward(joints)
+        return self.tick._replace(joints=joints, pose=pose, desired_rad=tuple(at))
+
+    def show(self, image: np.ndarray | None = None, **changes: Any) -> Tick:
+        """Send a tick that is later than all pauses between messages; return it."""
+        t_s = self.tick.t_s + 0.4
+        found, percept = present(self.tick.detections), present(self.tick.percept)
+        self._frame += 1
+        found = replace(found, captured_s=t_s, number=self._frame, image=image)
+        percept = replace(percept, captured_s=t_s)
+        self.tick = self.tick._replace(t_s=t_s, percept=percept)
+        tick = self.tick._replace(detections=found)._replace(**changes)
+        self._stream.update(tick)
+        return tick
+
+
+def _fail(line: str) -> None:
+    raise AssertionError(line)
