@@ -11,7 +11,6 @@ from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUD
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.params import BRIDGE_BAUD
 from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
@@ -23,10 +22,8 @@ from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 BAUDS: dict[BusKind, tuple[int, ...]] = {
     "dynamixel": DYNAMIXEL_BAUDS,
     "feetech": FEETECH_BAUDS,
-    "maestro": choices_of(MaestroParams, "baud"),
-    "pca9685": (BRIDGE_BAUD,),
 }
-"""Bit/s to which each kind can be set."""
+"""Bit/s to which smart servos can be set; a port of boards accepts any."""
 CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
 """Sizes of a Maestro."""
 
@@ -65,17 +62,15 @@ class FeetechLine(_SmartServoLine):
 class MaestroLine:
     """A Pololu Maestro and its servos.
 
-    channels: 6, 12, 18 or 24; device: its number in the Pololu protocol
+    channels: 6, 12, 18 or 24
     crc: whether it expects a CRC after every command
     servos: servos that differ from the default, by their channel
-    baud: rate of its serial pins; None: its USB port, where any rate works
     """
 
     channels: int = 12
-    device: int = 12
     crc: bool = False
     servos: tuple[HobbySpec, ...] = ()
-    baud: int | None = None
+    baud: ClassVar[int | None] = None
     kind: ClassVar[BusKind] = "maestro"
     listens: ClassVar[str] = "the board listens"
 
@@ -87,13 +82,12 @@ class Pca9685Line:
     addresses: addresses of the boards; the channels of the second begin at 16
     oscillator_hz: frequencies of their clocks
     servos: servos that differ from the default, by their channel
-    baud: rate of the bridge's line, None if any rate works
     """
 
     addresses: tuple[int, ...] = (0x40,)
     oscillator_hz: float = 25e6
     servos: tuple[HobbySpec, ...] = ()
-    baud: int | None = None
+    baud: ClassVar[int | None] = None
     kind: ClassVar[BusKind] = "pca9685"
     listens: ClassVar[str] = "the boards listen"
 
@@ -160,16 +154,7 @@ def build(
     if isinstance(what, MaestroLine):
         from gazerig.sim_mock.maestro.board import build_board
 
-        return build_board(
-            what.channels,
-            now_s,
-            what.device,
-            what.crc,
-            what.baud,
-            seed,
-            what.servos,
-            shafts.make_servo,
-        )
+        return build_board(what.channels, now_s, what.crc, seed, what.servos, shafts.make_servo)
     if isinstance(what, Pca9685Line):
         from gazerig.sim_mock.pca9685.bridge import build_bridge
 

@@ -7,7 +7,7 @@ from gazerig.config.load import shipped_path
 SECTION = """bus:
   port: /dev/i2c-1
   kind: pca9685  # mine
-  pca9685: {address: 0x40, frequency_hz: 50, oscillator_hz: 25000000}
+  pca9685: {address: 0x40, oscillator_hz: 25000000}
 
 """
 

@@ -3,19 +3,18 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
-from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.servo_bus.params import BusParams
+from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
@@ -31,41 +30,41 @@ from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.bus_suite import START, BusBench, BusUnderTest, create_bench
 
+PATIENT_S = 0.2
 
-def _patience(patient: bool, give_up_s: float) -> dict[str, Any]:
+
+def _timing(patient: bool, give_up_s: float) -> BusTiming:
     # A shared machine may stall a process for longer than real servos ever wait.
-    return {"give_up_s": give_up_s, **({"reply_timeout_ms": 200.0} if patient else {})}
+    wait_s = PATIENT_S if patient else TIMING.reply_timeout_s
+    return BusTiming(wait_s, give_up_s, stagger_s=0.0)
+
+
+def patient_family(family: Family) -> Family:
+    """Return a family whose servos neither answer at once nor stop when the host stalls."""
+    return replace(family, prompt_timeout_s=PATIENT_S, watchdog_unit_s=None)
 
 
 def _smart(
     model: str, patient: bool
 ) -> Callable[[BusPort, Sequence[ServoConfig], float], ServoBus]:
     def make(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
-        timeouts = _patience(patient, give_up_s)
-        if patient:
-            timeouts["prompt_timeout_ms"] = 200.0
-        family = FAMILY_OF[model]
-        params: BusParams = (
-            DynamixelParams(**timeouts, watchdog_ms=0)
-            if family.name == "dynamixel"
-            else FeetechParams(**timeouts)
-        )
-        return SmartServoBus(family, port, setups, params)
+        family = patient_family(FAMILY_OF[model]) if patient else FAMILY_OF[model]
+        return SmartServoBus(family, port, setups, timing=_timing(patient, give_up_s))
 
     return make
 
 
 def _maestro(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
-    return MaestroBus(port, setups, MaestroParams(give_up_s=give_up_s, stagger_ms=0.0))
+    return MaestroBus(port, setups, MaestroParams(), _timing(False, give_up_s))
 
 
 def _pca9685(port: BusPort, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
-    return Pca9685Bus(port, setups, Pca9685Params(give_up_s=give_up_s, stagger_ms=0.0))
+    return Pca9685Bus(port, setups, Pca9685Params(), _timing(False, give_up_s))
 
 
 def _maestro_pulses_on(bench: BusBench) -> None:
     assert bench.port.setBaudRate(115_200)
-    codec = MaestroCodec("compact", 12, False, 12)
+    codec = MaestroCodec()
     for setup, target in zip(bench.setups, bench.steps(START), strict=True):
         bench.port.write(codec.target(setup.id, target))
     bench.wait(0.3)

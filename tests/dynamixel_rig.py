@@ -4,7 +4,6 @@ from moving_bus import IDS, NAMES, MovingBus
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -15,11 +14,14 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 class Rig(MovingBus):
     """A bus of emulated servos, read by one of several methods."""
 
-    def __init__(self, fast=True, indirect=True, check_baud=False, servo_baud=None, **params):
+    def __init__(self, firmwares=(53, 53), servo_baud=None, baud=1_000_000):
         super().__init__()
-        specs = [ServoSpec(i, "xl330-m077", 2000) for i in IDS]
+        first, *others = IDS
+        old, new = firmwares
+        specs = [ServoSpec(first, "xl330-m077", 2000, old)]
+        specs += [ServoSpec(i, "xl330-m077", 2000, new) for i in others]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
-        self.chain.check_baud = check_baud
+        self.chain.check_baud = servo_baud is not None
         for servo in self.chain.servos if servo_baud else ():
             servo.memory.set("baud_rate", BAUD_RATES.index(servo_baud))
         self.chain.refresh()
@@ -28,11 +30,11 @@ class Rig(MovingBus):
             ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0, name)
             for i, name in zip(IDS, NAMES, strict=True)
         ]
-        chosen = DynamixelParams(fast_sync_read=fast, indirect_block=indirect, **params)
-        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, chosen)
+        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, baud)
 
     def errors(self):
         return self.bus.health().errors
 
 
-WAYS = {"fast indirect": (True, True), "plain direct": (False, False)}
+WAYS = {"fast indirect": (53, 53), "plain direct": (45, 53)}
+"""Firmware of the first servo and of the others; only both together decide how they are read."""

@@ -6,11 +6,10 @@ from math import pi, sin
 
 from feedback_rows import Row, rows
 
+from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
 from gazerig.drivers.servo_bus.bus import SmartServoBus
@@ -29,6 +28,7 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 TICK_S = 0.005
+TIMING = BusTiming(stagger_s=0.0)
 IDS = (1, 2, 3, 4, 5, 6)
 KINDS = ("dynamixel", "dynamixel direct", "feetech", "maestro", "maestro crc", "pca9685")
 BOARDS = ("maestro", "pca9685")
@@ -119,7 +119,9 @@ class Noisy:
         if self._make == "pca9685":
             return Pca9685Line(servos=tuple(HobbySpec(i, middle) for i in IDS))
         model = "sts3215" if self._make == "feetech" else "xl330-m077"
-        servos = tuple(ServoSpec(i, model, middle) for i in IDS)
+        # Servos without a common indirect block, one of which has no fast sync read.
+        old = IDS[:1] if kind.endswith("direct") else ()
+        servos = tuple(ServoSpec(i, model, middle, 45 if i in old else 53) for i in IDS)
         return FeetechLine(servos) if self._make == "feetech" else DynamixelLine(servos)
 
     def _bus(self, kind: str) -> ServoBus:
@@ -141,15 +143,12 @@ class Noisy:
             for i in IDS
         ]
         if self._make == "maestro":
-            with_crc = MaestroParams(stagger_ms=0.0, crc=kind.endswith("crc"))
-            return MaestroBus(self.port, setups, with_crc)
+            with_crc = MaestroParams(crc=kind.endswith("crc"))
+            return MaestroBus(self.port, setups, with_crc, TIMING)
         if self._make == "pca9685":
-            return Pca9685Bus(self.port, setups, Pca9685Params(stagger_ms=0.0))
-        if self._make == "feetech":
-            return SmartServoBus(FEETECH, self.port, setups, FeetechParams())
-        direct = kind.endswith("direct")
-        params = DynamixelParams(indirect_block=not direct, fast_sync_read=not direct)
-        return SmartServoBus(DYNAMIXEL, self.port, setups, params)
+            return Pca9685Bus(self.port, setups, Pca9685Params(), TIMING)
+        family = FEETECH if self._make == "feetech" else DYNAMIXEL
+        return SmartServoBus(family, self.port, setups)
 
     def truth(self) -> tuple[float, ...]:
         """Return the true positions of the joints."""

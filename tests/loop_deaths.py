@@ -28,22 +28,19 @@ SLOW_DEG_S = 4.0
 PATIENCE_S = 30.0
 
 
-def slow(kind: str, watchdog: bool = True) -> Rig:
+def slow(kind: str) -> Rig:
     """Return a kind's shipped rig whose joints take seconds to their ends."""
     rig = rig_of(kind)
     joints = {n: replace(j, max_speed_deg_s=SLOW_DEG_S) for n, j in rig.joints.items()}
-    if not watchdog:
-        dynamixel = replace(rig.bus.dynamixel, watchdog_ms=0)
-        rig = replace(rig, bus=replace(rig.bus, dynamixel=dynamixel))
     return replace(rig, joints=joints)
 
 
-def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
+def drive(kind: str, guarded: bool, path: str) -> None:
     """Drive all joints slowly to their ends, 100 ticks a second, and print events.
 
     After SIGUSR1 the first servo is limp.
     """
-    rig = slow(kind, watchdog)
+    rig = slow(kind)
     paths = bus_ports(rig, path)
     bus = (
         guarded_rig_bus(rig, paths)
@@ -150,14 +147,12 @@ class Driven(NamedTuple):
 
 
 @contextmanager
-def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[Driven]:
+def driven(kind: str, guarded: bool = True) -> Iterator[Driven]:
     """Return a rig that a loop in another process drives."""
     with PtyBuses() as buses:
         rig = slow(kind)
         (path,) = buses.start(emulated_lines(rig)).values()
-        loop = Branch(
-            partial(drive, kind, guarded, watchdog, path), stdout=subprocess.PIPE, text=True
-        )
+        loop = Branch(partial(drive, kind, guarded, path), stdout=subprocess.PIPE, text=True)
         # A line that never comes fails the test instead of hanging it.
         late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
         late.start()

@@ -4,6 +4,7 @@ from typing import Any
 
 from feedback_rows import rows
 
+from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.hobby_servo import HobbySpec
@@ -12,7 +13,8 @@ from gazerig.sim_mock.pca9685.bridge import build_bridge
 
 SPEED_STEPS_S = 4000.0
 GRAIN = 20
-QUICK = Pca9685Params(stagger_ms=0.0)
+BOARD = Pca9685Params()
+QUICK = BusTiming(stagger_s=0.0)
 
 
 def setup(servo_id, **changes):
@@ -23,14 +25,22 @@ def setup(servo_id, **changes):
 class World:
     """Boards in this process, and a bus on them."""
 
-    def __init__(self, ids=(0, 1, 5), params=QUICK, addresses=(0x40,), oscillator_hz=25e6, **more):
+    def __init__(
+        self,
+        ids=(0, 1, 5),
+        params=BOARD,
+        addresses=(0x40,),
+        oscillator_hz=25e6,
+        timing=QUICK,
+        **more,
+    ):
         self.now = [10.0]
         specs = [HobbySpec(i) for i in ids]
         self.device = build_bridge(addresses, lambda: self.now[0], oscillator_hz, 0, specs)
         self.sent: list[Any] = []
         self.port = InProcessPort(self.device, self.sent.append, "emulated", self._sleep_until)
         self.setups = [setup(i, **more) for i in ids]
-        self.bus = Pca9685Bus(self.port, self.setups, params)
+        self.bus = Pca9685Bus(self.port, self.setups, params, timing)
 
     def _sleep_until(self, t_s):
         self.now[0] = max(self.now[0], t_s)

@@ -3,7 +3,6 @@
 from moving_bus import IDS, NAMES, MovingBus
 
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -18,7 +17,7 @@ class Rig(MovingBus):
 
     alone = False
 
-    def __init__(self, specs=None, setups=None, baud=None, wire_time=False, **params):
+    def __init__(self, specs=None, setups=None, baud=None, wire_time=False):
         super().__init__()
         specs = specs or [ServoSpec(i, "sts3215", 2000) for i in IDS]
         self.chain = build_feetech(specs, lambda: self.now_s, baud=baud)
@@ -29,7 +28,7 @@ class Rig(MovingBus):
             ServoConfig(i, "sts3215", 1000, 3000, SPEED, name)
             for i, name in zip(IDS, NAMES, strict=True)
         ]
-        self.bus = SmartServoBus(FEETECH, self.port, self.setups, FeetechParams(**params))
+        self.bus = SmartServoBus(FEETECH, self.port, self.setups)
 
     def run(self, seconds, goals):
         for _ in range(round(seconds / 0.01)):

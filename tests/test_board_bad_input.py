@@ -50,7 +50,7 @@ def test_a_channel_that_no_board_has(tmp_path: Path) -> None:
     [
         (Pca9685Line(), "pca9685", "foreign on", "the chip at 0x40 is not a PCA9685: another chip "
          "has this address; close a jumper and write the new one under bus.pca9685.address"),
-        (Pca9685Line(), "maker", "", "no Maestro answers: on USB take the first of its two ports"),
+        (Pca9685Line(), "maker", "", "no Maestro answers: take the first of its two USB ports"),
         (MaestroLine(12), "pca9685", "", "no answer as an I2C bus (timeout): a PCA9685 is "
          "reached over an I2C bus such as /dev/i2c-1: write it under bus.port"),
     ],

@@ -6,7 +6,6 @@ from feedback_rows import rows
 from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
@@ -61,7 +60,7 @@ def test_one_message_names_missing_unexpected_and_wrong_servos_by_joint(rig):
         ServoConfig(9, "xl330-m077", 1000, 3000, 6000.0, "jaw"),
     ]
     with pytest.raises(ServoMissing) as caught:
-        SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams()).open()
+        SmartServoBus(DYNAMIXEL, rig.port, setups).open()
     message = str(caught.value)
     assert "neck_yaw (servo 1) is xl330-m077, not xl430-w250" in message
     assert "jaw (servo 9) does not answer" in message
@@ -73,7 +72,7 @@ def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told(ri
     servo = rig.chain[2]
     servo.memory.set("velocity_limit", 100)
     setup = ServoConfig(2, "xl330-m077", 1000, 3000, 6000.0, "jaw", (700, 10, 30), 0.4)
-    bus = SmartServoBus(DYNAMIXEL, rig.port, [setup], DynamixelParams())
+    bus = SmartServoBus(DYNAMIXEL, rig.port, [setup])
     bus.open()
     get = servo.memory.get
     names = ("position_p_gain", "position_i_gain", "position_d_gain")
@@ -100,7 +99,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
     now_s = [0.0]
     port = InProcessPort(build_dynamixel(specs, lambda: now_s[0]), sent.append)
     setups = [ServoConfig(s.id, s.model, 0, 4095, 6000.0) for s in specs]
-    bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
+    bus = SmartServoBus(DYNAMIXEL, port, setups)
     bus.open()
     bus.enable_torque()
     spans = set()
@@ -123,7 +122,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
 
 def test_open_with_an_impossible_baud_rate_names_it(rig):
     setups = [ServoConfig(1, "xl330-m077", 1000, 3000, 6000.0)]
-    rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))  # type: ignore[arg-type]
+    rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, baud=1234)
     with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
         rig.open()
 
@@ -147,8 +146,3 @@ def test_servos_without_a_current_sensor_report_their_load_as_it_is():
     readings = rig.tick([2500] * 3)
     assert readings[0].velocity_steps_s > 0.0
     assert 0.05 < readings[0].load <= 1.0
-
-
-def test_a_watchdog_shorter_than_one_step_is_refused():
-    with pytest.raises(ValueError, match="watchdog_ms 10 is too short"):
-        DynamixelParams(watchdog_ms=10)

@@ -25,7 +25,7 @@ BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quir
 LINES: list[Emulated] = [
     DynamixelLine((BUILT, ServoSpec(1, "xc330-m288")), 57_600),
     FeetechLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),
-    MaestroLine(24, 5, True, (HobbySpec(3, 4000.0),), 9600),
+    MaestroLine(24, True, (HobbySpec(3, 4000.0),)),
     MaestroLine(),
 ]
 KINDS = pytest.mark.parametrize("line", LINES, ids=[line.kind for line in LINES])

@@ -5,7 +5,6 @@ from moving_bus import IDS
 from sts_rig import Rig
 
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -106,12 +105,12 @@ def test_ranges_and_numbers_that_cannot_be_are_refused():
     for low, high in ((-1, 5), (0, 4096), (9, 8)):
         wrong = [s._replace(min_steps=low, max_steps=high) for s in rig.setups]
         with pytest.raises(ValueError, match=r"eye \(servo 1\): .* is not a range within 0..4095"):
-            SmartServoBus(FEETECH, rig.port, wrong, FeetechParams())
+            SmartServoBus(FEETECH, rig.port, wrong)
         with pytest.raises(ValueError, match="is not a range within"):
             rig.bus.retune(wrong)
     crowd = [ServoConfig(i, "sts3215", 0, 4095, 3000.0) for i in range(36)]
     with pytest.raises(ValueError, match="36 servos are too many for one bus: 35 at most"):
-        SmartServoBus(FEETECH, rig.port, crowd, FeetechParams())
+        SmartServoBus(FEETECH, rig.port, crowd)
 
 
 def test_with_the_bytes_time_on_the_wire_a_tick_fits_into_ten_milliseconds():

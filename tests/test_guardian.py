@@ -99,7 +99,7 @@ def test_all_ports_are_guarded(tmp_path):
 
 
 def test_plans_go_through_a_command_line():
-    plans = (PLAN, ReleasePlan("maestro", "/dev/a 'b\"", 9600, (0, 5), "pololu", 3, True, 24))
+    plans = (PLAN, ReleasePlan("maestro", "/dev/a 'b\"", 9600, (0, 5), True, 24))
     assert decode(encode(plans)) == plans
     assert describe(plans[0]) == "torque off on 2 servos of /tmp/no such port"
     assert describe(plans[1]) == "pulses off on 2 channels of /dev/a 'b\""

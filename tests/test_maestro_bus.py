@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from feedback_rows import rows
 
+from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.types import ServoConfig
@@ -28,14 +29,14 @@ TICK_S = 0.01
 class Bench:
     """A board, a port to it, and a bus; time passes during waits."""
 
-    def __init__(self, setups=SETUPS, channels=12, chosen=(), **params):
+    def __init__(self, setups=SETUPS, channels=12, chosen=(), crc=False):
         self.now_s = 0.0
         self.sent: list[Any] = []
-        self.board = build_board(channels, lambda: self.now_s, crc=params.get("crc", False))
+        self.board = build_board(channels, lambda: self.now_s, crc=crc)
         for case, value in chosen:
             self.board.choose_behaviour(case, value)
         self.port = InProcessPort(self.board, self.sent.append, "emulated board", self._sleep_until)
-        self.bus = MaestroBus(self.port, setups, MaestroParams(**{"channels": channels, **params}))
+        self.bus = MaestroBus(self.port, setups, MaestroParams(crc, channels))
 
     def _sleep_until(self, at_s):
         self.now_s = max(self.now_s, at_s)
@@ -101,10 +102,9 @@ def test_errors_from_before_are_told_and_cleared():
     assert bench.bus.faults() == ()
 
 
-@pytest.mark.parametrize("form", ["compact", "pololu"])
 @pytest.mark.parametrize("crc", [False, True])
-def test_every_form_of_the_commands(form, crc):
-    bench = Bench(protocol=form, crc=crc)
+def test_commands_with_and_without_check_bytes(crc):
+    bench = Bench(crc=crc)
     bench.bus.open()
     bench.bus.enable_torque()
     bench.run(0.5, [5000, 5500, 6500])
@@ -112,17 +112,10 @@ def test_every_form_of_the_commands(form, crc):
     assert bench.bus.health().errors == {}
 
 
-@pytest.mark.parametrize("form", ["compact", "pololu"])
-def test_a_board_that_detects_its_baud_rate_is_woken(form):
-    bench = Bench(chosen=[("mode", "uart-detect")], protocol=form)
-    bench.bus.open()
-    bench.bus.enable_torque()
-    assert bench.pulses() == [6100, CENTRE, HIGH]
-
-
 def test_a_mute_board_is_named_with_its_causes():
-    bench = Bench(chosen=[("mode", "mute")])
-    with pytest.raises(ServoMissing, match="USB Dual Port.*115200 bit/s.*CRC must be off"):
+    bench = Bench()
+    bench.board.choose_behaviour("mode", "mute")
+    with pytest.raises(ServoMissing, match="USB Dual Port.*CRC must be off"):
         bench.bus.open()
     assert bench.now_s < 0.2
 
@@ -168,7 +161,8 @@ def test_limits_are_armed_before_the_goal(bench):
     bench.bus = MaestroBus(
         bench.port,
         (SETUPS[0]._replace(max_accel_steps_s2=100_000.0),),
-        MaestroParams(stagger_ms=0.0),
+        MaestroParams(),
+        BusTiming(stagger_s=0.0),
     )
     bench.bus.open()
     bench.packets()
@@ -273,7 +267,7 @@ def test_an_error_that_sends_all_home_is_named_and_healed(held):
     said = " ".join(held.bus.events())
     assert "the board reports: serial protocol error" in said
     assert "sent home by an error (serial protocol error)" in said
-    assert held.bus.faults() == ("board 12: serial protocol error",)
+    assert held.bus.faults() == ("the board: serial protocol error",)
     assert held.bus.health().errors["serial protocol error"] == 1
     held.run(11.0, [5500, 5600, 6600])
     assert held.bus.faults() == ()

@@ -1,4 +1,4 @@
-"""Every command's bytes, in both forms, and what answers mean."""
+"""Every command's bytes, and what answers mean."""
 
 import pytest
 from hypothesis import given
@@ -13,7 +13,6 @@ from gazerig.drivers.maestro.commands import (
 )
 
 COMPACT = MaestroCodec()
-POLOLU = MaestroCodec("pololu")
 
 CALLS = (
     (lambda s: s.target(0, 6000), "84 00 70 2E"),
@@ -32,18 +31,14 @@ CALLS = (
 
 
 @pytest.mark.parametrize(("call", "expected"), CALLS, ids=[text for _, text in CALLS])
-def test_commands_in_both_forms(call, expected):
-    compact = bytes.fromhex(expected)
-    assert call(COMPACT) == compact
-    assert call(POLOLU) == bytes((0xAA, 0x0C, compact[0] & 0x7F)) + compact[1:]
+def test_commands(call, expected):
+    assert call(COMPACT) == bytes.fromhex(expected)
 
 
 def test_the_check_byte():
     assert crc7(bytes.fromhex("83 01")) == 0x17
     assert crc7(bytes.fromhex("84 00 70 2E")) == 0x2B
     assert MaestroCodec(crc=True).target(0, 6000) == bytes.fromhex("84 00 70 2E 2B")
-    both = MaestroCodec("pololu", crc=True).position(1)
-    assert both == bytes.fromhex("AA 0C 10 01") + bytes((crc7(bytes.fromhex("AA 0C 10 01")),))
 
 
 def test_neighbours_share_a_command_where_the_board_has_it():
@@ -82,8 +77,6 @@ def test_what_does_not_fit_is_refused(number):
 @given(
     st.builds(
         MaestroCodec,
-        st.sampled_from(["compact", "pololu"]),
-        st.integers(0, 127),
         st.booleans(),
         st.sampled_from([6, 12, 18, 24]),
     ),
@@ -91,6 +84,6 @@ def test_what_does_not_fit_is_refused(number):
 )
 def test_only_command_bytes_have_the_highest_bit(speech, goals):
     packet = speech.targets(goals)
-    heads = {0xAA} if speech.form == "pololu" else {0x84, 0x9F}
+    heads = {0x84, 0x9F}
     assert packet[0] in heads
     assert {byte for byte in packet if byte >= 0x80} <= heads

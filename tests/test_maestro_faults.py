@@ -22,34 +22,9 @@ def world():
 
 def test_a_mute_port_says_nothing(world):
     world.do("set mode mute")
-    assert world.ask("AA A1") == b""
-    assert not world.board.understands_baud(9600)
-    world.do("set mode usb-chained")
+    assert world.ask("A1") == b""
+    world.do("set mode usb-dual-port")
     assert world.ask("A1") == bytes(2)
-
-
-def test_serial_pins_that_detect_the_rate_wait_for_its_sign():
-    world = World()
-    world.do("set mode uart-detect")
-    assert world.board.check_baud
-    assert world.ask("A1", 115_200) == b""
-    (reply,) = world.board.exchange(bytes.fromhex("84 00 AA A1"), 115_200)
-    assert (reply.end, reply.pieces[0].data) == (4, bytes(2))
-    assert world.ask("A1", 9600) == b""
-    assert world.ask("A1", 115_200) == bytes((1, 0))
-    world.do("brown-out")
-    assert world.after(0.2).ask("A1", 9600) == b""
-    assert world.ask("AA A1", 9600) == bytes(2)
-
-
-def test_serial_pins_with_a_rate_of_their_own():
-    world = World(baud=57_600)
-    assert world.board.understands_baud(57_600) and not world.board.understands_baud(9600)
-    world.ask(target(0, 6000), 57_600)
-    assert world.ask("90 00", 57_600) == b"\x70\x17"
-    assert world.ask("A1", 9600) == b""
-    assert world.ask("90 00", 57_600) == bytes(2)
-    assert world.ask("A1", 57_600) == bytes((1, 0))
 
 
 # --- faults
@@ -127,7 +102,7 @@ def test_commands_and_bytes_are_lost_on_their_way(world):
     ("text", "says"),
     [
         ("error heat", "'heat' is none of signal, overrun"),
-        ("set mode loud", "expected usb-dual-port, usb-chained"),
+        ("set mode loud", "expected usb-dual-port, mute"),
         ("set timeout-ms nan", "not a number of milliseconds from 0"),
         ("set min-us 2400", "min-us 2400 would be above max-us 2000"),
     ],
@@ -142,7 +117,6 @@ def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
     ("channels", "options", "says"),
     [
         (8, {}, "8 channels: a Maestro has 6, 12, 18, 24"),
-        (6, {"device": 128}, "0 to 127"),
         (6, {"servos": [HobbySpec(6)]}, "channels are 0 to 5"),
         (6, {"servos": [(1,), (1,)]}, "channel 1: use a different channel for each"),
     ],

@@ -1,4 +1,4 @@
-"""Finding a Maestro: what answers, in which form, what it held, and that nothing moves."""
+"""Finding a Maestro: what answers, what it held, and that nothing moves."""
 
 import pytest
 from present import present
@@ -9,10 +9,8 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 
 
-def make(channels=12, device=12, crc=False, chosen=()):
-    board = build_board(channels, lambda: 0.0, device=device, crc=crc)
-    for case, value in chosen:
-        board.choose_behaviour(case, value)
+def make(channels=12, crc=False):
+    board = build_board(channels, lambda: 0.0, crc=crc)
     return board, InProcessPort(board)
 
 
@@ -28,7 +26,6 @@ def test_a_board_as_from_the_shop():
     _, port = make()
     found = probe(port, MaestroParams())
     assert found is not None
-    assert found.command_forms == ("compact", "pololu")
     assert (found.expects_crc, found.errors, found.is_script_running, found.channels) == (
         False,
         (),
@@ -73,12 +70,7 @@ def test_the_check_byte_is_found_out(wanted, real):
     assert found is not None and found.expects_crc is real
 
 
-def test_another_device_number_answers_the_compact_form_only():
-    _, port = make(device=3)
-    assert present(probe(port, MaestroParams())).command_forms == ("compact",)
-    assert present(probe(port, MaestroParams(device=3))).command_forms == ("compact", "pololu")
-
-
 def test_nobody_answers():
-    _, port = make(chosen=[("mode", "mute")])
+    board, port = make()
+    board.choose_behaviour("mode", "mute")
     assert probe(port, MaestroParams()) is None

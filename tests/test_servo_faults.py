@@ -21,7 +21,7 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 
 RIGS: dict[str, Callable[[], Any]] = {
-    **{f"dynamixel {way}": partial(DynamixelRig, *chosen) for way, chosen in WAYS.items()},
+    **{f"dynamixel {way}": partial(DynamixelRig, chosen) for way, chosen in WAYS.items()},
     "feetech": sts_rig.Rig,
 }
 
@@ -121,7 +121,7 @@ def test_silent_servos_cost_only_themselves(rig, policy, missing):
 @pytest.mark.parametrize(
     "away",
     [
-        partial(DynamixelRig, check_baud=True, servo_baud=1_000_000, baud=57_600),
+        partial(DynamixelRig, servo_baud=1_000_000, baud=57_600),
         partial(sts_rig.Rig, baud=500_000),
     ],
     ids=["dynamixel", "feetech"],

@@ -10,7 +10,6 @@ import pytest
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.read_plan import DIRECT, FastSyncRead, direct_windows
 from gazerig.drivers.feetech.family import FEETECH, window
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import checksum
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_servos
@@ -155,7 +154,7 @@ def test_signs_units_and_both_error_bytes():
 
 
 def test_after_trouble_no_reading_has_the_length_of_the_one_before():
-    plan = FEETECH.read_plan([], FeetechParams(torque_every=8), None)
+    plan = FEETECH.read_plan([], None)
     together, alone = plan.group_windows, plan.single_windows
     tells = ["torque" in together.next_window().fields for _ in range(16)]
     assert tells == ([True] + [False] * 7) * 2

@@ -14,13 +14,14 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.types import ServoBus, ServoConfig
 
 
-def _create_smart_bus(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
+def _create_smart_bus(
+    port: BusPort, own: Sequence[ServoConfig], params: DynamixelParams | FeetechParams
+) -> ServoBus:
     """Return the bus of smart servos of one family."""
-    return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
+    return SmartServoBus(FAMILY_OF[own[0].model], port, own, params.baud)
 
 
 def _plugin(kind: str, **facts: Any) -> BusPlugin:

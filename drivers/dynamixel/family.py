@@ -108,6 +108,7 @@ DYNAMIXEL = Family(
     highest_id=252,
     format_firmware=str,
     read_plan=read_plan,
+    prompt_timeout_s=0.0007,
     effort_register="present_current",
     armed_values=lambda setup: {},
     weak_check=False,

@@ -22,7 +22,6 @@ from gazerig.drivers.dynamixel.control_table import (
     IndirectBlock,
     indirect_blocks,
 )
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import BROADCAST, CHECK, HEADER, STATUS, sync_read
 from gazerig.drivers.servo_bus.read_plan import (
     AddressMap,
@@ -161,18 +160,16 @@ _ALONE = (
 """For servos read alone: never as long as a group read, and never twice the same."""
 
 
-def read_plan(
-    setups: "Sequence[ServoConfig]", params: DynamixelParams, firmware: Mapping[int, int] | None
-) -> ReadPlan:
+def read_plan(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> ReadPlan:
     """Return the read plan for servos with this firmware; None: not known yet."""
     alone = WindowSchedule(_ALONE, _ALONE)
     known = [(MODELS[s.model], firmware[s.id]) for s in setups] if firmware else []
     fast = bool(known) and all(version >= FAST_READ_SINCE[m.family] for m, version in known)
-    packets = FastSyncRead if params.fast_sync_read and fast else None
+    packets = FastSyncRead if fast else None
     blocks = [indirect_blocks(model, version)[0] for model, version in known]
     # All servos must have the indirect block at the same address.
     same = len({(one.address_base, one.data_base) for one in blocks}) == 1
-    if not params.indirect_block or not same:
+    if not same:
         return ReadPlan(direct_windows(), alone, alone, packets, covers_torque=False)
     block = blocks[0]
     data = struct.pack(f"<{len(INDIRECT_MAP)}H", *INDIRECT_MAP)

@@ -19,7 +19,6 @@ from gazerig.drivers.feetech.memory_table import (
     name_errors,
     speed_units,
 )
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Arming, Family
@@ -76,28 +75,22 @@ def window(address: int) -> ReadWindow:
     return ReadWindow(address, _END - address, layout, fields, "<", tuple(SIGN_BITS.items()))
 
 
-def read_plan(
-    setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
-) -> ReadPlan:
+def read_plan(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> ReadPlan:
     """Return the read plan: the values of every tick are adjacent in 56..70.
 
     Torque and the armed limits precede them, so at intervals the read begins at 40 and includes
     them.
     """
-    return series_read_plan(window, params.torque_every)
+    return series_read_plan(window)
 
 
-def series_read_plan(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
-    """Return the read plan of a series of servos.
+def series_read_plan(window: Callable[[int], ReadWindow]) -> ReadPlan:
+    """Return the read plan of a series of servos, with torque in every eighth read.
 
-    Args:
-        window: Creates a window from its address.
-        every: Torque is read in every n-th read.
+    window: creates a window from its address
     """
     armed, sensed = window(ARMED_AT), (window(SENSED_AT), window(SENSED_AT - 1))
-    usual = [armed, *sensed * every][:every]
-    if every == 1:
-        usual.append(window(ARMED_AT - 1))
+    usual = [armed, *sensed * 4][:8]
     spare = [window(SENSED_AT - more) for more in range(2, 7)]
     second = [window(SENSED_AT - more) for more in range(7, 11)]
     # Windows for servos that are read alone: their lengths differ from each other and from those of
@@ -137,6 +130,7 @@ FEETECH = Family(
     highest_id=HIGHEST_ID,
     format_firmware=lambda firmware: f"{firmware // 100}.{firmware % 100}",
     read_plan=read_plan,
+    prompt_timeout_s=0.001,
     effort_register="present_load",
     armed_values=armed_limits,
     weak_check=True,

@@ -27,7 +27,6 @@ from gazerig.drivers.feetech.memory_table import (
     TORQUE_FULL,
     FeetechRegister,
 )
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import GoalWrite
 from gazerig.drivers.servo_bus.family import Arming
 from gazerig.drivers.servo_bus.read_plan import ReadPlan, ReadWindow
@@ -80,11 +79,9 @@ def window(address: int) -> ReadWindow:
     return ReadWindow(address, _END - address, layout, columns, ">", tuple(SIGN_BITS.items()))
 
 
-def read_plan(
-    setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
-) -> ReadPlan:
+def read_plan(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> ReadPlan:
     """Return the read plan: as for STS servos, but one by one."""
-    return series_read_plan(window, params.torque_every)
+    return series_read_plan(window)
 
 
 def scs_settings(setup: "ServoConfig") -> dict[str, int]:

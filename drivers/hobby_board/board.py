@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from gazerig.drivers.bus.port_bus import Exchange
+from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
@@ -59,24 +60,6 @@ class ChannelStatus(NamedTuple):
     errors: tuple[str, ...] = ()
 
 
-class BoardTiming(NamedTuple):
-    """Times and rates of a board.
-
-    baud: baud rate of its port, bit/s
-    status_period_s: period of its status requests
-    stagger_s: time between the first pulses of two servos
-    give_up_s: longest silence or loss
-    longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf if
-        the board itself ramps pulses
-    """
-
-    baud: int
-    status_period_s: float
-    stagger_s: float
-    give_up_s: float
-    longest_ramp_s: float
-
-
 class Board(Protocol):
     """One board, or several on one line; all methods may raise BusLost.
 
@@ -93,8 +76,15 @@ class Board(Protocol):
         """Return the texts of messages about the board."""
 
     @property
-    def timing(self) -> BoardTiming:
-        """Return the board's time limits."""
+    def timing(self) -> BusTiming:
+        """Return the times of its bus."""
+
+    @property
+    def longest_ramp_s(self) -> float:
+        """Return the longest time for which the driver's ramps advance while nothing is sent.
+
+        inf: the board itself ramps pulses.
+        """
 
     @property
     def noise_errors(self) -> Sequence[str]:
@@ -121,7 +111,7 @@ class Board(Protocol):
     def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the board's errors; None without an answer."""
 
-    def read_waking_errors(self) -> tuple[str, ...] | None:
+    def read_errors(self) -> tuple[str, ...] | None:
         """Read the errors of a board after a long silence; None without an answer."""
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:

@@ -64,13 +64,13 @@ class HobbyBoardBus(PortBus):
     def _create_parts(self) -> None:
         """Create the stateful parts in their initial state."""
         timing = self._board.timing
-        self._channels = tuple(Channel(setup, timing.longest_ramp_s) for setup in self._setups)
+        self._channels = tuple(Channel(setup, self._board.longest_ramp_s) for setup in self._setups)
         self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
         self._silence = SilenceMonitor(self._log, self._line.lateness)
         self._rx_bytes, self._byte_s = 0, -inf
         self._link = ReconnectingPort(
             self._port,
-            timing.baud,
+            self._board.params.baud,
             timing.give_up_s,
             self._log,
             self._supervisor.mark_all_for_recovery,
@@ -90,7 +90,7 @@ class HobbyBoardBus(PortBus):
         self._setups = self._target_setups
         self._apply_limits()
         self._create_parts()
-        baud = self._board.timing.baud
+        baud = self._board.params.baud
         if not self._port.setBaudRate(baud):
             raise PortError(f"{self._port.port_name} cannot run at {baud} bit/s: choose 115200")
         try:
@@ -260,19 +260,11 @@ class HobbyBoardBus(PortBus):
     # --- reading
 
     def _check_board(self, now_s: float) -> bool:
-        """Read the board's status if it is due; return whether the board is known to be alive."""
-        if (
-            self._supervisor.may_send_goals
-            and now_s - self._heard_s < self._board.timing.status_period_s
-        ):
-            self._supervisor.advance(self._port.now_s())
-            self._supervisor.advance_pulses()
-            return True
+        """Read the board's status; return whether the board is known to be alive."""
         if not self._silence.is_due(now_s):
             return False
         if self._silence.missed > TRIES:
-            # After a long silence a board may have to detect its baud rate again.
-            errors = self._board.read_waking_errors()
+            errors = self._board.read_errors()
             if errors is None:
                 self._silence.record_miss(now_s, self._last_byte_s(now_s))
                 return False

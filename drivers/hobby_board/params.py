@@ -2,9 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, NamedTuple
-
-from gazerig.params import Bounds
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
@@ -35,23 +33,17 @@ HOBBY = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HobbyBoardParams(ABC):
-    """Time-outs of a board, the period of its checks, and how its servos start."""
-
-    # fmt: off
-    reply_timeout_ms: Annotated[float, Bounds(1, 200),
-        "Time-out of a reply, added to the transmission time of its bytes on a serial line."] = 20.0
-    watch_ms: Annotated[float, Bounds(0, 50),
-        "Interval at which the board's status and the pulse of one channel are read; 0: in every read. A longer interval saves time "
-        "on a slow line, but restarts are detected later."] = 0.0
-    stagger_ms: Annotated[float, Bounds(0, 1000),
-        "Delay between switching on the pulses of one servo and of the next; all at once could overload a weak power supply."] = 100.0
-    give_up_s: Annotated[float, Bounds(0.5, 3600), "The run ends when a lost port or board has not reconnected within this time."] = 60.0
-    # fmt: on
+    """Properties of a board."""
 
     @property
     @abstractmethod
     def channels(self) -> int:
         """Return the number of channels."""
+
+    @property
+    @abstractmethod
+    def baud(self) -> int:
+        """Return the baud rate of its port."""
 
     @abstractmethod
     def pulse_range_us(self) -> tuple[float, float, str]:

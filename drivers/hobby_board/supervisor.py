@@ -42,7 +42,7 @@ class BoardSupervisor:
         self._line = board.line
         self._channels = tuple(channels)
         self._log = log
-        self._is_ramped_here = board.timing.longest_ramp_s < inf
+        self._is_ramped_here = board.longest_ramp_s < inf
         self.engaged = False
         self.pending: list[Channel] = []
         self._channel_index = -1

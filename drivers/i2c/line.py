@@ -6,6 +6,7 @@ I2C has no checksums: an answer that causes an action is read twice.
 from collections import Counter
 from collections.abc import Sequence
 
+from gazerig.drivers.bus.timing import TIMING
 from gazerig.drivers.i2c.bridge import OUTCOMES, READ_STATUS
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
@@ -20,14 +21,16 @@ class I2cLine:
     failure: error of the last exchange, "" for none
     """
 
-    def __init__(self, port: BusPort, baud: int, reply_timeout_ms: float) -> None:
+    def __init__(
+        self, port: BusPort, baud: int, reply_timeout_s: float = TIMING.reply_timeout_s
+    ) -> None:
         self.port = port
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
         self.lateness = HostLateness()
         self.failure = ""
         self._byte_s = BITS_PER_BYTE / baud
-        self._reply_timeout_s = reply_timeout_ms / 1000.0
+        self._reply_timeout_s = reply_timeout_s
         self._late = False
         self._owed_bytes = 0
 

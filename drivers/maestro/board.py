@@ -6,9 +6,10 @@ Its own serial timeout, set with Pololu's program, helps if the cable or the com
 from collections.abc import Sequence
 from math import inf
 
+from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, BoardTiming, ChannelStatus, goals_of
+from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, goals_of
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import read_every_pulse
@@ -32,17 +33,16 @@ class MaestroBoard:
 
     noise_errors = ("damaged", "incomplete", *ERRORS)
 
-    def __init__(self, port: BusPort, params: MaestroParams) -> None:
-        self.params = params
-        self.line = MaestroLink(port, params)
-        self.timing = BoardTiming(
-            params.baud, params.watch_ms / 1000.0, params.stagger_ms / 1000.0, params.give_up_s, inf
-        )
+    longest_ramp_s = inf
+
+    def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
+        self.params, self.timing = params, timing
+        self.line = MaestroLink(port, params, timing)
         self.texts = BoardTexts(
-            name=f"board {params.device}",
+            name="the board",
             no_pulses_remedy="set its channel to Servo in Pololu's program",
             other_pulse_remedy="widen its range in Pololu's program, or delete the board's script",
-            noise_remedy="check cable, ground and baud rate",
+            noise_remedy="check cable and ground",
             no_answer_remedy=f"has the board {params.channels} channels?",
             unreachable_behaviour="the board keeps its last goals while it has power",
         )
@@ -59,12 +59,9 @@ class MaestroBoard:
         where = self.line.port.port_name
         register = self.line.wait_for_answer()
         if register is None:
-            params = self.params
-            number = f", its device number {params.device}" if params.protocol == "pololu" else ""
             remedy = (
-                "on USB take the first of its two ports and set it to "
-                "'USB Dual Port' in Pololu's program; on its serial pins check TX, RX, ground and "
-                f"{params.baud} bit/s{number}; its CRC must be {'on' if params.crc else 'off'}"
+                "take the first of its two USB ports and set it to 'USB Dual Port' in Pololu's "
+                f"program; its CRC must be {'on' if self.params.crc else 'off'}"
             )
             lateness, now_s = self.line.lateness, self.line.port.now_s()
             raise ServoMissing(lateness.blame(f"{where}: no Maestro answers", remedy, now_s))
@@ -111,9 +108,9 @@ class MaestroBoard:
             return None
         return ChannelStatus(pulse, name_errors(register | self.line.take_errors()))
 
-    def read_waking_errors(self) -> tuple[str, ...] | None:
-        """Read the errors of a board that may have to detect its baud rate; None if silent."""
-        register = self.line.read_waking_errors()
+    def read_errors(self) -> tuple[str, ...] | None:
+        """Read the errors once; None if the board is silent."""
+        register = self.line.read_errors()
         return None if register is None else name_errors(register)
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
@@ -157,11 +154,18 @@ class MaestroBus(HobbyBoardBus):
         setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
             are quarter microseconds.
         params: Communication parameters.
+        timing: Times of the bus.
 
     Raises:
         ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
-    def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: MaestroParams) -> None:
-        self._maestro = MaestroBoard(port, params)
+    def __init__(
+        self,
+        port: BusPort,
+        setups: Sequence[ServoConfig],
+        params: MaestroParams,
+        timing: BusTiming = TIMING,
+    ) -> None:
+        self._maestro = MaestroBoard(port, params, timing)
         super().__init__(self._maestro, setups)

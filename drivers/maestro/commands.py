@@ -1,7 +1,7 @@
 """Commands and answers of a Pololu Maestro as bytes; pure, nothing is sent here.
 
-A command byte has its highest bit set; data bytes do not. The compact form is the command and its
-data; the Pololu form is AA, a device number, the command without its highest bit, and the data.
+A command byte has its highest bit set; data bytes do not. In the compact form a command is followed
+by its data.
 Answers are plain bytes, low byte first, without a checksum. Source: Pololu Maestro Servo Controller
 User's Guide (0J40), sections 4.e and 5.
 """
@@ -10,8 +10,6 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
-
-from gazerig.drivers.maestro.params import Form
 
 SET_TARGET = 0x84
 SET_SPEED = 0x87
@@ -23,9 +21,6 @@ GET_ERRORS = 0xA1
 GO_HOME = 0xA2
 STOP_SCRIPT = 0xA4
 SCRIPT_STATUS = 0xAE
-
-POLOLU = 0xAA
-"""First byte of a command in the Pololu form; a board that detects its baud rate waits for it."""
 
 WORD = 2
 """Bytes of an answer to get position and get errors."""
@@ -88,13 +83,10 @@ def decode_words(answer: bytes) -> tuple[int, ...]:
 class MaestroCodec:
     """Encoder of commands in the form that a board expects.
 
-    form: "compact" or "pololu"; device: its number, 0..127, for the Pololu form
     crc: whether every command ends in a check byte
     channels: number of channels, which decides the available commands
     """
 
-    form: Form = "compact"
-    device: int = 12
     crc: bool = False
     channels: int = 12
 
@@ -106,8 +98,7 @@ class MaestroCodec:
         """
         if data and not 0 <= min(data) <= max(data) < 0x80:
             raise ValueError(f"command {code:02X}: data bytes must be 0..127, not {data}")
-        head = (code,) if self.form == "compact" else (POLOLU, self.device, code & 0x7F)
-        packet = bytes((*head, *data))
+        packet = bytes((code, *data))
         return packet + bytes((crc7(packet),)) if self.crc else packet
 
     def target(self, channel: int, steps: int) -> bytes:

@@ -7,6 +7,7 @@ answer the line is drained before the next request.
 from collections import Counter
 from collections.abc import Sequence
 
+from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, MaestroCodec, decode_words
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.process.host_lateness import HostLateness
@@ -32,17 +33,14 @@ class MaestroLink:
     lateness: counter of answers after their time-outs
     """
 
-    def __init__(self, port: BusPort, params: MaestroParams) -> None:
+    def __init__(self, port: BusPort, params: MaestroParams, timing: BusTiming = TIMING) -> None:
         self.port = port
-        self.codec = MaestroCodec(params.protocol, params.device, params.crc, params.channels)
-        # A command in the Pololu form begins with the byte that a board needs to detect its baud
-        # rate; any other board simply answers it.
-        self._waking = MaestroCodec("pololu", params.device, params.crc).errors()
+        self.codec = MaestroCodec(params.crc, params.channels)
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
         self.lateness = HostLateness()
         self._byte_s = BITS_PER_BYTE / params.baud
-        self._reply_timeout_s = params.reply_timeout_ms / 1000.0
+        self._reply_timeout_s = timing.reply_timeout_s
         self._late = False
         self._owed_bytes = 0
         self._unhandled_errors = 0
@@ -110,16 +108,9 @@ class MaestroLink:
         self.send(b"".join(self.codec.target(channel, 0) for channel in channels))
 
     def wait_for_answer(self) -> int | None:
-        """Read the errors until the board answers; None if it stays silent.
-
-        The request also lets a board detect its baud rate.
-        """
-        for attempt in range(GREETINGS):
-            packet = self._waking if attempt % 2 else self.codec.errors()
-            found = self.ask_words(packet, 1)
-            if found is not None:
-                return found[0]
-        return None
+        """Read the errors until the board answers; None if it stays silent."""
+        answers = (self.read_errors() for _ in range(GREETINGS))
+        return next((register for register in answers if register is not None), None)
 
     def expects_crc(self) -> bool:
         """Return whether the board expects check bytes.
@@ -132,9 +123,9 @@ class MaestroLink:
         found = self.ask_words(self.codec.errors(), 1)
         return found is None or not found[0] >> PROTOCOL_ERROR & 1
 
-    def read_waking_errors(self) -> int | None:
-        """Read the errors once, so that a board that detects its baud rate wakes up."""
-        found = self.ask_words(self._waking, 1)
+    def read_errors(self) -> int | None:
+        """Read the errors once; None without an answer."""
+        found = self.ask_words(self.codec.errors(), 1)
         return found[0] if found is not None else None
 
     def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:

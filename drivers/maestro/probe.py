@@ -1,9 +1,9 @@
-"""Detection of a Maestro at a port and of its command form; nothing is moved intentionally.
+"""Detection of a Maestro at a port; nothing is moved intentionally.
 
 One state changes: a board clears its error register when it is read, so the result contains it. A
-board treats unknown commands as errors, and on an error it sends its channels home. So forms other
-than the configured one are tried only if it is silent, and channels that may not exist are read
-only on request and if no channel outputs pulses.
+board treats unknown commands as errors, and on an error it sends its channels home. So the other
+setting of check bytes is tried only if it is silent, and channels that may not exist are read only
+on request and if no channel outputs pulses.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,18 @@ from typing import NamedTuple
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.maestro.commands import ERRORS, MICRO, PROTOCOL_ERROR, name_errors
 from gazerig.drivers.maestro.line import MaestroLink
-from gazerig.drivers.maestro.params import Form, MaestroParams
+from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
 
 USB_CHANNELS = {"1ffb:0089": 6, "1ffb:008a": 12, "1ffb:008b": 18, "1ffb:008c": 24}
 """Channels by USB vendor and product id."""
 
-FORMS: tuple[Form, ...] = ("compact", "pololu")
 TRIES = 3
 
 
 class DetectedMaestro(NamedTuple):
     """A board that answers.
 
-    command_forms: command forms that it answers; "pololu" with the given device number
     expects_crc: whether it expects a check byte after every command
     errors: errors of its error register, which is now cleared
     is_script_running: whether its own script runs, None if unknown
@@ -35,7 +33,6 @@ class DetectedMaestro(NamedTuple):
     channels: number of channels, None if not counted
     """
 
-    command_forms: tuple[Form, ...]
     expects_crc: bool
     errors: tuple[str, ...]
     is_script_running: bool | None
@@ -56,14 +53,12 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> Detected
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: choose 115200")
-    other: Form = "pololu" if params.protocol == "compact" else "compact"
     for crc in (params.crc, not params.crc):
-        for form in (params.protocol, other):
-            line = MaestroLink(port, replace(params, protocol=form, crc=crc))
-            port.drain()
-            register = line.wait_for_answer()
-            if register is not None and not register >> len(ERRORS) and line.expects_crc():
-                return _read_state(line, params, register, count)
+        line = MaestroLink(port, replace(params, crc=crc))
+        port.drain()
+        register = line.wait_for_answer()
+        if register is not None and not register >> len(ERRORS) and line.expects_crc():
+            return _read_state(line, params, register, count)
     return None
 
 
@@ -71,19 +66,6 @@ def _read_state(
     line: MaestroLink, params: MaestroParams, register: int, count: bool
 ) -> DetectedMaestro | None:
     """Read the remaining state of a board that answers."""
-    crc = line.codec.crc
-    forms: tuple[Form, ...] = ()
-    # If several boards share a line, all of them answer the compact form.
-    for form in FORMS if line.codec.form == "compact" else ("pololu",):
-        spoken = MaestroLink(line.port, replace(params, protocol=form, crc=crc))
-        found = _retry(partial(spoken.ask_words, spoken.codec.errors(), 1))
-        if found is not None:
-            forms, line = (*forms, form), spoken
-            register |= found[0]
-        else:
-            line.port.drain()
-    if not forms:
-        return None
     status = line.ask(line.codec.script_status(), 1)
     pulses = _retry(partial(line.read_pulses, range(min(MICRO, params.channels))))
     if pulses is None:
@@ -92,7 +74,7 @@ def _read_state(
     if channels is not None and channels > MICRO:
         pulses = line.read_pulses(range(channels)) or pulses
     script = None if status is None else status == b"\0"
-    return DetectedMaestro(forms, crc, name_errors(register), script, pulses, channels)
+    return DetectedMaestro(line.codec.crc, name_errors(register), script, pulses, channels)
 
 
 def _retry(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:

@@ -7,8 +7,9 @@ the last one stays. A servo's id is sixteen times the number of its board plus i
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
+from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, BoardTiming, ChannelStatus
+from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import read_every_pulse
@@ -61,21 +62,16 @@ class Pca9685Board:
 
     Args:
         port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
-        params: Addresses and timing of the boards.
+        params: Addresses and clock of the boards.
     """
 
     noise_errors = ("damaged", "incomplete")
 
-    def __init__(self, port: BusPort, params: Pca9685Params) -> None:
-        self.params = params
-        self.line = I2cLine(port, params.baud, params.reply_timeout_ms)
-        self.timing = BoardTiming(
-            params.baud,
-            params.watch_ms / 1000.0,
-            params.stagger_ms / 1000.0,
-            params.give_up_s,
-            LONGEST_LEAD_S,
-        )
+    longest_ramp_s = LONGEST_LEAD_S
+
+    def __init__(self, port: BusPort, params: Pca9685Params, timing: BusTiming = TIMING) -> None:
+        self.params, self.timing = params, timing
+        self.line = I2cLine(port, params.baud, timing.reply_timeout_s)
         named = " and ".join(f"{address:#x}" for address in params.addresses)
         again = "is another program using the board? check SDA, SCL and ground"
         self.texts = BoardTexts(
@@ -86,11 +82,8 @@ class Pca9685Board:
             no_answer_remedy="check power, SDA, SCL and ground of its board",
             unreachable_behaviour="the board keeps its last pulses while it has power",
         )
-        self._clocks = params.clocks
+        self._clock = params.clock
         self._places = [(address, nth) for address in params.addresses for nth in range(CHANNELS)]
-        self._resolution_steps = [
-            self._clocks[address].resolution_steps for address, _ in self._places
-        ]
         self._questions: dict[int, list[tuple[bytes, int]]] = {}
         self._sent: dict[int, tuple[int, int]] = {}
         self._sent_s = 0.0
@@ -131,9 +124,9 @@ class Pca9685Board:
         if now is None:
             return False
         mode1, mode2, prescale = now
-        if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale):
+        if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._clock.prescale):
             return True
-        if mode1 & SILENT or prescale != self._clocks[address].prescale:
+        if mode1 & SILENT or prescale != self._clock.prescale:
             # From any state: no pulses, sleep, prescaler, then wake.
             mine = [servo_id for servo_id in self._sent if self._places[servo_id][0] == address]
             for servo_id in mine:
@@ -141,7 +134,7 @@ class Pca9685Board:
             asleep = self.line.write_confirmed(
                 bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
                 bridge.write(address, MODE1, bytes((SLEEP | AUTO_INCREMENT,))),
-                bridge.write(address, PRESCALE, bytes((self._clocks[address].prescale,))),
+                bridge.write(address, PRESCALE, bytes((self._clock.prescale,))),
                 bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
                 bridge.write(address, MODE1, bytes((AWAKE,))),
             )
@@ -150,7 +143,7 @@ class Pca9685Board:
             wait_until(self.line.port, self.line.port.now_s() + START_S)
             # Channels that slept with pulses on would resume here; there are none now.
             self.line.write_confirmed(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
-            return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
+            return self._modes(address) == (AWAKE, TOTEM_POLE, self._clock.prescale)
         return self.line.write_confirmed(
             bridge.write(address, MODE1, bytes((AWAKE,))),
             bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
@@ -196,7 +189,7 @@ class Pca9685Board:
         found = self.line.ask(questions if with_prescale else questions[:2])
         if found is None:
             return None
-        usual = self._clocks[address].prescale
+        usual = self._clock.prescale
         prescale = found[2][0] if with_prescale else usual
         if found[0][0] == AWAKE and prescale == usual:
             return ChannelStatus(self._pulse_steps(channel.id, counts_of(found[1]), prescale))
@@ -205,7 +198,7 @@ class Pca9685Board:
         now, pulses = self._modes(address), self.read_pulses((channel.id,))
         if now is None or pulses is None:
             return None
-        well = now[0] & ~RESTART == AWAKE and now[2] == self._clocks[address].prescale
+        well = now[0] & ~RESTART == AWAKE and now[2] == self._clock.prescale
         if now[0] & EXTCLK:
             return ChannelStatus(0, (NO_CLOCK,))
         asleep = bool(now[0] & SILENT)
@@ -214,12 +207,12 @@ class Pca9685Board:
 
     def _pulse_steps(self, servo_id: int, counts: int, prescale: int) -> int:
         """Return the pulse of counts: exactly the sent pulse if the counts are those sent."""
-        sent, clock = self._sent.get(servo_id), self._clocks[self._places[servo_id][0]]
-        if sent is not None and sent[0] == counts and prescale == clock.prescale:
+        sent = self._sent.get(servo_id)
+        if sent is not None and sent[0] == counts and prescale == self._clock.prescale:
             return sent[1]
-        return round(counts * clock._replace(prescale=prescale).resolution_steps)
+        return round(counts * self._clock._replace(prescale=prescale).resolution_steps)
 
-    def read_waking_errors(self) -> tuple[str, ...] | None:
+    def read_errors(self) -> tuple[str, ...] | None:
         """Check whether the first board answers."""
         mode = self.line.ask([(bridge.read(self.params.address, MODE1, 1), 1)])
         return None if mode is None else ()
@@ -280,7 +273,7 @@ class Pca9685Board:
             servo_id, setup, steps = channel.id, channel.setup, round(channel.ramp.pulse_steps)
             # The intermediate pulse, within the limits of the channel.
             width = counts_within(
-                steps, setup.min_steps, setup.max_steps, self._resolution_steps[servo_id]
+                steps, setup.min_steps, setup.max_steps, self._clock.resolution_steps
             )
             counts[servo_id], self._sent[servo_id] = width, (width, steps)
             channel.sent_steps = steps
@@ -339,11 +332,18 @@ class Pca9685Bus(HobbyBoardBus):
         port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
         setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
             are quarter microseconds.
-        params: Addresses and timing of the boards.
+        params: Addresses and clock of the boards.
+        timing: Times of the bus.
 
     Raises:
         ValueError: a servo has a channel or a pulse width that the boards do not have.
     """
 
-    def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: Pca9685Params) -> None:
-        super().__init__(Pca9685Board(port, params), setups)
+    def __init__(
+        self,
+        port: BusPort,
+        setups: Sequence[ServoConfig],
+        params: Pca9685Params,
+        timing: BusTiming = TIMING,
+    ) -> None:
+        super().__init__(Pca9685Board(port, params, timing), setups)

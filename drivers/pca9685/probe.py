@@ -28,7 +28,7 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")
-    line = I2cLine(port, params.baud, params.reply_timeout_ms)
+    line = I2cLine(port, params.baud)
     found = []
     for address in range(FIRST, LAST + 1):
         if address in RESERVED:

@@ -8,6 +8,7 @@ from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.plausibility import DISTURBED_S
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.release_result import ReleaseResult
+from gazerig.drivers.bus.timing import TIMING, BusTiming
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
@@ -17,7 +18,6 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.faults import CHECK_SUPPLY, ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
-from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.servo_bus.poll_list import PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
@@ -29,6 +29,8 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.servo_bus.transient_faults import TransientFaultSupervisor
 from gazerig.drivers.types import Feedback, ServoConfig
 
+_WATCHDOG_S = 0.2
+"""Silence after which servos with a watchdog stop by themselves."""
 RESTART_S = 0.1
 """Silence after which servos may have restarted because their power was cut."""
 
@@ -42,7 +44,8 @@ class SmartServoBus(PortBus):
         family: Family of the servos.
         port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
         setups: The servos; all sequences of arguments and results have their order.
-        params: Communication parameters.
+        baud: Bit/s.
+        timing: Times of the bus.
 
     Raises:
         ValueError: too many servos for one packet of goals, or a range beyond one turn.
@@ -52,7 +55,12 @@ class SmartServoBus(PortBus):
     _supervisor: Supervisor
 
     def __init__(
-        self, family: Family, port: BusPort, setups: Sequence[ServoConfig], params: BusParams
+        self,
+        family: Family,
+        port: BusPort,
+        setups: Sequence[ServoConfig],
+        baud: int = 1_000_000,
+        timing: BusTiming = TIMING,
     ) -> None:
         if len(setups) > family.most_goals:
             raise ValueError(
@@ -61,11 +69,11 @@ class SmartServoBus(PortBus):
         self._family = family
         self._wary = family.weak_check or not family.faults_latch
         unit_s = family.watchdog_unit_s
-        self._watchdog = ceil(params.watchdog_ms / 1000.0 / unit_s) if unit_s else 0
+        self._watchdog = ceil(_WATCHDOG_S / unit_s) if unit_s else 0
         self._check_setups(setups)
         self._port = port
         self._setups = self._target_setups = tuple(setups)
-        self._params = params
+        self._baud, self._timing = baud, timing
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._lowest = tuple(setup.min_steps for setup in setups)
@@ -76,9 +84,9 @@ class SmartServoBus(PortBus):
         self._line = Transactions(
             port,
             family,
-            params.prompt_timeout_ms / 1000.0,
-            params.reply_timeout_ms / 1000.0,
-            params.baud,
+            family.prompt_timeout_s,
+            timing.reply_timeout_s,
+            baud,
             {setup.id: setup.label() for setup in setups},
         )
         self._damaged = 0
@@ -93,11 +101,11 @@ class SmartServoBus(PortBus):
         line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
         self._link = ReconnectingPort(
-            self._port, self._params.baud, self._params.give_up_s, log, self._reset_after_reconnect
+            self._port, self._baud, self._timing.give_up_s, log, self._reset_after_reconnect
         )
         self._poll_list = PollList(self._ids)
         self._health = ServoHealth(by_id, log)
-        plan = self._plan = self._family.read_plan(self._setups, self._params, firmware)
+        plan = self._plan = self._family.read_plan(self._setups, firmware)
         single = Registers(self._port, self._family, 1, self._line.lateness)
         self._provisioning = Provisioning(line, single, self._setups, log, plan.indirect_block)
         self._recovery = Recovery(
@@ -201,7 +209,7 @@ class SmartServoBus(PortBus):
             ServoMissing: servos are absent, of another model or refuse a setting.
         """
         self._apply_wanted()
-        where, baud = self._port.port_name, self._params.baud
+        where, baud = self._port.port_name, self._baud
         if not self._port.setBaudRate(baud):
             raise PortError(
                 f"{where} cannot run at {baud} bit/s: choose {self._family.recommended_bauds}"
@@ -257,7 +265,7 @@ class SmartServoBus(PortBus):
             return self._nothing
         if self._poll_list.is_troubled:
             silent_s = self._health.silent_for_s(now_s)
-            if silent_s >= self._params.give_up_s:
+            if silent_s >= self._timing.give_up_s:
                 fault = f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s"
                 raise BusLost(line.lateness.blame(fault, CHECK_SUPPLY, now_s, now_s - silent_s))
         return feedback.now

@@ -7,7 +7,7 @@ docs/servo-families.md explains it field by field.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from gazerig.drivers.serial.port import BusPort
 
@@ -202,8 +202,10 @@ class Family:
         format_firmware: formats a firmware number as the manufacturer does
 
     Reading:
-        read_plan: returns windows and packets for some servos, the rig's params and the firmware by
-            id, None before it is known
+        read_plan: returns windows and packets for some servos and the firmware by id, None before
+            it is known
+        prompt_timeout_s: shortest time-out of an answer; from it to the longest it adapts to twice
+            the worst delay measured
         effort_register: register of load or current
         armed_values: fields of a ``Sample`` that show whether a servo is still armed, and their
             expected values; None accepts any value
@@ -254,7 +256,8 @@ class Family:
     factory_baud: int
     highest_id: int
     format_firmware: Callable[[int], str]
-    read_plan: "Callable[[Sequence[ServoConfig], Any, Mapping[int, int] | None], ReadPlan]"
+    read_plan: "Callable[[Sequence[ServoConfig], Mapping[int, int] | None], ReadPlan]"
+    prompt_timeout_s: float
     effort_register: str
     armed_values: Callable[["ServoConfig"], Mapping[str, int | None]]
     weak_check: bool

@@ -90,7 +90,7 @@ class Provisioning:
             if bad:
                 raise ServoMissing(
                     f"{self._port_name}: {', '.join(bad)} does not accept the indirect addresses: restart "
-                    "the servo power, or set indirect_block: false"
+                    "the servo power"
                 )
 
     def disable(self, ids: Sequence[int]) -> None:

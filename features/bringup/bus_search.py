@@ -12,12 +12,12 @@ Reasons for the order and for what is sent:
   STS packet has no 00 behind FD, or no FD. Even a servo that accepted the other packets would
   only be pinged or read: nothing else is ever sent here.
 
-A board that receives data but cannot answer (one wire, a rate that is not searched) is not
+A board that receives data but cannot answer (one wire, serial pins at another rate) is not
 detected: with such a board on the line, specify the kind of servo.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
@@ -28,14 +28,11 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, scan
 from gazerig.features.bringup.servo_kinds import KINDS
 
-BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
-"""Baud rates of a Maestro's serial pins, the usual ones first; on USB any rate works."""
-
 ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 """Order of the search by kind; see above."""
 
 RATES: Mapping[BusKind, Sequence[int]] = {
-    "maestro": BOARD_RATES,
+    "maestro": (MaestroParams().baud,),
     **{kind.name: kind.family.scan_rates for kind in KINDS.values()},
 }
 
@@ -75,14 +72,13 @@ def plan_search(
     kinds, rates: kinds and rates to search; None: all rates
     """
     if usb.startswith(POLOLU):
-        return (("maestro", BOARD_RATES[0]),) if "maestro" in kinds else ()
+        return (("maestro", MaestroParams().baud),) if "maestro" in kinds else ()
     rows: list[tuple[BusKind, int]] = []
     for kind in ORDER:
         if kind in kinds:
-            some = [rate for rate in RATES[kind] if rates is None or rate in rates]
-            # Search for a Maestro even if its rates are not requested: its presence must be known.
-            some = some or [BOARD_RATES[0]] if kind == "maestro" else some
-            rows += [(kind, rate) for rate in some]
+            # Always search for a Maestro: its presence must be known.
+            wanted = RATES[kind] if rates is None or kind == "maestro" else rates
+            rows += [(kind, rate) for rate in RATES[kind] if rate in wanted]
     return tuple(rows)
 
 
@@ -122,7 +118,7 @@ def search_bus(
             )
         elif port.setBaudRate(baud):
             # Every board has the first six channels; others might cause an error.
-            board = probe(port, replace(MaestroParams(), baud=baud))
+            board = probe(port, MaestroParams())
             looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
         else:
             looked = SearchRound(kind, baud, is_supported=False)

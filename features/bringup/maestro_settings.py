@@ -55,16 +55,12 @@ def start_limits(setup: ServoConfig) -> tuple[int, int]:
     return (speed >> doubled) << doubled, accel_units(setup.max_accel_steps_s2)
 
 
-def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> Iterator[str]:
-    """Return the settings to make in Pololu's Maestro Control Center, line by line.
-
-    usb: whether the board's own USB port is used instead of its serial pins
-    """
+def instructions(params: MaestroParams, setups: Sequence[ServoConfig]) -> Iterator[str]:
+    """Return the settings to make in Pololu's Maestro Control Center, line by line."""
     yield "nothing of this can be set over the serial line; in Pololu's Maestro Control Center:"
     crc = "on" if params.crc else "off"
-    mode = "USB Dual Port" if usb else f"UART, fixed baud rate {params.baud}"
     yield "  tab Serial Settings:"
-    yield f"    Serial mode: {mode}    Device Number: {params.device}    Enable CRC: {crc}"
+    yield f"    Serial mode: USB Dual Port    Enable CRC: {crc}"
     yield (
         f"    Timeout: {TIMEOUT_S:.2f} s, so that pulses stop when the program or the cable dies"
     )

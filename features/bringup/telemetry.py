@@ -6,7 +6,6 @@ Opening a bus for motion sets its servos up, which is a write; a monitor only re
 """
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
 from math import degrees
 from typing import NamedTuple, Protocol
 
@@ -108,25 +107,15 @@ def telemetry_of(kind: ServoKind, joint: JointParams, values: Mapping[str, int])
 
 
 class MaestroTelemetry:
-    """Reads only the pulses of the channels of a Maestro.
-
-    A board that has not detected its baud rate yet waits for the first byte of the Pololu protocol,
-    so after a missing answer the query is also sent in that protocol.
-    """
+    """Reads only the pulses of the channels of a Maestro."""
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
-        self._lines = [
-            MaestroLink(port, params),
-            MaestroLink(port, replace(params, protocol="pololu")),
-        ]
+        self._line = MaestroLink(port, params)
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Read a joint's pulse; see TelemetryReader."""
-        found = self._lines[0].read_pulses((joint.id,))
-        if found is None:
-            self._lines.reverse()
-            return None
-        return pulse_telemetry(joint, found[0])
+        found = self._line.read_pulses((joint.id,))
+        return None if found is None else pulse_telemetry(joint, found[0])
 
 
 class Pca9685Telemetry:

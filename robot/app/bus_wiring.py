@@ -119,8 +119,6 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
         path,
         config.baud,
         ids,
-        board.protocol,
-        board.device,
         board.crc,
         board.channels,
         config.pca9685.addresses,
@@ -142,7 +140,7 @@ def has_watchdog(rig: Rig, name: str) -> bool:
     """Return whether the servos of one bus stop their motion when their program dies."""
     config = rig.bus_named(name)
     if is_ours(BUS, config.kind):
-        return bool(getattr(config.section, "watchdog_ms", 0))
+        return config.kind == "dynamixel"
     return not can_be_released(rig, name)
 
 

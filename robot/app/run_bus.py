@@ -184,9 +184,7 @@ CHAINS: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
 """Emulated smart servos by the kind of bus."""
 
 BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
-    "maestro": lambda bus, servos: MaestroLine(
-        bus.maestro.channels, bus.maestro.device, bus.maestro.crc, servos
-    ),
+    "maestro": lambda bus, servos: MaestroLine(bus.maestro.channels, bus.maestro.crc, servos),
     "pca9685": lambda bus, servos: Pca9685Line(
         bus.pca9685.addresses, bus.pca9685.oscillator_hz, servos
     ),

@@ -26,10 +26,8 @@ app = typer.Typer()
 _KNOWN_BY: dict[BusKind, str] = {
     "dynamixel": "servos know",
     "feetech": "STS servos support",
-    "maestro": "a Maestro's pins support",
-    "pca9685": "their bridge supports",
 }
-"""Text before the supported baud rates of each kind."""
+"""Text before the supported baud rates of smart servos."""
 
 
 @app.command(cls=RigCommand)
@@ -44,7 +42,6 @@ def emulate(
     wire_time: options.WireTime = False,
     turnaround_us: options.TurnaroundUs = 0.0,
     firmware: options.Firmware = None,
-    device: options.Device = None,
     crc: options.Crc = False,
     case: options.Case = None,
     until_eof: options.UntilEof = False,
@@ -60,16 +57,15 @@ def emulate(
             )
         if maestro is not None and firmware is not None:
             raise SetupError("--firmware: a Maestro does not report its version on this line")
-        if maestro is None and (crc or device is not None):
-            raise SetupError(f"{'--crc' if crc else '--device'}: only with --maestro")
+        if maestro is None and crc:
+            raise SetupError("--crc: only with --maestro")
         if servos is not None:
             devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, options.DEFAULT_BAUD)}
         elif maestro is not None:
             if maestro not in CHANNELS:
                 sizes = ", ".join(map(str, CHANNELS))
                 raise SetupError(f"--maestro {maestro}: a board has {sizes} channels")
-            number = options.DEFAULT_DEVICE if device is None else device
-            devices = {"": MaestroLine(maestro, number, crc)}
+            devices = {"": MaestroLine(maestro, crc)}
         elif pca9685 is not None:
             devices = {"": _parse_boards(pca9685)}
         else:
@@ -115,7 +111,7 @@ def _rig_devices(name: str, firmware: int | None) -> dict[str, Emulated]:
 
 def _set_baud(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
     """Return a device with another baud rate; None keeps its own rate."""
-    if isinstance(device, PluginLine):
+    if isinstance(device, MaestroLine | Pca9685Line | PluginLine):
         return device
     known = BAUDS[device.kind]
     if baud is not None and baud not in known:

@@ -9,10 +9,8 @@ from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.robot.cli.terminal import complete_rig
 from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE
-from gazerig.sim_mock.devices import MaestroLine
 
 DEFAULT_BAUD = 1_000_000
-DEFAULT_DEVICE = MaestroLine().device
 _NAMES: dict[BusKind, str] = {
     "dynamixel": "Dynamixel servos",
     "feetech": "STS servos",
@@ -59,8 +57,7 @@ Link = Annotated[
 Baud = Annotated[
     int | None,
     typer.Option(
-        help=f"Baud rate of the servos in bit/s (default {DEFAULT_BAUD}, or the rig's), "
-        "or of a Maestro's pins (default: its USB port, which accepts any)."
+        help=f"Baud rate of smart servos in bit/s (default {DEFAULT_BAUD}, or the rig's)."
     ),
 ]
 AnyBaud = Annotated[bool, typer.Option("--any-baud", help="Answer clients at every baud rate.")]
@@ -80,12 +77,6 @@ Firmware = Annotated[
         max=255,
         help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); for STS servos "
         "the number after 3.",
-    ),
-]
-Device = Annotated[
-    int | None,
-    typer.Option(
-        min=0, max=127, help=f"With --maestro: its device number (default {DEFAULT_DEVICE})."
     ),
 ]
 Crc = Annotated[

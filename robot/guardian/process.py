@@ -69,7 +69,7 @@ def _maestro(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.hobby_board.release import stop_pulses
     from gazerig.drivers.maestro.line import MaestroLink
 
-    params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
+    params = MaestroParams(plan.crc, plan.channels)
     return lambda port: stop_pulses(port, plan.baud, MaestroLink(port, params), plan.ids)
 
 

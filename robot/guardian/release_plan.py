@@ -6,7 +6,6 @@ import pickle
 from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS, BusKind
-from gazerig.drivers.maestro.params import Form
 
 
 class ReleasePlan(NamedTuple):
@@ -15,7 +14,7 @@ class ReleasePlan(NamedTuple):
     port: path of the serial port
     baud: bit/s
     ids: ids of the servos; channels of a Maestro
-    protocol, device, crc, channels: settings of a Maestro, as in gazerig.drivers.maestro.params
+    crc, channels: settings of a Maestro, as in gazerig.drivers.maestro.params
     addresses: addresses of PCA9685 boards
     family: name of the family of smart servos
     settings: parameters of a package's bus, from ``pickle_params``
@@ -25,8 +24,6 @@ class ReleasePlan(NamedTuple):
     port: str
     baud: int
     ids: tuple[int, ...]
-    protocol: Form = "compact"
-    device: int = 12
     crc: bool = False
     channels: int = 12
     addresses: tuple[int, ...] = ()

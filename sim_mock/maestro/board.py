@@ -22,7 +22,6 @@ from gazerig.sim_mock.maestro.commands import (
     GET_SCRIPT,
     GO_HOME,
     MINI_SSC,
-    POLOLU,
     RUN_SCRIPT,
     RUN_SCRIPT_WITH,
     SET_ACCELERATION,
@@ -106,7 +105,6 @@ class EmulatedMaestro:
         self,
         servos: Sequence[HobbyServo],
         now_s: Callable[[], float],
-        device: int = 12,
         settings: Settings | None = None,
         seed: int = 0,
     ) -> None:
@@ -114,8 +112,8 @@ class EmulatedMaestro:
         self.body = MaestroBody(servos, now_s, settings or Settings())
         self.faults = MaestroFaults(self, self.body, COMMANDS, seed)
         self._wire = self.faults.wire
-        self._parser = CommandParser(device, len(servos) > SIZES[0])
-        self._detected_baud: int | None = None
+        self.check_baud = False
+        self._parser = CommandParser(len(servos) > SIZES[0])
         self._apply_settings(self.body.settings)
         self._do: dict[int, Callable[[bytes], bytes | None]] = {
             SET_TARGET: lambda data: self._apply_to_channel(data, EmulatedChannel.set_target),
@@ -141,13 +139,8 @@ class EmulatedMaestro:
     # --- device interface
 
     def understands_baud(self, client_baud: int) -> bool:
-        """Return whether a client at this baud rate is understood, once it has sent AA."""
-        mode = self.body.settings.mode
-        if mode == "uart-fixed":
-            return client_baud == self.body.settings.baud
-        if mode == "uart-detect":
-            return self._detected_baud in (None, client_baud)
-        return mode != "mute"
+        """Return whether a client at this baud rate is understood: on USB every one is."""
+        return True
 
     def choose_behaviour(self, case: str, value: str) -> None:
         """Change a setting of the board; it does not restart."""
@@ -156,26 +149,17 @@ class EmulatedMaestro:
             steps = width_steps(case, value)
             self.body.limit(*((steps, None) if case == "min-us" else (None, steps)))
             return
-        before = self.body.settings.mode
         self._apply_settings(change_setting(self.body.settings, case, value))
-        if before != self.body.settings.mode:
-            self._forget_input()
         self.body.reset_timeout()
 
     def _apply_settings(self, settings: Settings) -> None:
         self.body.settings = settings
         self._parser.crc = settings.crc
-        # The client's rate matters at the serial pins only.
-        self.check_baud = settings.mode in ("uart-fixed", "uart-detect")
-
-    def _forget_input(self) -> None:
-        self._parser.forget()
-        self._detected_baud = None
 
     def restart(self) -> None:
         """Restart as after a dip of the supply."""
         self.body.restart()
-        self._forget_input()
+        self._parser.forget()
 
     def find_servo(self, channel: int) -> HobbyServo:
         """Return the servo of a channel, advanced to the present time."""
@@ -210,7 +194,7 @@ class EmulatedMaestro:
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Process received bytes; return the reply to each command in them."""
         self.body.advance()
-        came = self._filter_input(data, client_baud)
+        came = self._filter_input(data)
         missing, replies = len(data) - len(came), []
         for command in self._parser.feed(came):
             pieces = self._execute(command)
@@ -218,30 +202,14 @@ class EmulatedMaestro:
                 replies.append(DeviceReply(missing + command.end, pieces))
         return self.faults.add_line_noise(replies, data) if self._wire.has_any else replies
 
-    def _filter_input(self, data: bytes, client_baud: int | None) -> bytes:
-        """Return the bytes of a client that the board understands."""
+    def _filter_input(self, data: bytes) -> bytes:
+        """Return the bytes that reach the board."""
         if not self.body.is_awake or self.body.settings.mode == "mute":
             return b""
-        if self.check_baud and client_baud is not None:
-            data = self._filter_pins(data, client_baud)
         now_s = self.now_s()
         if not self._wire.has_any or not self._wire.is_on("lose_bytes", now_s):
             return data
         return bytes(b for b in data if self._wire.use_fault("lose_bytes", None, now_s) is None)
-
-    def _filter_pins(self, data: bytes, client_baud: int) -> bytes:
-        """Return the bytes understood at the serial pins: none before AA in uart-detect."""
-        if self.body.settings.mode == "uart-detect" and self._detected_baud is None:
-            sign = data.find(POLOLU)
-            if sign < 0:
-                return b""
-            self._detected_baud = client_baud
-            return data[sign:]
-        if self.understands_baud(client_baud):
-            return data
-        if data:
-            self.body.fail("signal")
-        return b""
 
     def _execute(self, command: ParsedCommand) -> list[Piece]:
         """Execute one command; return the answer."""
@@ -302,25 +270,17 @@ class EmulatedMaestro:
 def build_board(
     channels: int,
     now_s: Callable[[], float],
-    device: int = 12,
     crc: bool = False,
-    baud: int | None = None,
     seed: int = 0,
     servos: Sequence[HobbySpec | Sequence[float]] = (),
     make_servo: HobbyMaker = HobbyServo,
 ) -> EmulatedMaestro:
     """Build a board; channels without a spec have a default servo.
 
-    With a baud rate the host is at its serial pins, set to that rate; without one it is at the USB
-    command port, where any rate works.
-
     Raises:
         ValueError: such a board or servo does not exist.
     """
     if channels not in SIZES:
         raise ValueError(f"{channels} channels: a Maestro has {', '.join(map(str, SIZES))}")
-    if not 0 <= device <= 127:
-        raise ValueError(f"device {device}: a Maestro's number is 0 to 127")
     built = build_servos(servos, channels, make_servo)
-    settings = Settings(crc=crc) if baud is None else Settings("uart-fixed", crc, baud=baud)
-    return EmulatedMaestro(built, now_s, device, settings, seed)
+    return EmulatedMaestro(built, now_s, Settings(crc=crc), seed)

@@ -1,10 +1,9 @@
 """Parsing of the commands in the bytes that an emulated Maestro receives.
 
-Command bytes have bit 7 set, data bytes do not. Three forms: compact ``84 ch lo hi``, Pololu
-``AA device 04 ch lo hi``, Mini SSC ``FF servo target``, whose last two bytes are 0..254. Source:
-Pololu Maestro User's Guide (0J40), sections 5.c to 5.f. Assumed where it is silent [A]: AA
-directly before another command byte only serves baud rate detection and is no error; bytes after
-the number of another device are ignored until the next command byte.
+Command bytes have bit 7 set, data bytes do not. Two forms: compact ``84 ch lo hi``, and Mini SSC
+``FF servo target``, whose last two bytes are 0..254. Commands of the Pololu form, ``AA device 04 ch
+lo hi``, are ignored, as for another device. Source: Pololu Maestro User's Guide (0J40), sections
+5.c to 5.f.
 """
 
 from collections.abc import Iterator
@@ -54,7 +53,7 @@ class ParsedCommand(NamedTuple):
     """One command, or an error in the bytes.
 
     end: its end among the bytes fed
-    code: the command byte of its compact form, 0 on trouble
+    code: the command byte, 0 on trouble
     """
 
     end: int
@@ -66,13 +65,10 @@ class ParsedCommand(NamedTuple):
 class CommandParser:
     """Stores the received bytes of an incomplete command.
 
-    Args:
-        device: the number that Pololu forms must contain.
-        mini: whether the board has 12, 18 or 24 channels.
+    mini: whether the board has 12, 18 or 24 channels
     """
 
-    def __init__(self, device: int, mini: bool) -> None:
-        self.device = device
+    def __init__(self, mini: bool) -> None:
         self.crc = False
         self._known = {
             code: size for code, size in DATA_BYTES.items() if mini or code not in MINI_ONLY
@@ -103,48 +99,39 @@ class CommandParser:
     def _begin(self, byte: int) -> tuple[ParsedCommand, ...]:
         """Start a command; an unfinished one is an error."""
         packet = self._packet
-        said = (_PROTOCOL,) if packet and packet != _SIGN else ()
-        packet[:] = (byte,)
-        self._deaf = False
+        said = (_PROTOCOL,) if packet else ()
+        self._deaf = byte == POLOLU
+        packet[:] = b"" if self._deaf else (byte,)
         if byte in (POLOLU, MINI_SSC):
-            self._until = 2 if byte == POLOLU else 3
+            self._until = 3
             return said
         return said + self._check_complete()
 
     def _check_complete(self) -> tuple[ParsedCommand, ...]:
         """Check whether the command is complete, or when to check again."""
-        packet, head = self._packet, 1
-        if packet[0] == MINI_SSC:
-            return self._complete(MINI_SSC, head)
-        if packet[0] == POLOLU:
-            head = self._until = 3
-            if packet[1] != self.device:
-                packet.clear()
-                self._deaf = True
-                return ()
-            if len(packet) < head:
-                return ()
-        code = packet[head - 1] | 0x80
+        packet = self._packet
+        code = packet[0]
+        if code == MINI_SSC:
+            return self._complete(code)
         if code not in self._known:
             packet.clear()
             return (_PROTOCOL,)
-        self._until = head + self._known[code] + self.crc
+        self._until = 1 + self._known[code] + self.crc
         if code == SET_TARGETS:
             # Its first byte gives its length.
-            self._until = self._until + 2 * packet[head] if len(packet) > head else head + 1
-        return self._complete(code, head) if len(packet) >= self._until else ()
+            self._until = self._until + 2 * packet[1] if len(packet) > 1 else 2
+        return self._complete(code) if len(packet) >= self._until else ()
 
-    def _complete(self, code: int, head: int) -> tuple[ParsedCommand, ...]:
+    def _complete(self, code: int) -> tuple[ParsedCommand, ...]:
         packet = bytes(self._packet)
         self._packet.clear()
         if self.crc and code != MINI_SSC:
             packet, check = packet[:-1], packet[-1]
             if crc7(packet) != check:
                 return (ParsedCommand(0, 0, error="crc"),)
-        return (ParsedCommand(0, code, packet[head:]),)
+        return (ParsedCommand(0, code, packet[1:]),)
 
 
-_SIGN = bytes((POLOLU,))
 _PROTOCOL = ParsedCommand(0, 0, error="protocol")
 
 

@@ -8,12 +8,10 @@ differ.
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-Mode = Literal["usb-dual-port", "usb-chained", "uart-detect", "uart-fixed", "mute"]
+Mode = Literal["usb-dual-port", "mute"]
 OnError = Literal["off", "home", "ignore"]
 Startup = Literal["off", "home"]
 
-FIXED_BAUD = 9600
-"""Rate of the serial pins by default."""
 LONGEST_TIMEOUT_MS = 655_350.0
 LOWEST_US, HIGHEST_US = 64.0, 3280.0
 US = 4
@@ -23,14 +21,10 @@ US = 4
 class Settings:
     """Settings of a board.
 
-    mode: port of the host and its use. At the USB command port with usb-dual-port or usb-chained
-        any rate works; at the serial pins with uart-fixed only its rate, with uart-detect the rate
-        of a client that has sent AA; mute is the USB command port of a board in either uart mode,
-        which ignores all bytes.
+    mode: mute is the USB command port of a board in a UART mode, which ignores all bytes
     crc: whether a CRC is expected after every command except those of the Mini SSC protocol
     timeout_s: time without a valid command that is an error; 0: never
     on_error, startup: reaction of all channels; home_steps: the home position
-    baud: rate of uart-fixed
     speed, acceleration: initial limits of every channel, in the board's units
     """
 
@@ -40,7 +34,6 @@ class Settings:
     on_error: OnError = "off"
     startup: Startup = "off"
     home_steps: int = 1500 * US
-    baud: int = FIXED_BAUD
     speed: int = 0
     acceleration: int = 0
 

@@ -14,29 +14,28 @@ from loop_deaths import driven
 
 LOOK_S = 2.0
 CASES = [
-    ("dynamixel, own watchdog 200 ms", "dynamixel", False, True),
-    ("dynamixel, watchdog_ms 0, no guardian", "dynamixel", False, False),
-    ("dynamixel, watchdog_ms 0, guardian", "dynamixel", True, False),
-    ("feetech, no guardian", "feetech", False, True),
-    ("feetech, guardian", "feetech", True, True),
-    ("maestro, no guardian", "maestro", False, True),
-    ("maestro, guardian", "maestro", True, True),
-    ("pca9685, no guardian", "pca9685", False, True),
-    ("pca9685, guardian", "pca9685", True, True),
+    ("dynamixel, own watchdog 200 ms", "dynamixel", False),
+    ("dynamixel, guardian", "dynamixel", True),
+    ("feetech, no guardian", "feetech", False),
+    ("feetech, guardian", "feetech", True),
+    ("maestro, no guardian", "maestro", False),
+    ("maestro, guardian", "maestro", True),
+    ("pca9685, no guardian", "pca9685", False),
+    ("pca9685, guardian", "pca9685", True),
 ]
 
 
 def main(repeats: int) -> None:
     """Strike every kind with both signals and print how long it took."""
     print(f"{'':40} {'signal':8} limp after (ms)        still after (ms)")
-    for name, kind, guarded, watchdog in CASES:
+    for name, kind, guarded in CASES:
         for number in (signal.SIGKILL, signal.SIGSTOP):
             limp, still = [], []
             for _ in range(repeats):
-                with driven(kind, guarded, watchdog) as it:
+                with driven(kind, guarded) as it:
                     limp.append(it.limp_after_s(it.strike(number), LOOK_S))
                 if not guarded:
-                    with driven(kind, guarded, watchdog) as it:
+                    with driven(kind, guarded) as it:
                         still.append(it.still_after_s(it.strike(number), LOOK_S))
             print(f"{name:40} {number.name:8} {_told(limp):22} {_told(still)}", flush=True)
 

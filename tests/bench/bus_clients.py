@@ -10,6 +10,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -19,10 +20,8 @@ from rustypot import Sts3215PyController, Xl330PyController
 from serial import Serial
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import sync_read
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import sync_read as feetech_sync_read
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
@@ -60,11 +59,9 @@ def ours(kind: str, path: str) -> Iterator[Cycle]:
     port = BlockingPort(path)
     model = "sts3215" if kind == "feetech" else "xl330-m077"
     setups = [ServoConfig(i, model, 1000, 3000, 3000.0, f"joint_{i}") for i in IDS]
-    if kind == "feetech":
-        bus = SmartServoBus(FEETECH, port, setups, FeetechParams(baud=BAUD))
-    else:
-        # While others have their turn it is silent for longer than servos bear.
-        bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(baud=BAUD, watchdog_ms=0))
+    # While others have their turn it is silent for longer than Dynamixel servos bear.
+    family = replace(FEETECH if kind == "feetech" else DYNAMIXEL, watchdog_unit_s=None)
+    bus = SmartServoBus(family, port, setups, BAUD)
     bus.open()
     bus.enable_torque()
 

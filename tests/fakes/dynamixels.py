@@ -4,8 +4,8 @@ from typing import Any
 
 from feedback_rows import rows
 
+from gazerig.drivers.bus.timing import BusTiming
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
@@ -35,15 +35,19 @@ class SpoiltPort(InProcessPort):
 class Rig:
     """Three servos, a driver that is not yet open, and a clock set by hand."""
 
-    def __init__(self, fast=True, starts=(2001, 2002, 2003), model="xl330-m077", **params):
+    def __init__(
+        self, fast=True, starts=(2001, 2002, 2003), model="xl330-m077", direct=False, **timing
+    ):
         self.now_s = 100.0
         self.sent: list[Any] = []
-        specs = [ServoSpec(i, model, at) for i, at in zip(IDS, starts, strict=True)]
+        # The first servo's firmware decides about fast reads; an indirect block must be common.
+        first = 53 if fast and not direct else 46 if fast else 45
+        versions = (first, 53, 53) if direct else (first,) * 3
+        specs = [ServoSpec(*one) for one in zip(IDS, (model,) * 3, starts, versions, strict=True)]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.port = SpoiltPort(self.chain, self.sent.append)
         setups = [ServoConfig(i, model, 1000, 3000, 6000.0) for i in IDS]
-        chosen = DynamixelParams(fast_sync_read=fast, **params)
-        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, chosen)
+        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, timing=BusTiming(**timing))
 
     def open(self):
         self.bus.open()

@@ -255,7 +255,7 @@ def _show(
         given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
         script: dict[bool | None, str] = {True: "its own script runs", False: "no script runs"}
         for line in (
-            f"Pololu Maestro: {size}, {' and '.join(board.command_forms)} form, CRC {crc}",
+            f"Pololu Maestro: {size}, CRC {crc}",
             f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})",
             f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}",
             script.get(board.is_script_running, "its script: no answer"),

@@ -4,7 +4,6 @@ The serial line cannot set anything in a Maestro. A PCA9685 loses its settings w
 program sets it up at every start. Nothing moves.
 """
 
-import os
 from typing import NamedTuple
 
 import typer
@@ -17,7 +16,6 @@ from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.probe import USB_CHANNELS
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.registers import CHANNELS
-from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import instructions
@@ -79,11 +77,7 @@ def set_up_maestro(task: SetupTask) -> None:
         bench.unopened_port(wired.paths[task.bus]) as line,
     ):
         path, usb = line.port_name, bench.usb_id(line.port_name)
-        # The board's own USB port, not that of an adaptor at its serial pins.
-        on_usb = usb.startswith(POLOLU)
-        if not usb:
-            on_usb = not os.path.realpath(path).startswith(("/dev/ttyS", "/dev/ttyAMA"))
-        for text in instructions(params, setups, on_usb):
+        for text in instructions(params, setups):
             say(f"   {text}")
         if not task.yes:
             press_enter("   Enter: it is set, and Pololu's program is closed; Ctrl-C: end ")

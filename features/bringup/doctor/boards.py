@@ -35,7 +35,7 @@ _BAD_SCRIPT = "its script is at fault: delete it in Pololu's program"
 # fmt: off
 CURES = {
     "serial signal error": "something was sent at another baud rate, or the line is disturbed: "
-        "compare bus.maestro.baud with Pololu's program, check ground and cable",
+        "check ground and cable",
     "serial overrun": "the board could not follow: restart it, and report it if it comes again",
     "serial buffer full": "too much was sent at once: is another program using the board?",
     "serial CRC error": "check bytes were wrong: set bus.maestro.crc as 'Enable CRC' in Pololu's "
@@ -49,11 +49,6 @@ CURES = {
     "script program counter error": _BAD_SCRIPT,
 }
 # fmt: on
-
-_ON_USB = (
-    "take the first of its two ports (the Command Port), and set it to 'USB Dual Port' in Pololu's "
-    "program"
-)
 
 # fmt: off
 ADVICE = {
@@ -70,11 +65,8 @@ ADVICE = {
     "left on": Advice("warn", "gets pulses of {us:g} us though no program runs it", "{remedy}"),
     "outside": Advice("error", "gets pulses of {us:g} us though no program runs it, outside its "
         "range {low:g}..{high:g} us", "{remedy}"),
-    "mute on USB": Advice("error", "no Maestro answers at {baud} bit/s", _ON_USB),
-    "mute": Advice("error", "no Maestro answers at {baud} bit/s",
-        f"has it power? on USB {_ON_USB}; on its serial pins check TX, RX, ground and {{baud}} bit/s"),
-    "form": Advice("error", "answers the {form} form only, the YAML says {params.protocol}",
-        "{number}write bus.maestro.protocol: {form}, or set the device number"),
+    "mute": Advice("error", "no Maestro answers", "has it power? take the first of its two USB ports "
+        "(the Command Port), and set it to 'USB Dual Port' in Pololu's program"),
     "CRC": Advice("error", "wants a check byte (CRC) after every command, the YAML says crc: false",
         "write bus.maestro.crc: true, or change 'Enable CRC' in Pololu's program"),
     "no CRC": Advice("error", "wants no CRC, the YAML says crc: true",
@@ -186,7 +178,7 @@ def examine_maestro(
 
     Args:
         port: port, which is opened here.
-        params: protocol of the board according to the rig.
+        params: settings of the board according to the rig.
         setups: the servos of the rig.
         usb: vendor and product id of its port, "" unless on USB.
 
@@ -196,20 +188,14 @@ def examine_maestro(
     """
     found, size = probe(port, params), USB_CHANNELS.get(usb)
     if found is None:
-        return [ADVICE["mute" if size is None else "mute on USB"].at(WHERE, baud=params.baud)]
+        return [ADVICE["mute"].at(WHERE)]
     channels = size or params.channels
-    line = MaestroLink(port, _board_params(params, found))
+    line = MaestroLink(port, replace(params, crc=found.expects_crc))
     pulses = _read_pulses(line, setups, channels, found, size is not None)
     crc = "on" if found.expects_crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
-    well = f"answers in the {' and the '.join(found.command_forms)} form, CRC {crc}, {named}, no script"
+    well = f"answers, CRC {crc}, {named}, no script"
     own = []
-    if params.protocol not in found.command_forms:
-        pololu = params.protocol == "pololu"
-        number = f"its device number is not {params.device}; " if pololu else ""
-        own.append(
-            ADVICE["form"].at(WHERE, form=found.command_forms[0], params=params, number=number)
-        )
     if found.expects_crc != params.crc:
         own.append(ADVICE["CRC" if found.expects_crc else "no CRC"].at(WHERE))
     if size is not None and size != params.channels:
@@ -263,12 +249,6 @@ def _read_pulses(
     return pulses
 
 
-def _board_params(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
-    """Return the protocol of a detected board; the rig file may differ."""
-    form = params.protocol if params.protocol in found.command_forms else found.command_forms[0]
-    return replace(params, protocol=form, crc=found.expects_crc)
-
-
 def stop_script(port: BusPort, params: MaestroParams) -> str:
     """Stop the board's script; return "" or the reason of a failure. Nothing moves.
 
@@ -279,7 +259,7 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
     found = probe(port, params)
     if found is None:
         raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
-    line = MaestroLink(port, _board_params(params, found))
+    line = MaestroLink(port, replace(params, crc=found.expects_crc))
     line.send(line.codec.stop_script())
     return "" if line.ask(line.codec.script_status(), 1) == b"\1" else "it runs on"
 
