@@ -26,15 +26,16 @@ from gazerig.robot.remote.socket_server import ALL, EACH
 FLOODS = {
     "nothing": "",
     "work alone": "pass",
-    "set": "rig.set('gaze.saccade.max_speed_deg_s', 300.0 + n % 200)",
+    "set": "rig.set_many({'gaze.saccade.max_speed_deg_s': 300.0 + n % 200})",
     "get": "rig.get('')",
     "parameters": "rig.parameters('')",
     "status": "rig.status()",
-    "look": "rig.look_at(1.0, 0.001 * (n % 200), 0.2, stay=True)",
+    "look": "rig.send(LookAt((1.0, 0.001 * (n % 200), 0.2), stay=True))",
     "resume": "rig.resume(confirmed=True)",
 }
 FLOOD = """
 from gazerig.drivers.errors import DriverError
+from gazerig.robot.model.commands import LookAt
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 rig, n = RobotClient.connect(), 0
 while True:
@@ -69,7 +70,7 @@ def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float
     def is_driven() -> bool:
         return all(newest[0].joints.torque) and not newest[0].stopped
 
-    command = [sys.executable, "-c", FLOOD.format(FLOODS[what])]
+    command = [sys.executable, "-c", FLOOD.replace("{}", FLOODS[what])]
     begin = partial(subprocess.Popen, command, stdout=subprocess.PIPE, text=True)
     others: list[subprocess.Popen[str]] = []
     try:
@@ -121,7 +122,7 @@ def main(seconds: float) -> None:
             for limits in ((EACH, ALL), ((9.0, 9.0), (9.0, 9.0))):
                 server.EACH, server.ALL = limits
                 rate, lost, took_ms = flooded(what, seconds, 4)
-                share = f"{limits[1].share:.0%}" if limits[1] is ALL else "all"
+                share = f"{limits[1][0]:.0%}" if limits[1] is ALL else "all"
                 print(f"{what:10} {share:>8} {rate:7.1f} {lost:10} {took_ms:8.1f}", flush=True)
 
 
