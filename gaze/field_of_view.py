@@ -7,7 +7,7 @@ moving fist. Own bodies are therefore excluded.
 
 from math import atan2, radians, sqrt
 
-from gazerig.gaze.angles import angles_of, compose, direction, rotate, rotation
+from gazerig.gaze.angles import angles_of, compose, direction, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import Angles2, Angles3, BodyRows, GazeState, Mat3, Vec3
 
 FIELD_DEG = (100.0, 60.0, 60.0, 75.0)
@@ -36,11 +36,9 @@ def visible_bodies(bodies: BodyRows, state: GazeState) -> dict[int, str]:
     }
 
 
-def _is_inside(p: list[float], p_eye: Vec3, axes: Mat3, left: bool) -> bool:
+def _is_inside(p: Vec3, p_eye: Vec3, axes: Mat3, left: bool) -> bool:
     """Return whether a point is in the field of one eye."""
-    x, y, z = p[0] - p_eye[0], p[1] - p_eye[1], p[2] - p_eye[2]
-    (a, b, c), (d, e, f), (g, h, i) = axes
-    ahead, side, up = a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
+    ahead, side, up = rotate_back(axes, sub(p, p_eye))
     off_axis2 = side * side + up * up
     if off_axis2 == 0.0:
         return ahead > 0.0

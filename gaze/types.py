@@ -85,8 +85,8 @@ class Bodies:
 
     def rows(self) -> "BodyRows":
         """Return the bodies as plain numbers."""
-        p, v, w = self.p_world_m, self.v_world_m_s, self.w_world_rad_s
-        return BodyRows(self.ids, self.kinds, p.tolist(), v.tolist(), w.tolist())
+        columns = self.p_world_m, self.v_world_m_s, self.w_world_rad_s
+        return BodyRows(self.ids, self.kinds, *([vec(row) for row in one] for one in columns))
 
 
 class BodyRows(NamedTuple):
@@ -94,9 +94,9 @@ class BodyRows(NamedTuple):
 
     ids: tuple[int, ...]
     kinds: tuple[str, ...]
-    p_world_m: list[list[float]]
-    v_world_m_s: list[list[float]]
-    w_world_rad_s: list[list[float]]
+    p_world_m: list[Vec3]
+    v_world_m_s: list[Vec3]
+    w_world_rad_s: list[Vec3]
 
 
 @dataclass(frozen=True, slots=True)

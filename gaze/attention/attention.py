@@ -155,9 +155,14 @@ class Attention:
 
     def reset(self, t_s: float) -> None:
         """Forget all targets."""
-        for model in (self._bottom_up, self.top_down, self._idle, self._habituation):
+        for model in (
+            self._bottom_up,
+            self.top_down,
+            self._idle,
+            self._habituation,
+            self._reaction,
+        ):
             model.reset(t_s)
-        self._reaction.reset(t_s)
         self._memory.reset()
         self._persons.reset()
         self._gestures: dict[int, float] = {}
@@ -194,7 +199,7 @@ class Attention:
         fresh = percept is not None and t_s - percept.captured_s <= STALE_S
         new = percept is not None and percept.captured_s != self._seen_s
         target = self._target
-        if fresh and not new and target is not None and not self._reaction.is_waiting:
+        if fresh and not new and target is not None and self._reaction.next is None:
             return target  # as decided for this frame
         if percept is not None and fresh and new:
             self._seen_s = percept.captured_s
@@ -203,7 +208,7 @@ class Attention:
             self._target = self._reaction.take_due(t_s) or self._target
         else:
             self._target = None
-            self._reaction.drop()
+            self._reaction.next = None
         if self._target is None:
             return self._count_shift(self._idle.step(t_s, not fresh), t_s)
         if self._target.id >= 0:
@@ -254,7 +259,7 @@ class Attention:
         total = [one.total for one in made.saliences]
         best = max(range(len(total)), key=total.__getitem__, default=-1)
         if best < 0 or self._is_faint(made.saliences[best]):
-            self._reaction.drop()
+            self._reaction.next = None
             seen = [row for row in range(len(bodies)) if total[row] > -inf]
             self._idle.record_seen(
                 {bodies.ids[row]: vec(bodies.p_world_m[row]) for row in seen}, t_s
@@ -275,7 +280,7 @@ class Attention:
         winner = made.target(row, captured_s, plan)
         # A change of behaviour waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
-            self._reaction.drop()
+            self._reaction.next = None
             return winner
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
         self._reaction.start_waiting(winner, dwelt_s)

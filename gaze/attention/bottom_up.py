@@ -25,11 +25,12 @@ Bodies are computed one by one in plain arithmetic: for the few that a frame sho
 than calls of NumPy.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
-from math import exp, expm1, inf, sqrt
+from math import exp, expm1, inf
 from typing import Annotated, Literal
 
+from gazerig.gaze.angles import dot, norm, perpendicular, sub, unit
 from gazerig.gaze.types import BodyRows, Salience, Vec3
 from gazerig.params import Bounds
 
@@ -74,7 +75,7 @@ class BottomUpParams:
     # fmt: on
 
 
-def motion_terms(v: Sequence[float], w: Sequence[float], e: Sequence[float]) -> Vec3:
+def motion_terms(v: Vec3, w: Vec3, e: Vec3) -> Vec3:
     """Return the three terms of eq 1 for one body: slide, loom and spin.
 
     Loom is signed: positive for an approach.
@@ -84,12 +85,8 @@ def motion_terms(v: Sequence[float], w: Sequence[float], e: Sequence[float]) -> 
         w: angular velocity, rad/s.
         e: view direction of any length, normalised here.
     """
-    (x, y, z), (vx, vy, vz), (wx, wy, wz) = e, v, w
-    length = max(sqrt(x * x + y * y + z * z), 1e-300)
-    x, y, z = x / length, y / length, z / length
-    along = vx * x + vy * y + vz * z
-    ax, ay, az = vx - along * x, vy - along * y, vz - along * z
-    return sqrt(ax * ax + ay * ay + az * az), -along, abs(wx * x + wy * y + wz * z)
+    e = unit(e)
+    return norm(perpendicular(v, e)), -dot(v, e), abs(dot(w, e))
 
 
 _FAST, _FASTEST = 1.0, 3.0
@@ -233,12 +230,9 @@ class BottomUp:
         par, v, w = self._params, rows.v_world_m_s[i], rows.w_world_rad_s[i]
         if par.form == "literal":
             return motion_terms(v, w, gaze)
-        (px, py, pz), (vx, vy, vz) = rows.p_world_m[i], v
-        x, y, z = px - p_eye[0], py - p_eye[1], pz - p_eye[2]
-        slide, loom, spin = motion_terms(
-            (vx - v_eye[0], vy - v_eye[1], vz - v_eye[2]), w, (x, y, z)
-        )
-        distance = max(sqrt(x * x + y * y + z * z), _NEAREST_M)
+        rel = sub(rows.p_world_m[i], p_eye)
+        slide, loom, spin = motion_terms(sub(v, v_eye), w, rel)
+        distance = max(norm(rel), _NEAREST_M)
         return (
             slide / (distance * par.reference),
             loom / (distance * par.reference),

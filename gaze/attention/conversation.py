@@ -29,13 +29,14 @@ Nods and brow flashes of a listener are individual (Blomsma 2024): each head has
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, exp, hypot, inf, log, radians, sin, sqrt
+from math import atan2, cos, degrees, exp, hypot, inf, log, radians, sin
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import add, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.draws import draw_lognormal
 from gazerig.gaze.types import AWAY, Target, TurnState, Vec3
 from gazerig.params import Bounds
 
@@ -408,9 +409,7 @@ class ConversationGaze:
 
     def _draw_s(self, mean_s: float, sd_s: float) -> float:
         """Draw from the log-normal distribution with a given mean and standard deviation."""
-        sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
-        drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
-        return max(drawn, _SHORTEST_S)
+        return max(draw_lognormal(self._rng, mean_s, sd_s / mean_s), _SHORTEST_S)
 
     def _plan_speech(self, role: str, confidence: float, begins: bool, t_s: float) -> None:
         """Plan the look away at the beginning of a turn, and the return before its end."""

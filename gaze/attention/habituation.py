@@ -19,12 +19,13 @@ matching law (Herrnstein 1961).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import acos, exp, log, radians, sqrt
+from math import acos, exp, radians
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import dot, sub, unit
+from gazerig.gaze.draws import draw_lognormal
 from gazerig.gaze.types import BodyRows, Vec3
 from gazerig.params import Bounds
 
@@ -114,9 +115,8 @@ class Habituation:
     def start_stay(self, id: int) -> None:
         """Draw the additional time of a look, if it is at another one of several bodies."""
         if id != self.stays_at:
-            variance = log(1.0 + _STAY_SPREAD**2)
-            deviation = sqrt(variance) * float(self._rng.standard_normal())
-            self._stay_s = min(_STAY_S * exp(deviation - 0.5 * variance), _LONGEST_STAY_S)
+            drawn_s = draw_lognormal(self._rng, _STAY_S, _STAY_SPREAD)
+            self._stay_s = min(drawn_s, _LONGEST_STAY_S)
             self.stays_at = id
 
     def step(
@@ -198,11 +198,9 @@ class Habituation:
             }
         return surpluses
 
-    def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
+    def _return_factor(self, p_world_m: Vec3, p_eye: Vec3, t_s: float) -> float:
         """Return the factor of one body near the points left."""
-        x, y, z = p_world_m
-        way = unit(sub((x, y, z), p_eye))
-        factor = 1.0
+        way, factor = unit(sub(p_world_m, p_eye)), 1.0
         for left in self._left:
             cosine = dot(way, unit(sub(left.p_world_m, p_eye)))
             sigmas = acos(max(-1.0, min(1.0, cosine))) / _RETURN_RAD

@@ -19,12 +19,13 @@ above the neck base at the resting height.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, degrees, exp, hypot, inf, log, pi, radians, sin, sqrt
+from math import cos, degrees, exp, hypot, inf, pi, radians, sin
 from typing import Annotated
 
 import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub, wrap, yaw_pitch
+from gazerig.gaze.draws import draw_lognormal
 from gazerig.gaze.types import SEARCH, Angles2, Target, Vec3, body_name
 from gazerig.params import Bounds
 
@@ -112,7 +113,7 @@ class Idle:
         self._t_s = t_s
         self._last: Target | None = None
         self._lost = False
-        self._now = self._rest_target(t_s)
+        self._now = _idle_target("rest", -1, REST_M, t_s, "no one in sight")
         self._until_s = self._search_until_s = t_s
         self._count = 0
         self._gone: Target | None = None
@@ -199,7 +200,7 @@ class Idle:
     def _start_rest(self, t_s: float) -> None:
         """Start a rest: look straight ahead."""
         self._gone = None
-        self._now = self._rest_target(t_s)
+        self._now = _idle_target("rest", -1, REST_M, t_s, "no one in sight")
         self._until_s = t_s + self._draw_s(_REST_S) if self._params.explores else inf
 
     def _search(self, gone: Target, t_s: float) -> None:
@@ -308,18 +309,16 @@ class Idle:
     def _look(self, kind: str, place: Angles2, distance_m: float, t_s: float, why: str) -> None:
         """Set the target of a search or glance, with a new id."""
         self._count += 1
-        point, id = add(_EYE, scale(direction(place), distance_m)), -1 - self._count
-        self._now = Target(point, _STILL, t_s, kind, id, _SALIENCE, True, None, 0, why)
-
-    def _rest_target(self, t_s: float) -> Target:
-        why = "no one in sight"
-        return Target(REST_M, _STILL, t_s, "rest", -1, _SALIENCE, True, None, 0, why)
+        point = add(_EYE, scale(direction(place), distance_m))
+        self._now = _idle_target(kind, -1 - self._count, point, t_s, why)
 
     def _draw_s(self, mean_s: float) -> float:
         """Draw a log-normal duration with a mean and the common spread, 0.25 s at least."""
-        sigma2 = log(1.0 + _SPREAD**2)
-        drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
-        return max(drawn, _SHORTEST_S)
+        return max(draw_lognormal(self._rng, mean_s, _SPREAD), _SHORTEST_S)
+
+
+def _idle_target(kind: str, id: int, p_world_m: Vec3, t_s: float, why: str) -> Target:
+    return Target(p_world_m, _STILL, t_s, kind, id, _SALIENCE, True, None, 0, why)
 
 
 def _eccentricity_cost(yaw_share: float, pitch_share: float) -> float:

@@ -15,7 +15,7 @@ from math import dist, exp, hypot, inf
 
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.field_of_view import OWN
-from gazerig.gaze.types import Percept, Vec3, vec
+from gazerig.gaze.types import Percept, Vec3
 
 NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
 TRAITS = (NEAREST, WAVING, LOOKING, NEWEST)
@@ -107,15 +107,11 @@ class Persons:
             percept: percept of the frame.
             p_world_eye_m: position of the eye.
         """
-        bodies, dt_s, self._at_s = (
-            percept.bodies,
-            percept.captured_s - self._at_s,
-            percept.captured_s,
-        )
-        rows = [vec(p) for p in bodies.p_world_m]
+        rows, dt_s = percept.bodies.rows(), percept.captured_s - self._at_s
+        self._at_s = percept.captured_s
         faces = {
             id: p
-            for id, kind, p in zip(bodies.ids, bodies.kinds, rows, strict=True)
+            for id, kind, p in zip(rows.ids, rows.kinds, rows.p_world_m, strict=True)
             if kind == "face"
         }
         for id in faces:
@@ -132,14 +128,14 @@ class Persons:
             self._nearest = nearest
         self.parts, self.raised = {}, set()
         moving: set[int] = set()
-        for row, id in enumerate(bodies.ids):
-            if faces and id not in faces and bodies.kinds[row] != OWN:
-                vx, vy, vz = v = vec(bodies.v_world_m_s[row])
-                low_of = self._update_part(id, rows[row], faces, p_world_eye_m)
-                hand = self._update_hand(id, rows[row], v, faces, p_world_eye_m)
-                if bodies.kinds[row] == "hand" and norm(v) > _GESTURES_M_S:
+        for row, id in enumerate(rows.ids):
+            if faces and id not in faces and rows.kinds[row] != OWN:
+                p, v = rows.p_world_m[row], rows.v_world_m_s[row]
+                low_of = self._update_part(id, p, faces, p_world_eye_m)
+                hand = self._update_hand(id, p, v, faces, p_world_eye_m)
+                if rows.kinds[row] == "hand" and norm(v) > _GESTURES_M_S:
                     moving.add(low_of)
-                    if -vz > max(_GESTURES_M_S, hypot(vx, vy)):
+                    if -v[2] > max(_GESTURES_M_S, hypot(*v[:2])):
                         hand.sank_s = self._at_s
         share = min(1.0, dt_s / _GESTURES_S)
         for id in faces:

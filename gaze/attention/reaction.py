@@ -29,6 +29,7 @@ class Reaction:
 
     Attributes:
         immediate: whether there are no reaction times.
+        next: the pending target, None without one or when it is no longer the winner.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:
@@ -38,7 +39,7 @@ class Reaction:
 
     def reset(self, t_s: float) -> None:
         """Forget the pending target and the former ones."""
-        self._next: Target | None = None
+        self.next: Target | None = None
         self._drawn_s = 0.0
         self._won_s = self._free_s = t_s
         self._left_s: dict[int, float] = {}
@@ -54,29 +55,20 @@ class Reaction:
 
         free_s: earliest time of the change
         """
-        if self._next is None:
+        if self.next is None:
             self._won_s = target.at_s
             self._drawn_s = _MEDIAN_S * exp(_SPREAD * float(self._rng.standard_normal()))
-        self._next, self._free_s = target, free_s
-
-    def drop(self) -> None:
-        """Drop the pending target, as it is no longer the winner."""
-        self._next = None
-
-    @property
-    def is_waiting(self) -> bool:
-        """Return whether a target is pending."""
-        return self._next is not None
+        self.next, self._free_s = target, free_s
 
     def take_due(self, t_s: float) -> Target | None:
         """Return the target whose reaction time is over, once; None without one."""
-        target = self._next
+        target = self.next
         if target is None:
             return None
         due_s = -inf if self.immediate else self._won_s + self._ratio(target) * self._drawn_s
         if t_s < max(self._free_s, due_s) - 1e-9:
             return None
-        self._next = None
+        self.next = None
         return target
 
     def _ratio(self, target: Target) -> float:
