@@ -1,7 +1,7 @@
 """The declaration of a parameter: one annotated field of a frozen dataclass, in one line.
 
     comfort_deg: Annotated[float, Bounds(0, 90), "comfortable eccentricity of an eye"] = 8.0
-    profile: Annotated[Literal["min_jerk", "main_sequence"], "profile of saccades"] = "min_jerk"
+    profile: Annotated[Literal["min_jerk", "human"], "profile of saccades"] = "min_jerk"
 
 The configuration, live tuning, the page and the documents read this line; pydantic validates the
 dataclass itself. Every part of the program may import this module; it needs the standard library
