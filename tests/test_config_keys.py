@@ -6,8 +6,8 @@ from gazerig.config.load import shipped_path
 from gazerig.config.schema import Rig
 from gazerig.params import Declaration, declarations
 
-MOST_KEYS = 550  # to become 160
-MOST_LINES = 913  # of the shipped rig that shows them; to become 300
+MOST_KEYS = 209  # to become 160
+MOST_LINES = 300
 
 
 def leaves(declared: Declaration, key: str) -> Iterator[str]:
