@@ -199,9 +199,8 @@ def _put(data: dict[str, Any], key: str, value: Value) -> list[ConfigFault]:
     declared: Declaration | None = Declaration("params", params=Rig)
     for step in over:
         declared = declared.below(step) if declared is not None else None
-        if isinstance(held, dict) and (
-            held.get(step) is None or (declared is not None and held[step] in declared.choices)
-        ):
+        below = held.get(step) if isinstance(held, dict) else ()
+        if below is None or (declared is not None and below in declared.choices):
             held[step] = {}
         held = held[step] if isinstance(held, dict) else None
     if not isinstance(held, dict):

@@ -98,11 +98,11 @@ def fill(declared: Declaration, data: Any, faulty: Container[Path], path: Path =
             return made
         case Declaration(inner=Declaration() as inner), dict():
             return {key: fill(inner, one, faulty, (*path, key)) for key, one in data.items()}
+        case Declaration(form="row"), tuple():
+            pairs = enumerate(zip(declared.items, data, strict=False))
+            return tuple(fill(one, item, faulty, (*path, i)) for i, (one, item) in pairs)
         case Declaration(inner=Declaration() as inner), tuple():
             return tuple(fill(inner, one, faulty, (*path, i)) for i, one in enumerate(data))
-        case Declaration(form="row"), tuple():
-            items = enumerate(zip(declared.items, data, strict=False))
-            return tuple(fill(item, one, faulty, (*path, i)) for i, (item, one) in items)
     return float(data) if declared.form == "number" and data is not None else data
 
 
@@ -165,12 +165,13 @@ def _violations(into: type, details: ErrorDetails) -> list[Violation]:
         if below is not None:
             holder, declared = declared, below
             path.append(step)
-        elif not (declared.params and declared.choices):  # no name of an alternative type
+        elif not (declared.choices and _names_alternative(declared, step)):
             return _unknown_key(declared, (*path, step), value)
     if removed := _removed_keys(tuple(path), value):
         return removed
-    if declared.params and isinstance(value, dict) and details["type"] == "literal_error":
-        return []  # the errors of the dataclass are those of the value
+    alternatives = bool(declared.params and declared.choices)
+    if alternatives and isinstance(value, dict) == (details["type"] == "literal_error"):
+        return []  # the error of the other alternative
     if details["type"] == "missing" and isinstance(details["loc"][-1], int):
         rule = f"has length {len(value)}, wanted {holder.length}"
         return [Violation(tuple(path[:-1]), abbreviate(value), rule)]
@@ -178,6 +179,13 @@ def _violations(into: type, details: ErrorDetails) -> list[Violation]:
         described = f" ({declared.description})" if declared.description else ""
         return [Violation(tuple(path), "", f"missing; wanted {expected_text(declared)}{described}")]
     return [Violation(tuple(path), abbreviate(value), _rule(declared, details))]
+
+
+def _names_alternative(declared: Declaration, step: Step) -> bool:
+    """Return whether pydantic names one of two alternatives by a step, which is no key."""
+    if declared.params is None or not declared.choices:
+        return False
+    return str(step).startswith(("literal[", declared.params.__name__))
 
 
 def _unknown_key(holder: Declaration, path: Path, value: Any) -> list[Violation]:
@@ -195,8 +203,8 @@ def _unknown_key(holder: Declaration, path: Path, value: Any) -> list[Violation]
 @cache
 def _removed_table() -> dict[str, str]:
     lines = (SHIPPED / "removed_keys.yaml").read_text(encoding="utf-8").splitlines()
-    pairs = [line.split(": ", 1) for line in lines if ": " in line and not line.startswith("#")]
-    return {key: remedy.strip('"') for key, remedy in pairs}
+    pairs = [line.split(": ", 1) for line in lines if not line.startswith("#")]
+    return {key: remedy.strip("'\"") for key, remedy in pairs}
 
 
 def _removed_keys(path: Path, value: Any) -> list[Violation]:

@@ -105,7 +105,7 @@ class Declaration:
     """A parameter as declared, or an item of one.
 
     inner: items of a list or mapping
-    items: each item of a row, which is a list of different values
+    items: items of a row, a list of different values
     params: the dataclass, for form "params"
     optional: null is allowed
     low, high: bounds of a number, None without bounds
@@ -133,9 +133,9 @@ class Declaration:
 
     def below(self, step: str | int) -> "Declaration | None":
         """Return the declaration one step of a path below, None if no such key exists."""
-        if self.params is not None:
-            return declarations(self.params).get(str(step))
-        return self.items[int(step)] if self.items else self.inner
+        if self.items and isinstance(step, int):
+            return self.items[step]
+        return declarations(self.params).get(str(step)) if self.params else self.inner
 
 
 @cache
@@ -189,12 +189,12 @@ def _declaration(hint: Any, above: Declaration) -> Declaration:
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         return dataclasses.replace(plain, form="params", params=hint, unit="")
     if origin is tuple:
-        if len(set(args)) > 1 and args[-1] is not ...:
-            row = tuple(_declaration(kind, above) for kind in args)
-            return dataclasses.replace(plain, form="row", items=row)
         length = None if args[-1] is ... else len(args)
-        items = _declaration(args[0], above)
-        return dataclasses.replace(plain, form="list", inner=items, length=length)
+        if length is not None and len(set(args)) > 1:
+            items = tuple([_declaration(kind, above) for kind in args])
+            return dataclasses.replace(plain, form="row", items=items, length=length)
+        inner = _declaration(args[0], above)
+        return dataclasses.replace(plain, form="list", inner=inner, length=length)
     if origin in (dict, Mapping):
         return dataclasses.replace(plain, form="mapping", inner=_declaration(args[1], above))
     if origin is Literal or above.choices:

@@ -1,9 +1,14 @@
 """A rig has few keys: each is set by a shipped file, has a paper or an effect that people see."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
-from gazerig.config.load import shipped_path
-from gazerig.config.schema import Rig
+import pytest
+from ruamel.yaml import YAML
+
+from gazerig.config.load import ConfigError, shipped_path
+from gazerig.config.parameters import apply_changes
+from gazerig.config.schema import Rig, load_rig
 from gazerig.params import Declaration, declarations
 
 MOST_KEYS = 209  # to become 160
@@ -26,6 +31,19 @@ def test_a_rig_has_at_most_so_many_keys() -> None:
     keys = list(leaves(Declaration("params", params=Rig), ""))
     assert len(set(keys)) == len(keys) and "buses.*.port" in keys
     assert len(keys) <= MOST_KEYS
+
+
+def test_a_removed_key_is_answered_with_what_to_do(tmp_path: Path) -> None:
+    keys = set(leaves(Declaration("params", params=Rig), ""))
+    removed = YAML(typ="safe").load(shipped_path("rigs", "desk").parents[1] / "removed_keys.yaml")
+    assert keys.isdisjoint(removed) and all(isinstance(text, str) for text in removed.values())
+    text = shipped_path("rigs", "minimal").read_text(encoding="utf-8")
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"camera_recovery: {{give_up_s: 3}}\n{text}", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"mine.yaml:1: camera_recovery\S*: is gone: "):
+        load_rig(str(file))
+    with pytest.raises(ConfigError, match="joints.neck_yaw.play_deg: is gone: "):
+        apply_changes(load_rig("desk"), {"joints.neck_yaw.play_deg": 1.0})
 
 
 def test_the_desk_rig_is_short() -> None:
