@@ -11,7 +11,7 @@ from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import Rig, load_rig
 from gazerig.params import Declaration, declarations
 
-MOST_KEYS = 209  # to become 160
+MOST_KEYS = 160
 MOST_LINES = 300
 
 
