@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from gazerig.geometry import forward as forward
     from gazerig.geometry import inverse as inverse
     from gazerig.head import Head as Head
+    from gazerig.head import Order as Order
     from gazerig.local_head import SimulatedHead as SimulatedHead
     from gazerig.opening import open as open
-    from gazerig.order import Order as Order
     from gazerig.remote_head import connect as connect
     from gazerig.robot.control.head_state import GazeReading as GazeReading
     from gazerig.robot.control.head_state import HeadEvent as HeadEvent
@@ -49,7 +49,7 @@ _HOME = {
     "JointReading": "gazerig.robot.control.head_state",
     "JointSolution": "gazerig.geometry",
     "NotFound": "gazerig.errors",
-    "Order": "gazerig.order",
+    "Order": "gazerig.head",
     "Outcome": "gazerig.robot.model.outcome",
     "Person": "gazerig.robot.control.head_state",
     "Refused": "gazerig.errors",

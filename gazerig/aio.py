@@ -8,8 +8,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Container, Generator
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-from gazerig.head import Head
-from gazerig.order import Order
+from gazerig.head import Head, Order
 from gazerig.remote_head import RemoteHead
 from gazerig.remote_head import connect as connect_now
 from gazerig.robot.control.gaze_events import EventKind

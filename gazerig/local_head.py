@@ -14,8 +14,7 @@ from typing import Any, Self
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.sound.player import SoundError
 from gazerig.errors import Error, HeadEnded, Refused
-from gazerig.head import Head
-from gazerig.order import Order
+from gazerig.head import Head, Order
 from gazerig.program_signals import SIGNALS, interrupt, is_left_waiting_for
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Substitutes

@@ -6,8 +6,7 @@ from types import TracebackType
 from typing import Self
 
 from gazerig.errors import HeadEnded, NotFound
-from gazerig.head import Head
-from gazerig.order import Order
+from gazerig.head import Head, Order
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.model.commands import Command, Value, as_value
 from gazerig.robot.model.outcome import Progress

@@ -18,8 +18,8 @@ from gazerig.robot.model.requests import (
     Characters,
     Differs,
     Get,
-    Menus,
     Parameters,
+    ReadMenus,
     Revert,
     Save,
     SayPiece,
@@ -180,7 +180,7 @@ class CommandHandler:
             Exception: One of ``refusals``, with every broken rule.
         """
         match request:
-            case Menus():
+            case ReadMenus():
                 return self._menus()
             case Tracks():
                 return self._tracks()

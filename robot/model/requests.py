@@ -26,7 +26,7 @@ class Hello(Request, frozen=True):
     version: int
 
 
-class Status(Request, frozen=True):
+class ReadStatus(Request, frozen=True, tag="status"):
     """Name and state of the rig, and its last messages."""
 
 
@@ -36,7 +36,7 @@ class State(Request, frozen=True):
     after: int = 0
 
 
-class Menus(Request, frozen=True):
+class ReadMenus(Request, frozen=True, tag="menus"):
     """Behaviours, modes of conversation, lid movements; the present one first."""
 
 
@@ -107,7 +107,7 @@ class Fault(Request, frozen=True):
 
 
 Question = (
-    Hello | Status | State | Menus | Tracks | Parameters | Get | Unsaved | Differs | Characters
+    Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved | Differs | Characters
 )  # fmt: skip
 Change = Set | Save | Revert | Character | SayPiece | Fault
 SLOW: frozenset[str] = frozenset((*map(verb, get_args(Change)), "say"))

@@ -47,14 +47,14 @@ from gazerig.robot.model.requests import (
     Fault,
     Get,
     Hello,
-    Menus,
     Parameters,
+    ReadMenus,
+    ReadStatus,
     Revert,
     Save,
     SayPiece,
     Set,
     State,
-    Status,
     Tracks,
     Unsaved,
 )
@@ -266,7 +266,7 @@ class RobotClient:
 
     def status(self) -> dict[str, Any]:
         """Return the rig's name and process, the fields of ``HeadState``, and the last messages."""
-        return self.ask(Status(), dict[str, Any])
+        return self.ask(ReadStatus(), dict[str, Any])
 
     @property
     def name(self) -> str:
@@ -317,7 +317,7 @@ class RobotClient:
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return the choices of ``Ask``: menu -> choices, the present one first."""
-        return self.ask(Menus(), dict[str, tuple[str, ...]])
+        return self.ask(ReadMenus(), dict[str, tuple[str, ...]])
 
     def tracks(self) -> tuple[dict[str, Any], ...]:
         """Return all tracks: name, description, duration_s, slowed_by, refused (if it is)."""

@@ -20,7 +20,7 @@ WAIT_S, MOST_WAIT_S = 10, 15
 _TAG = {"type": ["string", "integer"], "description": "returned with the answer"}
 
 
-class Answer(msgspec.Struct):
+class ProgramAnswer(msgspec.Struct):
     """The answer to a message.
 
     Attributes:
@@ -45,7 +45,7 @@ class Answer(msgspec.Struct):
 def message_schemas() -> tuple[list[Schema], dict[str, Schema]]:
     """Return a reference for each message of a program, and the schemas of all types."""
     (*requests, _, _, _), named = msgspec.json.schema_components(
-        (*REQUESTS.values(), HeadReport, HeadState, Answer),
+        (*REQUESTS.values(), HeadReport, HeadState, ProgramAnswer),
         ref_template="#/components/schemas/{name}",
     )
     for name, kind in REQUESTS.items():
@@ -59,7 +59,7 @@ def message_schemas() -> tuple[list[Schema], dict[str, Schema]]:
 def api_description(base: str) -> Schema:
     """Return the OpenAPI description; ``base`` is the beginning of the paths."""
     requests, named = message_schemas()
-    of_answer = {"$ref": "#/components/schemas/Answer"}
+    of_answer = {"$ref": "#/components/schemas/ProgramAnswer"}
     report: Schema = {"ok": {"$ref": "#/components/schemas/HeadReport"}}
     refusals = {
         code: _response(what, of_answer)

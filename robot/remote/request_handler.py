@@ -20,10 +20,10 @@ from gazerig.robot.model.requests import (
     Character,
     Fault,
     Hello,
+    ReadStatus,
     Revert,
     Set,
     State,
-    Status,
     read_request,
 )
 from gazerig.robot.remote.socket_io import VERSION
@@ -153,7 +153,7 @@ class RequestHandler:
                         "update gazerig or the program"
                     )
                 return {"ok": {"version": VERSION, **self._about}}
-            case Status():
+            case ReadStatus():
                 return {"ok": self._status()}
             case State(after):
                 return {"ok": self._pulse.state(after)}
