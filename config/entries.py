@@ -10,7 +10,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from gazerig.config.faults import ConfigFault
@@ -191,54 +191,62 @@ class _Reader:
         self._file = file
         self._faults = faults
         self._values = 0
-        self._endless = False
 
     def read_top(self, node: MappingNode) -> Entry | None:
         """Return the top node as an entry, None if it is too deep, too large or not a mapping."""
-        root = self._entry(node, _line(node), ())
-        return root if isinstance(root.value, dict) and not self._endless else None
+        try:
+            root = self._entry(node, _line(node), ())
+        except _TooLarge as fault:
+            self._note(fault.line, (), str(fault))
+            return None
+        return root if isinstance(root.value, dict) else None
 
     def _entry(self, node: Node, line: int, path: tuple[Step, ...]) -> Entry:
         """Return a node as an entry."""
         self._values += 1
-        if self._endless or len(path) > _DEPTH or self._values > _VALUES:
-            if not self._endless:
-                self._note(line, (), _TOO_DEEP if len(path) > _DEPTH else _TOO_MANY)
-            self._endless = True
-            return Entry(None, self._file, line)
+        if len(path) > _DEPTH or self._values > _VALUES:
+            raise _TooLarge(line, _TOO_DEEP if len(path) > _DEPTH else _TOO_MANY)
         tag = str(node.tag).removeprefix(_TAG)
-        if isinstance(node, MappingNode) and tag == "map":
-            return Entry(self._mapping(node, path), self._file, line)
-        if isinstance(node, ScalarNode) and tag in _SCALARS:
-            return Entry(_SCALARS[tag](node.value), self._file, line)
-        if tag != "seq":
+        value: Any = None
+        if tag == "map" and isinstance(node, MappingNode):
+            value = self._mapping(node, path)
+        elif tag == "seq" and isinstance(node, SequenceNode):
+            value = tuple(self._entry(n, _line(n), (*path, i)) for i, n in enumerate(node.value))
+        elif tag in _SCALARS and isinstance(node, ScalarNode):
+            value = _SCALARS[tag](node.value)
+        else:
             self._note(line, path, f"the tag {node.tag} is not supported; remove it")
-            return Entry(None, self._file, line)
-        items = (self._entry(n, _line(n), (*path, i)) for i, n in enumerate(node.value))
-        return Entry(tuple(items), self._file, line)
+        return Entry(value, self._file, line)
 
-    def _mapping(self, node: MappingNode, path: tuple[Step, ...]) -> dict[str, Entry]:
+    def _mapping(self, node: Node, path: tuple[Step, ...]) -> dict[str, Entry]:
         """Return the entries of a mapping, each with the line of its key."""
         entries: dict[str, Entry] = {}
         for key, value in node.value:
-            line = _line(key)
-            if not isinstance(key, ScalarNode) or str(key.tag) != f"{_TAG}str":
-                if str(key.tag) == f"{_TAG}merge":
-                    bad_key = "merge keys (<<) are not supported; write the keys in full"
-                else:
-                    name = abbreviate(key.value) if isinstance(key, ScalarNode) else "this"
-                    bad_key = f"key {name} is not text; put it in quotes"
-                self._note(line, path, bad_key)
-            elif key.value in entries:
-                first = entries[key.value].line
-                self._note(line, (*path, key.value), f"duplicate key, first in line {first}")
+            line, name = _line(key), key.value
+            if str(key.tag) == f"{_TAG}merge":
+                rule = "merge keys (<<) are not supported; write the keys in full"
+                self._note(line, path, rule)
+            elif str(key.tag) != f"{_TAG}str":
+                shown = abbreviate(name) if isinstance(key, ScalarNode) else "this"
+                self._note(line, path, f"key {shown} is not text; put it in quotes")
+            elif name in entries:
+                first = entries[name].line
+                self._note(line, (*path, name), f"duplicate key, first in line {first}")
             else:
-                entries[key.value] = self._entry(value, line, (*path, key.value))
+                entries[name] = self._entry(value, line, (*path, name))
         return entries
 
     def _note(self, line: int, path: tuple[Step, ...], rule: str) -> None:
         """Record a fault."""
         self._faults.append(ConfigFault(self._file, line, ".".join(map(str, path)), "", rule))
+
+
+class _TooLarge(ValueError):
+    """The text stands for more than any configuration."""
+
+    def __init__(self, line: int, rule: str) -> None:
+        super().__init__(rule)
+        self.line = line
 
 
 def _parse_integer(text: str) -> int | str:

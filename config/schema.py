@@ -7,8 +7,6 @@ from math import radians
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped_path
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
@@ -22,17 +20,13 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
-from gazerig.gaze.track.animation import AnimationTables
-from gazerig.gaze.track.level import LevelRange
-from gazerig.gaze.track.pose_offset import NO_OFFSET
 from gazerig.gaze.types import PARTS
 from gazerig.params import declarations
 from gazerig.robot.model.coupling import pair_setups, unreachable_text
 from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.mass_params import MassParams
-from gazerig.robot.model.track_fit import TrackFit, TrackRefused, track_motions
-from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME, further_joints
+from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 NO_CHARACTER = "none"
 """In place of a character's name: none, whatever the rig's file says."""
@@ -434,43 +428,21 @@ def _too_fast(rig: Rig, move: _KeyedMove, key: str) -> Iterable[tuple[str, str]]
 
 
 def track_rules(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find tracks that the rig cannot play, and rules that name unknown tracks."""
+    """Find tracks with faults, and rules that name unknown tracks.
+
+    A track that the rig cannot follow is refused when it is played, and ``gazerig check`` names it.
+    """
     known = set(shipped_tracks())
-    # The names are checked here; the motion of levels when the track is played.
-    rest = NO_OFFSET._replace(joints_rad=(0.0,) * len(further_joints(rig.names)))
-    level = LevelRange(rest, rest, 0.0)
-    tables = AnimationTables(
-        dict.fromkeys(rig.expressions, rest), 0.5, dict.fromkeys(rig.levels, level)
-    )
     for i, file in enumerate(rig.track_files):
         try:
             track = load_track(track_path(file))
             known.add(track_name(file))
-            if track.sound and not Path(track.sound).is_file():
-                yield (
-                    f"track_files.{i}",
-                    f"{file}: sound {track.sound}: no such file; check the name",
-                )
-            # A track that the rig cannot play from the middle of its ranges is rejected.
-            limits = [rig.joints[name].limit() for name in rig.names]
-            middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
-            spans = {}
-            for name in LIDS:
-                ends = rig.lid_joints.ends_deg(name)
-                if name in rig.joints and ends is not None:
-                    spans[name] = radians(ends[1] - ends[0])
-            TrackFit(rig.names, spans).fit(
-                "",
-                track_motions(track, rig.names, 0, tables),
-                1.0,
-                middle,
-                limits,
-            )
         except ConfigError as error:
-            for fault in error.faults:
-                yield f"track_files.{i}", str(fault)
-        except TrackRefused as refused:
-            yield from ((f"track_files.{i}", f"{file}: {reason}") for reason in refused.reasons)
+            yield from ((f"track_files.{i}", str(fault)) for fault in error.faults)
+        else:
+            if track.sound and not Path(track.sound).is_file():
+                missing = f"{file}: sound {track.sound}: no such file; check the name"
+                yield f"track_files.{i}", missing
     for behaviour, rule in rig.gaze.top_down.rules.items():
         if rule.gesture and rule.gesture not in known:
             near = suggestion_text(rule.gesture, sorted(known)) or ";"

@@ -11,7 +11,7 @@ LARGEST = {
     "gaze": 72_500,
     "drivers": 135_900,
     "sim_mock": 80_000,
-    "config": 23_000,
+    "config": 18_900,
     "robot": 218_400,
     "robot/dashboard": 58_900,
     "gazerig": 21_800,
