@@ -330,8 +330,6 @@ def test_a_planner_needs_the_rules_it_chooses_between() -> None:
     rules = {"wait": TopDownParams().rules["wait"]}
     with pytest.raises(ValueError, match="behaviour 'guard' has no rule"):
         TopDownParams(rules=rules, planner=True)
-    with pytest.raises(ValueError, match="no rule can be called 'planned'"):
-        TopDownParams(rules={**TopDownParams().rules, PLANNED: rules["wait"]})
 
 
 def test_the_planner_switched_off_leaves_the_behaviour_of_the_start() -> None:

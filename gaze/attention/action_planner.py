@@ -20,7 +20,7 @@ Experimental Psychology 35A, 333-346). World frame, metres, seconds.
 """
 
 from collections.abc import Sequence
-from math import inf, sqrt
+from math import dist, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -159,8 +159,9 @@ class ActionPlanner:
             self.reset()
         self._at_s = t_s
         threat = self._threat(percept, p_eye, t_s)
-        face = min(percept.faces, key=lambda one: (_away_m(one, p_eye), one.id), default=None)
-        if face is not None and _away_m(face, p_eye) > _REACH_M:
+        near = [(dist(face.p_world_m, p_eye), face.id, face) for face in percept.faces]
+        away_m, _, face = min(near, default=(inf, -1, None), key=lambda one: one[:2])
+        if away_m > _REACH_M:
             face = None
         found = []
         if face is not None:
@@ -230,16 +231,20 @@ class ActionPlanner:
                 return now._replace(p_world_m=there[0].p_world_m, v_world_m_s=face.v_world_m_s)
             self._attack_end_s = t_s
         counters = t_s - self._guard_end_s < _COUNTER_S
-        least_m = _OPEN_M * (_COUNTER if counters else 1.0)
-        if face is None or not found or found[0].clear_m < least_m:
-            self._open = None
-            if face is None:
-                return Plan("wait", "no opponent within reach")
-            if not found:
-                return Plan("wait", "not both hands of the opponent are known")
-            why = f"the opponent's guard is closed ({found[0].clear_m:.2f} m)"
-            return Plan("wait", f"no fist approaches, and {why}")
-        best = found[0]
+        if face is None:
+            why = "no opponent within reach"
+        elif not found:
+            why = "not both hands of the opponent are known"
+        elif found[0].clear_m < _OPEN_M * (_COUNTER if counters else 1.0):
+            closed = f"the opponent's guard is closed ({found[0].clear_m:.2f} m)"
+            why = f"no fist approaches, and {closed}"
+        else:
+            return self._strike(found[0], face.v_world_m_s, counters, t_s)
+        self._open = None
+        return Plan("wait", why)
+
+    def _strike(self, best: HitTarget, v_m_s: Vec3, counters: bool, t_s: float) -> Plan:
+        """Attack a place that has been open for long enough."""
         if self._open is None or self._open[0] != best.name:
             self._open = best.name, t_s
         if not counters and t_s - self._open[1] < _OPENING_S - 1e-9:
@@ -249,7 +254,7 @@ class ActionPlanner:
         self._since_s, self._place = t_s, best.name
         after = " after a punch" if counters else ""
         why = f"{best.name} is open{after} ({best.clear_m:.2f} m from any hand)"
-        return Plan("attack", why, -1, best.p_world_m, face.v_world_m_s)
+        return Plan("attack", why, -1, best.p_world_m, v_m_s)
 
 
 def _is_punch(one: Approach, ratio: float) -> bool:
@@ -259,10 +264,6 @@ def _is_punch(one: Approach, ratio: float) -> bool:
         and one.closing_m_s * ratio >= _CLOSING_M_S
         and one.miss_m <= ratio * _MISS_M
     )
-
-
-def _away_m(face: Face, p_eye: Vec3) -> float:
-    return norm(sub(face.p_world_m, p_eye))
 
 
 def approaches(bodies: Bodies, p_eye: Vec3, late_s: float = 0.0) -> list[Approach]:

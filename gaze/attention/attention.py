@@ -91,29 +91,6 @@ class _Comparison(NamedTuple):
     saliences: list[Salience]
     rule_target: RuleTarget | None
 
-    def target(self, row: int, captured_s: float, plan: str) -> Target:
-        """Return the target of a row, with its reason."""
-        first, rule_target = self.saliences[row], self.rule_target
-        others = [one for i, one in enumerate(self.saliences) if i != row and one.total > -inf]
-        others.sort(key=lambda one: -one.total)
-        moving = first.translation + first.looming + first.rotation + first.onset
-        by_rule = rule_target is not None and first.rule > 0.0 and first.rule >= moving
-        name = body_name(first.kind, first.id)
-        if rule_target is not None and by_rule:
-            why = f"{name}: rule {rule_target.behaviour} {first.rule:.2f}"
-        else:
-            why = f"{name}: {_terms(first)}"
-        if rule_target is not None and rule_target.p_world_m is not None and first.id == NO_BODY:
-            p, v = rule_target.p_world_m, rule_target.v_world_m_s
-        else:
-            p, v = vec(self.bodies.p_world_m[row]), vec(self.bodies.v_world_m_s[row])
-        # The head's amplitude follows from the unfactored amount: habituation does not turn the
-        # head.
-        return Target(
-            p, v, captured_s, first.kind, first.id, max(first.rule, moving), by_rule, None, 0, why,
-            plan=plan, saliences=(first, *others[:_LISTED]),
-        )  # fmt: skip
-
 
 class Attention:
     """Choice of the target, once for each new frame.
@@ -276,8 +253,7 @@ class Attention:
         named = made.rule_target is not None and id in made.rule_target.ids
         if named:
             self._habituation.start_stay(id)
-        plan = self.top_down.plan_text
-        winner = made.target(row, captured_s, plan)
+        winner = self._make_target(made, row, captured_s)
         # A change of behaviour waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
             self._reaction.next = None
@@ -285,8 +261,28 @@ class Attention:
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
         self._reaction.start_waiting(winner, dwelt_s)
         if present is not None:
-            return made.target(present, captured_s, plan)
-        return self._target and self._target._replace(plan=plan)
+            return self._make_target(made, present, captured_s)
+        return self._target and self._target._replace(plan=winner.plan)
+
+    def _make_target(self, made: _Comparison, row: int, captured_s: float) -> Target:
+        """Return the target of a row, with its reason."""
+        first, rule_target = made.saliences[row], made.rule_target
+        others = [one for i, one in enumerate(made.saliences) if i != row and one.total > -inf]
+        others.sort(key=lambda one: -one.total)
+        moving = first.translation + first.looming + first.rotation + first.onset
+        by_rule = first.rule > 0.0 and first.rule >= moving
+        why = f"rule {self.top_down.behaviour} {first.rule:.2f}" if by_rule else _terms(first)
+        why = f"{body_name(first.kind, first.id)}: {why}"
+        if rule_target is not None and rule_target.p_world_m is not None and first.id == NO_BODY:
+            p, v = rule_target.p_world_m, rule_target.v_world_m_s
+        else:
+            p, v = vec(made.bodies.p_world_m[row]), vec(made.bodies.v_world_m_s[row])
+        # The head's amplitude follows from the unfactored amount: habituation does not turn the
+        # head.
+        return Target(
+            p, v, captured_s, first.kind, first.id, max(first.rule, moving), by_rule, None, 0, why,
+            plan=self.top_down.plan_text, saliences=(first, *others[:_LISTED]),
+        )  # fmt: skip
 
     def _is_faint(self, best: Salience) -> bool:
         """Return whether nothing is visible but things that get only glances: gaze is idle."""

@@ -42,8 +42,6 @@ _MOVES, _STILL_BELOW = 0.5, 0.15
 _SETTLED_S = 0.5
 """Time after entry during which a body gets no onset of motion as well."""
 _NEAREST_M = 0.05
-_SPARE = 16
-"""Number of former bodies, beyond twice the present ones, with stored states."""
 
 _ROTATION_RAD_S = 3.0
 """Angular speed about the line of sight that gives salience 1."""
@@ -221,8 +219,7 @@ class BottomUp:
             total = saturate(slide, loom, spin, most, worth) + onset
             found.append(Salience(id, rows.kinds[i], slide, abs(loom), spin, onset, total=total))
         self._at_s = t_s
-        if len(states) > 2 * len(rows.ids) + _SPARE:
-            self._states = {id: one for id, one in states.items() if t_s - one.seen_s <= _BLINK_S}
+        self._states = {id: one for id, one in states.items() if t_s - one.seen_s <= _BLINK_S}
         return found
 
     def _motion(self, rows: BodyRows, i: int, p_eye: Vec3, v_eye: Vec3, gaze: Vec3) -> Vec3:

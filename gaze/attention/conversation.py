@@ -75,13 +75,6 @@ ROLES = {
 """With a smallest angle of 0, as in the published distribution, half of the looks away would still
 be on the face.
 """
-_ROLE_OF = {
-    "listening": "listening",
-    "thinking": "thinking",
-    "speaking": "speaking",
-    "interrupted": "listening",
-}
-"""State of a turn -> role."""
 _PUBLISHED = {"listening": "listen", "thinking": "think", "speaking": "talk"}
 """Role of a reported turn -> that of Eyes Alive."""
 
@@ -98,6 +91,7 @@ _DRIFT_DEG = 0.75
 _SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
 # Share of gaze shifts, percent, to 0, 45, ... 315 deg; 0 is right, 90 up (Eyes Alive).
 DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
+_ENDS = np.cumsum(DIRECTIONS_PERCENT)
 _UP_SECTOR, _THINKS_UP = 2, 0.8
 """Sector that is up; share of a thinker's looks that go there, the others in any direction."""
 _ASIDE, _UP, _SPREAD_DEG = 0.78, 0.15, 35.0
@@ -233,7 +227,7 @@ class ConversationGaze:
         if state == "idle":
             self._take_role(self.chosen_mode, t_s)
             return
-        role = _ROLE_OF[state]
+        role = "listening" if state == "interrupted" else str(state)
         if self._law == "eyes_alive":
             role = _PUBLISHED[role]
         if state == "speaking":
@@ -394,10 +388,8 @@ class ConversationGaze:
             return spread_deg + (90.0 if draw < _ASIDE + _UP else 270.0)
         sector = _UP_SECTOR
         if ways == "any" or rng.random() >= _THINKS_UP:
-            sector, draw = 0, float(rng.random()) * sum(DIRECTIONS_PERCENT)
-            while sector < len(DIRECTIONS_PERCENT) - 1 and draw >= DIRECTIONS_PERCENT[sector]:
-                draw -= DIRECTIONS_PERCENT[sector]
-                sector += 1
+            draw = float(rng.random()) * _ENDS[-1]
+            sector = int(np.searchsorted(_ENDS, draw, side="right"))
         return 45.0 * sector + float(rng.uniform(-22.5, 22.5))
 
     def _draw_face_s(self) -> float:

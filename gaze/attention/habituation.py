@@ -192,10 +192,7 @@ class Habituation:
         least = min(surpluses.values())
         surpluses = {id: min(one - least, _LARGEST_S) for id, one in surpluses.items()}
         self._surpluses |= {id: _Surplus(one, t_s) for id, one in surpluses.items()}
-        if len(self._surpluses) > 2 * len(weights):
-            self._surpluses = {
-                k: one for k, one in self._surpluses.items() if t_s - one.at_s < _KEPT_S
-            }
+        self._surpluses = {k: one for k, one in self._surpluses.items() if t_s - one.at_s < _KEPT_S}
         return surpluses
 
     def _return_factor(self, p_world_m: Vec3, p_eye: Vec3, t_s: float) -> float:

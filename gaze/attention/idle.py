@@ -87,11 +87,6 @@ class IdleParams:
     # fmt: on
 
     @property
-    def aside_deg(self) -> float:
-        """Return how far the search goes towards the side to which the target left."""
-        return min(18.0, self.reach_deg / 2.0)
-
-    @property
     def glance_deg(self) -> Angles2:
         """Return the largest angles of a glance to the side, and up or down.
 
@@ -258,7 +253,7 @@ class Idle:
         soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
         now = yaw_pitch(rel)
         yaw, pitch = wrap(soon[0] - now[0]), soon[1] - now[1]
-        size, aside = hypot(yaw, pitch), radians(self._params.aside_deg)
+        size, aside = hypot(yaw, pitch), radians(min(18.0, self._params.reach_deg / 2.0))
         if size / 0.05 < radians(_LEAVING_DEG_S):
             return (0.0, 0.0)
         return yaw / size * aside, pitch / size * aside

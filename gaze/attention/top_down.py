@@ -51,9 +51,9 @@ class Rule:
             ValueError: an id is not a number; a person's trait is unknown; a point has no position,
                 or a position is given for another kind.
         """
-        prefix, colon, word = self.look_at.partition(":")
+        prefix, word = self._words
         known = {_ID: word.isdecimal(), _PERSON: word in TRAITS}
-        if self.look_at in TRAITS or (colon and not known.get(prefix)):
+        if self.look_at in TRAITS or (":" in self.look_at and not known.get(prefix)):
             traits = ", ".join(f'"{_PERSON}:{trait}"' for trait in TRAITS)
             raise ValueError(
                 f'look_at {self.look_at!r}: write a kind of body, one by its id, e.g. "id:7", or persons: {traits}'
@@ -64,7 +64,7 @@ class Rule:
     @property
     def person(self) -> str | None:
         """Return the trait of the persons that it names, None without one."""
-        prefix, _, trait = self.look_at.partition(":")
+        prefix, trait = self._words
         return trait if prefix == _PERSON else None
 
     @property
@@ -75,8 +75,13 @@ class Rule:
     @property
     def body_id(self) -> int | None:
         """Return the id of the single body that it names, None without one."""
-        prefix, _, number = self.look_at.partition(":")
+        prefix, number = self._words
         return int(number) if prefix == _ID else None
+
+    @property
+    def _words(self) -> tuple[str, str]:
+        prefix, _, word = self.look_at.partition(":")
+        return prefix, word
 
 
 def _shipped_rules() -> dict[str, Rule]:
@@ -108,22 +113,19 @@ class TopDownParams:
             if behaviour not in self.rules:
                 known = ", ".join(sorted(self.rules))
                 raise ValueError(f"behaviour {behaviour!r} has no rule; rules: {known}")
-        if PLANNED in self.rules:
-            raise ValueError(f"no rule can be called {PLANNED!r}: that name selects the planner")
 
 
 class RuleTarget(NamedTuple):
     """Targets of the present rule.
 
     ids: the selected bodies; none for a place
-    salience, behaviour: the rule's constant and name
+    salience: the rule's constant
     p_world_m, v_world_m_s: the selected place and its velocity; None for bodies
     kind: kind of the place
     """
 
     ids: Collection[int]
     salience: float
-    behaviour: str
     p_world_m: Vec3 | None = None
     v_world_m_s: Vec3 = _STILL
     kind: str = _POINT
@@ -215,11 +217,11 @@ class TopDown:
 
         seen: id and kind of the bodies in view
         """
-        rule, plan, at = self.rule, self._planner.plan, (self.rule.salience, self.behaviour)
+        rule, plan = self.rule, self._planner.plan
         if self.plans and rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
-            return RuleTarget((), *at, plan.p_world_m, plan.v_world_m_s, ATTACK_TARGET)
+            return RuleTarget((), rule.salience, plan.p_world_m, plan.v_world_m_s, ATTACK_TARGET)
         if rule.point_world_m is not None:
-            return RuleTarget((), *at, rule.point_world_m)
+            return RuleTarget((), rule.salience, rule.point_world_m)
         guarded = self.plans and rule.look_at == GUARD_TARGET
         number = plan.body_id if guarded else rule.body_id
         if number is None:
@@ -227,4 +229,4 @@ class TopDown:
         else:
             ids = [number] if number in seen else []
         named = [id for id in ids if id in self.named_ids]
-        return RuleTarget(named or ids, *at) if ids else None
+        return RuleTarget(named or ids, rule.salience) if ids else None

@@ -12,9 +12,10 @@ from math import cos, radians, sin
 
 import numpy as np
 from human.measured_run import MeasuredRun, Runner
-from human.row_16_idle import FURNISHED
+from human.row_16_idle import Room
 
 from gazerig.gaze.types import Vec3
+from gazerig.robot.model.commands import Value
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 _YAWS = (40, 0, -40, 0)
@@ -24,6 +25,7 @@ _TOGETHER_S = 0.008
 _FREE_DEG = 17.9
 _WAYS, _AT = (0.05, 0.95), (0.189, 0.811)
 """Shares of a movement by minimum jerk, and of its time until then."""
+_SEES_FAR: dict[str, Value] = {"camera.horizontal_field_deg": 140.0}
 _KINDS = ("glance", "search", "rest", "light")
 
 WANTED = {
@@ -59,19 +61,24 @@ class EqualLights:
 
 
 SCENE = EqualLights()
+WIDE = Room(
+    "wide-room",
+    [
+        (1.5 * cos(radians(yaw)), 1.5 * sin(radians(yaw)), _EYES_M[2])
+        for yaw in (-56, -28, 0, 28, 56)
+    ],
+)
+"""Things so far apart that many looks are as large as in that task."""
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return how the figures of equal looks scatter, and who goes first in natural ones."""
-    lit = {
-        "gaze.top_down.rules.wait.look_at": "light",
-        "camera.horizontal_field_deg": 140.0,  # so that far ones are seen
-    }
+    lit: dict[str, Value] = {"gaze.top_down.rules.wait.look_at": "light", **_SEES_FAR}
     equal = np.concatenate(
         [_shifts(run(SCENE, seed=n, seconds=seconds, overrides=lit)) for n in seeds]
     )
     natural = np.concatenate(
-        [_shifts(run(FURNISHED, seed=n, seconds=seconds, overrides={})) for n in seeds]
+        [_shifts(run(WIDE, seed=n, seconds=seconds, overrides=_SEES_FAR)) for n in seeds]
     )
     out = equal[equal[:, 0] > _FREE_DEG + 8.0]
     slopes = out[:, 1] / (out[:, 0] - _FREE_DEG)
