@@ -258,6 +258,8 @@ class HeadModel:
         self._neck, self._roll = neck_limit_rad, roll_limit_rad
         self.share = self._share = HeadShare(params, eye_limit_rad)
         self._people = params.goal_model == "stahl"
+        # The papers' heads leave an eye aside; only an urgent target is recentred, to the trigger.
+        self._comfort_rad = _COMFORT_RAD if self._people else inf
         self.foresees_s = _FORESEES_S if self._people else 0.0
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
@@ -330,8 +332,8 @@ class HeadModel:
         share, start = self._share_for(target, both_eyes_rad), self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
         short_rad = share.undershoot_rad(target.salience, arc_rad)
-        if self._people and min(short_rad, arc_rad) > _COMFORT_RAD:
-            short_rad = min(_COMFORT_RAD / 2.0, self.share.trigger_rad)
+        if min(short_rad, arc_rad) > self._comfort_rad:
+            short_rad = min(self._comfort_rad / 2.0, self.share.trigger_rad)
         return self._reachable_goal(target, facing_rad, facing_rad, short_rad, start, share)
 
     def draw_lead_s(
@@ -426,7 +428,7 @@ class HeadModel:
             and angle_between(self._goal_direction, direction(facing)) < trigger_rad
         ):
             self._start = self._goal_direction
-        comfort_rad, aside_rad = _COMFORT_RAD, eccentricity
+        comfort_rad, aside_rad = self._comfort_rad, eccentricity
         if is_face:
             comfort_rad *= _BEFORE_FACE
             aside_rad = angle_between(self._goal_direction, direction(facing))
@@ -435,7 +437,7 @@ class HeadModel:
         wait_s = _RECENTRE_S + self._later * _RECENTRE_SPREAD_S
         if self._is_urgent(target):
             wait_s = 0.0
-        if self._people and not moving and t_s - self._aside_since_s >= wait_s:
+        if t_s - self._aside_since_s >= wait_s and not moving:
             self._follows, self._relieves = False, True
         elif eccentricity >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
             self._follows, self._relieves = True, False
