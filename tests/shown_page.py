@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+import numpy as np
 from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 
@@ -37,10 +38,21 @@ SNAPSHOT = Snapshot(
     health="0 lost",
     joints=GAZE_JOINTS,
 )
-FACE = SeenFace(
-    3, (0.9, 0.1, 0.25), ((-0.98, -0.2, 0.0), (0.2, -0.98, 0.0), (0.0, 0.0, 1.0)),
-    ((0.9, 0.1, 0.25), (0.9, 0.13, 0.28)) * 4,
+# A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
+# order chin, left side, left eye, mouth, nose, right side, right eye, forehead.
+PARTS_M = (
+    (-0.015, 0.0, -0.085), (-0.045, 0.062, -0.020), (-0.022, 0.031, 0.035), (-0.010, 0.0, -0.045),
+    (0.0, 0.0, 0.0), (-0.045, -0.062, -0.020), (-0.022, -0.031, 0.035), (-0.020, 0.0, 0.080),
 )  # fmt: skip
+BACK = ((-0.98, 0.199, 0.0), (-0.199, -0.98, 0.0), (0.0, 0.0, 1.0))
+FACE = SeenFace(
+    3,
+    (0.9, 0.1, 0.25),
+    BACK,
+    tuple(
+        (x, y, z) for x, y, z in np.array((0.9, 0.1, 0.25)) + np.array(PARTS_M) @ np.array(BACK).T
+    ),
+)
 """A face that looks back along the x axis, a little aside."""
 PARAM = Parameter("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
