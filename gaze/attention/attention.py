@@ -84,7 +84,7 @@ class AttentionParams:
     # fmt: on
 
 
-class _Comparison(NamedTuple):
+class _Decision(NamedTuple):
     """Saliences of one decision: those of the bodies, then of a point that the rule names."""
 
     bodies: Bodies
@@ -264,7 +264,7 @@ class Attention:
             return self._make_target(made, present, captured_s)
         return self._target and self._target._replace(plan=winner.plan)
 
-    def _make_target(self, made: _Comparison, row: int, captured_s: float) -> Target:
+    def _make_target(self, made: _Decision, row: int, captured_s: float) -> Target:
         """Return the target of a row, with its reason."""
         first, rule_target = made.saliences[row], made.rule_target
         others = [one for i, one in enumerate(made.saliences) if i != row and one.total > -inf]
@@ -289,9 +289,7 @@ class Attention:
         faint = best.total < self._bottom_up.least_salience
         return best.total == -inf or (faint and best.kind != "face" and best.id != NO_BODY)
 
-    def _compare(
-        self, percept: Percept, bodies: Bodies, state: GazeState, t_s: float
-    ) -> _Comparison:
+    def _compare(self, percept: Percept, bodies: Bodies, state: GazeState, t_s: float) -> _Decision:
         """Return the saliences that the decision compares."""
         eye, rows, attended = state.p_world_head_m, bodies.rows(), self._identity[1]
         seen = visible_bodies(rows, state)
@@ -338,7 +336,7 @@ class Attention:
                 wanted = rule
             total = max(one.total, wanted) * factor if one.id in seen else -inf
             saliences.append(one._replace(rule=wanted, habituation=factor, total=total))
-        return _Comparison(bodies, saliences + point, rule_target)
+        return _Decision(bodies, saliences + point, rule_target)
 
     def _favoured(self, ids: Iterable[int], t_s: float) -> tuple[frozenset[int], float]:
         """Return the people who have a share of the looks together, and that share.
@@ -390,7 +388,7 @@ class Attention:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
-    def _target_row(self, made: _Comparison) -> int | None:
+    def _target_row(self, made: _Decision) -> int | None:
         """Return the row of the present target, None if it has disappeared."""
         kind, id = self._identity
         there = (

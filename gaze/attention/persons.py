@@ -50,7 +50,7 @@ _GONE_S = 120.0
 
 
 @dataclass(slots=True)
-class _Person:
+class _SeenPerson:
     """A person: times of appearance, last sight and last wave; share of time with gestures."""
 
     came_s: float
@@ -90,7 +90,7 @@ class Persons:
 
     def reset(self) -> None:
         """Forget all people."""
-        self._people: dict[int, _Person] = {}
+        self._people: dict[int, _SeenPerson] = {}
         self._hands: dict[int, _Hand] = {}
         self.parts: dict[int, int] = {}
         self.raised: set[int] = set()
@@ -115,7 +115,7 @@ class Persons:
             if kind == "face"
         }
         for id in faces:
-            self._people.setdefault(id, _Person(self._at_s, self._at_s)).seen_s = self._at_s
+            self._people.setdefault(id, _SeenPerson(self._at_s, self._at_s)).seen_s = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self.speaking = frozenset(face.id for face in percept.faces if face.speaks)
         if self.speaking:
