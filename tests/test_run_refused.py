@@ -54,6 +54,26 @@ def test_an_unknown_key_of_a_joint_is_the_only_error(
     assert "left_eye_pan.zero_stepp: unknown key 'zero_stepp'; did you mean 'zero_step'" in line
 
 
+MINIMAL = DESK.with_name("minimal.yaml")
+
+
+def test_ranges_in_radians_get_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path, text = tmp_path / "my.yaml", MINIMAL.read_text(encoding="utf-8")
+    for degrees, radians in (("35", "0.61"), ("30", "0.52")):
+        text = text.replace(f"min_deg: -{degrees}, max_deg: {degrees}",
+                            f"min_deg: -{radians}, max_deg: {radians}")  # fmt: skip
+    path.write_text(text, encoding="utf-8")
+    assert typed("check", str(path)) == 0
+    hint = "degrees? these look like radians"
+    assert f"min_deg and max_deg of all joints: no angle is above 0.61: {hint}" in " ".join(
+        capfd.readouterr().err.split()
+    )
+    # One joint with a usual range shows that they are degrees.
+    path.write_text(text.replace("-0.52, max_deg: 0.52", "-30, max_deg: 30"), encoding="utf-8")
+    assert typed("check", str(path)) == 0
+    assert hint not in capfd.readouterr().err
+
+
 def test_a_shell_sees_that_line_and_that_exit_code() -> None:
     done = gazerig("run", "--no-page", "--mock", "--scene", "circus", timeout=30)
     one_line_and_exit_code_2(done.returncode, done.stderr, "circus")
@@ -85,7 +105,7 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rig = tmp_path / "bad.yaml"
     text = DESK.read_text(encoding="utf-8")
     text = text.replace("max_speed_deg_s: 200.0", "max_speed_deg_s: 9000.0", 1)
-    text = text.replace("id: 9 ", "id: 8 ").replace("name: desk", "nmae: desk")
+    text = text.replace("id: 9\n", "id: 8\n").replace("name: desk", "nmae: desk")
     rig.write_text(text, encoding="utf-8")
     assert typed("check", str(rig)) == 2
     said = capfd.readouterr().err
@@ -93,3 +113,16 @@ def test_check(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
         assert part in said
     lines = [line for line in said.splitlines() if line.startswith(f"{rig}:")]
     assert len(lines) >= 4 and all(re.match(rf"{re.escape(str(rig))}:\d+: ", s) for s in lines)
+
+
+def test_a_track_in_radians_gets_a_hint(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path, track = tmp_path / "my.yaml", tmp_path / "turn.yaml"
+    path.write_text(
+        DESK.read_text(encoding="utf-8") + "\ntrack_files: [turn.yaml]\n", encoding="utf-8"
+    )
+    for yaw, hinted in ((0.35, True), (20.0, False)):
+        frames = f"[{{time_s: 1, head_yaw_deg: {yaw}, head_pitch_deg: -0.1}}]"
+        track.write_text(f"description: a turn\nframes: {frames}\n", encoding="utf-8")
+        assert typed("check", str(path)) == 0
+        said = capfd.readouterr().err
+        assert ("turn.yaml: no angle is above 0.35: degrees?" in said) == hinted, said

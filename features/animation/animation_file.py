@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from gazerig.config.rig import Rig
+from gazerig.config.tracks import radians_hint
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.animation import bottango, gltf_reader, servo_positions, table
@@ -49,20 +50,10 @@ def read_animation(
         )
     else:
         series = table.read_table(path, data, fps, names)
-        hint = _radians_hint(max([abs(angles).max() for _, angles in series.values()], default=0.0))
+        hint = radians_hint(abs(angles).max() for _, angles in series.values())
         found = ImportedAnimation(series, (hint,) if hint else (), poses=False)
     if not found.series:
         raise SetupError(
             f"{path} moves no joint of {rig.name}: {'; '.join(found.notes) or 'no keys'}: {names.hint()}"
         )
     return found
-
-
-def _radians_hint(largest: float) -> str:
-    """Return a hint if all angles are so small that they may be in radians, otherwise "".
-
-    It is no fault: a sway, or a mechanism with tiny motion, may have such angles in degrees.
-    """
-    if not 0.0 < largest < 1.0:
-        return ""
-    return f"no angle is above {largest:.3g}: degrees? these look like radians (1 rad is 57.3 deg)"

@@ -12,7 +12,7 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         say(check_line(rig))
-        hints = (*weight_lines(rig), *track_lines(rig))
+        hints = (*unit_lines(rig), *weight_lines(rig), *track_lines(rig))
         for line in hints:
             say(line)
 
@@ -29,6 +29,27 @@ def check_line(rig: str) -> str:
 
     found: Rig = load_rig(rig, further=[mesh_faults])
     return f"{rig}: valid: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
+
+
+_SMALLEST_DEG = 4.0
+"""Larger than pi: ranges of joints in radians are within."""
+
+
+def unit_lines(rig: str) -> list[str]:
+    """Return a hint for ranges and for each own track whose angles look like radians.
+
+    Raises:
+        ConfigError: the rig is invalid.
+    """
+    from gazerig.config.schema import load_rig
+    from gazerig.config.tracks import load_track, radians_hint, track_angles_deg, track_path
+
+    loaded = load_rig(rig)
+    ends = [end for one in loaded.joints.values() for end in (one.min_deg, one.max_deg)]
+    hints = {f"{rig}: min_deg and max_deg of all joints": radians_hint(ends, _SMALLEST_DEG)}
+    for file in loaded.track_files:
+        hints[file] = radians_hint(track_angles_deg(load_track(track_path(file))))
+    return [f"{where}: {hint}" for where, hint in hints.items() if hint]
 
 
 def weight_lines(rig: str) -> list[str]:
