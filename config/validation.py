@@ -30,7 +30,6 @@ _TYPE_WORDS: dict[type, str] = {
     str: "text",
     dict: "a mapping",
     list: "a list",
-    tuple: "a list",
 }
 
 

@@ -78,14 +78,14 @@ class Choices:
         return {"type": "literal", "expected": list(self.values)}
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True)
 class Unit:
     """Unit of a parameter whose name does not end with it."""
 
     name: str
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True)
 class Unlisted:
     """Marks a mapping that no file contains."""
 
@@ -100,7 +100,7 @@ Form = Literal[
 _PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclasses.dataclass(frozen=True)
 class Declaration:
     """A parameter as declared, or an item of one.
 
