@@ -213,6 +213,7 @@ OUTCOMES = get_args(gazerig.Outcome)
 
 SAID = {
     ". .venv/bin/activate",
+    *("v4l2-ctl", "not moving", "calibration"),
     # of a program's own
     *("import gazerig", "mypy --strict", "with", "for_s=2.0", "fast=True", *OUTCOMES),
     # keys, lines and answers of the program
