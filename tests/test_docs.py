@@ -99,7 +99,7 @@ def test_values_set_in_the_papers_are_allowed(desk_rig: Rig) -> None:
         for key, value in zip(words[::2], words[1::2], strict=True)
     ]
     for block in blocks("python"):
-        found = re.findall(r'rig\.set\("([\w.]+)", ([\d.]+)\)', block.text)
+        found = re.findall(r'rig\.set_many\(\{"([\w.]+)": ([\d.]+)\}', block.text)
         pairs += [(key, float(value)) for key, value in found]
     assert len(pairs) >= 4
     for key, value in pairs:
