@@ -79,7 +79,7 @@ def _limits(shape: Declaration) -> str:
 
 
 def _cell(words: str) -> str:
-    return words.replace("|", "\\|").replace("*", "\\*")
+    return words.replace("|", "\\|").replace("*", "\\*").replace("[", "\\[")
 
 
 if __name__ == "__main__":

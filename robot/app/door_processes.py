@@ -49,7 +49,7 @@ class DoorEntry(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> "DoorEntry":
-        """Return the entry of a text: NAME [ADDRESS] [--bind HOST:PORT].
+        """Return the entry of a text: ``NAME [ADDRESS] [--bind HOST:PORT]``.
 
         Raises:
             SetupError: it is not one.
