@@ -228,8 +228,3 @@ def there_is_none() -> None:
     assert whole_gazerig("stop") == none
     done = gazerig("stop", "--pid", "1")
     assert done.stderr == "no rig of process 1 is running: start one with gazerig run ...\n"
-
-
-def test_steer_needs_a_terminal() -> None:
-    done = gazerig("ctl", "steer")
-    assert done.returncode == 2 and "run this in one" in done.stderr

@@ -104,7 +104,6 @@ EXAMPLES: dict[str, Examples] = {
         ("ctl status", "target and its reason, guard, joints of the running rig"),
         ("ctl status --json", "the same for programs"),
     ),
-    "steer": (("ctl steer", "arrow keys move the gaze; space is STOP"),),
     "look": (
         ("ctl look 1 0.2 0.3", "make the running head look there"),
         ("ctl look free", "let it choose its targets again"),

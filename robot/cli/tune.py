@@ -15,7 +15,6 @@ from gazerig.drivers.process.own_folder import OwnFolder
 from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import fault as cli_fault
 from gazerig.robot.cli import look_and_stop
-from gazerig.robot.cli import steer as cli_steer
 from gazerig.robot.cli import talk as cli_talk
 from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
@@ -40,7 +39,6 @@ def select_rig(context: typer.Context, rig: PidOption = None) -> None:
 ctl.add_typer(look_and_stop.app)
 ctl.add_typer(cli_animation.app)
 ctl.add_typer(cli_talk.app)
-ctl.add_typer(cli_steer.app)
 ctl.add_typer(cli_fault.app)
 app = typer.Typer()
 app.add_typer(ctl)
