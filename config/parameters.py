@@ -25,6 +25,7 @@ LIVE_LIMITS = ("min_deg", "max_deg", "max_speed_deg_s", "max_accel_deg_s2")
 """Keys of a joint that a running rig applies."""
 _LIVE = (
     "character",
+    "ranges.*",
     "guard.*",
     "tracker.*",
     "loop.*",

@@ -123,7 +123,7 @@ def late_while_gentle(m: ModuleType) -> None:
             if gap > 50:  # longer than that it begins as from rest
                 assert speed <= braked + SOFT_START_RAD_S2 * DT + 1e-9
             fastest, last = max(fastest, speed), speed
-        assert (now > LOW + 0.05) == (missed == 2)
+        assert (now > LOW + 0.2) == (missed == 2)
 
 
 def slow_host(m: ModuleType) -> None:

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
+from msgspec import structs
 from page_person import (
     STOP,
     UNHURRIED_FRAMES,
@@ -75,12 +76,12 @@ def test_the_space_bar_stops_but_not_while_somebody_types(at_the_rig: tuple[Rig,
     before = len(rig.orders)
     field = beside("find", "input")
     person.fill(field, "saccade")
-    wait_for(lambda: person.reads("human_peak"), "what is found")
+    wait_for(lambda: person.reads("max_acceleration"), "what is found")
     person.space()
-    person.type("peak")
-    wait_for(lambda: not person.reads("human_base"), "what is not found any more")
-    assert person.reads("human_peak")
-    assert person.run(f"{field}.value") == "saccade peak"
+    person.type("speed")
+    wait_for(lambda: not person.reads("max_acceleration"), "what is not found any more")
+    assert person.reads("max_speed")
+    assert person.run(f"{field}.value") == "saccade speed"
     assert not rig.robot.stopped and rig.orders[before:] == []
     # On a button in focus a space would press it; here it stops, and nothing else.
     person.run(f"{beside('find', 'input')}.blur(); {saying('save')}.focus()")
@@ -109,7 +110,8 @@ def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]) ->
     wait_for(lambda: abs(shown_deg() - rig.desired_deg()) < 0.2, "the slider and the wish agreeing")
     person.click(saying("look freely"))
     wait_for(
-        lambda: cast(Any, rig.orders[-1])._replace(who="") == LookAt(None), "the rig being let go"
+        lambda: structs.replace(cast(Any, rig.orders[-1]), who="") == LookAt(None),
+        "the rig being let go",
     )
 
 

@@ -32,13 +32,17 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
     waiting = {parameter.key for parameter in knobs if parameter.live == NEXT_START}
     assert {"bus.port", "joints.neck_yaw.id", "oak.rate_hz", "camera.mount", "name"} <= waiting
     live = {parameter.key for parameter in knobs} - waiting
-    assert {key for key in live if not key.startswith(("gaze.", "guard.", "tracker."))} == {
+    assert {
+        key for key in live if not key.startswith(("gaze.", "ranges.", "guard.", "tracker."))
+    } == {
         "sound.device",
         "character",
         "loop.rate_hz",
         *(f"joints.{name}.{key}" for name in desk_rig.joints for key in LIVE_LIMITS),
     }
-    assert {key for key in waiting if key.startswith(("gaze.", "guard.", "tracker."))} == {
+    assert {
+        key for key in waiting if key.startswith(("gaze.", "ranges.", "guard.", "tracker."))
+    } == {
         "gaze.chooser"  # of a package, perhaps, which is loaded at the start
     }
     for parameter in knobs:

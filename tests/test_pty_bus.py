@@ -256,7 +256,7 @@ def test_a_board_tells_what_its_channels_send():
         path = bus.start_device(board, choices={"max-us": "1400"})
         assert asked(path, bytes.fromhex("9003"), 2, 115_200) == bytes(2)
         assert asked(path, bytes.fromhex("8403702E9003"), 2, 9600) == (5600).to_bytes(2, "little")
-        assert asked(path, bytes.fromhex("AA0C21"), 2) == bytes(2)
+        assert asked(path, bytes.fromhex("A1"), 2) == bytes(2)
         status = json.loads(bus.command("status"))
         assert len(status["servos"]) == 12
 

@@ -1,6 +1,5 @@
 """Every knob turned while the rig runs: no jump on the bus, nothing forgotten, nothing idle."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -82,9 +81,7 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
     turned: set[str] = set()
     todo = list(live_knobs())
     np.random.default_rng(0).shuffle(todo)
-    # Every run turns others, 210 together; all of them in every run with KNOBS_TURNED=1000.
-    count = int(os.environ.get("KNOBS_TURNED", "70"))
-    todo = todo if count >= len(todo) else todo[seed * count : (seed + 1) * count]
+    todo = todo[seed::3]  # every run turns others
     for knob in todo:
         was = value_of(running.rig, knob.key)
         for changes in some_changes(knob, running.rig, dice, walk):

@@ -86,7 +86,9 @@ def test_a_place_beyond_the_potentiometer_and_a_mixture_of_series_are_refused(tm
     path.write_text(scs_text().replace("zero_step: 512", "zero_step: 1000"), encoding="utf-8")
     with pytest.raises(ConfigError, match="1023"):
         load_rig(str(path))
-    path.write_text(scs_text(neck="sts3215"), encoding="utf-8")
+    eyes, neck = scs_text(neck="sts3215").split("neck_yaw:", 1)
+    neck = neck.replace("zero_step: 512", "zero_step: 2048")
+    path.write_text(f"{eyes}neck_yaw:{neck}", encoding="utf-8")
     with pytest.raises(ConfigError, match=r"a sts3215 cannot be on one bus with a scs0009"):
         load_rig(str(path))
 

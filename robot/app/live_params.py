@@ -100,6 +100,7 @@ def rig_in_effect(running: Rig, wanted: Rig) -> Rig:
     return replace(
         running,
         character=wanted.character,
+        ranges=wanted.ranges,
         gaze=replace(wanted.gaze, chooser=running.gaze.chooser, plugins=running.gaze.plugins),
         guard=wanted.guard,
         tracker=wanted.tracker,
@@ -190,7 +191,7 @@ class LiveParams:
         if now.scanpath != was.scanpath or walk != self._walk:
             parts.scanpath.retune(now.scanpath, walk)
         self._walk = walk
-        bounds = new.joints != old.joints
+        bounds = (new.joints, new.ranges) != (old.joints, old.ranges)
         if now.oculomotor != was.oculomotor or bounds:
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
         if now.head != was.head or bounds:
@@ -209,6 +210,8 @@ class LiveParams:
             parts.body.retune(new.joints, gentle_deg_s)
         if set_up or new.guard != old.guard:
             parts.guard.retune(new.guard, limits(new.joints))
+        if new.ranges != old.ranges:
+            parts.guard.start_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
             parts.guard.set_period(1.0 / new.loop.rate_hz)
         parts.tracker.params = new.tracker

@@ -372,6 +372,13 @@ _C = TypeVar("_C", bound=Command)
 _checker = msgspec.msgpack.Decoder(AnyCommand)
 
 
+def _plain(value: Any) -> Any:
+    """Return a number or an array of NumPy as Python's."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise ValueError(f"{type(value).__name__} is no value of a command")
+
+
 def check_command(command: _C) -> _C:
     """Return a command whose values are checked, with whole numbers as floats where they belong.
 
@@ -381,7 +388,7 @@ def check_command(command: _C) -> _C:
     if isinstance(command, Tune):
         return structs.replace(command, changes=as_value(command.changes))
     try:  # not JSON, in which NaN would become null
-        checked: _C = _checker.decode(msgspec.msgpack.encode(command))
+        checked: _C = _checker.decode(msgspec.msgpack.encode(command, enc_hook=_plain))
     except ValueError as error:
         raise ValueError(f"{verb(type(command))}: {error}") from None
     if isinstance(checked, Say) and not checked.what.strip():
