@@ -8,10 +8,10 @@ Single points are plain tuples of floats, which in a 5 ms tick are several times
 cheaper than three-element arrays; only sets of bodies are arrays.
 """
 
-from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
+from msgspec import Struct, field, structs
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import Angles2 as Angles2
@@ -58,8 +58,7 @@ PART_NAMES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Bodies:
+class Bodies(Struct, frozen=True, gc=False):
     """Possible targets of the gaze, one row per body.
 
     ids:       stable identity of each body; of people from 1, of hands and things from FIRST_THING
@@ -78,6 +77,12 @@ class Bodies:
     w_world_rad_s: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     radius_m: Floats = field(default_factory=lambda: np.zeros(0))
     pv_cov: Floats | None = None
+
+    def __post_init__(self) -> None:
+        """Give arrays without rows their columns, which a recording does not have."""
+        if not self.ids:
+            for name in ("p_world_m", "v_world_m_s", "w_world_rad_s"):
+                structs.force_setattr(self, name, np.zeros((0, 3)))
 
     def __len__(self) -> int:
         """Return the number of bodies."""
@@ -99,8 +104,7 @@ class BodyRows(NamedTuple):
     w_world_rad_s: list[Vec3]
 
 
-@dataclass(frozen=True, slots=True)
-class Face:
+class Face(Struct, frozen=True, gc=False):
     """One person's face in the world.
 
     id:            stable identity, equal to the id of its row in Bodies
@@ -139,8 +143,7 @@ class Face:
     speaks: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Percept:
+class Percept(Struct, frozen=True, gc=False):
     """Contents of one frame, in the world by the head pose at its time of capture.
 
     scene: number of cuts before this frame; after a cut earlier bodies no longer exist
@@ -164,7 +167,7 @@ SEARCH = "search"
 """Kind of a target at a possible place of a lost person."""
 
 
-class Salience(NamedTuple):
+class Salience(Struct, frozen=True, gc=False):
     """Salience of one body, term by term (Mitake et al., eq 1 and the rules).
 
     translation, looming, rotation: the three terms of eq 1; onset: of a recent entry into view
@@ -185,7 +188,7 @@ class Salience(NamedTuple):
     total: float = 0.0
 
 
-class Target(NamedTuple):
+class Target(Struct, frozen=True, gc=False):
     """Target of the gaze, with its reason.
 
     p_world_m, v_world_m_s: the point and its velocity, as at ``at_s``
@@ -219,7 +222,7 @@ class Target(NamedTuple):
     is_lost: bool = False
 
 
-class GazeState(NamedTuple):
+class GazeState(Struct, frozen=True, gc=False):
     """Measured position of head and eyes.
 
     head_rad, head_rate_rad_s: (yaw, pitch, roll) of the neck and their rates
@@ -247,7 +250,7 @@ class GazeState(NamedTuple):
     base_rate_rad_s: Angles2 = (0.0, 0.0)
 
 
-class LimitedAngle(NamedTuple):
+class LimitedAngle(Struct, frozen=True, gc=False):
     """An angle clipped by a range, in radians: requested, and executed.
 
     axis: "left eye yaw", "right eye pitch", "head yaw", "head pitch"
@@ -259,7 +262,7 @@ class LimitedAngle(NamedTuple):
     reason: str
 
 
-class GazeCommand(NamedTuple):
+class GazeCommand(Struct, frozen=True, gc=False):
     """The commands of the gaze models for this tick.
 
     head_rad: (yaw, pitch, roll); eye_left_rad, eye_right_rad: (yaw, pitch) in the head

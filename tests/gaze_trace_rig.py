@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from desk import GAZE_JOINTS, LIDS
+from msgspec import structs
 
 from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
@@ -108,5 +109,5 @@ def still(
 ) -> Callable[[float], Target]:
     point = scale(direction((radians(yaw_deg), radians(pitch_deg))), 10.0)
     ahead = Target((10.0, 0, 0), (0, 0, 0), 0.0, "thing", 0, salience, top_down, None, 1, "")
-    there = ahead._replace(p_world_m=point, id=1, shift=2)
+    there = structs.replace(ahead, p_world_m=point, id=1, shift=2)
     return lambda t: there if t >= 0.1 else ahead

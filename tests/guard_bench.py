@@ -5,6 +5,7 @@ from types import ModuleType
 from typing import Any
 
 from desk import GAZE_JOINTS
+from msgspec.structs import replace
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
@@ -46,7 +47,7 @@ class Bench:
             name: tuple(one if k == JOINT else usual[name] for k in range(9))
             for name, one in said.items()
         }
-        state = JointState(position, (0.0,) * 9, ages, ())._replace(**columns)
+        state = replace(JointState(position, (0.0,) * 9, ages, ()), **columns)
         wishes = (desired,) * 9 if isinstance(desired, float) else desired
         verdict = self.guard.check(wishes, state, age_s, self.t_s)
         before: tuple[float, ...] = self.path[-1]

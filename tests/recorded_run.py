@@ -1,10 +1,12 @@
 """A recorded run, and what it was recorded from."""
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
@@ -12,12 +14,11 @@ from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.control.tick_stream import TickStream, decode_plain
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 
-STARTED = "2026-01-31T23:59:59.250000+00:00"
+STARTED = datetime(2026, 1, 31, 23, 59, 59, 250_000, UTC)
 
 
 def assembly(recorder: Recorder | None = None) -> Assembly:
@@ -79,21 +80,11 @@ def record(
     return Recorded(path, seen, info, said, goals)
 
 
-def handed_over(tick: Tick, dt_s: float = 0.005) -> tuple[list[Any], list[Any]]:
-    """Return a tick's percepts and its fields as the process that writes a recording has them."""
-    stream, batches = TickStream(print), []
-    stream.add_sink("test", lambda batch: not batches.append(batch.data))  # type: ignore[func-returns-value]
-    stream.append(tick, dt_s, ())
-    stream.flush()
-    percepts, (row,) = decode_plain(batches[0])
-    return percepts, row
-
-
 def with_picture(tick: Tick, number: int) -> Tick:
     if number % 10:
         return tick
     picture = np.full((40, 60, 3), number % 250, np.uint8)
-    return tick._replace(detections=Detections(tick.t_s - 0.03, number + 1, 60, 40, image=picture))
+    return replace(tick, detections=Detections(tick.t_s - 0.03, number + 1, 60, 40, image=picture))
 
 
 def ordered(number: int, made: Assembly) -> None:
@@ -113,4 +104,4 @@ def ordered(number: int, made: Assembly) -> None:
 
 def exact(tick: Tick) -> str:
     """Write a tick so that two are the same only where every bit is; arrays apart."""
-    return repr(tick._replace(detections=None, percept=None))
+    return repr(replace(tick, detections=None, percept=None))

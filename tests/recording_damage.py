@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
     info = RunInfo(
         rig="desk", profile=rig.profile, config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
-        started_utc="2026-01-31T23:59:59+00:00", scene="visitor", mock=True, fast=True,
+        started_utc=datetime(2026, 1, 31, 23, 59, 59, tzinfo=UTC), scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)
     made = assemble(rig, options, Substitutes(body=recorder.wrap_body))

@@ -6,6 +6,7 @@ from math import hypot, inf
 import numpy as np
 import pytest
 from attention_scene import attention, body, looking, percept
+from msgspec import structs
 
 from gazerig.config.schema import load_rules
 from gazerig.gaze.attention.action_planner import (
@@ -39,7 +40,7 @@ def face(nose: Vec3 = NOSE) -> Face:
 def seen(t_s: float, *rows: Row, nose: Vec3 | None = NOSE) -> Percept:
     faces = () if nose is None else (face(nose),)
     found = percept(t_s, *rows)
-    return replace(found, faces=faces)
+    return structs.replace(found, faces=faces)
 
 
 def fist(id: int, p: Vec3, v: Vec3 = (0.0, 0.0, 0.0)) -> Row:
@@ -82,7 +83,7 @@ def test_a_punch_whose_speed_is_certain_is_guarded_against_at_once() -> None:
         one = punch(0.0)
         cov = np.zeros((2, 6, 6))
         cov[:, 3:, 3:] = np.eye(3) * sd_m_s**2
-        sure = replace(one, bodies=replace(one.bodies, pv_cov=cov))
+        sure = structs.replace(one, bodies=structs.replace(one.bodies, pv_cov=cov))
         assert ActionPlanner().step(sure, EYE, 0.0).action == action
 
 
@@ -217,11 +218,13 @@ def test_after_a_punch_less_room_will_do_for_a_moment() -> None:
     narrow = seen(0.0, fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09)))
     room = hit_places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m
     assert 0.6 * 0.28 < room < 0.28
-    still = [replace(narrow, captured_s=k * DT_S) for k in range(30)]
+    still = [structs.replace(narrow, captured_s=k * DT_S) for k in range(30)]
     assert {plan.action for plan in stepped(ActionPlanner(), still)} == {"wait"}
     planner = ActionPlanner()
     stepped(planner, [punch(k * DT_S) for k in range(4)])
-    after = stepped(planner, [replace(narrow, captured_s=(4 + k) * DT_S) for k in range(20)])
+    after = stepped(
+        planner, [structs.replace(narrow, captured_s=(4 + k) * DT_S) for k in range(20)]
+    )
     actions = [plan.action for plan in after]
     assert actions[0] == "guard" and "attack" in actions
     assert "after a punch" in after[actions.index("attack")].why
@@ -263,7 +266,7 @@ def with_face(found: Percept) -> Percept:
             found.bodies.v_world_m_s.tolist(), strict=True,
         )
     ]  # fmt: skip
-    return replace(percept(found.captured_s, *rows), faces=found.faces)
+    return structs.replace(percept(found.captured_s, *rows), faces=found.faces)
 
 
 def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent() -> None:
@@ -273,7 +276,7 @@ def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent
     assert (last.kind, last.id, last.salience, last.top_down) == ("attack_target", -1, 0.9, True)
     assert last.p_world_m == pytest.approx((1.0, 0.0, -0.3))
     assert last.plan.startswith("attack: chest is open")
-    moved = replace(opened(10 * DT_S, parted=True), faces=(face((0.95, 0.02, 0.0)),))
+    moved = structs.replace(opened(10 * DT_S, parted=True), faces=(face((0.95, 0.02, 0.0)),))
     (then,) = looks(model, [with_face(moved)])
     assert then.p_world_m == pytest.approx((0.95, 0.02, -0.3)) and then.shift == last.shift
 
@@ -295,7 +298,7 @@ def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> 
     punched = [with_face(punch(k * DT_S)) for k in range(6, 12)]
     assert {one.plan for one in looks(model, punched)} == {"wait: asked for"}
     model.top_down.behave(PLANNED)
-    assert looks(model, [replace(punched[-1], captured_s=12 * DT_S)])[0].plan[:5] in (
+    assert looks(model, [structs.replace(punched[-1], captured_s=12 * DT_S)])[0].plan[:5] in (
         "wait:",
         "guard",
     )

@@ -25,13 +25,6 @@ OWNERS = {
     "smbus2": ("drivers.i2c.port",),
     "zstandard": ("robot.recording.",),
     "miniaudio": ("drivers.sound.",),
-    "msgspec": (
-        "config.long_track",
-        "features.animation.",
-        "drivers.sound.",
-        "robot.",
-        "features.study.",
-    ),
     "matplotlib": ("features.lab.report.plotting", "features.study.report"),
     "pyarrow": ("features.lab.sweep.run_outcome",),
     "jinja2": ("features.lab.report.", "features.study.report"),
@@ -190,8 +183,8 @@ def test_emulated_servos_share_no_codec_with_the_drivers() -> None:
             assert not (shared and "smart_servo" in module), f"{module} must not know a make"
 
 
-def test_gaze_stands_on_numpy_alone() -> None:
-    standard = set(sys.stdlib_module_names) | {"numpy", "gaze", "params"}
+def test_gaze_stands_on_numpy_and_msgspec_alone() -> None:
+    standard = set(sys.stdlib_module_names) | {"numpy", "msgspec", "gaze", "params"}
     for module, path in modules():
         if module.startswith("gaze."):
             packages = {wanted.split(".")[0] for wanted in imports(path)}

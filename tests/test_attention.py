@@ -1,12 +1,12 @@
 """Field of view, eq 1, rules and the winner (Mitake et al.). Checks: docs/checks.md."""
 
-from dataclasses import replace
 from itertools import groupby
 from math import cos, exp, inf, radians, sin
 
 import numpy as np
 import pytest
 from attention_scene import FACE, attention, body, looking, percept, salience, waving
+from msgspec import structs
 
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
 from gazerig.gaze.attention.top_down import Rule, TopDownParams
@@ -38,7 +38,7 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     """Eq 1's third term, in what the eye sees: about the line of view, however far."""
     things = percept(0.0, *(body(n, "thing", (far, 0, 0)) for n, far in ((1, 1), (2, 4), (3, 1))))
     spins = np.array([[0.0, 0, 0], [-6.0, 0, 0], [0, 6.0, 0]])
-    turning = replace(things.bodies, w_world_rad_s=spins)
+    turning = structs.replace(things.bodies, w_world_rad_s=spins)
     found = salience(BottomUp(BottomUpParams()), turning, (0, 0, 0), 9.0)
     assert found.rotation == pytest.approx([0.0, 2.0, 0.0])
     assert found.total == pytest.approx([0.0, 0.35 * (1.0 - exp(-2.0 / 0.35)), 0.0])
@@ -161,9 +161,9 @@ def test_what_only_one_eye_sees_is_seen() -> None:
     both = bodies(body(1, "x", left), body(2, "x", right)).rows()
     assert visible_bodies(both, looking()).keys() == {1, 2}
     # With the left eye turned in, nothing sees the left body any more, and vice versa.
-    turned = looking()._replace(eye_left_rad=(radians(-30), 0.0))
+    turned = structs.replace(looking(), eye_left_rad=(radians(-30), 0.0))
     assert visible_bodies(both, turned).keys() == {2}
-    turned = looking()._replace(eye_right_rad=(radians(30), 0.0))
+    turned = structs.replace(looking(), eye_right_rad=(radians(30), 0.0))
     assert visible_bodies(both, turned).keys() == {1}
 
 
@@ -177,7 +177,7 @@ def test_ones_own_body_is_not_looked_at_however_it_moves() -> None:
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     model = BottomUp(BottomUpParams(form="literal", reference=9.0))
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
-    seen = replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
+    seen = structs.replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
         saliences = salience(model, seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
         for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0, 6.0), strict=True):
@@ -196,7 +196,7 @@ def test_retinal_form_is_relative_to_the_moving_eye() -> None:
 
 def test_the_heads_own_motion_makes_what_stands_still_slide() -> None:
     model = attention()
-    here, there = looking(), looking()._replace(p_world_head_m=(0.0, 0.01, 0.0))
+    here, there = looking(), structs.replace(looking(), p_world_head_m=(0.0, 0.01, 0.0))
     model.choose(percept(0.0, FACE), here, 0.0)
     moved = model.choose(percept(0.05, FACE), there, 0.05)
     smoothed = 1.0 - exp(-0.05 / 0.1)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import angle_between, sub, unit
 from gazerig.gaze.attention.conversation import (
@@ -98,7 +99,7 @@ def test_who_never_looks_away_passes_targets_untouched() -> None:
 def test_only_faces_are_looked_away_from() -> None:
     model = aversion()
     model.choose_mode("talk", 0.0)
-    hand = face()._replace(kind="hand")
+    hand = replace(face(), kind="hand")
     assert all(model.look(hand, HEAD, k * DT) is hand for k in range(3000))
 
 
@@ -128,7 +129,7 @@ def test_how_far_away_follows_the_published_law() -> None:
 @pytest.mark.parametrize("distance_m", [0.4, 0.8, 2.5])
 def test_a_look_away_passes_beside_the_face_however_near_it_is(distance_m: float) -> None:
     model = aversion(3)
-    near = face()._replace(p_world_m=(0.05 + distance_m, 0.0, 0.2), centre_world_m=None)
+    near = replace(face(), p_world_m=(0.05 + distance_m, 0.0, 0.2), centre_world_m=None)
     places = set()
     for k in range(20_000):
         target = model.look(near, HEAD, 0.05 * k)
@@ -213,12 +214,12 @@ def test_every_leave_and_return_is_one_new_shift_and_the_count_never_falls() -> 
             turns += 1
             assert now.shift > before.shift
         elif now.kind == "away":
-            assert now == before._replace(at_s=now.at_s)
+            assert now == replace(before, at_s=now.at_s)
     assert turns > 20
     model.choose_mode("none", 100.0)
     after = model.look(face(250), HEAD, 100.02)
     assert after.kind == "face" and after.shift > seen[-1].shift - 1
-    assert after == face(250)._replace(shift=after.shift)
+    assert after == replace(face(250), shift=after.shift)
 
 
 def test_another_face_is_looked_at_before_it_is_looked_away_from() -> None:
@@ -246,7 +247,7 @@ def test_a_change_of_the_conversation_returns_to_the_face() -> None:
 def test_a_face_straight_above_has_places_beside_it() -> None:
     model = aversion(15)
     model.choose_mode("think", 0.0)
-    above = face()._replace(p_world_m=(0.05, 0.0, 1.2), centre_world_m=None)
+    above = replace(face(), p_world_m=(0.05, 0.0, 1.2), centre_world_m=None)
     away = next(t for k in range(1000) if (t := model.look(above, HEAD, k * DT)).kind == "away")
     angle = angle_between((0.0, 0.0, 1.0), sub(away.p_world_m, HEAD))
     assert 5.0 - 1e-6 <= degrees(angle) <= 27.5 + 1e-6

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
@@ -141,7 +142,11 @@ def planned(actions: Callable[[float], str], seconds: float = 20.0) -> dict[str,
     score = PlannerScore((punch, Event("attack", "look", "x", 5.0, 6.0, FACE, 0.6)), 10.0)
     for slot in range(round(seconds * 100) + 1):
         made = tick(3.0 + slot * 0.01, "attack_target" if slot % 100 < 50 else "face", FACE)
-        score.update(made._replace(target=made.target._replace(plan=f"{actions(slot * 0.01)}: x")))
+        score.update(
+            structs.replace(
+                made, target=structs.replace(made.target, plan=f"{actions(slot * 0.01)}: x")
+            )
+        )
     return score.figures()
 
 

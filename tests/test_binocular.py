@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from gaze_trace_rig import CENTRED, DESK, Rig
+from msgspec import structs
 
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
@@ -92,11 +93,11 @@ def eyes(
     turning: yaw of the head in radians, which is held by hand
     """
     alone, rows = Alone(geometry), []
-    first = begin if begin is not None else where(0.0)._replace(v_world_m_s=(0.0, 0.0, 0.0))
+    first = begin if begin is not None else structs.replace(where(0.0), v_world_m_s=(0.0, 0.0, 0.0))
     settle = round(4.0 / dt)
     for k in range(-settle, round(seconds / dt)):
         t = k * dt
-        target = where(t) if k >= 0 else first._replace(at_s=t)
+        target = where(t) if k >= 0 else structs.replace(first, at_s=t)
         yaw = turning(max(0.0, t)) if turning is not None else 0.0
         left, right = (eye[0] for eye in alone.tick(target, (yaw, 0.0, 0.0), t, dt))
         if k >= 0:
@@ -192,7 +193,7 @@ def test_e26_version_and_vergence_do_not_disturb_each_other() -> None:
     def ends(version: float, vergence: float) -> Followed:
         # Where eyes at this version converge by that angle: on the circle through both.
         place = meeting(version, vergence)
-        return eyes(lambda t: aim(0.0)._replace(p_world_m=place, at_s=t), 1.5, begin=begin)
+        return eyes(lambda t: structs.replace(aim(0.0), p_world_m=place, at_s=t), 1.5, begin=begin)
 
     together, turned, nearer = ends(1.5, 6.0), ends(1.5, 4.0), ends(0.0, 6.0)
     assert np.abs(together.version - turned.version).max() < 0.01
@@ -245,7 +246,7 @@ def test_e28_an_eye_that_cannot_follow_is_on_the_target_as_soon_as_it_can() -> N
 def test_e29_reflex_without_a_target(hz: float, phase: float, residual: float) -> None:
     w, dt = 2.0 * pi * hz, 0.001
     begin = aim(0.0, 0.0, 100.0, -4.0)
-    lost = begin._replace(v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
+    lost = structs.replace(begin, v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
     trace = eyes(lambda t: lost, 4.0 / hz, dt, begin, lambda t: radians(10.0) * sin(w * t))
     keep = trace.t > 2.0 / hz
     # The command of tick k follows from the head at tick k and holds at its end.
@@ -259,7 +260,7 @@ def test_e29_reflex_without_a_target(hz: float, phase: float, residual: float) -
 def test_e29_the_reflex_is_late_by_its_delay_and_no_part_of_a_tick(dt: float) -> None:
     w = 2.0 * pi * 0.5
     begin = aim(0.0, 0.0, 100.0, -4.0)
-    lost = begin._replace(v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
+    lost = structs.replace(begin, v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
     trace = eyes(lambda t: lost, 8.0, dt, begin, lambda t: radians(10.0) * sin(w * t))
     keep = trace.t > 4.0
     # An angle is held for a tick: its middle counts.
@@ -271,7 +272,7 @@ def test_e29_the_reflex_is_late_by_its_delay_and_no_part_of_a_tick(dt: float) ->
 def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
     alone = Alone(DESK)
     target = Target((1.5, 0.2, 0.2), (0, 0, 0), 0.0, "thing", 1, 0.2, False, None, 1, "")
-    lost = target._replace(v_world_m_s=(0.0, 1e-9, 0.0))  # the reflex alone holds the gaze
+    lost = structs.replace(target, v_world_m_s=(0.0, 1e-9, 0.0))  # the reflex alone holds the gaze
     lines = []
     for k in range(620):
         share = min(max((k - 400) / 199, 0.0), 1.0)
@@ -309,7 +310,7 @@ def test_a_saccade_prescribes_the_angles_and_pursuit_goes_on_after_it() -> None:
         t = k * DT
         jump, seen_s = 8.0 if t >= 1.0 else 0.0, t - 0.07
         target = aim(20.0 * seen_s + jump - 20.0, 20.0, t=seen_s)
-        target = target._replace(shift=1 if t < 1.0 else 2)
+        target = structs.replace(target, shift=1 if t < 1.0 else 2)
         command = rig.tick(target, t, DT)
         yaws.append(degrees(0.5 * (command.eye_left_rad[0] + command.eye_right_rad[0])))
         phases.append(command.phase)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
 from exported_run import RATE_HZ, Run, seen
+from msgspec.structs import replace
 from present import present
 
 from gazerig.gaze.angles import rotation
@@ -63,7 +64,8 @@ def test_left_and_up_are_positive_and_the_head_carries_the_eyes() -> None:
 def test_a_rolled_head_turns_what_is_sideways_into_what_is_up() -> None:
     level = pose((0.0, 0.0), (0.0, 0.0), 0.0)
     # Right ear down: what is to its left is now above.
-    rolled = level._replace(
+    rolled = replace(
+        level,
         R_world_head=rotation((0.0, 0.0, radians(90.0))),
         eye_left_rad=(radians(7.0), 0.0),
         eye_right_rad=(radians(7.0), 0.0),
@@ -74,7 +76,7 @@ def test_a_rolled_head_turns_what_is_sideways_into_what_is_up() -> None:
 def test_an_eye_whose_servo_is_silent_is_lost_and_only_that(face: Run) -> None:
     tick = face.ticks[1000]
     silent = [
-        tick._replace(joints=tick.joints._replace(missing=missing), t_s=tick.t_s + 0.005 * k)
+        replace(tick, joints=replace(tick.joints, missing=missing), t_s=tick.t_s + 0.005 * k)
         for k, missing in enumerate([("left_eye_tilt",), ("neck_roll",), ("right_upper_lid",), ()])
     ]
     trace = collect_gaze_angles(silent)
@@ -187,9 +189,9 @@ def test_what_is_near_is_looked_at_without_a_saccade_and_what_is_far_is_not(face
     def at(off_deg: float, shift: int, part: str, saccades: int = 0) -> Tick:
         turned = Rotation.from_euler("z", off_deg, degrees=True).apply(way)
         x, y, z = (head + turned).tolist()
-        target = tick.target._replace(p_world_m=(x, y, z), shift=shift, part=part)
-        gaze = tick.gaze._replace(phase="fixate", saccades=saccades)
-        return tick._replace(target=target, gaze=gaze, t_s=tick.t_s + 0.005 * shift)
+        target = replace(tick.target, p_world_m=(x, y, z), shift=shift, part=part)
+        gaze = replace(tick.gaze, phase="fixate", saccades=saccades)
+        return replace(tick, target=target, gaze=gaze, t_s=tick.t_s + 0.005 * shift)
 
     ticks = [at(0.0, 1, "LE"), at(0.4, 2, "RE"), at(5.0, 3, "N"), at(5.0, 4, "N", saccades=1)]
     trace = collect_gaze_angles(ticks)
@@ -217,10 +219,10 @@ def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(
 
 def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
     ticks = list(face.ticks[1000:1600])
-    ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
-    ticks[200] = ticks[200]._replace(commands=(Jog(()),))
-    ticks[300] = ticks[300]._replace(commands=(Stop("hand"),))
-    ticks[300:400] = [tick._replace(stopped="hand") for tick in ticks[300:400]]
+    ticks[100] = replace(ticks[100], commands=(Jog((("neck_yaw", 0.1),)),))
+    ticks[200] = replace(ticks[200], commands=(Jog(()),))
+    ticks[300] = replace(ticks[300], commands=(Stop("hand"),))
+    ticks[300:400] = [replace(tick, stopped="hand") for tick in ticks[300:400]]
     trace = collect_gaze_angles(ticks)
     assert (trace.movement[100:200] == 0).all() and (trace.movement[300:400] == 0).all()
     assert (trace.movement[200:300] > 0).all() and (trace.movement[400:] > 0).all()

@@ -1,12 +1,12 @@
 """Faces out of view: they stay in mind where they were, and keep their identity."""
 
-from dataclasses import replace
 from math import pi
 from typing import Any
 
 import numpy as np
 import pytest
 from attention_scene import FACE, attention, body, looking, percept
+from msgspec import structs
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention.attention import Attention
@@ -27,7 +27,9 @@ def looks(
     times = start_s + np.arange(round(30 * seconds)) / 30
     seen = (percept(t, *rows) for t in times)
     faces = () if speaker is None else (_speaking(speaker),)
-    return [model.choose(replace(one, faces=faces), looking(), one.captured_s) for one in seen]
+    return [
+        model.choose(structs.replace(one, faces=faces), looking(), one.captured_s) for one in seen
+    ]
 
 
 def _speaking(id: int) -> Face:
@@ -64,7 +66,7 @@ def test_after_a_cut_nobody_is_looked_for_where_they_were(cut: bool) -> None:
     looks(model, [FACE, OTHER], 0.0, 0.5)
     ids = set()
     for t in 0.5 + np.arange(300) / 30:
-        seen = replace(percept(t, HAND), scene=int(cut))
+        seen = structs.replace(percept(t, HAND), scene=int(cut))
         target = model.choose(seen, looking(), t)
         if t > 1.5:  # by then the choice of a new target has been made
             ids.add(target.id)

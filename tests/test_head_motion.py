@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
 from gazerig.gaze.types import Floats, Target
@@ -133,7 +134,7 @@ def test_the_head_recentres_soon_before_what_it_is_most_interested_in(
     head, place, yaw = model(), (radians(15.0), 0.0), 0.0
     for k in range(round(2.0 / DT)):
         t = k * DT
-        seen = target(t, kind="attack_target", top_down=top_down)._replace(salience=salience)
+        seen = replace(target(t, kind="attack_target", top_down=top_down), salience=salience)
         yaw = head.step(seen, place, place, abs(place[0] - yaw), 1.0, t)[0]
     assert (degrees(yaw) > 5.0) == turns
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from gazerig.gaze.angles import norm, sub, yaw_pitch
 from gazerig.gaze.attention.idle import Idle, IdleParams
@@ -195,7 +196,7 @@ def test_no_glance_jumps_to_a_place_far_aside() -> None:
 
 def test_a_thing_that_no_longer_moves_is_not_searched_for() -> None:
     model = idle(2)
-    model.remember(seen()._replace(kind="thing"))
+    model.remember(structs.replace(seen(), kind="thing"))
     model.record_seen({3: (1.0, 0.2, 0.2)}, 0.5)
     assert {t.kind for t in run(model, 0.5, 6.0)} == {"rest", "glance"}
 

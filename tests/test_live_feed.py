@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from msgspec import structs
 from shown_page import wait_for
 from world_shapes import SmallWorld
 
@@ -32,6 +33,7 @@ from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.control_source import TrackState
 from gazerig.robot.model.conversation import ConversationState
 from gazerig.robot.model.types import Snapshot
+from gazerig.robot.perception.egomotion_residual import ResidualFigures
 from gazerig.sim_mock.scenes.scene import ScenePicture
 
 
@@ -60,7 +62,7 @@ class Page:
         self.page = PageProcess("127.0.0.1", 0)
         self.page.join(ours)
         self.said: list[str] = []
-        self.state = RunState({"lost": 3}, "wait", "talking", "shy", (None, None, 0))
+        self.state = RunState({"lost": 3}, "wait", "talking", "shy", ResidualFigures(None, None, 0))
         self.rigs = 0
         self.picture: ScenePicture | None = None
         self.world: SmallWorld | None = None
@@ -102,7 +104,7 @@ def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> Non
     shots: list[Snapshot] = []
     talk = ConversationState(3, "speaking", 1, 0.5, 6.0, 0.9, "Hello", "agent")
     ticks = [
-        tick._replace(conversation=talk, tracks=(TrackState(2, "show", owns=("jaw",)),))
+        structs.replace(tick, conversation=talk, tracks=(TrackState(2, "show", owns=("jaw",)),))
         for tick in ran.ticks
     ]
     for tick in ticks:
@@ -155,7 +157,7 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     tick = ran.ticks[-1]
     assert tick.detections is not None
     found = replace(tick.detections, image=image, depth_m=metres)
-    page.stream.update(tick._replace(detections=found))
+    page.stream.update(structs.replace(tick, detections=found))
     news = read_waiting(page.feed, page.live)
     assert news.image is not None
     assert found.located is not None
@@ -196,9 +198,9 @@ def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: Run, page:
     page.comes_up()
     for n in range(3):
         for tick in ran.ticks:
-            page.stream.update(tick._replace(t_s=tick.t_s + 2.0 * n))
+            page.stream.update(structs.replace(tick, t_s=tick.t_s + 2.0 * n))
     assert page.page.dropped > 500 and page.said[1:] == []
     (shot,) = page.shown()  # what it had room for, and then the newest
-    page.stream.update(ran.ticks[-1]._replace(t_s=99.0))
+    page.stream.update(structs.replace(ran.ticks[-1], t_s=99.0))
     (newest,) = page.shown()
     assert shot.t_s < 3.0 and newest.t_s == 99.0 and newest.faces

@@ -12,6 +12,7 @@ import pytest
 from gaze_trace_rig import CENTRED, DESK, DT, EXACT, HUMAN, SACCADE, Rig, still
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from gazerig.gaze.angles import (
     add,
@@ -81,7 +82,7 @@ def test_the_head_leaves_room_for_both_eyes_to_converge(
         rig = Rig(eye_deg=25.0, geometry=DESK, head=head)
         middle = rig.kinematics.forward(rig.joints).p_world_head_m
         aside = add(middle, scale(direction((radians(yaw), 0.0)), distance_m))
-        there = still(0.0, salience=0.2)(0.2)._replace(p_world_m=aside, kind=kind)
+        there = structs.replace(still(0.0, salience=0.2)(0.2), p_world_m=aside, kind=kind)
         last = rig.run(lambda t, there=there: there, 2.0).commands[-1]  # type: ignore[misc]
         assert last.phase == "fixate" and last.limited == (), yaw
 
@@ -226,7 +227,7 @@ def test_small_errors_are_followed_and_not_jumped_to() -> None:
 
 def test_a_target_change_in_flight_waits_for_the_landing() -> None:
     rig = Rig(params=PEOPLE)
-    a, b = still(30.0)(1.0), still(-30.0)(1.0)._replace(id=2, shift=3)
+    a, b = still(30.0)(1.0), structs.replace(still(-30.0)(1.0), id=2, shift=3)
     trace = rig.run(lambda t: a if t < 0.03 else b, 1.5)
     phases = [c.phase == "saccade" for c in trace.commands]
     landed = phases.index(False, phases.index(True))
@@ -304,7 +305,7 @@ def test_no_eye_beyond_its_limit_nothing_infinite_and_no_gaze_above_the_cap(
         if before is not None and geometry is CENTRED:
             assert angle_between(way, before) <= radians(500.0) * dt + 1e-9
         before = way
-        rig.joints = joints._replace(position_rad=now) if rng.random() < 0.8 else joints
+        rig.joints = structs.replace(joints, position_rad=now) if rng.random() < 0.8 else joints
 
 
 def _any_target(rng: np.random.Generator, at_s: float, shift: int) -> Target:

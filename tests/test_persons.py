@@ -1,6 +1,5 @@
 """Rules name persons by what they do: in the YAML, from frame to frame, and in a scene of three."""
 
-from dataclasses import replace
 from functools import cache
 from math import pi, sin
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from attention_scene import attention, looking
+from msgspec import structs
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.schema import load_rules
@@ -52,8 +52,8 @@ def equal_people(
     looks: list[int] = []
     for k in range(round(seconds * 20)):
         seen = percept(0.05 * k, places, (5, 6, 7))
-        faces = tuple(replace(face, speaks=face.id == speaks) for face in seen.faces)
-        looks.append(model.choose(replace(seen, faces=faces), looking(), 0.05 * k).id)
+        faces = tuple(structs.replace(face, speaks=face.id == speaks) for face in seen.faces)
+        looks.append(model.choose(structs.replace(seen, faces=faces), looking(), 0.05 * k).id)
     edges = np.flatnonzero(np.diff(looks))
     return {id: looks.count(id) / len(looks) for id in places}, (0.05 * np.diff(edges)).tolist()
 
@@ -187,7 +187,7 @@ def shares(look_at: str, numbers: tuple[int, ...], start_s: float, end_s: float)
     """Return how much of a time each of three people is looked at by a rule."""
     rules = {"wait": Rule(look_at, 2.5)}
     model = attention(TopDownParams(rules=rules), np.random.default_rng(0))
-    state, scene = looking()._replace(p_world_head_m=HEAD_M), load_scene("three-people")
+    state, scene = structs.replace(looking(), p_world_head_m=HEAD_M), load_scene("three-people")
     found = []
     for k in range(round(30 * end_s)):
         t_s = k / 30

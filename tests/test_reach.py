@@ -7,6 +7,7 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import norm, sub
@@ -42,7 +43,7 @@ def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Com
         t_s = tick * DT_S
         state = JointState(q, (0.0,) * len(q), (t_s,) * len(q), ())
         gaze = oculomotor.step(
-            target_at(point)._replace(at_s=t_s), kinematics.forward(state), t_s, DT_S
+            replace(target_at(point), at_s=t_s), kinematics.forward(state), t_s, DT_S
         )
         desired = kinematics.inverse(gaze)
         q = tuple(

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import pytest
 from fakes.runs import VISIT, record
+from msgspec import structs
 from recorded_rigs import Run
 from recorded_run import exact
 
@@ -20,6 +21,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.resimulate import Resimulation, rerun
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import TickRecord
 from gazerig.robot.model.commands import (
     Ask,
     Command,
@@ -35,11 +37,8 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunEnd, as_text
+from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.tick_record import (
-    TickRecord,
-)
 
 NECK_YAW = 6
 Asked = dict[int, tuple[Command, ...]]
@@ -136,8 +135,8 @@ def test_the_last_bit_of_one_joint_is_seen(once: Run, monkeypatch: pytest.Monkey
                 joints = moment.tick.joints
                 angles = list(joints.position_rad)
                 angles[NECK_YAW] = nextafter(angles[NECK_YAW], inf)
-                joints = joints._replace(position_rad=tuple(angles))
-                moment = moment._replace(tick=moment.tick._replace(joints=joints))
+                joints = structs.replace(joints, position_rad=tuple(angles))
+                moment = structs.replace(moment, tick=structs.replace(moment.tick, joints=joints))
             yield moment
 
     monkeypatch.setattr(RunRecording, "moments", bent)
@@ -153,7 +152,7 @@ def test_the_recorded_rig(once: Run, tmp_path: Path) -> None:
 
 def test_a_recording_without_ticks_is_refused(once: Run, tmp_path: Path) -> None:
     path = tmp_path / "none.mcap"
-    writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), as_text(once.recording.info), 0)
+    writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), once.recording.info)
     writer.close(RunEnd("seconds"))
     with pytest.raises(SetupError, match="contains no tick: nothing can be run again"):
         rerun(RunRecording(path))

@@ -18,7 +18,7 @@ from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunEnd, as_text
+from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
 # --- what cannot be read
@@ -47,10 +47,10 @@ def test_time_that_runs_back_or_leaps_is_no_run(recorded: Recorded, tmp_path: Pa
         found = [json.loads(m.data) for *_, m in make_reader(file).iter_messages([fmt.TICK])][:3]
     for number, (moved_s, right) in enumerate(((0.0, True), (-0.006, False), (4000.0, False))):
         path = tmp_path / f"{number}.mcap"
-        writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), as_text(recorded.info), 0)
+        writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), recorded.info)
         for nth, tick in enumerate(found):
-            t_s = tick["t_s"] + moved_s * (nth == 2)
-            writer.add(fmt.Message(fmt.TICK, 0.0, {**tick, "t_s": t_s, "percept": None}))
+            t_s = tick["tick"]["t_s"] + moved_s * (nth == 2)
+            writer.add(fmt.TICK, 0.0, {**tick, "tick": {**tick["tick"], "t_s": t_s}})
         writer.close(RunEnd("seconds"))
         if right:
             assert len(list(RunRecording(path).ticks())) == 3

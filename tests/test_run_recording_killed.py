@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import time
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
@@ -23,7 +24,7 @@ TICK_S = 0.05
 
 def rig(path: Path) -> None:
     """Record a rig until it is killed, and print the time of each tick's transfer."""
-    info = RunInfo("desk", "robot", "a: 1", 0, 1.0 / TICK_S, "2026-01-31T00:00:00+00:00")
+    info = RunInfo("desk", "robot", "a: 1", 0, 1.0 / TICK_S, datetime(2026, 1, 31, tzinfo=UTC))
     recorder = Recorder(path, info)
     recorder.open()
     assert recorder._link is not None and recorder._link._process is not None

@@ -16,7 +16,7 @@ from gazerig.drivers.files.file_input import MAGIC
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.run_info import RunEnd, as_text
+from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
 MESSAGES, A_CHUNK = 40, 10
@@ -31,10 +31,10 @@ class Written:
     def __init__(self, path: Path) -> None:
         noise = Random(1)
         fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        made = RunWriter(fd, as_text(info_for()), 0)
+        made = RunWriter(fd, info_for())
         self.kept = [path.stat().st_size]
         for n in range(1, MESSAGES + 1):
-            made.add(fmt.Message(fmt.ORDER, 0.1 * n, {"order": noise.randbytes(300).hex()}))
+            made.add(fmt.DESCRIPTION, 0.1 * n, {"data": noise.randbytes(300).hex()})
             if n % A_CHUNK == 0:
                 made.flush()
                 self.kept.append(path.stat().st_size)
@@ -98,7 +98,7 @@ def test_what_is_written_is_put_on_the_disk_every_second(
             clock.sleep_until(clock.now_s() + 0.1)
             yield None
 
-    made = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), as_text(info_for()), 0)
+    made = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), info_for())
     ours, theirs = socket.socketpair()
     with ours, theirs:
         writer._write(nothing_for(5.05), made, theirs, clock)

@@ -11,6 +11,7 @@ import pytest
 from desk import GAZE_JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
@@ -181,7 +182,7 @@ def test_not_finite_wishes_hold_and_say_so() -> None:
 def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
     for off in [*np.linspace(-0.01, 0.01, 21).tolist(), -1e-6, 1e-6, inf, nan]:
         guard, t = ready(), 1.0
-        ages = measured(t)._replace(measured_s=but(joint, t - 0.15 - off, t))
+        ages = replace(measured(t), measured_s=but(joint, t - 0.15 - off, t))
         verdict = guard.check((0.0001,) * 9, ages, 0.0, t)
         stale = not off <= 0.0
         assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale joints") == stale
@@ -194,7 +195,7 @@ def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
 
 def test_stale_joints_hold_only_themselves() -> None:
     guard, t = ready(), 0.3
-    ages = measured(t)._replace(measured_s=(t,) * 8 + (t - 0.2,))
+    ages = replace(measured(t), measured_s=(t,) * 8 + (t - 0.2,))
     verdict = guard.check((0.001,) * 9, ages, 0.0, t)
     assert verdict.reasons == ("neck_roll: stale joints",)
     assert verdict.command_rad[8] == 0.0 and verdict.command_rad[0] == pytest.approx(0.001)

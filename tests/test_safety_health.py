@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from msgspec.structs import replace
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointLimit
@@ -43,7 +44,7 @@ class World:
             for name, one in said.items()
         }
         wishes = tuple(desired if k == JOINT else 0.0 for k in range(9))
-        verdict = self.guard.check(wishes, joints._replace(**columns), 0.0, self.t_s)
+        verdict = self.guard.check(wishes, replace(joints, **columns), 0.0, self.t_s)
         self.position = list(verdict.command_rad)
         self.path.append(verdict.command_rad[JOINT])
         return verdict
@@ -95,7 +96,7 @@ def test_a_hot_joint_lets_the_others_park(world: World) -> None:
         world.t_s += DT
         joints = JointState(tuple(world.position), (0.0,) * 9, (world.t_s,) * 9, ())
         heat = tuple(69.0 if k == JOINT else 40.0 for k in range(9))
-        verdict = world.guard.check((0.3,) * 9, joints._replace(temperature_c=heat), 0.0, world.t_s)
+        verdict = world.guard.check((0.3,) * 9, replace(joints, temperature_c=heat), 0.0, world.t_s)
         world.position = list(verdict.command_rad)
     parked = [angle == pytest.approx(0.3) for angle in verdict.command_rad]
     assert parked == [k != JOINT for k in range(9)]

@@ -7,6 +7,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from msgspec import structs
 from present import present
 
 from gazerig.config.load import load, shipped_path
@@ -135,7 +136,7 @@ def test_other_targets_pass_through_and_a_new_face_starts_anew() -> None:
     walk = walker(9)
     for k in range(300):
         walk.wander(TARGET, PERCEPT, k * 0.01, settled=True)
-    hand = TARGET._replace(kind="hand", id=9)
+    hand = structs.replace(TARGET, kind="hand", id=9)
     assert walk.wander(hand, PERCEPT, 3.1, settled=True).part is None
     assert walk.wander(TARGET, PERCEPT, 3.2, settled=True).part == "FR"
 
@@ -190,7 +191,7 @@ def test_a_face_is_entered_at_the_eye_or_the_nose_nearest_to_the_gaze(
     assert walk.wander(TARGET, PERCEPT, 0.0, False, head, gaze_m).part == wanted
     # Once on the face, the walk continues from its part, wherever the gaze points.
     assert walk.wander(TARGET, PERCEPT, 0.1, False, head, (0.0, 1.0, 0.2)).part == wanted
-    away = TARGET._replace(kind="away")
+    away = structs.replace(TARGET, kind="away")
     assert walk.wander(away, PERCEPT, 0.2, True, head, (1.0, 0.9, 0.2)).part is None
     assert walk.wander(TARGET, PERCEPT, 0.3, True, head, (1.0, 0.9, 0.2)).part == farthest
 
@@ -208,7 +209,7 @@ def test_the_first_rest_on_a_face_begins_when_the_gaze_arrives() -> None:
     assert until_s >= 0.060 + 0.14
     moved = walk.wander(TARGET, PERCEPT, until_s, True)
     assert moved.part != entered.part and walk.rests_until_s == inf
-    walk.wander(TARGET._replace(kind="away"), PERCEPT, until_s + 0.1, True)
+    walk.wander(structs.replace(TARGET, kind="away"), PERCEPT, until_s + 0.1, True)
     assert walk.rests_until_s == -inf
 
 
@@ -334,7 +335,7 @@ def visited(face: Face, params: ScanpathParams | None = None, seed: int = 1) -> 
     """Return the share of the looks at each part of a face 1 m or more ahead."""
     walk = Scanpath(params or ScanpathParams(), PEOPLE, np.random.default_rng(seed))
     percept, parts = Percept(0.0, Bodies(), (face,)), []
-    target = TARGET._replace(p_world_m=face.p_world_m)
+    target = structs.replace(TARGET, p_world_m=face.p_world_m)
     shift = None
     for k in range(40_000):
         look = walk.wander(target, percept, k * 0.02, settled=True)
@@ -370,7 +371,7 @@ def test_speech_draws_looks_to_the_mouth() -> None:
 def test_a_look_that_returns_from_the_side_begins_at_an_eye_or_the_nose() -> None:
     face = face_at(0.8)
     percept = Percept(0.0, Bodies(), (face,))
-    target = TARGET._replace(p_world_m=face.p_world_m)
+    target = structs.replace(TARGET, p_world_m=face.p_world_m)
     for aside in (-1.0, 1.0):
         walk = Scanpath(ScanpathParams(), PEOPLE, np.random.default_rng(0))
         look = walk.wander(target, percept, 0.0, True, gaze_world_m=(0.8, aside, -0.3))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from gazerig.config.load import load, shipped_path
 from gazerig.gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
@@ -140,12 +141,12 @@ def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face() -> None:
 @pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
 def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model: Any) -> None:
     path = Scanpath(ScanpathParams(model=model), WALK, np.random.default_rng(1))
-    hand = TARGET._replace(kind="hand", id=9, why="hand 9")
+    hand = structs.replace(TARGET, kind="hand", id=9, why="hand 9")
     assert path.wander(hand, PERCEPT, 0.0, True, HEAD) == hand
     look = path.wander(TARGET, PERCEPT, 0.1, True, HEAD)
     assert look.centre_world_m == FACE.p_world_m
     assert "face 3" in look.why
-    unseen = TARGET._replace(id=4)
+    unseen = structs.replace(TARGET, id=4)
     assert path.wander(unseen, PERCEPT, 0.2, True, HEAD) == unseen
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from msgspec.structs import replace
 from recorded_rigs import Run, recorded
 from recorded_run import exact
 from six_joints import SIX
@@ -92,7 +93,7 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
 
 def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
     silent = [
-        tick._replace(joints=tick.joints._replace(missing=missing))
+        replace(tick, joints=replace(tick.joints, missing=missing))
         for tick, missing in zip(
             maker.ticks[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
         )

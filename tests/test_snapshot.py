@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 from fakes.runs import play
+from msgspec.structs import replace
 from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
@@ -105,8 +106,8 @@ def test_the_camera_sits_on_the_head_and_sees_the_face() -> None:
 def test_servos_come_with_their_limits_and_their_silences() -> None:
     rig, _, ticks = visit()
     snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
-    silent = ticks[3].joints._replace(missing=("neck_yaw",))
-    for tick in (*ticks[:3], ticks[3]._replace(joints=silent)):
+    silent = replace(ticks[3].joints, missing=("neck_yaw",))
+    for tick in (*ticks[:3], replace(ticks[3], joints=silent)):
         snapshots.update(tick)
     shot = snapshots.build(SnapshotTexts())
     assert shot is not None and shot.servos.limits is not None
@@ -120,7 +121,7 @@ def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     ticks = visit()[2]
     snapshots = SnapshotBuilder(RATE_HZ)
     calm = [tick for tick in ticks if tick.guard_result.level == "ok"][:4]
-    short = calm[1]._replace(guard_result=calm[1].guard_result._replace(level="hold"))
+    short = replace(calm[1], guard_result=replace(calm[1].guard_result, level="hold"))
     for tick in (calm[0], short, calm[2]):
         snapshots.update(tick)
     shot = snapshots.build(SnapshotTexts())
@@ -149,8 +150,8 @@ def test_joints_of_servos_that_tell_nothing_are_shown_as_estimated() -> None:
     assert shot.servos.temperature_c == shot.servos.voltage_v == (None,) * 6
     assert shot.servos.unanswered == (0,) * 6
     assert all(len(row.measured_rad) == 6 for row in shot.trail)
-    one = ticks[-1].joints._replace(measured=(True, False, True, True, True, False))
-    mixed = snapshot(ticks[-1]._replace(joints=one), 200.0, "", "")
+    one = replace(ticks[-1].joints, measured=(True, False, True, True, True, False))
+    mixed = snapshot(replace(ticks[-1], joints=one), 200.0, "", "")
     assert mixed.estimated == ("eyes_tilt", "right_lower_lid")
     measured = snapshot(visit()[2][-1], 200.0, "", "")
     assert measured.joints == GAZE_JOINTS and measured.estimated == ()

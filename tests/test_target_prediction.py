@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
@@ -38,7 +39,7 @@ def shown(path: Path, seconds: float, noise_m: float = 0.0,
         seen = target(path, k * FRAME_S)
         x, y, z = seen.p_world_m
         prediction.record_target(
-            seen._replace(p_world_m=(x, y + noise_m * float(rng.normal()), z)), EYE, fastest
+            replace(seen, p_world_m=(x, y + noise_m * float(rng.normal()), z)), EYE, fastest
         )
     return prediction
 
@@ -148,7 +149,7 @@ def test_a_swing_that_stopped_while_something_else_was_looked_at_is_not_expected
     resting = at(0.3 + 0.1, 0.0, 0.0)
     kept = 0
     for k in range(12):
-        prediction.record_target(resting._replace(at_s=end_s + 0.6 + k * FRAME_S), EYE, FAST)
+        prediction.record_target(replace(resting, at_s=end_s + 0.6 + k * FRAME_S), EYE, FAST)
         kept += prediction.sine is not None
     assert prediction.sine is None
     assert kept <= 5
@@ -213,7 +214,7 @@ def test_cos_and_sin_of_an_ellipse_are_both_predicted() -> None:
         t = k * FRAME_S
         v = (0.0, -0.1 * w * sin(w * t), 0.06 * w * cos(w * t))
         prediction.record_target(
-            at(0.0, 0.0, t)._replace(p_world_m=place(t), v_world_m_s=v), EYE, FAST
+            replace(at(0.0, 0.0, t), p_world_m=place(t), v_world_m_s=v), EYE, FAST
         )
     moved = prediction.displacement(t + AGE_S)
     assert norm(sub(moved, sub(place(t + AGE_S), place(t)))) < 0.003

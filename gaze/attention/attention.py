@@ -14,6 +14,7 @@ from math import dist, inf
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.attention.bottom_up import OWN_MOTION, BottomUp
@@ -206,7 +207,7 @@ class Attention:
             self._identity = identity
             self._shift += 1
             self._since_s = t_s
-        return target._replace(shift=self._shift)
+        return replace(target, shift=self._shift)
 
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
         """Return the present target with its present position, None without one.
@@ -262,7 +263,7 @@ class Attention:
         self._reaction.start_waiting(winner, dwelt_s)
         if present is not None:
             return self._make_target(made, present, captured_s)
-        return self._target and self._target._replace(plan=winner.plan)
+        return self._target and replace(self._target, plan=winner.plan)
 
     def _make_target(self, made: _Decision, row: int, captured_s: float) -> Target:
         """Return the target of a row, with its reason."""
@@ -335,7 +336,7 @@ class Attention:
             if one.id in shares:
                 wanted = rule
             total = max(one.total, wanted) * factor if one.id in seen else -inf
-            saliences.append(one._replace(rule=wanted, habituation=factor, total=total))
+            saliences.append(replace(one, rule=wanted, habituation=factor, total=total))
         return _Decision(bodies, saliences + point, rule_target)
 
     def _favoured(self, ids: Iterable[int], t_s: float) -> tuple[frozenset[int], float]:

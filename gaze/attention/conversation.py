@@ -33,6 +33,7 @@ from math import atan2, cos, degrees, exp, hypot, inf, log, radians, sin
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.attention.attention import Attention
@@ -287,7 +288,7 @@ class ConversationGaze:
             if self._role.ways == "aside" and _is_on_face(self._away, centre, p_world_head_m):
                 self._avert(target, p_world_head_m)  # the person has moved into the look away
             return self._away_target(target, self._away, t_s)
-        return target._replace(shift=target.shift + self._shifts) if self._shifts else target
+        return replace(target, shift=target.shift + self._shifts) if self._shifts else target
 
     @property
     def _role(self) -> Role:
@@ -346,7 +347,8 @@ class ConversationGaze:
     def _away_target(self, target: Target, away: Vec3, t_s: float) -> Target:
         """Return the target of a look away."""
         role = "no conversation" if self._mode == "none" else self._mode
-        return target._replace(
+        return replace(
+            target,
             p_world_m=away,
             v_world_m_s=(0.0, 0.0, 0.0),
             at_s=t_s,

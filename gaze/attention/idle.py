@@ -23,6 +23,7 @@ from math import cos, degrees, exp, hypot, inf, pi, radians, sin
 from typing import Annotated
 
 import numpy as np
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub, wrap, yaw_pitch
 from gazerig.gaze.draws import draw_lognormal
@@ -165,7 +166,8 @@ class Idle:
             return
         coast_s = min(max(0.0, t_s - gone.at_s), _COAST_S) if blind else 0.0
         there = self._reachable(add(gone.p_world_m, scale(gone.v_world_m_s, coast_s)))
-        self._now = gone._replace(
+        self._now = replace(
+            gone,
             p_world_m=there,
             v_world_m_s=_STILL,
             at_s=t_s,
@@ -173,7 +175,7 @@ class Idle:
             centre_world_m=None,
             is_lost=True,
         )
-        self._gone = gone._replace(p_world_m=there)
+        self._gone = replace(gone, p_world_m=there)
         self._until_s = t_s + self._params.hold_ms / 1e3
         self._search_until_s = self._until_s + SEARCH_S
 

@@ -202,14 +202,10 @@ class Oculomotor:
             else "pursue" if norm(velocity) > MOVING_M_S
             else "fixate"
         )  # fmt: skip
-        # Built without the call of a Python function that the class itself would cost.
-        return tuple.__new__(
-            GazeCommand,
-            (
-                head, left, right, lids.left, lids.right, phase, lids.blink, place.point_m,
-                place.saccades, place.fixations, self._lids.blinks, lids.lower_left,
-                lids.lower_right, limited,
-            ),
+        return GazeCommand(
+            head, left, right, lids.left, lids.right, phase, lids.blink, place.point_m,
+            place.saccades, place.fixations, self._lids.blinks, lids.lower_left,
+            lids.lower_right, limited,
         )  # fmt: skip
 
     def reachable_gaze(self, target: Target) -> ReachableGaze:
@@ -303,7 +299,10 @@ class Oculomotor:
     def _predict_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when a present eye command takes effect."""
         lag = self._lag_s
-        (yaw, pitch, roll), (yaw_rate, pitch_rate, roll_rate) = state[:2]
+        (yaw, pitch, roll), (yaw_rate, pitch_rate, roll_rate) = (
+            state.head_rad,
+            state.head_rate_rad_s,
+        )
         base, turning = state.base_rad, state.base_rate_rad_s
         if turning != (0.0, 0.0):
             base = base[0] + turning[0] * lag, base[1] + turning[1] * lag

@@ -17,6 +17,7 @@ from math import inf
 from typing import Annotated, Literal
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
 from gazerig.gaze.angles import add, angle_between, sub
@@ -120,11 +121,12 @@ def _replace_target(
 ) -> Target:
     """Return a target with the point of its face, and counting the shifts on the face."""
     if face is None or look is None:
-        return target._replace(shift=target.shift + shift) if shift else target
+        return replace(target, shift=target.shift + shift) if shift else target
     what = PART_NAMES[look.part] if look.part is not None else "random angles about"
     # The gaze waits for a lost face at its extrapolated position, with its parts.
     moved = sub(target.p_world_m, face.p_world_m)
-    return target._replace(
+    return replace(
+        target,
         p_world_m=add(look.p_world_m, moved),
         part=look.part,
         shift=target.shift + shift,

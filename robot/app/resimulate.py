@@ -11,6 +11,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from msgspec import structs
+
 from gazerig.config.load import ConfigError, load, shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text, track_files
@@ -23,10 +25,10 @@ from gazerig.robot.app.run_summary import Summary
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.control.tick import MeasuredJoints, TickRecord
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.recording.playback_devices import NoCamera, PlaybackBody, PlaybackPerception
 from gazerig.robot.recording.read import BadRecording, RunRecording
-from gazerig.robot.recording.tick_record import MeasuredJoints, TickRecord
 
 Joints = Literal["recorded", "emulated"]
 
@@ -184,7 +186,7 @@ class _Resimulator:
             except DriverError as error:
                 return f"fault: {error}"
             if self._body is not None:  # events of bus and camera belong to the recorded computer
-                tick = tick._replace(events=was.events)
+                tick = structs.replace(tick, events=was.events)
             self._compared.update(was, tick)
             if self._on_tick is not None:
                 self._on_tick(tick)
@@ -239,13 +241,13 @@ class _Decisions(NamedTuple):
 
 
 def _decisions(tick: Tick) -> _Decisions:
-    gaze = tick.gaze._replace(limited=())  # only in recordings of later versions
+    gaze = structs.replace(tick.gaze, limited=())  # only in recordings of later versions
     # Commands for absent lids have no effect.
     if _LOWER_LIDS.isdisjoint(tick.guard_result.joints):
-        gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
+        gaze = structs.replace(gaze, lower_left=1.0, lower_right=1.0)
     # The wording of the reason may change; its content is in the saliences.
     return _Decisions(
-        repr(tick.target._replace(why="")),
+        repr(structs.replace(tick.target, why="")),
         repr(gaze),
         repr(tick.desired_rad),
         repr(tick.guard_result.command_rad),

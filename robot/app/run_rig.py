@@ -127,7 +127,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         tracks_yaml=tracks_text(rig.track_files),
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,
-        started_utc=datetime.now(UTC).isoformat(),
+        started_utc=datetime.now(UTC),
         scene=options.scene or options.world_name,
         eyes=eyes,
         mock=options.mock,

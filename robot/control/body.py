@@ -183,13 +183,9 @@ class Body:
         if self._recovering:
             self._report_recovered(angles)
         missing = tuple([self.names[i] for i in gone]) if gone else ()
-        # Avoids the call of the class's constructor, a Python function.
-        return tuple.__new__(
-            JointState,
-            (
-                angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured,
-            ),
-        )  # fmt: skip
+        return JointState(
+            angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured
+        )
 
     def relax_idle(
         self, desired_rad: JointAngles, joints: JointState, t_s: float, held: bool

@@ -6,6 +6,8 @@ The rig's own attention is always updated, so that it can choose whenever the ru
 from math import dist
 from typing import Any, Protocol
 
+from msgspec.structs import replace
+
 from gazerig.drivers.errors import PluginError
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import GazeState, Percept, Target, Vec3
@@ -93,7 +95,7 @@ class RuleChooser:
         if identity != self._identity or own.shift != self._own_shift and target is own:
             self._shift += 1
         self._identity, self._own_shift = identity, own.shift
-        return target._replace(shift=self._shift)
+        return replace(target, shift=self._shift)
 
     def _to_target(self, answer: Any, t_s: float) -> Target | None:
         """Return the target that a rule has chosen.
@@ -115,7 +117,7 @@ class RuleChooser:
                 f"target, a point x, y, z within {FARTHEST_M:g} m, or None"
             )
         if isinstance(answer, Target):
-            return answer._replace(p_world_m=(x, y, z), saliences=())
+            return replace(answer, p_world_m=(x, y, z), saliences=())
         return Target(
             (x, y, z), (0.0, 0.0, 0.0), t_s, "point", -1, 1.0, True, None, 0, "a rule's point"
         )

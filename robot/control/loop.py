@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Callable
 from math import inf, radians
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.drivers.camera.capture_loop import CLOSING
 from gazerig.drivers.errors import DriverError
@@ -34,6 +34,7 @@ from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import (
     NO_TRACK,
+    AnyCommand,
     Ask,
     Command,
     Jog,
@@ -313,11 +314,11 @@ class Robot:
         lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
         events = (*self._messages, *self.body.bus.events(), *self.camera.events())
         self._messages.clear()
-        tick = tuple.__new__(Tick, (
+        tick = Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             stopped, self._lead.controlled_by, lead, self._tracks.states(t_s), False,
             self._conversation.state,
-        ))  # fmt: skip
+        )  # fmt: skip
         self._looks.newest = tick
         return tick
 
@@ -386,9 +387,9 @@ class Robot:
             named = plugin_error(error) or describe_error(error)
             self.closing_events = (f"{CLOSING}: {named}",)
 
-    def _execute_commands(self, t_s: float) -> tuple[Command, ...]:
+    def _execute_commands(self, t_s: float) -> tuple[AnyCommand, ...]:
         """Execute and return the queued commands, and end a control that was not renewed."""
-        taken = []
+        taken: list[Any] = []
         for waiting in self._commands.take() if self._commands else ():
             command = self._looks.resolve_pixel(waiting.command)
             if isinstance(command, Ask) and command.menu == "track":

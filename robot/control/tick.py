@@ -1,12 +1,13 @@
-"""Inputs and decisions of one tick."""
+"""Inputs and decisions of one tick, and its record."""
 
-from typing import NamedTuple
+from msgspec import UNSET, Struct, UnsetType
+from msgspec.structs import replace
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target, Vec3
-from gazerig.robot.model.commands import Command
+from gazerig.robot.model.commands import AnyCommand
 from gazerig.robot.model.control_source import (
     NO_CLIENT_CONTROL,
     ControlState,
@@ -16,7 +17,7 @@ from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
-class Tick(NamedTuple):
+class Tick(Struct, frozen=True, gc=False, omit_defaults=True):
     """The inputs and decisions of one tick: desired, commanded and measured values.
 
     Attributes:
@@ -41,7 +42,7 @@ class Tick(NamedTuple):
     desired_rad: JointAngles
     guard_result: GuardResult
     events: tuple[str, ...] = ()
-    commands: tuple[Command, ...] = ()
+    commands: tuple[AnyCommand, ...] = ()
     stopped: str = ""
     controlled_by: str = ""
     client_control: ControlState = NO_CLIENT_CONTROL
@@ -72,7 +73,48 @@ class Tick(NamedTuple):
         parking = self.parking_tick(
             t_s, self.joints, self.pose, self.desired_rad, guard_result, events
         )
-        return parking._replace(stopped=stopped, parking=False)
+        return replace(parking, stopped=stopped, parking=False)
+
+
+class TorqueEnabled(Struct, frozen=True, gc=False, tag=True):
+    """A switch-on of the torque, with the present angles as goals."""
+
+    goals_rad: JointAngles
+
+
+class MeasuredJoints(Struct, frozen=True, gc=False, tag=True):
+    """A reading of the joints at ``t_s``."""
+
+    t_s: float
+    joints: JointState
+
+
+class TorqueRefused(Struct, frozen=True, gc=False, tag=True):
+    """A refused switch-on of the torque, with the reason."""
+
+    why: str
+
+
+BodyRecord = TorqueEnabled | MeasuredJoints | TorqueRefused
+"""Report of the machine between two ticks."""
+
+
+class TickRecord(Struct, frozen=True, gc=False, omit_defaults=True):
+    """A tick as other processes and recordings have it.
+
+    Attributes:
+        tick: The tick without its detections and its percept.
+        dt_s: Time since the previous tick, or since the start of the loop.
+        percept: The tick's percept if it is another than that of the previous tick.
+        before: Reports of the machine since the previous tick, without the tick's own joints.
+        exact: The record in MessagePack if it has NaN or infinity, which JSON lacks.
+    """
+
+    tick: Tick
+    dt_s: float
+    percept: Percept | None | UnsetType = UNSET
+    before: tuple[BodyRecord, ...] = ()
+    exact: bytes = b""
 
 
 def stopped_result(

@@ -6,97 +6,31 @@ bit.
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf
-from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
+from msgspec import UNSET, UnsetType
+from msgspec.structs import replace
 
-from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Percept, Target, Vec3
+from gazerig.gaze.types import Percept
 from gazerig.robot.control.observers import failure_text
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.control_source import ControlState, TrackState
-from gazerig.robot.model.conversation import ConversationState
-from gazerig.robot.model.types import GuardResult, JointAngles, JointState
+from gazerig.robot.control.tick import BodyRecord, Tick, TickRecord
 
+T = TypeVar("T")
 LIVE_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 """Time between two batches of a run in real time."""
 SIMULATED_S = 0.2
 """Time between two batches in simulated time, without viewers."""
-
-Before = Sequence[tuple[str, Any]]
-"""Further inputs of a run besides a tick's own fields: kind and plain values of each."""
-
-
-_FaceRow = tuple[
-    int,
-    Vec3,
-    Vec3,
-    Mat3,
-    tuple[Vec3, ...],
-    float,
-    str,
-    float,
-    float,
-    float | None,
-    bool | None,
-    Vec3 | None,
-    float | None,
-    float | None,
-    bool | None,
-]  # the fields of a Face
-
-
-class TickRow(NamedTuple):
-    """A tick as the receiver reads it; fields as in ``Tick``.
-
-    Attributes:
-        dt_s: Time since the previous tick.
-        percept: Number of the percept, None without one.
-        command_is_desired: Whether ``guard_result.desired_rad`` equals ``desired_rad``.
-        commands: Plain values of the commands.
-        before: Further inputs of the run, for a recording.
-    """
-
-    t_s: float
-    dt_s: float
-    percept: int | None
-    joints: JointState
-    pose: GazeState
-    target: Target
-    gaze: GazeCommand
-    desired_rad: JointAngles
-    guard_result: GuardResult
-    command_is_desired: bool
-    events: tuple[str, ...]
-    commands: list[Any]
-    stopped: str
-    controlled_by: str
-    client_control: ControlState
-    tracks: tuple[TrackState, ...]
-    parking: bool
-    conversation: ConversationState
-    before: list[Any]
-
-
-class _PerceptRow(NamedTuple):
-    """A percept as the receiver reads it; bodies: the columns of ``Bodies``."""
-
-    number: int
-    captured_s: float
-    bodies: tuple[Any, ...]
-    faces: list[_FaceRow]
-    scene: int
 
 
 class TickBatch(NamedTuple):
     """A batch of ticks in the order of time.
 
     Attributes:
-        data: [percepts, rows]: the new percepts of these ticks, each as
-            [number, captured_s, bodies, faces], and the fields of ``TickRow`` of each tick.
+        data: A list of ``TickRecord``.
         ticks: Number of ticks.
         newest: The last tick.
     """
@@ -117,11 +51,10 @@ class TickStream:
     def __init__(self, report: Callable[[str], None], every_s: float = LIVE_S) -> None:
         self._report, self._every_s = report, every_s
         self._sinks: tuple[tuple[str, Callable[[TickBatch], bool]], ...] = ()
-        self._ticks: list[tuple[Tick, float, Before]] = []
+        self._records: list[TickRecord] = []
+        self._newest: Tick | None = None
         self._due_s = -inf
-        self._percept: Percept | None = None
-        self._number = 0
-        self._again = False
+        self._percept: Percept | None | UnsetType = UNSET
 
     def add_sink(self, name: str, take: Callable[[TickBatch], bool]) -> None:
         """Add a sink, which returns False if it loses a batch."""
@@ -129,81 +62,55 @@ class TickStream:
 
     def update(self, tick: Tick) -> None:
         """Add a tick of a run that is not recorded."""
-        self.append(tick, 0.0, ())
+        self.append(tick, 0.0)
 
-    def append(self, tick: Tick, dt_s: float, before: Before) -> None:
+    def append(self, tick: Tick, dt_s: float, before: tuple[BodyRecord, ...] = ()) -> None:
         """Add a tick with its further inputs, and send a batch when it is due."""
-        self._ticks.append((tick, dt_s, before))
+        percept = UNSET if tick.percept is self._percept else tick.percept
+        self._percept, self._newest = tick.percept, tick
+        plain = replace(tick, detections=None, percept=None)
+        self._records.append(TickRecord(plain, dt_s, percept, before))
         if not 0.0 <= self._due_s - tick.t_s <= self._every_s:
             self.flush()
             self._due_s = tick.t_s + self._every_s
 
     def flush(self) -> None:
         """Send the ticks since the last batch."""
-        ticks = self._ticks
-        if not ticks or not self._sinks:
-            ticks.clear()
+        records, newest = self._records, self._newest
+        if newest is None or not records:
             return
-        batch = TickBatch(self._encode_batch(), len(ticks), ticks[-1][0])
-        ticks.clear()
+        self._records = []
+        if not self._sinks:
+            return
+        batch = TickBatch(encode(records), len(records), newest)
         for sink in self._sinks:
             try:
-                self._again |= not sink[1](batch)
+                if not sink[1](batch):
+                    self._percept = UNSET  # it may have lost the present percept
             except Exception as error:
                 self._sinks = tuple([one for one in self._sinks if one is not sink])
                 self._report(failure_text(sink[0], error))
 
-    def _encode_batch(self) -> bytes:
-        percepts, rows = [], []
-        if self._again:  # a sink that lost a batch may have lost the present percept
-            self._again = False
-            if self._percept is not None:
-                percepts.append(_percept_row(self._number, self._percept))
-        for tick, dt_s, before in self._ticks:
-            percept, guard = tick.percept, tick.guard_result
-            if percept is not None and percept is not self._percept:
-                self._percept = percept
-                self._number += 1
-                percepts.append(_percept_row(self._number, percept))
-            rows.append((
-                tick.t_s, dt_s, None if percept is None else self._number, tick.joints, tick.pose,
-                tick.target, tick.gaze, tick.desired_rad, guard,
-                guard.desired_rad == tick.desired_rad, tick.events,
-                tick.commands, tick.stopped, tick.controlled_by,
-                tick.client_control, tick.tracks, tick.parking, tick.conversation, before,
-            ))  # fmt: skip
-        return encode((percepts, rows))
-
 
 def encode(value: object) -> bytes:
-    """Return plain values, named tuples and arrays as MessagePack.
+    """Return a value as MessagePack.
 
     Raises:
-        TypeError: A value has another type.
+        TypeError: A part of it has a type that msgspec does not support.
     """
     try:
         return _encoder.encode(value)
     except UnicodeEncodeError:  # a file or device name that is not text
-        return _encoder.encode(_to_utf8(msgspec.to_builtins(value, enc_hook=_to_plain)))
+        return _encoder.encode(_to_utf8(msgspec.to_builtins(value, enc_hook=to_plain)))
 
 
-def decode_rows(data: bytes) -> tuple[dict[int, Percept], list[TickRow]]:
-    """Return the percepts of ``TickBatch.data`` by number, and its ticks.
-
-    Raises:
-        msgspec.MsgspecError: The data is not a batch.
-    """
-    percepts, rows = _rows.decode(data)
-    return {row.number: _read_percept(row) for row in percepts}, rows
-
-
-def decode_plain(data: bytes) -> Any:
-    """Return the values of MessagePack as plain lists, with the types of numbers unchanged.
+def decode(data: bytes, kind: type[T]) -> T:
+    """Return the value of a type that ``encode`` wrote.
 
     Raises:
-        msgspec.MsgspecError: The data is not MessagePack.
+        msgspec.MsgspecError: The data is not such a value.
     """
-    return _plain.decode(data)
+    return msgspec.msgpack.decode(data, type=kind, dec_hook=to_array)
 
 
 def all_finite(data: bytes) -> bool:
@@ -211,25 +118,16 @@ def all_finite(data: bytes) -> bool:
     return _NOT_FINITE.search(data) is None
 
 
-def _read_percept(row: _PerceptRow) -> Percept:
-    """Return a percept from the row of ``_percept_row``."""
-    ids, kinds, p_m, v_m_s, w_rad_s, radius_m, cov = row.bodies
-    p, v, w = (np.array(rows, float).reshape(-1, 3) for rows in (p_m, v_m_s, w_rad_s))
-    pv_cov = None if cov is None else np.array(cov, float).reshape(-1, 6, 6)
-    bodies = Bodies(tuple(ids), tuple(kinds), p, v, w, np.array(radius_m, float), pv_cov)
-    return Percept(row.captured_s, bodies, tuple([Face(*face) for face in row.faces]), row.scene)
-
-
-def _percept_row(number: int, percept: Percept) -> tuple[Any, ...]:
-    faces = [_face_values(face) for face in percept.faces]
-    return (number, percept.captured_s, _body_values(percept.bodies), faces, percept.scene)
-
-
-def _to_plain(value: Any) -> Any:
-    """Return a NumPy array or number as a list or a Python number."""
+def to_plain(value: Any) -> Any:
+    """Return a NumPy array or number as a list or a Python number, for msgspec's encoders."""
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is not part of a tick")
+
+
+def to_array(kind: Any, value: Any) -> Any:
+    """Return a list as a NumPy array, for msgspec's decoders."""
+    return np.array(value, float)
 
 
 def _to_utf8(value: Any) -> Any:
@@ -245,9 +143,4 @@ def _to_utf8(value: Any) -> Any:
 
 _NOT_FINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
 """A double whose exponent has all bits set: nan, inf or, by chance, other equal bytes."""
-# msgspec would encode a frozen dataclass with the names of its fields.
-_body_values = attrgetter(*Bodies.__slots__)
-_face_values = attrgetter(*Face.__slots__)
-_encoder = msgspec.msgpack.Encoder(enc_hook=_to_plain)
-_plain = msgspec.msgpack.Decoder()
-_rows = msgspec.msgpack.Decoder(tuple[list[_PerceptRow], list[TickRow]])
+_encoder = msgspec.msgpack.Encoder(enc_hook=to_plain)

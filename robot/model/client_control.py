@@ -8,6 +8,7 @@ from math import degrees, radians
 from typing import Literal
 
 from msgspec import structs
+from msgspec.structs import replace
 
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
@@ -153,7 +154,7 @@ class ClientControl:
         chosen = self.chosen_target(percept, t_s)
         if chosen is None:
             return target
-        return chosen._replace(shift=target.shift + self._shifts, saliences=target.saliences)
+        return replace(chosen, shift=target.shift + self._shifts, saliences=target.saliences)
 
     def chosen_target(self, percept: Percept | None, t_s: float) -> Target | None:
         """Return the client's target, None without one."""

@@ -217,25 +217,21 @@ class Kinematics:
         x, y, z = p_head
         half, shut, span = self._half, self._shut, self._span
         aside_x, aside_y, aside_z = R[0][1] * half, R[1][1] * half, R[2][1] * half
-        # Avoids the call of the class's constructor, a Python function.
-        return tuple.__new__(
-            GazeState,
-            (
-                head,
-                rates[:3],
-                (pan_left, tilt_left),
-                (pan_right, tilt_right),
-                R,
-                p_head,
-                (x + aside_x, y + aside_y, z + aside_z),
-                (x - aside_x, y - aside_y, z - aside_z),
-                _share((upper_left - shut[0]) / span[0]),
-                _share((upper_right - shut[1]) / span[1]),
-                _share((lower_left - shut[2]) / span[2]),
-                _share((lower_right - shut[3]) / span[3]),
-                base,
-                rates[3:],
-            ),
+        return GazeState(
+            head,
+            rates[:3],
+            (pan_left, tilt_left),
+            (pan_right, tilt_right),
+            R,
+            p_head,
+            (x + aside_x, y + aside_y, z + aside_z),
+            (x - aside_x, y - aside_y, z - aside_z),
+            _share((upper_left - shut[0]) / span[0]),
+            _share((upper_right - shut[1]) / span[1]),
+            _share((lower_left - shut[2]) / span[2]),
+            _share((lower_right - shut[3]) / span[3]),
+            base,
+            rates[3:],
         )
 
     def inverse(self, command: GazeCommand, further_rad: JointAngles = ()) -> JointAngles:
@@ -245,7 +241,7 @@ class Kinematics:
             command: Gaze command.
             further_rad: Angles of the joints that gaze does not move, default 0.
         """
-        head, left, right, lid_left, lid_right = command[:5]
+        head, left, right = command.head_rad, command.eye_left_rad, command.eye_right_rad
         shut, span = self._shut, self._span
         # In the order of GAZE_JOINTS.
         angles = self._desired_of(
@@ -254,8 +250,8 @@ class Kinematics:
                 *right,
                 0.5 * (left[0] + right[0]),
                 0.5 * (left[1] + right[1]),
-                shut[0] + lid_left * span[0],
-                shut[1] + lid_right * span[1],
+                shut[0] + command.lid_left * span[0],
+                shut[1] + command.lid_right * span[1],
                 shut[2] + command.lower_left * span[2],
                 shut[3] + command.lower_right * span[3],
                 *head,

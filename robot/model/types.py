@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from msgspec import Struct
+
 from gazerig.gaze.angles import Mat3, Vec3
 from gazerig.robot.model.control_source import ControlSource, TrackState
 from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
@@ -59,7 +61,7 @@ def further_joints(names: Iterable[str]) -> tuple[str, ...]:
 Level = Literal["ok", "limited", "hold", "torque_off"]
 
 
-class JointState(NamedTuple):
+class JointState(Struct, frozen=True, gc=False):
     """The measured joints. The fields from ``torque`` on are empty if unknown.
 
     Attributes:
@@ -82,7 +84,7 @@ class JointState(NamedTuple):
     torque: tuple[bool, ...] = ()
     fault: tuple[str, ...] = ()
     load: tuple[float, ...] = ()
-    temperature_c: tuple[float | None, ...] = ()
+    temperature_c: tuple[int | float | None, ...] = ()
     voltage_v: tuple[float | None, ...] = ()
     rearmed: tuple[bool, ...] = ()
     measured: tuple[bool, ...] = ()
@@ -106,7 +108,7 @@ LIMP = "limp"
 """The guard's remark about a joint that has no torque because it is idle."""
 
 
-class GuardResult(NamedTuple):
+class GuardResult(Struct, frozen=True, gc=False):
     """The guard's result of a tick.
 
     Attributes:

@@ -271,7 +271,7 @@ def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) ->
 def _bodies(tracks: tuple[BodyTrack, ...]) -> Bodies:
     """Return faces and moving things as bodies; a spin in the image is about the view line."""
     if not tracks:
-        return Bodies(pv_cov=np.zeros((0, 6, 6)))
+        return Bodies()
     numbers: list[float] = []
     for track in tracks:
         known, found = track.filter, track.detection

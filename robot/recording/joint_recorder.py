@@ -8,15 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.control.body import Body
+from gazerig.robot.control.tick import BodyRecord, MeasuredJoints, TorqueEnabled, TorqueRefused
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState
-from gazerig.robot.recording.tick_record import (
-    BodyRecord,
-    MeasuredJoints,
-    TorqueEnabled,
-    TorqueRefused,
-)
 
 
 class ForwardingBody(Body):

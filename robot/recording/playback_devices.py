@@ -7,19 +7,19 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
-from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.types import JointAngles, JointState
-from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import Tracker
-from gazerig.robot.recording.joint_recorder import ForwardingBody
-from gazerig.robot.recording.tick_record import (
+from gazerig.robot.control.tick import (
     BodyRecord,
     MeasuredJoints,
     TickRecord,
     TorqueEnabled,
     TorqueRefused,
 )
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.frames import CameraMount, PoseHistory
+from gazerig.robot.model.types import JointAngles, JointState
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.recording.joint_recorder import ForwardingBody
 
 H = TypeVar("H", bound=BodyRecord)
 

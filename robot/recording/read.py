@@ -1,49 +1,37 @@
 """Reader of a recorded run; that of a killed program is readable to its last complete part."""
 
-import base64
 import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
 
 import msgspec
 import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Header, Metadata
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Channel, Chunk, Footer, Header, McapRecord, Message, Metadata
+from mcap.stream_reader import StreamReader, breakup_chunk
+from msgspec import UNSET, structs
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.files.file_input import MAGIC, open_mcap
 from gazerig.gaze.types import Percept
-from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick import Tick, TickRecord
+from gazerig.robot.control.tick_stream import decode, to_array
+from gazerig.robot.model.commands import check_command
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording.run_info import (
-    FORMAT,
-    PROFILE,
-    RunEnd,
-    RunInfo,
-    read_run_end,
-    read_run_info,
-)
-from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
+from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, read_text
 
 _CURE = "make one with gazerig run --record"
 _CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
-_HEAD = 9  # bytes of a record's header: kind and length
 _LARGEST_CHUNK = 64 << 20
 """Limit of a compressed or decompressed chunk; the writer's chunks have about 1 MB."""
 _LARGEST = _LARGEST_CHUNK + 1000  # bytes of a record; more is damage
-_CRC_PIECE = 1 << 20
 _LONGEST_GAP_S = 3600.0  # between two ticks; more is damage
-_FIXED = 22  # bytes of a message before its data: channel, sequence, two times
-_PERCEPTS_KEPT = 8  # a tick refers to the newest one or the one before it
-_KINDS = frozenset(value for name, value in vars(Opcode).items() if name.isupper())
 DAMAGE = (
     McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, zstandard.ZstdError,
     AttributeError, ArithmeticError, RecursionError, MemoryError,
@@ -51,12 +39,22 @@ DAMAGE = (
 """Errors caused by a file with damaged or impossible contents."""
 
 
+class _Exact(msgspec.Struct):
+    """The part of a ``TickRecord`` that replaces the others."""
+
+    exact: bytes = b""
+
+
+_ticks = msgspec.json.Decoder(TickRecord, dec_hook=to_array)
+_exact = msgspec.json.Decoder(_Exact)
+
+
 class BadChunk(McapError):
     """A chunk that does not match its header."""
 
 
-def decompress_chunk(chunk: Chunk) -> bytes:
-    """Decompress the records of a chunk.
+def decompress_chunk(chunk: Chunk) -> Chunk:
+    """Return a chunk with its records decompressed.
 
     Raises:
         BadChunk: The chunk is too large, does not match its header or uses another compression.
@@ -65,34 +63,23 @@ def decompress_chunk(chunk: Chunk) -> bytes:
     size = chunk.uncompressed_size
     if size > _LARGEST_CHUNK:
         raise BadChunk(f"a chunk of {size / 1e6:.0f} MB")
+    data = chunk.data
     if chunk.compression == "zstd":
         # At most one byte more than the size: a few bytes can expand to gigabytes.
         decompressor = zstandard.ZstdDecompressor(max_window_size=_LARGEST_CHUNK)
-        with decompressor.stream_reader(BytesIO(chunk.data), read_across_frames=True) as reader:
-            found: bytes = reader.read(size + 1)
-            data = found
-    elif chunk.compression == "":
-        data = chunk.data
-    else:
+        with decompressor.stream_reader(BytesIO(data), read_across_frames=True) as reader:
+            data = reader.read(size + 1)
+    elif chunk.compression:
         raise BadChunk("a chunk compressed by another program")
     if len(data) != size:
         raise BadChunk("a chunk whose size differs from its header")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise BadChunk("a chunk with a wrong checksum")
-    return data
+    return replace(chunk, compression="", data=data)
 
 
 class BadRecording(SetupError):
     """A file that is not a recording of a run, or cannot be read further."""
-
-
-class _ChunkIndex(NamedTuple):
-    """Position of a chunk's content in the file, and the times of its messages."""
-
-    offset: int
-    length: int
-    first_ns: int
-    last_ns: int
 
 
 class RunRecording:
@@ -115,35 +102,26 @@ class RunRecording:
         self.path = Path(path)
         self.whole = False
         self.end = RunEnd()
-        self._chunks: list[_ChunkIndex] = []
-        found: RunInfo | None = None
-        with open_mcap(self.path, BadRecording, _CURE) as file:
-            for kind, offset, length in self._records(file):
-                if kind == Opcode.HEADER:
+        info: RunInfo | None = None
+        times_ns: list[int] = []
+        for record in self._records(validate=True):
+            match record:
+                case Header():
+                    self._check_profile(record.profile)
+                case Chunk():
+                    times_ns += (record.message_start_time, record.message_end_time)
+                case Metadata(name=fmt.RUN):
                     with _damage_errors(self.path):
-                        profile = Header.read(_content(file, offset, length)).profile
-                    self._check_profile(profile)
-                elif kind == Opcode.CHUNK:
+                        info = read_text(record.metadata, RunInfo)
+                case Metadata(name=fmt.END):
                     with _damage_errors(self.path):
-                        first_ns, last_ns = struct.unpack("<QQ", _bytes(file, offset, 16))
-                    self._chunks.append(_ChunkIndex(offset, length, first_ns, last_ns))
-                elif kind == Opcode.METADATA:
-                    with _damage_errors(self.path):
-                        record = Metadata.read(_content(file, offset, length))
-                    found = self._read_metadata(record) or found
-                elif kind == Opcode.DATA_END:
-                    self._check_sum(file, offset, length)
-                elif kind == Opcode.FOOTER:
+                        self.end = read_text(record.metadata, RunEnd)
+                case Footer():
                     self.whole = True
-        if found is None:
+        if info is None:
             raise BadRecording(f"{self.path} is empty: it contains nothing of a run")
-        self.info = found
-        chunks = self._chunks
-        self.duration_s = (
-            (max(c.last_ns for c in chunks) - min(c.first_ns for c in chunks)) / 1e9
-            if chunks
-            else 0.0
-        )
+        self.info = info
+        self.duration_s = (max(times_ns) - min(times_ns)) / 1e9 if times_ns else 0.0
 
     @property
     def note(self) -> str:
@@ -169,67 +147,58 @@ class RunRecording:
         Raises:
             BadRecording: The file is damaged.
         """
-        percepts: dict[int, Percept] = {}
+        percept: Percept | None = None
         before_s: float | None = None
-        for topic, data in self._messages({fmt.TICK, fmt.PERCEPT}):
+        for data in self._tick_messages():
             with _damage_errors(self.path):
-                message = msgspec.json.decode(data)
-                if topic == fmt.PERCEPT:
-                    number, percept = percept_from_json(message)
-                    percepts[number] = percept
-                    if len(percepts) > _PERCEPTS_KEPT:
-                        del percepts[next(iter(percepts))]
-                    continue
-                moment = from_json(message, percepts)
-                t_s = moment.tick.t_s
+                exact = _exact.decode(data).exact
+                record = decode(exact, TickRecord) if exact else _ticks.decode(data)
+                if record.percept is not UNSET:
+                    percept = record.percept
+                commands = tuple([check_command(one) for one in record.tick.commands])
+                tick = structs.replace(record.tick, percept=percept, commands=commands)
                 # Exports fill gaps with rows; a gap of years would give too many.
-                if not isfinite(t_s) or (
-                    before_s is not None and not 0.0 <= t_s - before_s < _LONGEST_GAP_S
+                if not isfinite(tick.t_s) or (
+                    before_s is not None and not 0.0 <= tick.t_s - before_s < _LONGEST_GAP_S
                 ):
-                    raise ValueError(f"a tick at {t_s} s after {before_s} s")
-                before_s = t_s
-            yield moment
+                    raise ValueError(f"a tick at {tick.t_s} s after {before_s} s")
+                before_s = tick.t_s
+            yield structs.replace(record, tick=tick, percept=percept)
 
-    def frames(self) -> Iterator[tuple[float, bytes]]:
-        """Return the camera's frames: time of the exposure and JPEG.
-
-        Raises:
-            BadRecording: The file is damaged.
-        """
-        for _, data in self._messages({fmt.FRAME}):
-            with _damage_errors(self.path):
-                message = msgspec.json.decode(data)
-                frame = float(message["captured_s"]), base64.b64decode(message["data"])
-            yield frame
-
-    def health(self) -> Iterator[dict[str, Any]]:
-        """Return the bus counts and the servos' readings, recorded once per second.
-
-        Raises:
-            BadRecording: The file is damaged.
-        """
-        for _, data in self._messages({fmt.HEALTH}):
-            with _damage_errors(self.path):
-                message: dict[str, Any] = msgspec.json.decode(data)
-            yield message
-
-    def _messages(self, wanted: set[str]) -> Iterator[tuple[str, memoryview]]:
-        """Return topic and data of the messages of some topics, in the order of the file."""
+    def _tick_messages(self) -> Iterator[bytes]:
+        """Return the ticks in the order of the file."""
         topics: dict[int, str] = {}
-        with open_mcap(self.path, BadRecording, _CURE) as file:
-            for place in self._chunks:
-                with _damage_errors(self.path):
-                    chunk = Chunk.read(_content(file, place.offset, place.length))
-                    records = memoryview(decompress_chunk(chunk))
-                    found = list(_select_messages(records, topics, wanted))
-                yield from found
+        for record in self._records(validate=False):
+            if not isinstance(record, Chunk):
+                continue
+            with _damage_errors(self.path):
+                inside = breakup_chunk(decompress_chunk(record))
+                topics |= {one.id: one.topic for one in inside if isinstance(one, Channel)}
+                ticks = [
+                    one.data
+                    for one in inside
+                    if isinstance(one, Message) and topics[one.channel_id] == fmt.TICK
+                ]
+            yield from ticks
 
-    def _read_metadata(self, record: Metadata) -> RunInfo | None:
-        """Read a metadata record; return the run's settings if it contains them."""
-        with _damage_errors(self.path):
-            if record.name == fmt.END:
-                self.end = read_run_end(record.metadata)
-            return read_run_info(record.metadata) if record.name == fmt.RUN else None
+    def _records(self, validate: bool) -> Iterator[McapRecord]:
+        """Return the complete records; in a file that was not closed, those before its end.
+
+        Args:
+            validate: Compare the whole file with its checksum.
+        """
+        with open_mcap(self.path, BadRecording, _CURE) as file, _damage_errors(self.path):
+            file.seek(-len(MAGIC), 2)
+            closed = file.read() == MAGIC and file.tell() > len(MAGIC)
+            file.seek(0)
+            reader = StreamReader(
+                file, emit_chunks=True, validate_crcs=validate, record_size_limit=_LARGEST
+            )
+            try:
+                yield from reader.records
+            except (EndOfFile, struct.error):
+                if closed:
+                    raise
 
     def _check_profile(self, profile: str) -> None:
         """Reject a file that is not a recording of a run."""
@@ -249,58 +218,6 @@ class RunRecording:
             f"{self.path} is not a recording of gazerig (its profile is {profile!r}): make one with "
             "gazerig run --record"
         )
-
-    def _check_sum(self, file: BinaryIO, offset: int, length: int) -> None:
-        """Reject a file whose bytes do not match its checksum."""
-        with _damage_errors(self.path):
-            wanted = DataEnd.read(_content(file, offset, length)).data_section_crc
-        if not wanted:  # earlier versions wrote no checksum
-            return
-        file.seek(0)
-        left, found = offset - _HEAD, 0
-        while left > 0 and (piece := file.read(min(left, _CRC_PIECE))):
-            found, left = zlib.crc32(piece, found), left - len(piece)
-        if found != wanted:
-            raise BadRecording(f"{self.path} is damaged (wrong checksum): copy it again")
-
-    def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
-        """Return kind, offset and length of each complete record."""
-        end = file.seek(0, 2)
-        # A file with this magic number at its end was written completely.
-        closed = end > 2 * len(MAGIC) and _bytes(file, end - len(MAGIC), len(MAGIC)) == MAGIC
-        offset = len(MAGIC)
-        while offset + _HEAD <= end:
-            head = _bytes(file, offset, _HEAD)
-            kind, length = head[0], int.from_bytes(head[1:], "little")
-            cut = offset + _HEAD + length > end
-            if length > _LARGEST or kind not in _KINDS or (cut and closed):
-                raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it again")
-            if cut:
-                return
-            yield kind, offset + _HEAD, length
-            if kind == Opcode.FOOTER:
-                return
-            offset += _HEAD + length
-        if closed:
-            raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it again")
-
-
-def _select_messages(
-    records: memoryview, topics: dict[int, str], wanted: set[str]
-) -> Iterator[tuple[str, memoryview]]:
-    """Return topic and data of a chunk's wanted messages; add its channels to ``topics``."""
-    at = 0
-    while at < len(records):
-        kind, length = records[at], int.from_bytes(records[at + 1 : at + _HEAD], "little")
-        at += _HEAD
-        if kind == Opcode.MESSAGE:
-            topic = topics[int.from_bytes(records[at : at + 2], "little")]
-            if topic in wanted:
-                yield topic, records[at + _FIXED : at + length]
-        elif kind == Opcode.CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(records[at : at + length])))
-            topics[channel.id] = channel.topic
-        at += length
 
 
 @contextmanager
@@ -332,13 +249,3 @@ def _damage_errors(path: Path) -> Iterator[None]:
     except DAMAGE as error:
         what = " ".join(str(error).split())[:80]
         raise BadRecording(f"{path} is damaged ({what}): copy it again") from None
-
-
-def _bytes(file: BinaryIO, offset: int, length: int) -> bytes:
-    file.seek(offset)
-    return file.read(length)
-
-
-def _content(file: BinaryIO, offset: int, length: int) -> ReadDataStream:
-    """Return a stream of a record's content."""
-    return ReadDataStream(BytesIO(_bytes(file, offset, length)))

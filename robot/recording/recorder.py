@@ -18,23 +18,15 @@ from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.drivers.process.passed_image import copy_image
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_stream import (
-    LIVE_S,
-    SIMULATED_S,
-    Before,
-    TickBatch,
-    TickStream,
-    encode,
-)
+from gazerig.robot.control.tick import BodyRecord, MeasuredJoints, Tick
+from gazerig.robot.control.tick_stream import LIVE_S, SIMULATED_S, TickBatch, TickStream, encode
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.joint_recorder import JointRecorder
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
-from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, body_record_as_plain
+from gazerig.robot.recording.run_format import Health
+from gazerig.robot.recording.run_info import RunEnd, RunInfo
 from gazerig.robot.recording.writer_client import WriterClient
 
 _HEALTH_S = 1.0
-_NOTHING: Before = ()
 _EARLY_S = 1e-3  # a frame may be this early, as times are rounded
 
 
@@ -131,8 +123,7 @@ class Recorder:
             self._link.open(file_fd)
         finally:
             os.close(file_fd)
-        start = as_text(self._info), started_ns(self._info), self._urdf
-        self._link.post(writer.BEGIN, encode(start))
+        self._link.post(writer.BEGIN, encode((self._info, self._urdf)))
 
     def begin(self) -> None:
         """Replace an older recording; call it when the run has started.
@@ -162,7 +153,15 @@ class Recorder:
 
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
-        before = self._records_before(tick)
+        # The tick has its own joints.
+        before = tuple(
+            [
+                one
+                for one in self._body_records
+                if not (isinstance(one, MeasuredJoints) and one.joints is tick.joints)
+            ]
+        )
+        self._body_records.clear()
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
         self.stream.append(tick, dt_s, before)
@@ -172,26 +171,9 @@ class Recorder:
             self._checked_s = tick.t_s
             self.stream.flush()
             sent, received, errors = self._health()
-            self._link.post(writer.HEALTH, encode(((sent, received, dict(errors)), self.lost)))
+            health = Health(sent, received, dict(errors), self.lost)
+            self._link.post(writer.HEALTH, encode(health))
             self._link.listen()
-
-    def _records_before(self, tick: Tick) -> Before:
-        """Return the body's records since the last tick, without the tick's own joints."""
-        records = self._body_records
-        if (
-            len(records) == 1
-            and type(records[0]) is MeasuredJoints
-            and records[0][1] is tick.joints
-        ):
-            records.clear()
-            return _NOTHING
-        before = [
-            body_record_as_plain(one)
-            for one in records
-            if not (type(one) is MeasuredJoints and one.joints is tick.joints)
-        ]
-        records.clear()
-        return before
 
     def _take(self, batch: TickBatch) -> bool:
         """Send ticks to the writer; return False if they are lost."""
@@ -236,7 +218,7 @@ class Recorder:
         self.stream.flush()
         self._link.drain()  # makes room for the record of the end
         end = RunEnd(stopped_by, self.lost, self._seconds, tx_sha256 or "")
-        self._link.post(writer.END, encode({name: getattr(end, name) for name in RunEnd.__slots__}))
+        self._link.post(writer.END, encode(end))
         self._link.close()
         if self._last_s is None:
             if self._temporary is not None:

@@ -6,15 +6,17 @@ truncated to its last complete chunk, so that it can be read.
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import msgspec
 from mcap.writer import CompressionType, Writer
 
+from gazerig.robot.control.tick_stream import to_plain
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording.run_info import PROFILE, RunEnd, as_text
+from gazerig.robot.recording.run_info import PROFILE, RunEnd, RunInfo, as_text, started_ns
 
+_encoder = msgspec.json.Encoder(enc_hook=to_plain)
 _CHUNK_BYTES = 1 << 20
 _WHOLE_NS = 1_000_000_000
 
@@ -34,16 +36,15 @@ class RunWriter:
         failed: Reason why nothing more can be written, or "".
     """
 
-    def __init__(self, fd: int, about: Mapping[str, str], started_ns: int) -> None:
+    def __init__(self, fd: int, info: RunInfo) -> None:
         """Write the beginning of the file.
 
         Args:
             fd: Descriptor of an empty file, open for writing; ``close`` closes it.
-            about: Settings of the run from ``run_info.as_text``.
-            started_ns: Wall clock at the first tick.
+            info: Settings of the run.
         """
         self._file = _UnbufferedFile(fd)
-        self._started_ns = started_ns
+        self._started_ns = started_ns(info)
         self._writer = Writer(
             self._file,  # type: ignore[arg-type]  # of a file, it uses write, tell and flush
             chunk_size=_CHUNK_BYTES,
@@ -55,7 +56,7 @@ class RunWriter:
         self.failed = ""
         with self._error_handling():
             self._writer.start(PROFILE, "gazerig")
-            self._writer.add_metadata(fmt.RUN, dict(about))
+            self._writer.add_metadata(fmt.RUN, as_text(info))
             self._file.keep()
 
     @property
@@ -68,22 +69,26 @@ class RunWriter:
         """Return the wall clock at a time since the first tick."""
         return self._started_ns + round(at_s * _WHOLE_NS)
 
-    def add(self, message: fmt.Message) -> None:
-        """Append a message to the present chunk; do nothing after a failure."""
+    def add(self, topic: str, at_s: float, message: object) -> None:
+        """Append a message to the present chunk; do nothing after a failure.
+
+        Args:
+            topic: Its topic, which determines its type.
+            at_s: Time since the first tick.
+            message: The message.
+        """
         if self.failed:
             return
-        topic = message.topic
         self._counts[topic] = self._counts.get(topic, 0) + 1
         with self._error_handling():
             channel = self._channels.get(topic)
             if channel is None:
-                name, schema = fmt.SCHEMAS[topic]
-                about = self._writer.register_schema(
-                    name, "jsonschema", msgspec.json.encode(schema)
-                )
+                name, kind = fmt.TYPES[topic]
+                schema = msgspec.json.encode(fmt.json_schema(kind))
+                about = self._writer.register_schema(name, "jsonschema", schema)
                 channel = int(self._writer.register_channel(topic, "json", about))
                 self._channels[topic] = channel
-            at_ns, data = self.time_ns(message.at_s), msgspec.json.encode(message.data)
+            at_ns, data = self.time_ns(at_s), _encoder.encode(message)
             self._writer.add_message(channel, at_ns, data, at_ns, self._counts[topic])
 
     def flush(self) -> None:

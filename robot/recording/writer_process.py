@@ -14,22 +14,24 @@ import select
 import socket
 import sys
 from collections.abc import Iterator
+from math import inf
 from typing import Any, NamedTuple
+
+from msgspec import UNSET
+from msgspec.structs import replace
 
 from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
 from gazerig.drivers.process.priority import lower_priority
-from gazerig.drivers.types import BusHealth, ImageArray
-from gazerig.gaze.types import GazeCommand, GazeState, Vec3
-from gazerig.robot.control.tick_stream import TickRow, all_finite, decode_plain
+from gazerig.drivers.types import ImageArray
+from gazerig.gaze.types import Percept
+from gazerig.robot.control.tick import Tick, TickRecord
+from gazerig.robot.control.tick_stream import all_finite, decode, encode
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import viewer_messages as viewers
-from gazerig.robot.recording.run_info import RunEnd
+from gazerig.robot.recording.run_info import RunEnd, RunInfo
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.tick_record import as_json, percept_as_json
 
-_PERCEPT, _JOINTS = TickRow._fields.index("percept"), TickRow._fields.index("joints")
 _VIEWED_EVERY_S = 0.0399  # slightly below 40 ms, so that rounding does not make it 45
 
 
@@ -40,75 +42,59 @@ class RecordRouter:
         self._writer = writer
         self._first_s: float | None = None
         self._at_s = 0.0
-        self._viewed_s = -1.0
-        self._newest: list[Any] | None = None
-        self._faces: list[Vec3] = []
-        self._percepts: dict[int, list[Any]] = {}
-        self._written = 0
-        self._finite = False
+        self._viewed_s = -inf
+        self._percept: Percept | None = None
 
     def write_ticks(self, data: bytes) -> None:
-        """Write the ticks of a ``tick_stream.TickBatch``, each percept before the first with it."""
-        percepts, rows = decode_plain(data)
-        self._finite = all_finite(data)
-        self._percepts.update({one[0]: one for one in percepts})
-        for row in rows:
-            number = row[_PERCEPT]
-            if number is not None and number > self._written:
-                self._written = number
-                percept = percept_as_json(self._percepts[number], self._finite)
-                self._faces = [face["p_world_m"] for face in percept["faces"]]
-                self._add(fmt.PERCEPT, percept)
-                self._percepts = {n: one for n, one in self._percepts.items() if n > number}
-            self._tick(row)
+        """Write the ticks of a ``tick_stream.TickBatch``."""
+        finite = all_finite(data)
+        for record in decode(data, list[TickRecord]):
+            exact = b"" if finite else encode(record)
+            if not all_finite(exact):
+                record = replace(record, exact=exact)
+            if record.percept is not UNSET:
+                self._percept = record.percept
+            if self._first_s is None:
+                self._first_s = record.tick.t_s
+            self._at_s = record.tick.t_s - self._first_s
+            self._add(fmt.TICK, record)
+            for event in record.tick.events:
+                self._add(fmt.LOG, viewers.Log(self._now, event))
+            if self._at_s - self._viewed_s >= _VIEWED_EVERY_S:
+                self._viewed_s = self._at_s
+                self._write_views(record.tick)
 
-    def _tick(self, row: list[Any]) -> None:
-        """Write a tick, and about every 40 ms the messages for viewers."""
-        data = as_json(row, self._finite)
-        if self._first_s is None:
-            self._first_s = data["t_s"]
-        self._at_s = data["t_s"] - self._first_s
-        self._add(fmt.TICK, data)
-        for event in data["events"]:
-            self._add(fmt.LOG, viewers.log_message(event, self._now_ns))
-        for order in data["commands"]:
-            self._add(fmt.ORDER, order)
-        self._newest = row
-        if self._at_s - self._viewed_s >= _VIEWED_EVERY_S or self._viewed_s < 0.0:
-            self._viewed_s = self._at_s
-            viewed, now_ns = TickRow(*row), self._now_ns
-            joints, names = JointState(*viewed.joints), GuardResult(*viewed.guard_result).joints
-            pose, gaze = GazeState(*viewed.pose), GazeCommand(*viewed.gaze)
-            self._add(fmt.JOINT_STATES, viewers.joint_states(names, joints, now_ns))
-            self._add(fmt.TRANSFORMS, viewers.transforms(pose, now_ns))
-            self._add(
-                fmt.SCENE, viewers.scene_message(pose, gaze.gaze_point_world_m, self._faces, now_ns)
-            )
+    def _write_views(self, tick: Tick) -> None:
+        """Write the messages for viewers."""
+        pose, now = tick.pose, self._now
+        faces = self._percept.faces if self._percept is not None else ()
+        self._add(
+            fmt.JOINT_STATES, viewers.joint_states(tick.guard_result.joints, tick.joints, now)
+        )
+        self._add(fmt.TRANSFORMS, viewers.transforms(pose, now))
+        points_m = [face.p_world_m for face in faces]
+        point_m = tick.gaze.gaze_point_world_m
+        self._add(fmt.SCENE, viewers.scene_message(pose, point_m, points_m, now))
 
     def write_frame(self, captured_s: float, image: ImageArray) -> None:
         """Write a camera image as JPEG."""
-        from gazerig.robot.dashboard.feed.camera_overlay import encode  # loads OpenCV
+        # Loads OpenCV.
+        from gazerig.robot.dashboard.feed.camera_overlay import encode as encode_jpeg
 
         first_s = self._first_s if self._first_s is not None else captured_s
-        exposed_ns = self._writer.time_ns(captured_s - first_s)
-        self._add(fmt.FRAME, viewers.image_message(encode(image), captured_s, exposed_ns))
+        exposed = viewers.time_stamp(self._writer.time_ns(captured_s - first_s))
+        self._add(fmt.FRAME, viewers.CompressedImage(exposed, captured_s, encode_jpeg(image)))
 
-    def write_health(self, bus: BusHealth, lost: int) -> None:
-        """Write the bus counts and the servos' readings of the newest tick."""
-        servos = {}
-        if self._newest is not None:
-            joints = JointState(*self._newest[_JOINTS])
-            fields = ("temperature_c", "voltage_v", "load", "fault")
-            servos = {name: getattr(joints, name) for name in fields}
-        counts = {"tx_bytes": bus.tx_bytes, "rx_bytes": bus.rx_bytes, "errors": dict(bus.errors)}
-        self._add(fmt.HEALTH, {**counts, **servos, "lost_ticks": lost})
+    def write_health(self, health: fmt.Health) -> None:
+        """Write the bus counts."""
+        self._add(fmt.HEALTH, health)
 
     @property
-    def _now_ns(self) -> int:
-        return self._writer.time_ns(self._at_s)
+    def _now(self) -> viewers.Time:
+        return viewers.time_stamp(self._writer.time_ns(self._at_s))
 
-    def _add(self, topic: str, data: dict[str, Any]) -> None:
-        self._writer.add(fmt.Message(topic, self._at_s, data))
+    def _add(self, topic: str, message: object) -> None:
+        self._writer.add(topic, self._at_s, message)
 
 
 MORE, LAST = b"+", b"."
@@ -141,10 +127,10 @@ def main(socket_fd: int, file_fd: int) -> None:
         first = next((one for one in messages if one is not None), None)
         if first is None:
             return
-        about, started_ns, urdf = decode_plain(first.body)
-        writer = RunWriter(file_fd, about, started_ns)
+        info, urdf = decode(first.body, tuple[RunInfo, str])
+        writer = RunWriter(file_fd, info)
         if urdf:
-            writer.add(fmt.Message(fmt.DESCRIPTION, 0.0, {"data": urdf}))
+            writer.add(fmt.DESCRIPTION, 0.0, viewers.Text(urdf))
         end = _write(messages, writer, rig, RealClock())
         writer.close(end)
         _send_reply(
@@ -163,15 +149,14 @@ def _write(
     for one in messages:
         kind, body, fd = one if one is not None else (b"", b"", -1)
         if kind == END:
-            end = RunEnd(**decode_plain(body))
+            end = decode(body, RunEnd)
         elif kind == TICKS:
             router.write_ticks(body)
         elif kind == FRAME:
-            captured_s, shape, dtype = decode_plain(body)
-            router.write_frame(captured_s, take_image(PassedImage(fd, tuple(shape), dtype)))
+            captured_s, shape, dtype = decode(body, tuple[float, tuple[int, ...], str])
+            router.write_frame(captured_s, take_image(PassedImage(fd, shape, dtype)))
         elif kind == HEALTH:
-            counts, lost = decode_plain(body)
-            router.write_health(BusHealth(*counts), lost)
+            router.write_health(decode(body, fmt.Health))
         now_s = clock.now_s()
         if now_s - flushed_s >= _FLUSH_S:
             flushed_s = now_s

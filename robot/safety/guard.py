@@ -228,10 +228,7 @@ class Guard:
                 short[i] = outcome
         self._calm = followed
         if followed:
-            # Avoids the call of the class's constructor, a Python function.
-            return tuple.__new__(
-                GuardResult, (desired_rad, "ok", (), desired_rad, (), (), self._names)
-            )
+            return GuardResult(desired_rad, "ok", (), desired_rad, (), (), self._names)
         if short != self._short:  # findings often stay the same for many ticks
             self._short, self._findings = short, _findings(short, self._names)
         level, reasons, why, critical = self._findings

@@ -7,6 +7,7 @@ from typing import Any, get_args
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from gazerig.config.schema import Rig
 from gazerig.features.bringup.calibration.face_steering import (
@@ -223,7 +224,7 @@ def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
     tick = ticks(made, steered, 1.0)
     steered.press("enter", tick.t_s)
     # Eyes that are measured elsewhere, whatever their command.
-    aside = tick.pose._replace(eye_left_rad=(0.3, 0.0))
-    assert steered.update(tick._replace(t_s=tick.t_s + 0.1, pose=aside)) is None
-    why = steered.update(tick._replace(t_s=tick.t_s + WAIT_S + 0.1, pose=aside))
+    aside = replace(tick.pose, eye_left_rad=(0.3, 0.0))
+    assert steered.update(replace(tick, t_s=tick.t_s + 0.1, pose=aside)) is None
+    why = steered.update(replace(tick, t_s=tick.t_s + WAIT_S + 0.1, pose=aside))
     assert why is not None and "not taken" in why and steered.state.part == "N"

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from command_line import typed
+from msgspec import structs
 from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_walk
@@ -425,13 +426,14 @@ def test_an_independent_judge_finds_the_same_saccades(gathered: GazeTrace) -> No
 
 def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> None:
     missing = [
-        tick._replace(joints=tick.joints._replace(missing=("left_eye_pan",))) for tick in ticks
+        structs.replace(tick, joints=structs.replace(tick.joints, missing=("left_eye_pan",)))
+        for tick in ticks
     ]
     events = EventDetector()
     found = [event for tick in missing[:4000] for event in events.update(tick)]
     assert not any(isinstance(event, SaccadeEvent | FixationEvent) for event in found)
     events = EventDetector()
-    stopped = [tick._replace(stopped="somebody did") for tick in ticks[:4000]]
+    stopped = [structs.replace(tick, stopped="somebody did") for tick in ticks[:4000]]
     assert [event for tick in stopped for event in events.update(tick)] == []
 
 

@@ -191,7 +191,7 @@ def _recording_header(recording: "RunRecording", name: str) -> "RunHeader":
         ("servos", info.bus if info.mock else "real"),
         ("time", "simulated" if info.fast else "real"),
         ("seed", str(info.seed)),
-        ("started", info.started_utc),
+        ("started", info.started_utc.isoformat()),
         ("versions", ", ".join(f"{name} {v}" for name, v in sorted(info.versions.items()))),
     )
     warnings = (recording.note,) if recording.note else ()

@@ -14,6 +14,7 @@ from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from msgspec import UNSET, structs
 
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -28,8 +29,8 @@ from gazerig.drivers.types import (
     MovingBlob,
 )
 from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_stream import decode_plain, decode_rows, encode
+from gazerig.robot.control.tick import Tick, TickRecord
+from gazerig.robot.control.tick_stream import decode, encode
 from gazerig.robot.control.tick_text import health_text, perception_text
 from gazerig.robot.dashboard.feed.gaze_trail import GazeHistory, GazeTrail
 from gazerig.robot.dashboard.feed.page_process import (
@@ -88,9 +89,8 @@ class RunState(NamedTuple):
     """State of a run that ticks do not contain.
 
     errors: errors of the bus, by kind; behaviour, conversation, character: the present ones
-    residual: see ``ResidualFigures``
     scene_start_s: start of a simulated scene or world, None before it and without one
-    timing: the loop's own figures, as fields of ``LoopFigures``; None: unknown. In the page's own
+    timing: the loop's own figures; None: unknown. In the page's own
         figures, ticks that a busy page did not accept would appear late.
     expression: the present one, "" without any
     """
@@ -99,9 +99,9 @@ class RunState(NamedTuple):
     behaviour: str
     conversation: str
     character: str
-    residual: tuple[float | None, float | None, int]
+    residual: ResidualFigures
     scene_start_s: float | None = None
-    timing: Sequence[Any] | None = None
+    timing: LoopFigures | None = None
     expression: str = ""
 
 
@@ -189,7 +189,7 @@ class LiveFeed:
         self._builder: SnapshotBuilder | None = None
         self._poses: PoseHistory | None = None
         self._percept: Percept | None = None
-        self._state = RunState({}, "", "", "", (None, None, 0))
+        self._state = RunState({}, "", "", "", ResidualFigures(None, None, 0))
         self._found: Detections | None = None
         self._wants_depth = False
         self._newest: Tick | None = None
@@ -204,7 +204,7 @@ class LiveFeed:
         if kind == TICKS:
             self._take_ticks(body)
         elif kind == STATE:
-            self._state = RunState(*decode_plain(body))
+            self._state = decode(body, RunState)
         elif kind == RIG:
             models, *parts = pickle.loads(body)
             SERVOS.update(models)
@@ -221,7 +221,7 @@ class LiveFeed:
             if pickle.dumps(rig.world) != pickle.dumps(self._world):
                 self._world = rig.world
         elif kind == DETECTED:
-            self._take_frame(FrameHeader(*decode_plain(body)), fd)
+            self._take_frame(decode(body, FrameHeader), fd)
         else:
             return False
         return True
@@ -232,7 +232,7 @@ class LiveFeed:
             return None
         self._new_ticks = False
         state, tick = self._state, self._newest
-        seen = perception_text(tick, ResidualFigures(*state.residual))
+        seen = perception_text(tick, state.residual)
         perception = " | ".join(filter(None, (seen, self._detector)))
         health = health_text(BusHealth(0, 0, state.errors))
         return self._builder.build(
@@ -242,7 +242,7 @@ class LiveFeed:
                 perception,
                 state.character,
                 state.conversation,
-                LoopFigures(*state.timing) if state.timing is not None else None,
+                state.timing,
                 state.expression,
             )
         )
@@ -302,17 +302,10 @@ class LiveFeed:
     def _take_ticks(self, data: bytes) -> None:
         if self._builder is None or self._poses is None:
             return
-        percepts, rows = decode_rows(data)
-        for row in rows:
-            if row.percept is None:
-                self._percept = None
-            else:  # the previous percept replaces one that is not in the batch
-                self._percept = percepts.get(row.percept, self._percept)
-            tick = Tick(
-                row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
-                row.desired_rad, row.guard_result, row.events, (), row.stopped, row.controlled_by, row.client_control,
-                row.tracks, row.parking, row.conversation,
-            )  # fmt: skip
+        for record in decode(data, list[TickRecord]):
+            if record.percept is not UNSET:
+                self._percept = record.percept
+            tick = structs.replace(record.tick, detections=self._found, percept=self._percept)
             self._builder.update(tick)
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
             self._newest, self.shown_s = tick, tick.t_s

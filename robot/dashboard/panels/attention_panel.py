@@ -70,7 +70,7 @@ def salience_bars(snapshot: Snapshot) -> str:
     rows = snapshot.saliences
     if not rows:
         return note("nothing is salient: the gaze wanders")
-    sums = [sum(max(0.0, term) for term in one[2:7]) for one in rows]
+    sums = [sum(max(0.0, getattr(one, term)) for term in _TERMS) for one in rows]
     full = max(_LEAST_FULL, *sums, rows[0].total)
     bars = "".join(_row(one, full, winner=row == 0) for row, one in enumerate(rows))
     keys = "".join(
