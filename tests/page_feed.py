@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 from present import present
 
 from gazerig.config.schema import load_rig
@@ -18,9 +19,10 @@ from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.model.types import LoopFigures
+from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 IN_TIME = LoopFigures(200.0, 0.0, 0.0, 0.0, 0, 0, 10.0)
-STATE = RunState({}, "wait", "", "shy", (None, None, 0), timing=IN_TIME)
+STATE = RunState({}, "wait", "", "shy", ResidualFigures(None, None, 0), timing=IN_TIME)
 GREY = np.full((400, 640, 3), (140, 120, 100), np.uint8)
 """A picture of the size that the scene's camera has."""
 
@@ -59,9 +61,9 @@ class PageFeed:
         """Return the tick with other angles of some joints."""
         joints, names = self.tick.joints, self.tick.guard_result.joints
         at = [joints_rad.get(n, x) for n, x in zip(names, joints.position_rad, strict=True)]
-        joints = joints._replace(position_rad=tuple(at))
+        joints = structs.replace(joints, position_rad=tuple(at))
         pose = self._made.shown_rig().kinematics.forward(joints)
-        return self.tick._replace(joints=joints, pose=pose, desired_rad=tuple(at))
+        return structs.replace(self.tick, joints=joints, pose=pose, desired_rad=tuple(at))
 
     def show(self, image: np.ndarray | None = None, **changes: Any) -> Tick:
         """Send a tick that is later than all pauses between messages; return it."""
@@ -69,9 +71,9 @@ class PageFeed:
         found, percept = present(self.tick.detections), present(self.tick.percept)
         self._frame += 1
         found = replace(found, captured_s=t_s, number=self._frame, image=image)
-        percept = replace(percept, captured_s=t_s)
-        self.tick = self.tick._replace(t_s=t_s, percept=percept)
-        tick = self.tick._replace(detections=found)._replace(**changes)
+        percept = structs.replace(percept, captured_s=t_s)
+        self.tick = structs.replace(self.tick, t_s=t_s, percept=percept)
+        tick = structs.replace(self.tick, detections=found, **changes)
         self._stream.update(tick)
         return tick
 

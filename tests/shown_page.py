@@ -10,9 +10,10 @@ import numpy as np
 from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 
+from gazerig.gaze.types import Face
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.model.parameter import Parameter
-from gazerig.robot.model.types import SeenFace, Snapshot
+from gazerig.robot.model.types import Snapshot
 
 T = TypeVar("T")
 
@@ -45,13 +46,15 @@ PARTS_M = (
     (0.0, 0.0, 0.0), (-0.045, -0.062, -0.020), (-0.022, -0.031, 0.035), (-0.020, 0.0, 0.080),
 )  # fmt: skip
 BACK = ((-0.98, 0.199, 0.0), (-0.199, -0.98, 0.0), (0.0, 0.0, 1.0))
-FACE = SeenFace(
+FACE = Face(
     3,
     (0.9, 0.1, 0.25),
+    (0.0, 0.0, 0.0),
     BACK,
     tuple(
         (x, y, z) for x, y, z in np.array((0.9, 0.1, 0.25)) + np.array(PARTS_M) @ np.array(BACK).T
     ),
+    1.0,
 )
 """A face that looks back along the x axis, a little aside."""
 PARAM = Parameter("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
 from msgspec import structs
+from msgspec.structs import replace
 from page_feed import GREY, IN_TIME, PageFeed
 from page_layout import boxes, faults, value, violations
 from shown_page import running_page, wait_for
@@ -59,14 +60,14 @@ class Shown:
         """Show a state and wait until the page shows it."""
         changes, timing = CHANGES[name], BUSY if name == "busy" else IN_TIME
         guard = self.feed.tick.guard_result
-        results = {key: changes[key] for key in changes if key in guard._fields}
-        others = {key: changes[key] for key in changes if key not in guard._fields}
+        results = {key: changes[key] for key in changes if key in guard.__struct_fields__}
+        others = {key: changes[key] for key in changes if key not in guard.__struct_fields__}
         errors = {"timeout": 3} if name == "bus lost" else {}
         self.feed.state = self.feed.state._replace(errors=errors, timing=timing)
         said = "['headline', 'busy'].map(id => document.getElementById(id).textContent)"
 
         def says() -> bool:
-            tick = self.feed.show(image, guard_result=guard._replace(**results), **others)
+            tick = self.feed.show(image, guard_result=replace(guard, **results), **others)
             words = [head_activity(tick).headline, busy_text(timing)]
             return bool(value(self.browser, said) == words)
 

@@ -14,7 +14,7 @@ from six_joints import SIX, of_six
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import BusHealth, DetectedFace, Detections, MovingBlob
-from gazerig.gaze.types import PARTS, Salience
+from gazerig.gaze.types import PARTS, Face, Salience
 from gazerig.robot.control.tick_text import health_text
 from gazerig.robot.dashboard.feed.camera_overlay import (
     IMAGE_WIDTH_PX,
@@ -45,7 +45,6 @@ from gazerig.robot.model.types import (
     LoopFigures,
     SeenBlink,
     SeenCamera,
-    SeenFace,
     SeenSaccade,
     ServoLimits,
     Servos,
@@ -199,7 +198,7 @@ FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 
 def looking(t_s: float, name: str = "face 1: nose", part: str | None = "N") -> Snapshot:
     """A head at the origin that looks straight at a face a metre away."""
-    face = SeenFace(1, (1.0, 0.0, 0.0), FACING, tuple((1.0, 0.0, 0.0) for _ in PARTS))
+    face = Face(1, (1.0, 0.0, 0.0), (0.0,) * 3, FACING, tuple((1.0, 0.0, 0.0) for _ in PARTS), 1.0)
     return replace(
         snapshot(t_s), p_world_head_m=(0.0, 0.0, 0.0),
         p_world_eyes_m=((0.0, 0.03, 0.0), (0.0, -0.03, 0.0)), p_world_target_m=(1.0, 0.0, 0.0),

@@ -15,7 +15,7 @@ from gazerig.robot.model.control_source import ControlSource, TrackState
 from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 
 if TYPE_CHECKING:
-    from gazerig.gaze.types import Salience
+    from gazerig.gaze.types import Face, Salience
 
 GAZE_JOINTS = (
     "left_eye_pan",
@@ -148,26 +148,6 @@ class GuardResult(Struct, frozen=True, gc=False):
         return JointOutcome(
             self.desired_rad[i], self.command_rad[i], self.why[i] if self.why else ""
         )
-
-
-@dataclass(frozen=True, slots=True)
-class SeenFace:
-    """A face for the page: identity, centre, axes and the eight parts, world frame.
-
-    Attributes:
-        p_world_m: Centre at the frame's capture, like all positions here.
-        v_world_m_s: Velocity of the centre.
-        looks_at_head: Whether the person looks at the head, None if that is too uncertain.
-        speaks: Whether the mouth moves as in speech, None if the mouth is not found.
-    """
-
-    id: int
-    p_world_m: Vec3
-    R_world_face: Mat3
-    parts_world_m: tuple[Vec3, ...]
-    v_world_m_s: Vec3 = (0.0, 0.0, 0.0)
-    looks_at_head: bool | None = None
-    speaks: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +331,7 @@ class Snapshot:
     phase: str
     level: Level
     reasons: tuple[str, ...]
-    faces: tuple[SeenFace, ...]
+    faces: tuple["Face", ...]
     bodies: tuple[SeenBody, ...]
     rate_hz: float
     health: str

@@ -27,7 +27,6 @@ from gazerig.robot.model.types import (
     SeenBody,
     SeenCamera,
     SeenEvent,
-    SeenFace,
     SeenSaccade,
     ServoLimits,
     Servos,
@@ -216,7 +215,7 @@ def snapshot(
         phase=does.phase,
         level=tick.guard_result.level,
         reasons=tick.guard_result.reasons,
-        faces=_faces(tick),
+        faces=percept.faces if percept is not None else (),
         bodies=_bodies(tick),
         rate_hz=rate_hz,
         health=health,
@@ -258,23 +257,6 @@ def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
 
 def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:
     return None if _LOWER_LIDS.isdisjoint(names) else (pose.lower_left, pose.lower_right)
-
-
-def _faces(tick: Tick) -> tuple[SeenFace, ...]:
-    if tick.percept is None:
-        return ()
-    return tuple(
-        SeenFace(
-            face.id,
-            face.p_world_m,
-            face.R_world_face,
-            face.parts_world_m,
-            face.v_world_m_s,
-            face.looks_at_head,
-            face.speaks,
-        )
-        for face in tick.percept.faces
-    )
 
 
 def _bodies(tick: Tick) -> tuple[SeenBody, ...]:

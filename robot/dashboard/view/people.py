@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import viser
 
-from gazerig.gaze.types import PARTS, Floats, Vec3
+from gazerig.gaze.types import PARTS, Face, Floats, Vec3
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glow_disc, painted_glb
 from gazerig.robot.dashboard.view.scene_node import rotation_to, set_pose, set_rotation
 from gazerig.robot.description.mesh import Colour, Mesh, cap, ring
@@ -13,7 +13,7 @@ from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.person_shape import LOOKS, hand, head, torso
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
+from gazerig.robot.model.types import SeenBody, Snapshot
 
 FIXATED_WITHIN_M = 0.02
 """Largest distance of the target from its face part, m (parts are 3 cm apart or more)."""
@@ -58,7 +58,7 @@ class _Shadow:
 class _Person:
     """Person of a face: a head in the face's frame, and an upright chest."""
 
-    def __init__(self, scene: viser.SceneApi, frame: str, face: SeenFace) -> None:
+    def __init__(self, scene: viser.SceneApi, frame: str, face: Face) -> None:
         self._shade = _Shadow(scene, f"/shades/{face.id}", 0.3)
         shown, chest = _person_glb((face.id - 1) % len(LOOKS))
         self._head = scene.add_glb(f"{frame}/head", shown, cast_shadow=False, receive_shadow=False)
@@ -66,7 +66,7 @@ class _Person:
             f"/chests/{face.id}", chest, cast_shadow=False, receive_shadow=False
         )
 
-    def show(self, face: SeenFace, nose_m: Floats) -> None:
+    def show(self, face: Face, nose_m: Floats) -> None:
         """Move the person so that the nose is at its detected position."""
         (ahead, _, _), (aside, _, _), _ = face.R_world_face
         x, y, z = face.p_world_m
@@ -93,7 +93,7 @@ class _Outline:
             f"{frame}/outline", line.vertices, line.faces, color=_FOUND, side="double"
         )
 
-    def show(self, face: SeenFace, nose_m: Floats) -> None:
+    def show(self, face: Face, nose_m: Floats) -> None:
         """Move the line to the face, in the plane of the eyes."""
         set_pose(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
 
@@ -111,7 +111,7 @@ class _FaceView:
     marks: whether the world draws the person, so that the detected face is only marked
     """
 
-    def __init__(self, scene: viser.SceneApi, face: SeenFace, *, marks: bool) -> None:
+    def __init__(self, scene: viser.SceneApi, face: Face, *, marks: bool) -> None:
         self._scene = scene
         self._name = f"/faces/{face.id}"
         self._frame = scene.add_frame(self._name, show_axes=False)
@@ -128,7 +128,7 @@ class _FaceView:
             f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, side="double"
         )
 
-    def show(self, face: SeenFace, p_world_target_m: Vec3, parts: bool) -> None:
+    def show(self, face: Face, p_world_target_m: Vec3, parts: bool) -> None:
         """Move the person; ``parts``: mark the face's parts, with a halo at the fixated one."""
         set_pose(self._frame, face.p_world_m, quaternion(face.R_world_face))
         self._label.text = face_label(face)
@@ -251,14 +251,14 @@ class PeopleView:
         self._label.text = snapshot.target_name
 
 
-def face_label(face: SeenFace) -> str:
+def face_label(face: Face) -> str:
     """Return the label of a face, e.g. "face 3, looks at the head, speaks"."""
     looks = ", looks at the head" if face.looks_at_head else ""
     speaks = ", speaks" if face.speaks else ""
     return f"face {face.id}{looks}{speaks}"
 
 
-def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:
+def fixated_part(face: Face, p_world_target_m: Vec3) -> int | None:
     """Return the row of the target's face part, None if the target is on no part."""
     away_m = np.linalg.norm(np.array(face.parts_world_m) - p_world_target_m, axis=1)
     nearest = int(away_m.argmin())
