@@ -18,7 +18,7 @@ from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunEnd
+from gazerig.robot.recording.run_info import PROFILE, RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
 # --- what cannot be read
@@ -76,11 +76,11 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
         tmp_path / "text": "is not a recording: make one with gazerig run --record",
         tmp_path / "empty": "is not a recording",
         written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
-        written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* up to 1: update gazerig",
+        written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* reads 2: use the version",
         written(
             tmp_path / "other", "ros2"
         ): r"not a recording of gazerig \(its profile is 'ros2'\)",
-        written(tmp_path / "bare", "gazerig-run-1"): "it contains nothing of a run",
+        written(tmp_path / "bare", PROFILE): "it contains nothing of a run",
     }
     for path, words in wrong.items():
         with pytest.raises(SetupError, match=words) as found:

@@ -211,8 +211,8 @@ class RunRecording:
             )
         if profile.startswith(_RUN):
             raise BadRecording(
-                f"{self.path} is of format {profile.removeprefix(_RUN)}, this program reads up to "
-                f"{FORMAT}: update gazerig"
+                f"{self.path} is of format {profile.removeprefix(_RUN)}, this program reads "
+                f"{FORMAT}: use the version of gazerig that recorded it"
             )
         raise BadRecording(
             f"{self.path} is not a recording of gazerig (its profile is {profile!r}): make one with "

@@ -9,9 +9,9 @@ import msgspec
 from msgspec import Meta, Struct
 
 T = TypeVar("T")
-FORMAT = 1
-"""Version of the message contents; it increases when an older reader would misinterpret them."""
-PROFILE = "gazerig-run-1"
+FORMAT = 2
+"""Version of the message contents; only this one is read."""
+PROFILE = f"gazerig-run-{FORMAT}"
 """MCAP profile of recordings of runs."""
 
 
