@@ -5,14 +5,11 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.computer import (
-    LOWEST_HZ,
     ComputerFigures,
     load_level,
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
-from gazerig.robot.control.loop_timing import slower_rate
-from gazerig.robot.model.types import LoopFigures
 
 CARD, SOFTWARE, NOTHING = False, True, None
 
@@ -53,25 +50,6 @@ def test_the_rate_of_a_level_and_the_option_that_overrides_it(
 ) -> None:
     asked = RunOptions(mock=True, **options)  # type: ignore[arg-type]
     assert with_options(load_rig("desk"), asked.check_and_complete()).loop.rate_hz == rate_hz
-
-
-@pytest.mark.parametrize(
-    ("over_s", "late_share", "rate_hz", "slower_hz"),
-    [
-        (2.5, 0.06, 200.0, 100.0),
-        (2.5, 0.06, 94.0, 50.0),
-        (2.5, 0.06, 50.0, None),
-        (2.5, 0.06, 40.0, None),
-        (2.5, 0.04, 200.0, None),
-        (1.5, 0.50, 200.0, None),
-    ],
-)
-def test_a_computer_that_becomes_busy_halves_the_rate(
-    over_s: float, late_share: float, rate_hz: float, slower_hz: float | None
-) -> None:
-    figures = LoopFigures(rate_hz, 0.0, 1.0, 30.0, 9, 9, over_s, late_share, 30.0)
-    assert slower_rate(figures, rate_hz, LOWEST_HZ) == slower_hz
-    assert slower_rate(None, rate_hz, LOWEST_HZ) is None
 
 
 def test_a_busy_computer_renders_no_pictures_of_a_world() -> None:

@@ -99,7 +99,7 @@ def nod(**more: object) -> Track:
 def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
     fast = (KeyFrame(0.05, head_pitch_deg=-10.0),)
     with pytest.raises(
-        TrackRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, \d+ more than the 1600 for"
+        TrackRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, but tracks may use 1600"
     ):
         fitted(Track("a jerk", fast))  # fmt: skip
     slow = fitted(Track("a jerk", fast, fit="slow"))
@@ -111,9 +111,7 @@ def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
 
 
 def test_at_the_end_of_a_range_it_is_smaller_or_refused() -> None:
-    with pytest.raises(
-        TrackRefused, match=r"neck_pitch at 0\.\d\d s: -39\.0 deg is 4\.0 deg beyond"
-    ):
+    with pytest.raises(TrackRefused, match="neck_pitch leaves its range: it can move 50% as far"):
         fitted(nod(), neck_pitch=-31.0)  # fmt: skip
     found = fitted(nod(fit="slow"), neck_pitch=-31.0)
     assert found.reduced_joints == (("neck_pitch", pytest.approx(0.5)),)

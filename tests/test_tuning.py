@@ -276,13 +276,10 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     bench = Bench(str(mine), scanpath="random", saccade="min_jerk")
     assert bench.tuning.unsaved() == ()
     bench.tuning.apply_character("bold")
-    bench.tuning.set_option("loop.rate_hz", 50.0)
     bench.tuning.reload(mine)
     assert bench.made.live_params.rig.gaze.scanpath.model == "random"
-    assert bench.made.live_params.rig.loop.rate_hz == 50.0
     assert [change.key for change in bench.tuning.unsaved()] == ["character"]
     bench.tuning.set({"gaze.idle.hold_ms": 300.0})
     bench.tuning.save()
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"
-    assert load_rig(str(mine)).loop.rate_hz == 200.0
     assert load_rig(str(mine)).gaze.idle.hold_ms == 300.0

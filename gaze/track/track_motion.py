@@ -76,7 +76,6 @@ class TrackMotion:
 
     duration_s: time until everything is at rest again
     samples: samples of all channels; of a long track those with the extremes
-    key_times_s: times of the keys by index of the channel
     channels: indices of the channels that it moves; owned: those that it owns
     events: gaze points, expressions and cues
 
@@ -124,10 +123,6 @@ class TrackMotion:
         self._keys_s = [
             np.array(found.times_s) for found in (*keys.values(), *(one.keys for one in levels))
         ]
-        self.key_times_s: dict[int, Floats] = {}
-        for i, curve, *_ in self._curves:
-            known = self.key_times_s.get(i, np.zeros(0))
-            self.key_times_s[i] = np.union1d(known, curve.times_s)
         ends = [found[-1][0] for found in events if found]
         self.duration_s = max(
             [curve.duration_s for _, curve, *_ in self._curves] + ends, default=0.0

@@ -178,19 +178,6 @@ class ParamStore:
                 rig = apply_changes(state.saved, changes)
             return self._apply(state, rig)
 
-    def set_option(self, key: str, value: Value) -> tuple[str, ...]:
-        """Apply a value as an option of the command line does: it is not written to a file.
-
-        Raises:
-            gazerig.config.load.ConfigError: the value breaks a rule; nothing changes.
-        """
-        with self._changing:
-            state, change = self._state, {key: value}
-            rig = apply_changes(state.rig, change)
-            state = state._replace(saved=apply_changes(state.saved, change))
-            self._options = {**self._options, **change}
-            return self._apply(state, rig)
-
     def unsaved(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the files."""
         state = self._state

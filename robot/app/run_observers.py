@@ -6,9 +6,7 @@ its own thread or process, and receives each tick with hardly any delay.
 
 import contextlib
 import os
-import threading
 from collections.abc import Callable, Iterator
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +17,7 @@ from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
-from gazerig.robot.app.computer import LOWEST_HZ, level_text
+from gazerig.robot.app.computer import level_text
 from gazerig.robot.app.door_processes import DoorProcesses
 from gazerig.robot.app.mock_agent import AgentScene, MockAgent
 from gazerig.robot.app.options import RunOptions
@@ -28,7 +26,7 @@ from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.app.voice import RunVoice
 from gazerig.robot.control.command_handler import accept_only_stops
 from gazerig.robot.control.loop import LoopCount
-from gazerig.robot.control.loop_timing import LoopTiming, busy_text, slower_rate
+from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
@@ -50,7 +48,6 @@ if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
 
 _STATES_PER_FIGURES = 3
-_RELIEF_S = 1.0
 STEER = "steer"
 """Name of the menu with the page's steps of a calibration (dashboard/panels/controls.py)."""
 
@@ -108,8 +105,6 @@ class RunObservers:
         self._emulated = options.mock and steer is None
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(assembly.live_params.rig.detector))
-        self._measured = options.computer is not None and options.rate is None
-        self._relief_s = -inf
         self._choice = level_text(options.computer) if options.computer is not None else ""
         self._tuning, self._recorder = tuning, recorder
         name = options.name or rig_name(options.rig)
@@ -229,8 +224,6 @@ class RunObservers:
             observers.add("the simulated voice agent", self._report_talk)
         if not self._fast:
             observers.add("the loop's time", self._record_time)
-            if self._measured and self._tuning is not None:
-                observers.add("the choice of the loop's rate", self._relieve_computer)
         if self._page is not None:
             observers.add("picking a point on the page", self._follow)
         if self._status is not None:
@@ -364,22 +357,6 @@ class RunObservers:
         if tick.commands and any(isinstance(command, Tune) for command in tick.commands):
             self._timing.retune(self._made.loop.rate_hz)
         self._timing.update(tick.t_s)
-
-    def _relieve_computer(self, tick: Tick) -> None:
-        """Halve the rate of the loop if the measured computer has become too busy for it."""
-        if tick.t_s < self._relief_s:
-            return
-        self._relief_s, rate_hz = tick.t_s + _RELIEF_S, self._made.loop.rate_hz
-        slower_hz = slower_rate(self._timing.figures(), rate_hz, LOWEST_HZ)
-        if slower_hz is not None and self._tuning is not None:
-            self._say(
-                f"the computer has become too busy for {rate_hz:g} Hz: the loop continues at "
-                f"{slower_hz:g} Hz; --rate overrides it"
-            )
-            # The rules of a rig take longer to check than a tick has.
-            threading.Thread(
-                target=self._tuning.set_option, args=("loop.rate_hz", slower_hz), daemon=True
-            ).start()
 
     def _follow(self, tick: Tick) -> None:
         """Store the percept for the placement of a click, and show the rig again after tuning."""

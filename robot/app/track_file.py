@@ -22,7 +22,6 @@ from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.motion_keys import GRID_S, fit_keys, resample, smooth
 from gazerig.robot.model.track_fit import (
     FittedTrack,
-    KeyExcess,
     TrackFit,
     TrackRefused,
     channel_of_joint,
@@ -135,12 +134,10 @@ class RigTrack(NamedTuple):
 
     fitted: the track as the rig plays it; None if it cannot
     refused: the reason, "" if it can
-    excesses: every key that it cannot reach or follow as written
     """
 
     fitted: FittedTrack | None
     refused: str
-    excesses: tuple[KeyExcess, ...]
 
 
 def write_track(rig: Rig, name: str, text: str, folder: Path, force: bool) -> tuple[Path, RigTrack]:
@@ -166,13 +163,9 @@ def fit_to_rig(rig: Rig, track: Track) -> RigTrack:
     fit = TrackFit(rig.names, lid_spans(rig))
     try:
         made = track_motions(track, rig.names, 0, animation_tables(rig))
+        return RigTrack(fit.fit("", made, 1.0, middle, bounds), "")
     except TrackRefused as refused:
-        return RigTrack(None, str(refused), ())
-    excesses = fit.key_excesses(made, middle, bounds) if track.frames else ()
-    try:
-        return RigTrack(fit.fit("", made, 1.0, middle, bounds), "", excesses)
-    except TrackRefused as refused:
-        return RigTrack(None, str(refused), excesses)
+        return RigTrack(None, str(refused))
 
 
 def _check_length(takes_s: float) -> None:

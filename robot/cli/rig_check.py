@@ -65,7 +65,7 @@ def weight_lines(rig: str) -> list[str]:
 
 
 def track_lines(rig: str) -> list[str]:
-    """Return every key of a good rig's own tracks that it cannot reach or follow.
+    """Return how a good rig plays each of its own tracks.
 
     Raises:
         ConfigError: the rig is not good.
@@ -73,13 +73,10 @@ def track_lines(rig: str) -> list[str]:
     from gazerig.config.schema import load_rig
     from gazerig.config.tracks import load_track, track_path
     from gazerig.robot.app.track_file import fit_to_rig
-    from gazerig.robot.cli.tracks import excess_lines
+    from gazerig.robot.cli.tracks import fit_text
 
     loaded = load_rig(rig)
     return [
-        line
+        fit_text(loaded.name, file, fit_to_rig(loaded, load_track(track_path(file))))
         for file in loaded.track_files
-        for line in excess_lines(
-            loaded.name, file, fit_to_rig(loaded, load_track(track_path(file)))
-        )
     ]

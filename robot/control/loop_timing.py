@@ -11,8 +11,7 @@ OVER_S = 5.0
 BUSY_SHARE = 0.05
 """A computer that misses this share of the slots is too busy."""
 _SHORTEST_S = 3.0
-"""Shortest time for a message; before it a measured computer takes a lower rate."""
-_RELIEF_S = 2.0
+"""Shortest time for a message, s."""
 
 
 class LoopTiming:
@@ -81,16 +80,3 @@ def busy_text(figures: LoopFigures | None) -> str:
         f"the computer is too busy: {figures.late_share:.0%} of ticks came late "
         f"(worst {figures.latest_ms:.0f} ms)"
     )
-
-
-def slower_rate(figures: LoopFigures | None, rate_hz: float, lowest_hz: float) -> float | None:
-    """Return a lower rate for a loop on a computer that has become busy, None to keep its rate.
-
-    Args:
-        figures: Figures of the last seconds, None if unknown.
-        rate_hz: Present rate.
-        lowest_hz: Lowest rate of any computer.
-    """
-    if figures is None or figures.over_s < _RELIEF_S or figures.late_share < BUSY_SHARE:
-        return None
-    return max(lowest_hz, rate_hz / 2.0) if rate_hz > lowest_hz else None

@@ -251,7 +251,7 @@ class TrackChoices:
         try:
             fitted = self._fit_track(Play(name), middle, limits)
         except TrackRefused as refused:
-            return TrackInfo(name, track.description, refused=refused.reasons[0])
+            return TrackInfo(name, track.description, refused=str(refused))
         made = self._require_motions(name, 0)
         return TrackInfo(
             name, track.description, fitted.track.duration_s, fitted.slowed_by, "", made.owns,

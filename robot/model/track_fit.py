@@ -33,29 +33,12 @@ _SMALLEST = 0.2
 """Smallest share of a track that a range may leave; less is hardly visible and is not played."""
 _ROUNDING = 1e-6
 _LEFT = 0.25
-_MOST_NAMED = 200
-_BETWEEN = np.linspace(0.0, 1.0, 25)
-_KEYS_AT_ONCE = 2000
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class TrackRefused(ValueError):
-    """A track that a rig cannot play.
-
-    Attributes:
-        reasons: The reason; or one for each key that the rig cannot reach or follow, with joint,
-            time and limit, at most 200 and the number of the others.
-    """
-
-    def __init__(self, *reasons: str) -> None:
-        super().__init__(*reasons)
-        more = len(reasons) - _MOST_NAMED
-        self.reasons = (*reasons[:_MOST_NAMED], *[f"and {more} more keys"] * (more > 0))
-
-    def __str__(self) -> str:
-        """Return all reasons."""
-        return "; ".join(self.reasons)
+    """A track that a rig cannot play; the message gives the reason."""
 
 
 class FittedTrack(NamedTuple):
@@ -221,30 +204,6 @@ def _neck(channel: str) -> str:
     return channel.replace("head", "neck")
 
 
-class KeyExcess(NamedTuple):
-    """A key that a rig cannot reach, or not follow from the key before.
-
-    quantity: "range", "speed" or "acceleration"; asked, most: in deg, deg/s or deg/s^2
-    """
-
-    time_s: float
-    joint: str
-    quantity: str
-    asked: float
-    most: float
-
-    def text(self) -> str:
-        """Return joint, time and amount."""
-        at = f"{self.joint} at {self.time_s:.2f} s"
-        over = abs(self.asked) - abs(self.most)
-        if self.quantity == "range":
-            return (
-                f"{at}: {self.asked:.1f} deg is {over:.1f} deg beyond its range, {self.most:g} deg"
-            )
-        unit = "deg/s" if self.quantity == "speed" else "deg/s2"
-        return f"{at}: needs {self.asked:.0f} {unit}, {over:.0f} more than the {self.most:.0f} for tracks"
-
-
 class TrackFit:
     """The fit of tracks to the limits of one rig.
 
@@ -322,20 +281,17 @@ class TrackFit:
             base_rad = np.array(base_rad)
             base_rad[[self.joints.index(name) for name in made.owns]] = 0.0
 
-        def refusal(otherwise: str) -> TrackRefused:
-            keys = self.key_excesses(made, base_rad, limits, speed)
-            return TrackRefused(*[one.text() for one in keys] or [otherwise])
-
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
         if smaller and not slow:
-            raise refusal(f"{smaller[0][0]} leaves its range")
+            joint, share = smaller[0]
+            raise TrackRefused(f"{joint} leaves its range: it can move {share:.0%} as far")
         if smaller and min(left for _, left in smaller) < _SMALLEST:
             joint = min(smaller, key=lambda one: one[1])[0]
             raise TrackRefused(f"{joint} is at the end of its range")
         samples = motion.samples.scale(sizes, speed)
         factor, joint, text = self._too_fast(samples, limits, matrix)
         if factor > 1.0 + _ROUNDING and not slow:
-            raise refusal(text)
+            raise TrackRefused(text)
         stretch = _stretch(matrix, limits)
         played = PlayedTrack(
             name,
@@ -365,66 +321,6 @@ class TrackFit:
                     sizes[c] = min(sizes[c], there / far)
                     smaller[self.joints[j]] = float(sizes[c])
         return sizes, tuple(smaller.items())
-
-    def key_excesses(
-        self, made: TrackMotions, base_rad: Floats, limits: Sequence[JointLimit],
-        rate: float = 1.0,
-    ) -> tuple[KeyExcess, ...]:  # fmt: skip
-        """Return every key that the rig cannot reach or follow, in the order of times.
-
-        Args:
-            made: The track's curves on this rig.
-            base_rad: Joint angles to which it is added.
-            limits: Limits of the joints.
-            rate: Factor on its defined speed.
-        """
-        motion, matrix = made.motion, self._matrix_of(made.motion)
-        owned = [name in made.owns for name in self.joints]
-        base = np.where(owned, 0.0, base_rad)
-        low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
-        most = _track_limits(limits)
-        reach_of = self._own  # without eyes that compensate for the head as far as they can
-        if made.track.space == "joint":
-            reach_of = matrix * (self._own != 0.0).any(axis=1, keepdims=True)
-        keys = motion.key_times_s
-        times = np.unique(np.concatenate([np.zeros(1), *keys.values()]))
-        blocks = []
-        for first in range(0, len(times) - 1, _KEYS_AT_ONCE):
-            ends = times[first : first + _KEYS_AT_ONCE + 1]
-            inner = ends[:-1, None] + np.diff(ends)[:, None] * _BETWEEN
-            samples = motion.sample_at(inner.ravel())
-            blocks.append(
-                [base + motion.sample_at(ends[1:]).value @ reach_of]
-                + [
-                    factor * np.abs(column @ matrix).reshape(*inner.shape, -1).max(axis=1)
-                    for factor, column in zip((rate, rate**2), samples[2:], strict=True)
-                ]
-            )
-        found: list[KeyExcess] = []
-        angles, *peaks = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-        for j, joint in enumerate(self.joints):
-            own = [keys[int(c)] for c in np.flatnonzero(matrix[:, j]) if int(c) in keys]
-            rows = np.flatnonzero(np.isin(times[1:], np.concatenate([np.zeros(0), *own])))
-            if not len(rows):
-                continue
-            at_s = times[1:][rows]
-            reach = angles[rows, j]
-            beyond = np.maximum(reach - high[j], low[j] - reach) > _ROUNDING
-            found += [
-                KeyExcess(
-                    t, joint, "range", degrees(a), degrees(high[j] if a > high[j] else low[j])
-                )
-                for t, a in zip(at_s[beyond].tolist(), reach[beyond].tolist(), strict=True)
-            ]
-            starts = np.concatenate(([0], rows[:-1] + 1))  # the motion since the key before
-            for peak, limit, quantity in zip(peaks, most, ("speed", "acceleration"), strict=True):
-                worst = np.maximum.reduceat(peak[: rows[-1] + 1, j], starts)
-                fast = worst > limit[j] * (1.0 + _ROUNDING)
-                found += [
-                    KeyExcess(t, joint, quantity, degrees(v), degrees(limit[j]))
-                    for t, v in zip(at_s[fast].tolist(), worst[fast].tolist(), strict=True)
-                ]
-        return tuple(sorted(found))
 
     def remaining_limits(
         self, limits: Sequence[JointLimit], others: Iterable[PlayedTrack]
