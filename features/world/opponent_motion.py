@@ -13,9 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.features.world.time_profiles import smooth_rise
-from gazerig.features.world.timeline import HEAD_M
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.sim_mock.scenes.scene import Event
 
 STEP_S, AHEAD = 0.01, 5
 """Period of the rows, and how many are written ahead, so that no reader has to extrapolate."""
@@ -24,8 +22,6 @@ HOLD_S, TAKE_S = 1.0, 0.6
 MAX_M_S, MAX_M_S2, _RATE_HZ = 3.0, 40.0, 16.0
 """Limits of the fist: a scripted punch has 2.6 m/s."""
 BODY_M_S, _BODY_RATE_HZ, _BODY_FROM_M, _BODY_TO_M = 0.8, 4.0, (-0.15, -0.5), (0.4, 0.5)
-_PUNCH_M_S, _ARRIVED_M_S, _PUNCH_M, _OVER_S = 0.8, 0.3, 0.15, 0.25
-_OPEN_M, _OPEN_S = 0.2, 0.3
 _KEPT = 1024
 """Number of rows that readers can read: 10 s."""
 
@@ -44,18 +40,14 @@ class OpponentMotion:
 
     Attributes:
         spans_s: times in which a person moved it, (start, end).
-        events: punches and open guards that are over, derived from the motion.
     """
 
     def __init__(self, home_m: Vec3) -> None:
         self.spans_s: list[tuple[float, float]] = []
-        self.events: list[Event] = []
         self._home = np.array(home_m)
         self._target, self._ordered_s = self._home, -np.inf
         self._share, self._fist, self._speed = 0.0, self._home, np.zeros(3)
         self._body, self._body_speed = np.zeros(2), np.zeros(2)
-        self._punch: tuple[float, float] | None = None
-        self._open_s: float | None = None
 
     @property
     def is_at_rest(self) -> bool:
@@ -74,7 +66,6 @@ class OpponentMotion:
             self.spans_s.append((t_s, t_s))
             self._fist, self._speed = self._home, np.zeros(3)
             self._body, self._body_speed = np.zeros(2), np.zeros(2)
-        before_m = self._fist
         self._fist, self._speed = _follow_target(
             self._fist, self._speed, self._target if held else self._home, _RATE_HZ, MAX_M_S
         )
@@ -86,34 +77,9 @@ class OpponentMotion:
         self._share = float(np.clip(self._share + change, 0.0, 1.0))
         if self.spans_s:
             self.spans_s[-1] = (self.spans_s[-1][0], t_s)
-        self._find_events(before_m, t_s)
         return OpponentRow(
             number, float(smooth_rise(np.array(self._share))), self._fist, self._body
         )
-
-    def _find_events(self, before_m: Floats, t_s: float) -> None:
-        """Note a fast approach that has ended near the head, and a guard that was open."""
-        far_m = float(np.linalg.norm(self._fist - HEAD_M))
-        closing_m_s = (float(np.linalg.norm(before_m - HEAD_M)) - far_m) / STEP_S
-        if self._punch is None and closing_m_s >= _PUNCH_M_S:
-            self._punch = t_s - STEP_S, far_m
-        elif self._punch is not None and closing_m_s < _ARRIVED_M_S:
-            (start_s, from_m), self._punch = self._punch, None
-            if from_m - far_m >= _PUNCH_M:
-                self._note("punch", "hand", start_s, t_s + _OVER_S, due_s=t_s)
-        low = self._fist[2] < self._home[2] - _OPEN_M
-        if low and self._open_s is None:
-            self._open_s = t_s
-        elif not low and self._open_s is not None:
-            start_s, self._open_s = self._open_s, None
-            if t_s - start_s >= _OPEN_S:
-                self._note("attack", "attack_target", start_s, t_s)
-
-    def _note(
-        self, name: str, kind: str, start_s: float, end_s: float, due_s: float | None = None
-    ) -> None:
-        x, y, z = self._fist.tolist()
-        self.events.append(Event(name, "look", kind, start_s, end_s, (x, y, z), 0.6, due_s))
 
 
 def _follow_target(
@@ -200,11 +166,6 @@ class Opponent:
     def spans_s(self) -> Sequence[tuple[float, float]]:
         """Return the times in which a person moved it."""
         return () if self._motion is None else self._motion.spans_s
-
-    @property
-    def events(self) -> Sequence[Event]:
-        """Return the events of its motion that are over."""
-        return () if self._motion is None else self._motion.events
 
     def move(self, p_m: Vec3, t_s: float) -> None:
         """Move the fist to a point; t_s: time of the scene."""

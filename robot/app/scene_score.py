@@ -13,19 +13,13 @@ guards. It uses ``Target.plan`` and the events of a scene: "punch", with the arr
 fist, and "attack", while the opponent's guard is open.
 """
 
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from math import dist
 from statistics import median
 from typing import Literal, NamedTuple
 
-from gazerig.gaze.types import Vec3
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.moved_opponent import MovableOpponent
 from gazerig.robot.model.scene_events import BoxingEvent, ExpectedResponse
-
-_MOST_TICKS = 2000
-"""Number of ticks stored to score an event of a person's motion: 10 s at 200 Hz."""
 
 
 class _EventOutcome(NamedTuple):
@@ -75,26 +69,20 @@ class BehaviourScore:
         self,
         events: Iterable[ExpectedResponse],
         round_s: float,
-        moved: MovableOpponent | None = None,
-        start_s: Callable[[], float | None] = lambda: None,
     ) -> None:
         self._events = tuple(events)
-        self._moved, self._judged, self._start_s = moved, 0, start_s
-        self._looks: deque[tuple[float, float, str, Vec3]] = deque(maxlen=_MOST_TICKS)
         self._round_s = round_s
         self._observations: dict[int, _EventObservation] = {}
         self._outcomes: dict[str, list[_EventOutcome]] = {event.name: [] for event in self._events}
         self._first_s: float | None = None
         self._last_s = 0.0
         self._round = 0
-        self._round_of: dict[int, int] = {}
 
     def update(self, tick: Tick) -> None:
         """Count one tick; the first one is the start of the scene."""
         if self._first_s is None:
             self._first_s = self._last_s = tick.t_s
         dt_s, self._last_s = tick.t_s - self._last_s, tick.t_s
-        self._judge_moved(dt_s, tick)
         number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
         if number != self._round:
             self._round = int(number)
@@ -102,7 +90,6 @@ class BehaviourScore:
                 self._close_event(i)
         for i, event in enumerate(self._events):
             if event.start_s <= phase_s < event.end_s:
-                self._round_of[i] = self._round
                 watch, target = self._observations.setdefault(i, _EventObservation()), tick.target
                 away_m = dist(target.p_world_m, event.place_world_m)
                 on = target.kind == event.kind and away_m <= event.within_m
@@ -114,28 +101,7 @@ class BehaviourScore:
         """Record the outcome of an event."""
         event = self._events[i]
         outcome = self._observations.pop(i).outcome(event.response)
-        start_s = self._round_s * self._round_of[i]
-        if not _is_moved(self._moved, start_s + event.start_s, start_s + event.end_s):
-            self._outcomes[event.name].append(outcome)
-
-    def _judge_moved(self, dt_s: float, tick: Tick) -> None:
-        """Score the events of a person's motion, which are known only when they are over."""
-        if self._moved is None or not self._moved.spans_s:
-            return
-        start_s = self._start_s()
-        now_s = tick.t_s - ((self._first_s or 0.0) if start_s is None else start_s)
-        self._looks.append((now_s, dt_s, tick.target.kind, tick.target.p_world_m))
-        while self._judged < len(events := self._moved.events):
-            event = events[self._judged]
-            if event.end_s > now_s:
-                break
-            self._judged += 1
-            watch = _EventObservation()
-            for at_s, step_s, kind, p_m in self._looks:
-                if event.start_s <= at_s < event.end_s:
-                    near = dist(p_m, event.place_world_m) <= event.within_m
-                    watch.update(kind == event.kind and near, at_s - event.start_s, step_s)
-            self._outcomes.setdefault(event.name, []).append(watch.outcome(event.response))
+        self._outcomes[event.name].append(outcome)
 
     def figures(self) -> dict[str, dict[str, float | int | None]]:
         """Return for each name the number of events, the number seen, and statistics.
@@ -179,11 +145,8 @@ class PlannerScore:
         self,
         events: Iterable[BoxingEvent],
         round_s: float,
-        moved: MovableOpponent | None = None,
-        start_s: Callable[[], float | None] = lambda: None,
     ) -> None:
-        self._events, self._round_s, self._moved = tuple(events), round_s, moved
-        self._start_s = start_s
+        self._events, self._round_s = tuple(events), round_s
         self._first_s: float | None = None
         self._last_s = 0.0
         self._action = ""
@@ -241,18 +204,14 @@ class PlannerScore:
         }
 
     def _event_times(self, name: str) -> list[_Time]:
-        """Return the times of all events with a name: scripted ones, and those of a person."""
-        found = []
-        for number in range(int(self._last_s // self._round_s) + 1):
-            start_s = self._round_s * number
-            for event in self._events:
-                time = _time(event, start_s)
-                if event.name == name and not _is_moved(self._moved, time[0], time[1]):
-                    found.append(time)
-        moved = () if self._moved is None else self._moved.events
-        scene_s, first_s = self._start_s(), self._first_s
-        late_s = 0.0 if scene_s is None or first_s is None else scene_s - first_s
-        return found + [_time(event, late_s) for event in moved if event.name == name]
+        """Return the times of all events with a name."""
+        rounds = range(int(self._last_s // self._round_s) + 1)
+        return [
+            _time(event, self._round_s * number)
+            for number in rounds
+            for event in self._events
+            if event.name == name
+        ]
 
 
 def _time(event: BoxingEvent, after_s: float) -> _Time:
@@ -263,9 +222,3 @@ def _time(event: BoxingEvent, after_s: float) -> _Time:
 def _is_during(at_s: float, times: Iterable[_Time], before_s: float, after_s: float) -> bool:
     """Return whether a time is within an event, or near one."""
     return any(start - before_s <= at_s <= end + after_s for start, end, _ in times)
-
-
-def _is_moved(moved: MovableOpponent | None, start_s: float, end_s: float) -> bool:
-    """Return whether a person moved the opponent during a scripted event, and so replaced it."""
-    spans = () if moved is None else moved.spans_s
-    return any(start <= end_s and start_s <= end for start, end in spans)

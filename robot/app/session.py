@@ -28,23 +28,21 @@ if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
 
 
-class SceneScore(NamedTuple):
+class SceneScore:
     """Score of the responses to a scene's events, by the gaze and by the action planner."""
 
-    behaviours: BehaviourScore
-    planner: PlannerScore
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self.behaviours = BehaviourScore(scene.events(), scene.round_s)
+        self.planner = PlannerScore(scene.events(), scene.round_s)
 
-    @classmethod
-    def from_scene(
-        cls, scene: Scene, start_s: Callable[[], float | None] = lambda: None
-    ) -> "SceneScore":
-        """Return the score of a scene before its first tick; start_s: its start, or None."""
-        events = scene.events()
-        moved = scene.opponent if isinstance(scene, BoxingScene) else None
-        return cls(
-            BehaviourScore(events, scene.round_s, moved, start_s),
-            PlannerScore(events, scene.round_s, moved, start_s),
-        )
+    def figures(self) -> dict[str, object]:
+        """Return the scores; none if a person moved the opponent, who left the script then."""
+        scene = self._scene
+        if isinstance(scene, BoxingScene) and scene.opponent and scene.opponent.spans_s:
+            return {}
+        found = {"behaviours": self.behaviours.figures(), "planner": self.planner.figures()}
+        return {name: figures for name, figures in found.items() if figures}
 
 
 def run_figures(
@@ -67,10 +65,8 @@ def run_figures(
     if digest is not None:
         bus["tx_sha256"] = digest
     ticks = summary.figures() if summary is not None else {}
-    if score is not None and (behaviours := score.behaviours.figures()):
-        ticks["behaviours"] = behaviours
-    if score is not None and (planner := score.planner.figures()):
-        ticks["planner"] = planner
+    if score is not None:
+        ticks |= score.figures()
     seconds = {"seconds": ticks.pop("seconds")} if ticks else {}
     return {
         **seconds,
@@ -203,11 +199,7 @@ class Session:
         self._summary = Summary() if summarised else None
         self._faults = JointFaults(tried, self._run_observers.busy_message)
         scene = assembly.scene
-        room = assembly.room
-        start_s = (lambda: None) if room is None else room.start_s
-        self._score = (
-            SceneScore.from_scene(scene, start_s) if summarised and scene is not None else None
-        )
+        self._score = SceneScore(scene) if summarised and scene is not None else None
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)

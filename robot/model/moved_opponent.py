@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.scene_events import SceneEvent
 
 
 class MovableOpponent(Protocol):
@@ -13,11 +12,6 @@ class MovableOpponent(Protocol):
     @property
     def spans_s(self) -> Sequence[tuple[float, float]]:
         """Return the times in which a person moved it, (start, end)."""
-        ...
-
-    @property
-    def events(self) -> Sequence[SceneEvent]:
-        """Return the events of its motion that are over."""
         ...
 
     def move(self, p_m: Vec3, t_s: float) -> None:
