@@ -69,9 +69,6 @@ class SecondTuning:
             if value != self._file.get(key)
         )
 
-    def changed_from_defaults(self) -> tuple[ParamChange, ...]:
-        return self.unsaved()
-
     def save(self, path: Path | None = None) -> SavedFile:
         changes = self.unsaved()
         self._file = dict(self._now)

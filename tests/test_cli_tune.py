@@ -75,7 +75,7 @@ def held(key: str) -> Any:
 
 def test_get_shows_all_and_marks_what_is_not_saved() -> None:
     everything = gazerig("ctl", "get").stdout.splitlines()
-    assert len(everything) > 150 and everything[0].split() == ["key", "value", "unit", "default"]
+    assert len(everything) > 200 and everything[0].split() == ["key", "value", "unit", "default"]
     assert gazerig("ctl", "set", RATE, "150").returncode == 0
     table = gazerig("ctl", "get", "loop").stdout.splitlines()
     (row,) = (line for line in table if RATE in line)

@@ -191,9 +191,6 @@ class OneParam(StandIn):
     def unsaved(self) -> tuple[object, ...]:
         return ()
 
-    def changed_from_defaults(self) -> tuple[object, ...]:
-        return ()
-
     def characters(self) -> tuple[str, ...]:
         return ("none", "calm")
 

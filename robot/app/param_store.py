@@ -183,10 +183,6 @@ class ParamStore:
         state = self._state
         return _changes(state.saved, state.rig, state.file_values)
 
-    def changed_from_defaults(self) -> tuple[ParamChange, ...]:
-        """Return the values that differ from the defaults, those of the shipped rig."""
-        return _changes(self._defaults, self._state.rig, values(self._defaults))
-
     def revert(self) -> tuple[str, ...]:
         """Apply the values in the files again.
 

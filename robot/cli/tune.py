@@ -106,8 +106,11 @@ def get(
         values = rig.get(prefix)
         found = [param for param in rig.parameters() if param.key in values]
         if differs:
-            other = {change.key for change in rig.changed_from_defaults()}
-            found = [param for param in found if param.key in other]
+            found = [
+                param
+                for param in found
+                if _value_text(values[param.key]) != _value_text(param.default)
+            ]
         if not found and not differs:
             raise SetupError(f"{prefix}: no key begins with it; gazerig ctl get lists all")
         if as_json:

@@ -16,7 +16,6 @@ from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.model.requests import (
     Character,
     Characters,
-    Differs,
     Get,
     Parameters,
     ReadMenus,
@@ -67,10 +66,6 @@ class ParamAccess(Protocol):
 
     def unsaved(self) -> Sequence[ParamChange]:
         """Return the present values that are not in the file."""
-        ...
-
-    def changed_from_defaults(self) -> Sequence[ParamChange]:
-        """Return the values that differ from the defaults."""
         ...
 
     def save(self, path: Path | None = None) -> SavedFile:
@@ -206,8 +201,6 @@ class CommandHandler:
                 return params.get(prefix)
             case Unsaved():
                 return params.unsaved()
-            case Differs():
-                return params.changed_from_defaults()
             case Characters():
                 return params.characters()
             case Set(changes):

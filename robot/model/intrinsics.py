@@ -94,13 +94,6 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     return found
 
 
-def undistort(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Return the pixels (n, 2) without the lens's distortion."""
-    i = intrinsics
-    points: Floats = rays(points_px, i)[:, :2] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
-    return points
-
-
 def _undistort(plane: Floats, distortion: Distortion) -> Floats:
     """Undistort points of the plane z = 1 by fixed-point iteration.
 

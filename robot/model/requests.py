@@ -60,10 +60,6 @@ class Unsaved(Request, frozen=True):
     """Values that differ from the rig's file."""
 
 
-class Differs(Request, frozen=True):
-    """Values that differ from the defaults."""
-
-
 class Characters(Request, frozen=True):
     """Names of characters."""
 
@@ -107,7 +103,7 @@ class Fault(Request, frozen=True):
 
 
 Question = (
-    Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved | Differs | Characters
+    Hello | ReadStatus | State | ReadMenus | Tracks | Parameters | Get | Unsaved | Characters
 )  # fmt: skip
 Change = Set | Save | Revert | Character | SayPiece | Fault
 SLOW: frozenset[str] = frozenset((*map(verb, get_args(Change)), "say"))

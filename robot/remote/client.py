@@ -43,7 +43,6 @@ from gazerig.robot.model.requests import (
     SLOW,
     Character,
     Characters,
-    Differs,
     Fault,
     Get,
     Hello,
@@ -293,10 +292,6 @@ class RobotClient:
     def unsaved(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the rig's file."""
         return self.ask(Unsaved(), tuple[ParamChange, ...])
-
-    def changed_from_defaults(self) -> tuple[ParamChange, ...]:
-        """Return the present values that differ from the defaults."""
-        return self.ask(Differs(), tuple[ParamChange, ...])
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write the present values to the rig's own file, or to another file on this computer."""

@@ -17,7 +17,7 @@ from gazerig.robot.model.commands import (
     set_client,
 )
 from gazerig.robot.model.reply import CommandTaker, Ticket
-from gazerig.robot.model.requests import Character, Differs, Revert, Save, Set, read_request
+from gazerig.robot.model.requests import Character, Revert, Save, Set, read_request
 
 _REPLY_S = 1.0
 _STOP_S = 0.8
@@ -116,9 +116,6 @@ class PageRequestHandler:
                 return "\n".join(done) or "all is as in the file again"
             case Character(name):
                 return "\n".join(done) or f"the character is {name}"
-            case Differs():
-                lines = [f"{one.key}: {one.new} (default {one.old})" for one in done]
-                return "\n".join(lines) or "all is as by default"
         return None  # the page receives the other answers in other messages
 
     def _reply_text(self, ticket: Ticket, within_s: float) -> str | None:
