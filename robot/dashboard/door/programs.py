@@ -3,6 +3,7 @@
 GET  /api/v1/state          newest state
 POST /api/v1/do             one message; an order's answer has its outcome
 GET  /api/v1/socket         websocket: messages in both directions, states, events
+GET  /api/v1/openapi.json   description
 """
 
 import asyncio
@@ -46,13 +47,10 @@ from gazerig.robot.remote.excess import (
     TokenBucket,
     find_stop,
 )
+from gazerig.robot.remote.openapi import MOST_RATE_HZ, MOST_WAIT_S, WAIT_S, api_description
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION
 
 BASE = f"{API}v{VERSION}"
-MOST_RATE_HZ = 60
-"""Highest rate of states."""
-WAIT_S, MOST_WAIT_S = 10, 15
-"""Wait of an HTTP request for an outcome: the usual one and the longest."""
 MOST_PROGRAMS = 32
 """Largest number of websockets of programs; equal to that of tabs of the page."""
 _EVENTS_HZ = 20.0
@@ -262,6 +260,8 @@ class ProgramRoutes:
                     return await self._post(request)
                 case "GET", "socket":
                     return await self._socket(request)
+                case "GET", "openapi.json":
+                    return self._answer(api_description(BASE), 200)
             raise MessageRefused(
                 f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/",
                 404,
