@@ -269,8 +269,8 @@ class Machine:
                 raise RuleViolation(f"{name}'s servo has goal {goal}")
             room = self.room_rad + (GIVES_RAD if self._loaded else 0.0)
             inside = limit.low_rad - room <= true[i] <= limit.high_rad + room
-            if goal is None and self._loaded:
-                self._fallen.add(i)  # nothing holds a limp joint against a load
+            if goal is None:
+                self._fallen.add(i)  # nothing holds a limp joint, or brakes one in motion
             elif inside:
                 self._fallen.discard(i)
             if i in self._fallen:
