@@ -9,10 +9,10 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from page_feed import PageFeed
 from page_visitor import LOOKING, Visitor
 from present import present

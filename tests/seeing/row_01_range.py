@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 from seeing.material import at_hand
 from stand_in import StandIn
@@ -189,7 +190,7 @@ def believed(
     made.robot.start(made.clock)
     try:
         run(made.robot, made.clock, made.loop, lambda t: "end" if t >= seconds else None,
-            lambda tick: ticks.append(tick._replace(detections=None)))  # fmt: skip
+            lambda tick: ticks.append(structs.replace(tick, detections=None)))  # fmt: skip
     finally:
         made.robot.stop()
         made.close()

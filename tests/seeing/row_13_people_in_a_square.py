@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from fakes.runs import play
 from film_gaze import gaze_point, in_picture
+from msgspec import structs
 from numpy.typing import NDArray
 from seeing.material import at_hand
 
@@ -56,7 +57,7 @@ def measure(full: bool) -> dict[str, float]:
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, video=film, bus="ideal"))
     ticks: list[Tick] = []
     # Pictures are large.
-    play(made, SECONDS, lambda tick: ticks.append(tick._replace(detections=None)))
+    play(made, SECONDS, lambda tick: ticks.append(structs.replace(tick, detections=None)))
     masks = _moving_masks(film)
     seconds: defaultdict[int, float] = defaultdict(float)
     on: defaultdict[int, list[bool]] = defaultdict(list)
