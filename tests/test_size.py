@@ -12,16 +12,16 @@ LARGEST = {
     "drivers": 128_100,
     "sim_mock": 79_300,
     "config": 19_100,
-    "robot": 204_900,
-    "robot/dashboard": 57_700,
+    "robot": 197_700,
+    "robot/dashboard": 57_500,
     "gazerig": 14_600,
     "doors": 10_300,
     "features/animation": 6_800,
     "features/bringup": 52_800,
-    "features/lab": 54_900,
+    "features/lab": 53_400,
     "features/study": 10_200,
-    "features/world": 49_700,
-    "tests": 582_600,
+    "features/world": 49_200,
+    "tests": 581_000,
 }
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)
