@@ -21,6 +21,7 @@ def test_noise_gives_no_wrong_value_moves_no_joint_out_and_ends_nothing(kind, pe
     assert outcome.ended == ""
     assert outcome.recover_s is not None
     assert outcome.recover_s < 2.0
+    assert not [line for line in outcome.said if "this computer" in line]
 
 
 def test_a_servo_that_answers_as_its_neighbour_is_not_believed_where_noise_hides_that_one():

@@ -71,7 +71,7 @@ class HostLateness:
         return f"{fault}: {late}; {NOT_THE_BUS}" if late else f"{fault}: {remedy}"
 
     def was_late_since(self, begin_s: float) -> bool:
-        """Return whether an answer was late since ``begin_s``, with or without noise."""
+        """Return whether an answer was late since ``begin_s``."""
         return self._last_s >= begin_s
 
     def record_own_silence(self, silent_s: float, until_s: float) -> None:
@@ -88,10 +88,6 @@ class HostLateness:
         if self.was_late_since(begin_s):
             return "this computer was busy, or the emulator was suspended: answers arrived late"
         return ""
-
-    def forget(self) -> None:
-        """Reset the count."""
-        self._late.clear()
 
     def late_answers(self, now_s: float) -> int:
         """Return the number of late answers within the last second; 0 if they are few."""

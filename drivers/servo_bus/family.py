@@ -95,10 +95,6 @@ class Codec(Protocol):
     """Encoder and decoder of packets; a module of functions."""
 
     @property
-    def HEADER(self) -> bytes:
-        """First bytes of every packet."""
-
-    @property
     def STATUS_OVERHEAD(self) -> int:
         """Bytes of an answer in addition to its params."""
 

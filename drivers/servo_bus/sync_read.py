@@ -55,7 +55,7 @@ class SyncReader:
             plan.single_windows,
             plan.confirming_windows,
         )
-        self._packets, self._header = plan.create_group_read, line.family.codec.HEADER
+        self._packets = plan.create_group_read
         self._until_s = inf
         self._sync_read = line.family.sync_read
         self.unanswered_s = self.stray_s = -inf
@@ -197,12 +197,10 @@ class SyncReader:
                 if servo_id not in samples:
                     self._unanswered_s[servo_id] = now_s
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
-            if not samples and not damaged and self._header in raw:
-                self._line.lateness.record_late_answer(now_s)  # to an earlier request
+            if not samples:
+                self._line.record_late(raw)  # an answer to an earlier request
             # Later bytes must not be mistaken for the next answer.
             line, polled = self._line, self.poll_list
-            if damaged:
-                line.lateness.forget()  # noise looks like a late answer
             for servo_id in damaged:
                 line.errors["corrupt"] += 1
                 polled.record_damaged(servo_id, now_s)

@@ -175,7 +175,7 @@ class Transactions:
         # Bytes received before the request belong to an earlier one.
         waited = self._reply_owed and bool(port.getBytesAvailable())
         if waited:
-            self._record_late(port.read_until(_ROOM, port.now_s()))
+            self.record_late(port.read_until(_ROOM, port.now_s()))
         now_s, prompt_s = port.now_s(), timeout.seconds
         # Times and counts as in ``send``, without the cost of another call every tick.
         free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
@@ -244,13 +244,13 @@ class Transactions:
             self.rx_bytes += len(more)
             if not more or self.port.now_s() >= end_s or len(dropped) >= 16 * _ROOM:
                 if dropped and self._reply_owed:
-                    self._record_late(dropped)
+                    self.record_late(dropped)
                     self._silent = False
                 elif dropped and raw is not None:
-                    self._record_late(dropped, raw)
+                    self.record_late(dropped, raw)
                 return len(dropped)
 
-    def _record_late(self, raw: bytes, before: bytes = b"") -> None:
+    def record_late(self, raw: bytes, before: bytes = b"") -> None:
         """Record answers that arrived after their time-outs; noise does not count.
 
         before: bytes that arrived in time, and may be the begin of the first answer
@@ -313,7 +313,7 @@ class Transactions:
         """Send one request and return the bytes of good answers by id."""
         codec, port = self.family.codec, self.port
         if self._answer_owed and port.getBytesAvailable():
-            self._record_late(port.read_until(_ROOM, port.now_s()))
+            self.record_late(port.read_until(_ROOM, port.now_s()))
         port.clearPort()
         self.send(self.family.request(ids, address, length))
         # In the loop other servos wait, and the delay of answers has been measured.
