@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from math import degrees
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.reachability import look_reply, reached_joints
 from gazerig.robot.model.commands import LookAt, check_command
-from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.reply import JointReply
 from gazerig.robot.model.types import JointState
 
@@ -86,7 +83,7 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
     except ValueError as error:
         raise Refused(str(error)) from None
     found = _load(rig)
-    kinematics, oculomotor = _gaze_parts(found)
+    kinematics, oculomotor = kinematics_and_oculomotor(found, 0)
     target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
     ranges = limits(found.joints)
     reply = look_reply(target, oculomotor, kinematics, ranges)
@@ -112,7 +109,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
         Refused: the rig has no such joint; the message lists its joints.
         ConfigError: the rig is invalid.
     """
-    kinematics, _ = _gaze_parts(_load(rig))
+    kinematics, _ = kinematics_and_oculomotor(_load(rig), 0)
     if strange := [name for name in joints_rad if name not in kinematics.names]:
         there = ", ".join(kinematics.names)
         raise Refused(f"this rig has no joint {strange[0]!r}; available: {there}")
@@ -132,25 +129,3 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
 
 def _load(rig: Rig | str) -> Rig:
     return load_rig(rig) if isinstance(rig, str) else rig
-
-
-def _gaze_parts(rig: Rig) -> tuple[Kinematics, Oculomotor]:
-    return _cached_parts(_RigKey(rig))
-
-
-class _RigKey:
-    """A rig as a cache key: equal only to itself, because rigs hold mappings."""
-
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
-
-    def __hash__(self) -> int:
-        return id(self.rig)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _RigKey) and other.rig is self.rig
-
-
-@lru_cache(maxsize=8)
-def _cached_parts(key: _RigKey) -> tuple[Kinematics, Oculomotor]:
-    return kinematics_and_oculomotor(key.rig, 0)

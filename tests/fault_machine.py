@@ -30,6 +30,8 @@ FAST = 1.3
 ROOM_RAD = 0.03
 """Largest overshoot beyond the end of the range, by inertia."""
 NEAR_RAD = 0.06
+COASTS_RAD = 0.21
+"""Farthest that a joint coasts whose torque goes off in motion: 136 steps of a Feetech servo."""
 GIVES_RAD = 0.06
 """Largest deflection of a joint under torque by a load."""
 
@@ -271,6 +273,12 @@ class Machine:
             inside = limit.low_rad - room <= true[i] <= limit.high_rad + room
             if goal is None:
                 self._fallen.add(i)  # nothing holds a limp joint, or brakes one in motion
+                room += 0.0 if self._loaded else COASTS_RAD
+                if (
+                    not self._loaded
+                    and not limit.low_rad - room <= true[i] <= limit.high_rad + room
+                ):
+                    raise RuleViolation(f"{name} is at {true[i]:.4f} rad, without torque")
             elif inside:
                 self._fallen.discard(i)
             if i in self._fallen:

@@ -4,7 +4,6 @@ import contextlib
 import sys
 from collections.abc import Callable
 from functools import partial
-from types import TracebackType
 from typing import Self
 
 from gazerig.drivers.plugins import describe_error
@@ -43,12 +42,7 @@ class LineQueue:
         """Return the queue."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Wait for the running delivery, and abandon it after a second."""
         if not self._lines.wait_idle(_END_S):
             self._lost += len(self._lines)
