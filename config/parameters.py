@@ -28,14 +28,10 @@ _LIVE = (
     "ranges.*",
     "guard.*",
     "tracker.*",
-    "loop.*",
     "sound.device",
     *(f"joints.*.{name}" for name in LIVE_LIMITS),
 )
-"""Keys that a running rig applies, besides those of gaze; it reads all others when it starts.
-
-The program itself slows the loop when the computer has become too busy.
-"""
+"""Keys that a running rig applies, besides those of gaze; it reads all others when it starts."""
 
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:

@@ -79,9 +79,9 @@ def test_get_shows_all_and_marks_what_is_not_saved() -> None:
     assert gazerig("ctl", "set", RATE, "150").returncode == 0
     table = gazerig("ctl", "get", "loop").stdout.splitlines()
     (row,) = (line for line in table if RATE in line)
-    assert row.split() == ["*", RATE, "150.0", "Hz", "200.0"]
+    assert row.split() == ["*", RATE, "150.0", "Hz", "200.0", "next", "start"]
     alone = gazerig("ctl", "get", RATE).stdout
-    assert "control rate; 20 .. 1000 Hz; changes at the next tick" in alone
+    assert "control rate; 20 .. 1000 Hz; changes at the next start" in alone
 
 
 def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None:
@@ -89,7 +89,7 @@ def test_set_reads_values_as_the_yaml_does_and_tells_what_became_of_it() -> None
     assert done.returncode == 0, done.stderr
     assert sorted(done.stdout.splitlines()) == [
         "gaze.scanpath.model = random",
-        f"{RATE} = 150.0",
+        f"{RATE} = 150.0 (at the next start)",
     ]
     assert "already active" in gazerig("ctl", "set", RATE, "150.0").stderr
     assert "not saved yet: 2 values" in done.stderr

@@ -37,7 +37,6 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
     } == {
         "sound.device",
         "character",
-        "loop.rate_hz",
         *(f"joints.{name}.{key}" for name in desk_rig.joints for key in LIVE_LIMITS),
     }
     assert {

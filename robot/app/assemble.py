@@ -105,8 +105,8 @@ class Assembly(NamedTuple):
 
     @property
     def loop(self) -> LoopParams:
-        """Return the present rate of the loop."""
-        return self.live_params.loop
+        """Return the rate of the loop."""
+        return self.live_params.rig.loop
 
     @property
     def park_rad(self) -> JointAngles:

@@ -39,7 +39,6 @@ from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -104,7 +103,6 @@ def rig_in_effect(running: Rig, wanted: Rig) -> Rig:
         gaze=replace(wanted.gaze, chooser=running.gaze.chooser, plugins=running.gaze.plugins),
         guard=wanted.guard,
         tracker=wanted.tracker,
-        loop=wanted.loop,
         sound=replace(running.sound, device=wanted.sound.device),
         joints={**running.joints, **joints},
     )
@@ -127,11 +125,6 @@ class LiveParams:
         self._camera = camera
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _PreparedChange] = {}
-
-    @property
-    def loop(self) -> LoopParams:
-        """Return the present rate of the loop."""
-        return self.rig.loop
 
     @property
     def park_rad(self) -> JointAngles:
@@ -212,8 +205,6 @@ class LiveParams:
             parts.guard.retune(new.guard, limits(new.joints))
         if new.ranges != old.ranges:
             parts.guard.start_gently()  # desired angles jump
-        if new.loop.rate_hz != old.loop.rate_hz:
-            parts.guard.set_period(1.0 / new.loop.rate_hz)
         parts.tracker.params = new.tracker
         more = [
             name

@@ -37,7 +37,6 @@ from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
 from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.dashboard.requests.page_requests import PageRequestHandler
 from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
-from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.client import rig_name
@@ -353,9 +352,7 @@ class RunObservers:
             self._made.robot.report(line)
 
     def _record_time(self, tick: Tick) -> None:
-        """Record the time of a tick; a tuned loop has its own slots."""
-        if tick.commands and any(isinstance(command, Tune) for command in tick.commands):
-            self._timing.retune(self._made.loop.rate_hz)
+        """Record the time of a tick."""
         self._timing.update(tick.t_s)
 
     def _follow(self, tick: Tick) -> None:

@@ -289,7 +289,7 @@ class Session:
                     say(note)
                 run_observers.open()
                 loop = TickLoop(
-                    assembly.robot, assembly.clock, lambda: assembly.live_params.rig.loop, run_observers.wrap_stop(self._stop_reason),
+                    assembly.robot, assembly.clock, assembly.loop, run_observers.wrap_stop(self._stop_reason),
                     self._observers.update,
                 )  # fmt: skip
                 yield loop

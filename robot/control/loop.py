@@ -419,8 +419,7 @@ class TickLoop:
     Args:
         robot: Reads, decides and writes once per tick.
         clock: The host's clock or a simulated one.
-        params: Rate and slots, or a function that returns them if the rate may change. Slots of a
-            new rate start at the last tick's slot.
+        params: Rate of the loop.
         stop: Takes the seconds since the start; returns the reason to stop, or None.
         watch: Called with every tick.
     """
@@ -429,25 +428,20 @@ class TickLoop:
         self,
         robot: Robot,
         clock: Clock,
-        params: LoopParams | Callable[[], LoopParams],
+        params: LoopParams,
         stop: Callable[[float], str | None],
         watch: Callable[[Tick], None],
     ) -> None:
         self._robot, self._clock, self._stop, self._watch = robot, clock, stop, watch
-        self._params = params if callable(params) else lambda: params
-        self._start_s = self._slots_s = self._last_s = clock.now_s()
-        self._rate_hz = self._params().rate_hz
+        self._period_s = 1.0 / params.rate_hz
+        self._start_s = self._last_s = clock.now_s()
         self._slot = self._ticks = self._overruns = 0
 
     def step(self) -> str | None:
         """Wait for the next slot and tick; return the reason for the end, otherwise None."""
-        clock, rate_hz = self._clock, self._params().rate_hz
-        if rate_hz != self._rate_hz:
-            self._slots_s += self._slot * (1.0 / self._rate_hz)
-            self._rate_hz, self._slot = rate_hz, 0
-        period = 1.0 / rate_hz
+        clock, period = self._clock, self._period_s
         self._slot += 1
-        clock.sleep_until(self._slots_s + self._slot * period)
+        clock.sleep_until(self._start_s + self._slot * period)
         t_s = clock.now_s()
         reason = self._stop(t_s - self._start_s)
         if reason is not None:
@@ -460,7 +454,7 @@ class TickLoop:
             return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
         self._last_s = t_s
         self._ticks += 1
-        late = int((clock.now_s() - self._slots_s) / period) - self._slot
+        late = int((clock.now_s() - self._start_s) / period) - self._slot
         if late > 0:
             self._overruns += late
             self._slot += late
@@ -474,7 +468,7 @@ class TickLoop:
 def run(
     robot: Robot,
     clock: Clock,
-    params: LoopParams | Callable[[], LoopParams],
+    params: LoopParams,
     stop: Callable[[float], str | None],
     watch: Callable[[Tick], None],
 ) -> LoopCount:

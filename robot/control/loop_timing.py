@@ -24,13 +24,8 @@ class LoopTiming:
     def __init__(self, rate_hz: float) -> None:
         self._rows: deque[tuple[float, float, int, float]] = deque()
         self._overruns = 0
-        self.retune(rate_hz)
-
-    def retune(self, rate_hz: float) -> None:
-        """Set another rate and discard the record."""
         self._rate_hz, self._period_s = rate_hz, 1.0 / rate_hz
         self._last_s: float | None = None
-        self._rows.clear()
 
     def update(self, t_s: float) -> None:
         """Record the start time of a tick; a time before the last resets the record."""

@@ -96,10 +96,6 @@ class Guard:
         self.limp: frozenset[int] = frozenset()
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
-    def set_period(self, period_s: float) -> None:
-        """Set the nominal time between ticks."""
-        self._late.period_s = period_s
-
     def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
         """Change the limits without a jump; counters and findings stay.
 

@@ -34,7 +34,7 @@ def play(
         return run(
             made.robot,
             made.clock,
-            lambda: made.loop,
+            made.loop,
             lambda s: "over" if s >= seconds - 1e-9 else None,
             watch,
         )
@@ -66,7 +66,7 @@ def record(
     made.clock.sleep_until(start_s)
     made.robot.start(made.clock)
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
-    count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
+    count = run(made.robot, made.clock, made.loop, stop, watch)
     shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_bytes_digest())
     made.close()

@@ -213,7 +213,6 @@ class LiveFeed:
                 self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
                 self._poses = PoseHistory(rig.shown.kinematics)
             self._builder.rig = rig.shown
-            self._builder.retune(rig.rate_hz)
             self.emulated, self.choice = rig.emulated, rig.choice
             self._picture, self._detector = rig.picture, rig.detector
             # Sent again with every change of the rig; equal parts are kept, because they are

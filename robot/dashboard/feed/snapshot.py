@@ -121,12 +121,6 @@ class SnapshotBuilder:
         self._movements = EyeMovements()
         self._unanswered: Counter[str] = Counter()
 
-    def retune(self, rate_hz: float) -> None:
-        """Continue with another rate of the loop."""
-        if rate_hz != self._rate_hz:
-            self._rate_hz = rate_hz
-            self._timing.retune(rate_hz)
-
     def update(self, tick: Tick) -> None:
         """Add a tick."""
         self._ticks.append(tick)
