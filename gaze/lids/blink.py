@@ -19,11 +19,12 @@ A closing continues unchanged to its end even if parameters change meanwhile.
 """
 
 from dataclasses import dataclass
-from math import exp, inf, log, sqrt
+from math import exp, inf, sqrt
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
+from gazerig.gaze.draws import draw_lognormal
 from gazerig.gaze.minimum_jerk import min_jerk
 from gazerig.params import Bounds
 
@@ -200,8 +201,7 @@ def blink_pause_s(law: LidLaw, per_min: float, length_s: float, rng: np.random.G
         return SHORTEST_PAUSE_S + mean * float(rng.standard_exponential())
     # A log-normal part on top of the shortest pause, with mean and spread such that the whole pause
     # has the wanted ones.
-    sigma2 = log(1.0 + (law.interval_cv * between / mean) ** 2)
-    return SHORTEST_PAUSE_S + mean * exp(sqrt(sigma2) * rng.standard_normal() - 0.5 * sigma2)
+    return SHORTEST_PAUSE_S + draw_lognormal(rng, mean, law.interval_cv * between / mean)
 
 
 def evokes_blink(law: LidLaw, shift_deg: float, rng: np.random.Generator) -> bool:

@@ -8,9 +8,10 @@ Rests on the parts of a face last from landing to departure, and no less than se
 """
 
 from collections.abc import Callable
-from math import exp, log, sqrt
 
 import numpy as np
+
+from gazerig.gaze.draws import draw_lognormal
 
 Draw = Callable[[np.random.Generator], float]
 """Function that draws one dwell time in seconds, above 0."""
@@ -24,9 +25,7 @@ _LEAST_ABOVE = 0.15
 
 def lognormal_dwell(mean_s: float, sd_s: float) -> Draw:
     """Return the function that draws dwell times of a mean and standard deviation."""
-    sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
-    mu, sigma = log(mean_s) - 0.5 * sigma2, sqrt(sigma2)
-    return lambda rng: exp(mu + sigma * rng.standard_normal())
+    return lambda rng: draw_lognormal(rng, mean_s, sd_s / mean_s)
 
 
 def rest_dwell(mean_s: float, sd_s: float, shortest_s: float) -> Draw:
