@@ -139,7 +139,12 @@ class Order:
         """Return the order itself."""
         return self
 
-    def __exit__(self, *raised: object) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         """Give up control."""
         self.end()
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import TracebackType
 from typing import Self
 
 from gazerig.errors import HeadEnded, NotFound
@@ -34,7 +35,12 @@ class RemoteHead(Head):
         """Return the head itself."""
         return self
 
-    def __exit__(self, *raised: object) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         """Give up control and disconnect."""
         self._client.close()
 

@@ -24,6 +24,9 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 MOST_GROUPS = 64
 """Largest number of prepared exchanges."""
 
+MOST_UNREAD = 4096
+"""Largest number of bytes that are kept to see whether they are a late answer."""
+
 OWED_S = 0.5
 """Time after its time-out during which an answer may still arrive."""
 
@@ -56,6 +59,7 @@ class SyncReader:
             plan.confirming_windows,
         )
         self._packets = plan.create_group_read
+        self._unread = b""
         self._until_s = inf
         self._sync_read = line.family.sync_read
         self.unanswered_s = self.stray_s = -inf
@@ -197,8 +201,11 @@ class SyncReader:
                 if servo_id not in samples:
                     self._unanswered_s[servo_id] = now_s
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
-            if not samples:
-                self._line.record_late(raw)  # an answer to an earlier request
+            before, self._unread = self._unread, b""
+            late = not samples and self._line.record_late(raw, before)
+            if not samples and not late and self._packets is not None:
+                # The blocks of one late answer may arrive in the windows of several requests.
+                self._unread = (before + raw)[-MOST_UNREAD:]
             # Later bytes must not be mistaken for the next answer.
             line, polled = self._line, self.poll_list
             for servo_id in damaged:

@@ -250,15 +250,19 @@ class Transactions:
                     self.record_late(dropped, raw)
                 return len(dropped)
 
-    def record_late(self, raw: bytes, before: bytes = b"") -> None:
-        """Record answers that arrived after their time-outs; noise does not count.
+    def record_late(self, raw: bytes, before: bytes = b"") -> bool:
+        """Record answers that arrived after their time-outs; return whether there are any.
 
-        before: bytes that arrived in time, and may be the begin of the first answer
+        Noise does not count.
+
+        before: earlier bytes, which may be the begin of the first answer
         """
         parse = self.family.codec.parse_statuses
         intact = sum(status.intact for status in parse(before + raw))
-        if intact > sum(status.intact for status in parse(before)):
-            self.lateness.record_late_answer(self.port.now_s())
+        if intact <= sum(status.intact for status in parse(before)):
+            return False
+        self.lateness.record_late_answer(self.port.now_s())
+        return True
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos.
