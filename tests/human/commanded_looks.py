@@ -6,6 +6,7 @@ from math import radians
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from true_shafts import looked_at
 
 from gazerig.config.schema import load_rig
@@ -82,7 +83,7 @@ def _seen_and_not_ordered(robot: Any) -> None:
 
     def seen(percept: Percept | None, t_s: float) -> Target | None:
         target: Target | None = chosen(percept, t_s)
-        return None if target is None else target._replace(kind="thing")
+        return None if target is None else replace(target, kind="thing")
 
     robot._lead.chosen_target = seen
 

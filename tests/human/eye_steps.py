@@ -60,7 +60,7 @@ class Step:
 def steps(rig_name: str, sizes_deg: Sequence[float]) -> Iterator[Step]:
     """Yield saccades of some sizes in both directions, each about the middle of the range."""
     rig = load_rig(rig_name)
-    bench, law = Bench(rig), SaccadeModel(rig.gaze.saccade)
+    bench, law = Bench(rig), SaccadeModel(rig.gaze.saccade).profile
     bench.shafts.looking = False
     bench.start()
     i = bench.names.index(EYES[rig_name])

@@ -27,7 +27,7 @@ WANTED = {
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the worst of each rig; nothing of it is random."""
-    figures = {}
+    figures: dict[str, float] = {}
     for name in EYES:
         every = list(steps(name, SIZES_DEG))
         figures |= {
