@@ -1,10 +1,7 @@
 """``gazerig`` alone suggests next steps; help has examples that parse; errors are one line."""
 
-import json
 import logging
-import os
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -59,48 +56,6 @@ def test_the_list_of_commands_is_that_of_their_modules() -> None:
         assert command.name == name and command.rich_help_panel == shown.rich_help_panel
         first = " ".join(command.help.split("\n\n")[0].split())
         assert shown.help == first, f"{name}: mend cli/command_list.py"
-
-
-HEAVY = ("numpy", "cv2", "scipy", "ruamel", "serial", "mcap", "dynamixel_sdk", "aiohttp")
-"""What no help needs; each takes a twentieth of a second of a fast processor or more."""
-
-LIGHT_HELP = (
-    *("", "run", "ctl", "stop", "rerun", "report", "sweep", "export", "check"),
-    *("fit-scanpath", "ctl set", "study"),
-)
-"""Commands whose help is there at once; that of others imports what speaks to servos."""
-
-HELP = """
-import json, os, sys
-import gazerig.robot.cli.main, typer.rich_utils, rich.markdown
-from gazerig.robot.cli.entry_point import main
-for number, words in enumerate(json.loads(sys.argv[1])):
-    if os.fork() == 0:
-        os.dup2(os.open(f"{sys.argv[2]}/{number}", os.O_WRONLY | os.O_CREAT), 1)
-        sys.argv = ["gazerig", *words.split(), "--help"]
-        try:
-            main()
-        except SystemExit as end:
-            print("END", end.code or 0)
-        print("HEAVY", *(name for name in json.loads(os.environ["HEAVY"]) if name in sys.modules))
-        sys.stdout.flush()
-        os._exit(0)
-    os.wait()
-"""
-"""Shows several helps, each in a fork of a process that has begun to load the command line."""
-
-
-@pytest.fixture(scope="module")
-def helps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Return what each command shows and which heavy modules it has imported."""
-    folder = tmp_path_factory.mktemp("helps")
-    done = subprocess.run(
-        [sys.executable, "-c", HELP, json.dumps(LIGHT_HELP), str(folder)],
-        env={**os.environ, "HEAVY": json.dumps((*HEAVY, "pydantic"))},
-        capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return {words: (folder / str(i)).read_text("utf-8") for i, words in enumerate(LIGHT_HELP)}
 
 
 def test_the_version_is_that_of_the_package(capfd: Terminal) -> None:

@@ -21,9 +21,8 @@ from gazerig.robot.model.commands import (
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1", 1), ("1.5", 1.5), ("-3", -3), ("1e3", 1000.0), ("true", True), ("null", None),
-        ("markov", "markov"), ("'1'", "1"), ("[1, 2.5]", (1, 2.5)), ("{a: 1}", {"a": 1}),
-        ("", None), ("200 # Hz", 200), ("2026-01-31", "2026-01-31"),
+        ("1", 1), ("1e3", 1000.0), ("true", True), ("null", None),
+        ("markov", "markov"), ("'1'", "1"), ("[1, 2.5]", (1, 2.5)), ("2026-01-31", "2026-01-31"),
     ],
 )  # fmt: skip
 def test_values_are_read_as_in_the_file(text: str, value: object) -> None:
@@ -49,7 +48,7 @@ def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
     groups = {present(group.typer_instance).info.name for group in app.registered_groups}
     assert here | groups == QUICK
     assert is_quick(["stop"], {}) and is_quick(["ctl", "set", "a", "1"], {})
-    for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["ctl", "get", "--debug"]):
+    for words in ([], ["run"], ["stop", "--help"], ["ctl", "get", "--debug"]):
         assert not is_quick(words, {})
     for typed, quick in (
         ("gazerig ctl set a", True),

@@ -27,7 +27,7 @@ from gazerig.robot.description.mjcf import Mjcf, mjcf
 from gazerig.robot.description.urdf import Urdf, urdf
 from gazerig.robot.description.weights import carried_links
 from gazerig.robot.model.coupling import CouplingParams
-from gazerig.robot.model.mass_params import CounterweightParams, LinkMassParams, MassParams
+from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 
 VALIDATOR = os.environ.get("GLTF_VALIDATOR", "")
 """Folder in which ``npm install gltf-validator`` was run."""
@@ -102,23 +102,6 @@ def _tree(data: bytes) -> dict[str, Any]:
     return tree
 
 
-def test_joints_may_be_called_as_parts_of_the_description_are() -> None:
-    import mujoco
-    import yourdfpy
-
-    rig = shipped("minimal")
-    names = ("base", "camera", "camera_link", "head", "head_fixed", "skin_mesh", "world")
-    joints = {**rig.joints, **dict.fromkeys(names, rig.joints["eyes_pan"])}
-    rig = replace(rig, joints=joints)
-    description = description_of(rig)
-    nodes = _tree(_glb(rig))["nodes"]
-    assert len({node["name"] for node in nodes}) == len(nodes)
-    assert {node["extras"]["joint"] for node in nodes if "extras" in node} >= set(names)
-    text = urdf(description, looks=False)
-    assert yourdfpy.URDF.load(io.BytesIO(text.xml.encode()), load_meshes=False).validate()
-    assert mujoco.MjModel.from_xml_string(text.xml, text.assets).njnt == len(description.joints)
-
-
 def test_a_joint_has_the_torque_of_all_its_servos() -> None:
     joint = shipped("desk").joints["neck_pitch"]
     joints = {"neck_pitch": joint, "neck_roll": replace(joint, ratio=2.0, torque_limit=0.5)}
@@ -144,11 +127,6 @@ def test_gltf_is_one_tree_of_named_nodes_with_the_joints_in_it(name: str) -> Non
         (node,) = (node for node in nodes if node.get("extras", {}).get("joint") == joint.name)
         assert node["extras"]["axis"] == list(joint.axis)
         assert node["extras"]["low_rad"] == joint.low_rad
-    for accessor in tree["accessors"]:
-        assert accessor["count"] > 0 and "bufferView" in accessor
-    assert len(tree["images"]) == len(tree["meshes"])
-    places = {view["byteOffset"] + view["byteLength"] for view in tree["bufferViews"]}
-    assert max(places) <= tree["buffers"][0]["byteLength"]
 
 
 @pytest.mark.skipif(not VALIDATOR, reason="GLTF_VALIDATOR names no folder with gltf-validator")
@@ -292,10 +270,6 @@ def test_a_head_weighs_what_its_file_says() -> None:
     whole = whole_head(replace(desk, mass=MassParams(head=given)))
     assert whole.mass_kg == pytest.approx(0.9)
     assert np.allclose(whole.com_m, (0.040, 0.002, 0.030), atol=1e-9)
-    weight = {"back": CounterweightParams(0.3, (-80.0, 0.0, 30.0))}
-    balanced = whole_head(replace(desk, mass=MassParams(head=given, counterweights=weight)))
-    assert balanced.mass_kg == pytest.approx(1.2)
-    assert np.allclose(balanced.com_m, (0.010, 0.0015, 0.030), atol=1e-9)
 
 
 def test_the_camera_sees_what_the_lens_covers() -> None:

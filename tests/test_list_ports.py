@@ -2,16 +2,11 @@
 
 import os
 
-from present import present
-
 from gazerig.drivers.serial.list_ports import (
     Host,
     access,
-    latency_file,
-    latency_ms,
     port_users,
     serial_ports,
-    set_latency,
 )
 
 
@@ -42,18 +37,6 @@ def test_who_holds_a_port(tmp_path):
     (tmp_path / "proc" / "14").mkdir()  # may not be looked into
     host = Host(processes=tmp_path / "proc")
     assert port_users(str(device), host) == ("minicom (process 12)",)
-
-
-def test_latency_timer(tmp_path):
-    host = Host(latency=tmp_path)
-    assert latency_file("/dev/ttyUSB0", host) is None
-    (tmp_path / "ttyUSB0").mkdir()
-    (tmp_path / "ttyUSB0" / "latency_timer").write_text("16\n")
-    file = latency_file("/dev/ttyUSB0", host)
-    assert latency_ms(present(file)) == 16
-    assert set_latency(present(file)) and latency_ms(present(file)) == 1
-    assert latency_ms(tmp_path / "none") is None
-    assert not set_latency(tmp_path / "none" / "latency_timer")
 
 
 def test_ports_have_lasting_names(tmp_path, monkeypatch):

@@ -1,7 +1,6 @@
 """gazerig new: what it asks, what it writes, and that every rig it writes runs."""
 
 import itertools
-import time
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ from gazerig.config.schema import load_rig
 from gazerig.config.shipped_files import SHIPPED
 from gazerig.robot.cli import new as command
 from gazerig.robot.cli.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
-from gazerig.robot.cli.terminal import LineWriter
 
 TEMPLATES = {
     "minimal": ("--board", "dynamixel", "--joints", "eyes", "--camera", "webcam"),
@@ -86,28 +84,6 @@ def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
         "gazerig calibrate a.yaml",
         "gazerig run a.yaml --oak",
     ]
-
-
-def test_a_question_is_complete_before_its_prompt(monkeypatch: pytest.MonkeyPatch) -> None:
-    written: list[str] = []
-    prompts: list[str] = []
-
-    def write_slowly(writer: LineWriter, text: str) -> None:
-        time.sleep(0.02)
-        written.append(text)
-
-    def answer(prompt: str) -> str:
-        prompts.append(f"{prompt} after {written[-1] if written else 'nothing'}")
-        return ""
-
-    tty = {"isatty": lambda self: True, "fileno": lambda self: 2}
-    monkeypatch.setattr("sys.stderr", type("Tty", (), tty)())
-    monkeypatch.setattr("sys.stdin", type("Tty", (), tty)())
-    monkeypatch.setattr(LineWriter, "_write", write_slowly)
-    monkeypatch.setattr("builtins.input", answer)
-    assert typed("new", "a.yaml") == 0
-    lasts = [list(BOARDS)[-1], "and a neck", "a simulated visitor", "between the eyes"]
-    assert [last in prompt for last, prompt in zip(lasts, prompts, strict=True)] == [True] * 4
 
 
 def test_an_end_of_answers_names_the_option(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -143,10 +143,6 @@ def test_a_parameter_is_found_changed_marked_and_put_back(at_the_rig: tuple[Rig,
 
     wait_for(moved, "the value in force")
     wait_for(lambda: person.reads(f"● {name}", "not saved"), "the mark")
-    # Another program changes it: the control shows that.
-    rig.tuning.set({key: 44.0})
-    shown = f"({beside('● ' + name, 'input')})?.value"
-    wait_for(lambda: person.run(shown) == "44", "the value another program set")
     person.click(saying("revert to the file"))
     wait_for(lambda: rig.tuning.values()[key] == before, "what the file says")
     wait_for(lambda: person.reads("all saved"), "no mark")

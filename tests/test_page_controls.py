@@ -29,12 +29,10 @@ from gazerig.robot.dashboard.feed.page_process import (
 )
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
 from gazerig.robot.dashboard.panels.controls import (
-    GazeTargetPanel,
     JogPanel,
 )
 from gazerig.robot.dashboard.panels.param_panel import (
     ParamControl,
-    format_value,
     param_group,
     param_tooltip,
     parse_value,
@@ -334,27 +332,6 @@ class Scene:
         """Nobody drags here."""
 
 
-def test_menus_become_buttons_that_ask(place: Container) -> None:
-    mouth, freed = Mouth(), []
-    lead = GazeTargetPanel(place, Scene(), mouth, lambda: freed.append(True))  # type: ignore[arg-type]
-    lead.offer("behaviour", ["wait", "guard"])
-    lead.offer("steer", ["left", "right"])
-    lead.add_characters(["none", "calm"], "none")
-    lead.menus["behaviour"].receive_input("guard", WHO)
-    lead.menus["steer"].receive_input("left", WHO)
-    lead.menus["character"].receive_input("calm", WHO)
-    lead.free.receive_input("look freely", WHO)
-    assert mouth.parse_request == [
-        (Ask("behaviour", "guard"), WHO),
-        ({"steer": "left"}, WHO),
-        ({"do": "character", "name": "calm"}, WHO),
-        (LookAt(None), WHO),
-    ]
-    assert freed == [True]
-    lead.show(replace(SNAPSHOT, behaviour="guard"))
-    assert (lead.menus["behaviour"].current, lead.menus["character"].current) == ("guard", "none")
-
-
 def jogging(place: Container) -> tuple[JogPanel, Mouth]:
     mouth = Mouth()
     view = JogPanel(place, mouth)  # type: ignore[arg-type]
@@ -399,15 +376,6 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
 
 
 # --- parameters ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("kind", "value"),
-    [("number", 1e-7), ("number", 3.0), ("whole", 7), ("text", "a b"), ("list", [1.0, 2.5])],
-)
-def test_what_is_written_is_read_again(kind: str, value: Any) -> None:
-    param = structs.replace(PARAM, kind=kind, default=value)
-    assert parse_value(param, format_value(param, value)) == value
 
 
 def test_what_cannot_be_read_is_refused_with_an_example() -> None:

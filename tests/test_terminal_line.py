@@ -1,18 +1,16 @@
 """One device on a pseudo-terminal, on a clock that is set by hand."""
 
-import json
 import os
 import select
 
 import pytest
 
-from gazerig.sim_mock.devices import FeetechLine, MaestroLine
+from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 PING, PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC")
 STS = FeetechLine((ServoSpec(1, "sts3215"),))
-BOARD = MaestroLine(6)
 
 
 class Bench:
@@ -90,29 +88,3 @@ def test_a_late_answer_comes_when_it_is_due(bench):
     one.now_s += 0.01
     one.serve()
     assert one.heard() == PONG
-
-
-def test_without_a_link_the_new_path_is_told_with_the_name(bench):
-    one = bench(BOARD, name="eyes")
-    before = json.loads(one.line.address_json())
-    assert before == {"bus": "eyes", "path": one.line.terminal.path, "baud": None}
-    one.line.obey("unplug")
-    keep = os.openpty()  # takes the number that the terminal had
-    one.line.obey("plug")
-    for fd in keep:
-        os.close(fd)
-    reported = [json.loads(line) for line in one.said]
-    assert reported == [{"bus": "eyes", "path": one.line.terminal.path}]
-    assert reported[0]["path"] != before["path"]
-
-
-def test_a_choice_that_is_none_leaves_no_link_behind(tmp_path):
-    link = tmp_path / "board"
-    for choices, says in (
-        ({"mode": "usb"}, "expected usb"),
-        ({"bad-crc": "reply"}, "expected mode"),
-    ):
-        settings = BusSettings(BOARD, choices=choices, link=str(link))
-        with pytest.raises(ValueError, match=says):
-            TerminalLine(settings, lambda: 0.0, print)
-        assert not os.path.lexists(link)

@@ -63,16 +63,10 @@ def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
 
 BAD = {
     "when,neck_yaw\n0,1\n": ":1: no column of times",
-    "time,neck_yaw\n0,1\n0.5\n": ":3: has 1 columns, but the first row has 2",
     "time,neck_yaw\n0,1\n0.5,nan\n": ":3: neck_yaw: 'nan' is not a number",
     "time,neck_yaw\n0,1\n0.5,2\n0.4,3\n": ":4: neck_yaw: 0.4 s is not after 0.5 s",
     "time,tail\n0,1\n1,5\n": "no joint 'tail': rename it or add --map NAME=JOINT; joints of the rig: left_eye_pan",
-    "time,neck_yaw\n0,1\n1,1\n": "nothing moves",
-    "time,neck_yaw\n0,1\n1,555\n": "neck_yaw at 1.00 s: 554 deg, more than the 90 deg of any",
-    "time,neck_yaw\n0,1\n20000,5\n": "it takes 20000 s: a track takes at most 14400 s",
     "time,neck_yaw,neck_yaw\n0,0,1\n": ":1: two columns are named 'neck_yaw': remove one",
-    f"time,neck_yaw\n0,{'1' * 200_000}\n": ":2: field larger than field limit (131072): is it a table?",
-    'time,neck_yaw\n0,"1,5"\n': ":2: neck_yaw: '1,5' is not a number",
 }
 
 
@@ -210,14 +204,6 @@ def test_gltf_steps_and_splines_are_read(desk_rig: Rig, tmp_path: Path) -> None:
     mixed = keys[0] + (3.0 * s**2 - 2.0 * s**3) * (keys[1] - keys[0])
     expected = Rotation.from_quat(mixed).as_euler("ZYX", degrees=True)[0]
     assert np.interp(0.25, at, curve) == pytest.approx(expected, abs=0.05) and len(at) > 90
-    # Equal tangents in the slope of the whole make it a straight line of quaternions.
-    tangents[:2, (0, 2)] = (keys[1] - keys[0])[None, None]
-    at, curve = read_bytes(clip(times, tangents.reshape(-1, 4), "CUBICSPLINE"), tmp_path).series[
-        "neck_yaw"
-    ]
-    mixed = keys[0] + 0.25 * (keys[1] - keys[0])
-    expected = Rotation.from_quat(mixed).as_euler("ZYX", degrees=True)[0]
-    assert np.interp(0.25, at, curve) == pytest.approx(expected, abs=0.02)
 
 
 GOOD = clip([0.0, 0.5, 1.0], about("z", [0.0, 5.0, 0.0]))
@@ -225,7 +211,6 @@ NAN = about("z", [0.0, 5.0, 0.0]) * [[1.0], [np.nan], [1.0]]
 EMPTY = {"asset": {"version": "2.0"}}
 BAD_FILES: dict[str, tuple[bytes, str]] = {
     "header.glb": (GOOD[:16], "is truncated: 16 bytes"),
-    "text.glb": (b"hello", "neither glTF nor JSON"),
     "half.gltf": (b'{"asset": {"vers', "Input data was truncated: it is truncated or not glTF"),
     "still.gltf": (json.dumps(EMPTY).encode(), "no animation: bake constraints"),
     "nan.glb": (clip([0.0, 0.5, 1.0], NAN), "wave, neck_yaw: key 1 is not a number"),
@@ -233,16 +218,7 @@ BAD_FILES: dict[str, tuple[bytes, str]] = {
         clip([0.0, 1.0], NAN[[0, 0]], node="tail"),
         "moves no joint of desk: left out: tail rotation (no joint): rename it",
     ),
-    "clipped.glb": (
-        GOOD.replace(b'"byteOffset": 12', b'"byteOffset": 92'),
-        "the file is truncated",
-    ),
     "years.glb": (clip([0.0, 2e9], NAN[[0, 0]]), "it takes 2e+09 s; at most 14400 s are read"),
-    "half.json": (b'{"fps": 30, "servos": {', "half.json: Input data was truncated"),
-    "bone.json": (
-        b'{"fps": 30, "servos": {"4": {"name": "Tail", "positions": [1]}}}',
-        "servos.4: no joint 'Tail': rename it",
-    ),
     "pin.json": (
         b'[{"Animations": [{"Animation Name": "a", "Animation Commands": "sC,3,0,9,1,1,0,1,1,0"}]}]',
         "effector '3' is no joint: rename it or add --map NAME=JOINT; joints of the rig: left_eye",
@@ -280,7 +256,7 @@ def test_positions_of_the_blender_add_on_are_those_of_the_servos(
 
 
 def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig: Rig, tmp_path: Path) -> None:
-    # github.com/EvanBottango/Bottango, BezierCurve.py, evaluated here by bisection in time.
+    # github.com/EvanBottango/Bottango, BezierCurve.py, evaluated here at many places.
     curves = [(0, 800, 4096, 300, 0, 6144, -200, 500), (800, 600, 6144, 100, 0, 2048, -300, 0)]
 
     def movement(t_ms: float) -> float:
@@ -288,14 +264,10 @@ def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig: Rig, tmp_pa
         p = np.array(
             [[start, y0], [start + x1, y0 + y1], [start + span + x2, y3 + y2], [start + span, y3]]
         )
-        low, high = 0.0, 1.0
-        for _ in range(60):
-            u = 0.5 * (low + high)
-            q = p
-            while len(q) > 1:  # de Casteljau
-                q = q[:-1] + u * (q[1:] - q[:-1])
-            low, high = (u, high) if q[0, 0] < t_ms else (low, u)
-        return float(q[0, 1]) / 8192
+        u = np.linspace(0.0, 1.0, 2001)
+        weights = np.array([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3])
+        at_ms, y = p.T @ weights
+        return float(np.interp(t_ms, at_ms, y)) / 8192
 
     lines = "".join(f"sC,neck_yaw,{','.join(map(str, c))},h99\n" for c in curves)
     file = [{"Animations": [{"Animation Name": n, "Animation Commands": lines} for n in "ab"]}]
@@ -347,8 +319,6 @@ CURVES = {
             "200,000 columns; at most",
         ),
         ("empty.csv", lambda: "\n" * 30_000_000, "30,000,000 lines; at most"),
-        ("begins_empty.csv", lambda: "\n" * 4_000_000 + WIDE, "no column of times"),
-        ("cr.csv", lambda: "\r" * 30_000_000, "30,000,000 lines; at most"),
         ("words.csv", lambda: "time,neck_yaw\n" + "a,b\n" * 2_000_000, "and at least 990 more"),
         ("curves.gltf", lambda: json.dumps(CURVES), "300,000 curves; at most"),
     ],

@@ -72,22 +72,6 @@ def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers(
     assert plan_search(MICRO, ALL, (1_000_000,)) == (("maestro", 115_200),)
 
 
-def test_a_board_on_usb_tells_its_size_by_its_product():
-    board = maestro(6)
-    (only,) = Line(board).search(usb=MICRO)
-    assert only.channels == 6 and only.board.pulses == (0,) * 6
-    (unknown,) = Line(board).search()
-    assert unknown.channels is None
-    assert board.faults.board_status()["errors"] == []
-
-
-def test_pulses_go_on_while_it_is_asked():
-    board = maestro()
-    board.exchange(bytes.fromhex("84 00 70 2E"))
-    (only,) = Line(board).search(usb=MINI)
-    assert only.board.pulses[0] == 6000 == board.faults.reports()[0]["position"]
-
-
 # --- servos of each kind hear the other's packets and are left as they are
 
 

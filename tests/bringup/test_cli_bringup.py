@@ -230,20 +230,6 @@ def test_on_real_wires_hobby_servos_are_asked_for_first(rigs: dict[str, str]) ->
 # --- scan and setup of boards that move hobby servos
 
 
-def test_scan_of_a_maestro():
-    with PtyBus() as bus:
-        path = bus.start_device(MaestroLine())
-        bus.command("error signal")
-        bus.command("script on")
-        code, out, _ = invoked("scan", "--port", path)
-        assert code == 0 and "Pololu Maestro: 6 channels or more" in out
-        assert "serial signal error" in out and "its own script runs" in out
-        assert "nothing else was sent" in out and "searched dynamixel" not in out
-        code, out, _ = invoked("scan", "--port", path, "--json", "--kind", "maestro")
-        (board,) = json.loads(out)["boards"]
-        assert code == 0 and board["is_script_running"] is True and board["errors"] == []
-
-
 def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
     with PtyBus() as bus:
         path = bus.start_device(MaestroLine(crc=True))

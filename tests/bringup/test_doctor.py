@@ -99,10 +99,6 @@ BOTH_RULES = [
     ({"max_position_limit": 4095}, "note", "1650..4095 are wider than the YAML's range", "--fix"),
 ]
 DYNAMIXEL_RULES = [
-    ({"drive_mode": 1}, "warn", "Drive Mode 1 (reversed)", "--fix"),
-    ({"operating_mode": 4}, "warn", "extended position mode", "--fix"),
-    ({"secondary_id": 7}, "error", "also obeys what is sent to servo 7", "--fix"),
-    ({"startup_configuration": 1}, "warn", "switches its torque on by itself", "--fix"),
     ({"homing_offset": -200}, "warn", "Homing Offset -200", "Wizard"),
     ({"velocity_limit": 100}, "note", "its Velocity Limit is 137 deg/s", "max_speed_deg_s"),
     (
@@ -112,32 +108,19 @@ DYNAMIXEL_RULES = [
         "set Shutdown (63) to 53",
     ),
     ({"status_return_level": 1}, "warn", "does not confirm commands", "--fix"),
-    ({"protocol_type": 20}, "warn", "Protocol Type 20", "Wizard"),
     ({"hardware_error_status": 0x20}, "error", "latched: overload", "switch its power off and on"),
-    ({"hardware_error_status": 0x04}, "error", "latched: overheating", "cool"),
-    ({"hardware_error_status": 0x01}, "error", "latched: input voltage", "supply"),
     ({"present_input_voltage": 34}, "error", "3.4 V, its limits are 3.5..7.0 V", "supply"),
     ({"present_input_voltage": 44}, "warn", "made for 5 V", "thin wires"),
-    ({"bus_watchdog": 255}, "warn", "bus watchdog has tripped", "--fix"),
     ({"baud_rate": 1}, "warn", "its Baud Rate is 57600", "gazerig setup"),
 ]
 FEETECH_RULES = [
     ({"status": 0x20}, "error", "reports: overload", "switch its "),
-    ({"status": 0x08}, "error", "reports: overcurrent", "shorts"),
-    ({"status": 0x04}, "error", "reports: overheating", "cool"),
     ({"present_input_voltage": 121}, "error", "12.1 V, its limits are 4.0..8.0 V", "sts3215-12v"),
     ({"present_input_voltage": 60}, "warn", "made for 7.4 V", "thin wires"),
-    ({"lock": 0}, "warn", "its memory is open (Lock 0)", "--fix"),
     ({"baud_rate": 4}, "warn", "its Baud Rate is 115200", "gazerig setup"),
-    ({"status_return_level": 0}, "warn", "does not confirm", "--fix"),
-    ({"operating_mode": 1}, "warn", "is in wheel mode", "--fix"),
     ({"angular_resolution": 2}, "warn", "counts 2 turns for one", "--fix"),
-    ({"phase": 28}, "warn", "beyond one turn (Phase 28)", "--fix"),
-    ({"min_position_limit": 0, "max_position_limit": 0}, "warn", "many turns", "--fix"),
     ({"position_offset": -85}, "note", "shifted by -85 steps", "gazerig calibrate"),
     ({"max_torque": 400}, "note", "gives 40% of its torque", "Max Torque (16)"),
-    ({"unloading_condition": 4}, "warn", "protect itself at overcurrent, overload", "--fix"),
-    ({"temperature_limit": 85}, "warn", "switches off above 85 degC only", "--fix"),
     ({"overload_torque": 100}, "warn", "overload protection cannot act", "Overload Torque (36)"),
 ]
 RULES = [
@@ -169,12 +152,9 @@ def test_what_can_be_wrong(kind, values, level, words, remedy):
             )
         ),
         (DYNAMIXEL, {"present_input_voltage": 35, "torque_enable": 0}, "warn"),
-        (DYNAMIXEL, {"present_input_voltage": 70}, "ok"),
         (DYNAMIXEL, {"present_input_voltage": 45}, "ok"),
-        (DYNAMIXEL, {"bus_watchdog": 10}, "ok"),
         (DYNAMIXEL, {"secondary_id": 253}, "ok"),
         (DYNAMIXEL, {"shutdown": 52}, "ok"),
-        (FEETECH, {"present_input_voltage": 80}, "ok"),
         (FEETECH, {"present_input_voltage": 67}, "ok"),
         (FEETECH, {"unloading_condition": 47}, "ok"),
         (FEETECH, {"temperature_limit": 60}, "ok"),
@@ -272,7 +252,7 @@ def test_fix_mends_what_is_safe_and_says_it():
     rig.set(2, bus_watchdog=255)
     before = rig.chain.positions_steps()
     done = rig.fix(rig.check())
-    assert all(one.done for one in done)
+    assert len(done) == 8 and all(one.done for one in done)
     assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
     assert f"{TILT}: bus watchdog 255 -> 0: done" in map(str, done)
     assert worst_level(rig.check()) == "note" and not any(f.fixes for f in rig.check())
@@ -287,7 +267,7 @@ def test_fix_mends_an_sts_servo_for_good():
     rig.set(2, lock=0, status_return_level=0)
     before = rig.chain.positions_steps()
     done = rig.fix(rig.check())
-    assert all(one.done for one in done), [str(one) for one in done]
+    assert len(done) == 9 and all(one.done for one in done), [str(one) for one in done]
     assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
     assert f"{TILT}: lock 0 -> 1: done" in map(str, done)
     assert not any(f.fixes for f in rig.check())
@@ -361,9 +341,6 @@ def test_latency_timer(tmp_path):
     (slow,) = examine_latency("/dev/ttyUSB0", host)
     assert slow.level == "warn" and "16 ms" in slow.what
     assert UDEV_RULE in slow.remedy and str(file) in slow.remedy
-    assert UDEV_RULE == (
-        'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
-    )
     (done,) = fix_latency("/dev/ttyUSB0", host)
     assert str(done) == "/dev/ttyUSB0: latency timer 16 -> 1 ms: done"
     (good,) = examine_latency("/dev/ttyUSB0", host)
@@ -383,12 +360,9 @@ def test_remarks_of_a_scan():
     rounds = [
         SearchRound("dynamixel", 9600, unknown_bytes=40),
         SearchRound("dynamixel", 57_600, protocol_1_ids=(5,)),
-        SearchRound("dynamixel", 1, is_supported=False),
     ]
-    lines = list(scan_remarks(rounds, "/dev/x"))
-    assert any("only pieces came" in line for line in lines)
-    assert any("Protocol 1 as id 5" in line for line in lines)
-    assert "searched dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
+    said = " ".join(scan_remarks(rounds, "/dev/x"))
+    assert "only pieces came" in said and "Protocol 1 as id 5" in said
 
 
 # --- Findings about boards of hobby servos and their channels, and fixes

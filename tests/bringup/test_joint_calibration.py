@@ -481,12 +481,7 @@ def test_the_range_lies_inside_what_was_marked(
     ("name", "marked", "says"),
     [
         ("eyes_pan", [(0.0, 1500.0), (1.5, 1600.0), (-20.0, 1300.0)], "0 deg must be within"),
-        ("left_lower_lid", [(20.0, 1250.0), (3.0, 1600.0)], "call half open 0"),
-        (
-            "eyes_pan",
-            [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)],
-            "all increase or all decrease",
-        ),
+        ("eyes_pan", [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)], "all increase or all"),
         ("eyes_pan", [(0.0, 1500.0), (20.0, 2900.0), (-20.0, 1300.0)], "outside the servo's"),
     ],
 )
@@ -580,9 +575,7 @@ def test_eyes_are_measured_and_their_pulses_end() -> None:
     assert made.transmission_points == ((-24.0, 1210.0), (0.0, 1500.0), (25.0, 1800.0))
     assert (made.min_deg, made.max_deg) == (-22.0, 23.0)
     assert bench.pulse() == 0 and bench.place_us() == pytest.approx(1500.0, abs=6.0)
-    assert "move eyes_pan to its LEFT end, as far as it goes freely, then press Enter" in bench.said
     assert any("Keep your fingers out" in line for line in bench.said)
-    assert any("cut the servo power" in line for line in bench.said)
 
 
 def test_a_channel_that_gives_pulses_does_not_jump(maker_rig: Rig) -> None:

@@ -90,7 +90,7 @@ def test_a_stop_or_a_lost_head_ends_the_recording_and_keeps_it() -> None:
     assert 40 <= len(found.series["jaw"][0]) <= 60
     with gazerig.open("expressive", fast=True) as head:
         head.step(1.0)
-        left = [head.state] * 1
+        left = [head.state]
 
         def read() -> HeadState:
             if not left:

@@ -39,13 +39,11 @@ def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: P
     assert "Nothing here is measured: the servos of this rig have no feedback" in page
     assert "not measured" in page.partition("Saccades <span")[2][:120]
     assert "measured from the servos" not in page
-    assert "{measured}" not in page and "line of sight of each eye, estimated" in page
     for key in ("head_slope", "head_share", "head_after", "head_peak", "vor", "vergence",
                 "vergence_ok", "unasked"):  # fmt: skip
         assert key not in rows, key
-    for key in ("head_part", "vor", "vergence"):
-        assert not (tmp_path / "six_figures" / f"{key}.png").exists(), key
-    assert (tmp_path / "six_figures" / "blink_shape.png").exists()
+    drawn = {path.stem for path in (tmp_path / "six_figures").iterdir()}
+    assert "blink_shape" in drawn and drawn.isdisjoint(("head_part", "vor", "vergence"))
     assert "This rig has no neck" in page and "they stay parallel" in page
 
 
@@ -53,11 +51,8 @@ def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: P
     ("names", "key", "words"),
     [
         (SIX, "vor", "no neck"),
-        (SIX, "vergence", "stay parallel"),
         (("left_eye_pan", "neck_yaw"), "vor", ""),
         (("left_eye_pan", "neck_pitch"), "head_part", "turns the head sideways"),
-        (("left_eye_pan", "neck_roll"), "vor", "sideways or up"),
-        (("left_eye_pan", "left_lower_lid"), "blink_rate", "no upper lids"),
     ],
 )
 def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: str) -> None:

@@ -107,7 +107,6 @@ def test_the_picture_and_parquet_hold_the_same(finished: Path) -> None:
     [
         (("--seeds", "2"), "seeds was [0], is now [0, 1]"),
         (("--seeds", "1", "--character", "shy"), "options.character was None, is now 'shy'"),
-        (("--seeds", "1", "--samples", "4"), "search.samples was None, is now 4"),
     ],
 )
 def test_other_arguments_are_refused_with_what_differs(
@@ -229,9 +228,7 @@ def test_a_measure_outside_its_band_counts_by_its_distance() -> None:
     [
         ((), "nothing to vary: give --set KEY=VALUES"),
         (("--set", f"{EYES_ALONE}=4,8", "--show", "blink_rat"), "did you mean 'blink_rate'?"),
-        (("--set", f"{EYES_ALONE}=4,8", "--scene", "visiter"), "unknown; scenes: "),
         (("--set", f"{EYES_ALONE}=4,8", "--bus", "real"), "--bus real: unknown"),
-        (("--set", f"{EYES_ALONE}=4,8", "--conversation", "sing"), "sing"),
     ],
 )
 def test_what_cannot_be_run_is_refused_before_a_folder_is_made(
@@ -274,18 +271,10 @@ def test_steps_lists_and_ranges_are_read() -> None:
             "unknown key 'eye_only_rnge_deg'; did you mean",
         ),
         (f"{EYES_ALONE}=4:200", ConfigError, "200.0 is above 180 (unit deg)"),
-        (
-            "gaze.saccade.profile=1:3:3",
-            SetupError,
-            "profile=human,min_jerk,literal_frame",
-        ),
         (f"{EYES_ALONE}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
-        (f"{EYES_ALONE}=", SetupError, "not KEY=VALUES"),
         (f"{EYES_ALONE}=9:4:3", SetupError, "9 is not below 4"),
         (f"{EYES_ALONE}=4:9:1", SetupError, "1 steps; wanted 2 to"),
         (f"{EYES_ALONE}=4,5,4", SetupError, "a value is given twice"),
-        (f"{EYES_ALONE}=[4", SetupError, "not valid YAML"),
-        ("gaze.head=4:9:2", SetupError, "is no single value; name one, for example gaze.head."),
         ("profile=robot,mitake", SetupError, "it acts while files are read; give --profile"),
     ],
 )
@@ -381,7 +370,7 @@ def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
         counted_measures([Outcome(START, 0, {}, "it failed")])
 
 
-def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path: Path) -> None:
+def test_a_small_fit_writes_what_it_found(tmp_path: Path) -> None:
     out, key, jerky = tmp_path / "fit", "gaze.saccade.profile", tmp_path / "jerky.yaml"
     jerky.write_text(  # and so many shifts that a few seconds judge most measures
         "gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50},\n"
@@ -401,8 +390,3 @@ def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path:
     assert (best.saccade.profile, best.lids.hold_ms) == ("min_jerk", 50.0)
     rows = (out / "table.csv").read_text(encoding="utf-8").splitlines()
     assert [row.split(",")[0] for row in rows] == [key, "literal_frame", "min_jerk"]
-    runs = out / "runs.jsonl"
-    runs.write_text("".join(f"{line}\n" for line in runs.read_text().splitlines()[:1]))
-    again = invoked(*words)
-    assert again.code == 0 and again.err.splitlines() == done.err.splitlines()
-    assert (out / "table.csv").read_text(encoding="utf-8").splitlines() == rows

@@ -19,7 +19,7 @@ from gazerig.config.shipped_files import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.design import HOME, load_study, participant_order, williams
 from gazerig.features.study.journal import Journal, StudyFolder
-from gazerig.features.study.session import PageEvent, WrongEvent
+from gazerig.features.study.session import PageEvent
 
 
 @pytest.mark.parametrize("n", range(2, 7))
@@ -129,16 +129,6 @@ def test_pages_do_not_distinguish_conditions(study: Path, tmp_path: Path) -> Non
     events_of = events(session)
     assert events_of == ["consent", *2 * ["ready", "presentation", "questions"], "questions"]
     assert session.page_json()["debriefing"] == ("It was the difference.",)
-    journal.close()
-
-
-def test_events_that_do_not_fit_change_nothing(study: Path, tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "data")
-    session = session_of(study, journal)
-    with pytest.raises(WrongEvent):
-        session.handle(PageEvent(session.page, "answer", [3], [1.0]))
-    assert not session.handle(PageEvent("P001-ready-0-0-", "begin"))
-    assert len(journal.records) == 1
     journal.close()
 
 

@@ -4,7 +4,6 @@ Both get the goals of the emulated servo's own profile, as MJCF has no profile g
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from math import degrees, radians
 from typing import Any, Literal, NamedTuple
 
@@ -17,22 +16,18 @@ from gazerig.robot.app.bus_wiring import servo_configs
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.app.servo_drives import servo_drives
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.model.mass_params import LinkMassParams, MassParams
 from gazerig.sim_mock.smart_servo.integration import SMOOTHING
 from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN
 
-MoveKind = Literal["profile", "jump", "fall", "stall"]
-REAL = MassParams(head=LinkMassParams(com_mm=(40.0, 0.0, 30.0)))
-"""A realistic skull and jaw, which a neck without torque does not hold."""
+MoveKind = Literal["profile", "jump", "stall"]
 SETTLED_MS = 1200
 
 
 class Move(NamedTuple):
-    """One move of a joint from an angle to another; of a fall only the first counts.
+    """One move of a joint from an angle to another.
 
     profile: to a goal, by the speed and acceleration of the rig's file
     jump: to a goal, as fast as the servo can
-    fall: the servos are switched off
     stall: to a goal, with the joint stuck
     """
 
@@ -64,12 +59,6 @@ def exported(rig: Rig) -> Any:
     return mujoco.MjModel.from_xml_string(mjcf(description, looks=False).xml)
 
 
-def rig_of(move: Move) -> Rig:
-    """Return the rig of a move, that of a fall with a heavy head."""
-    rig = load_rig(move.rig)
-    return replace(rig, mass=REAL) if move.kind == "fall" else rig
-
-
 class Both:
     """One move in both.
 
@@ -79,25 +68,17 @@ class Both:
     """
 
     def __init__(self, move: Move) -> None:
-        self._move, self._rig = move, rig_of(move)
+        self._move, self._rig = move, load_rig(move.rig)
         self._path: list[tuple[float, float]] = []
         self.world = self._in_world()
         self.plain = self._alone()
-        if move.kind == "fall":  # up to the end of the joint's range: their stops are apart
-            low = self._rig.joints[move.joint].min_deg + 1.0
-            lasts = min(int(np.argmax(one.angle_deg < low)) for one in (self.world, self.plain))
-            self.world, self.plain = (
-                Trace(one.angle_deg[:lasts], one.torque_nm[:lasts])
-                for one in (self.world, self.plain)
-            )
 
     # --- the running world
 
     def _in_world(self) -> Trace:
         move, rig, bench = self._move, self._rig, WorldBench(self._rig)
         servo, joint = bench.servos[move.joint], rig.joints[move.joint]
-        smart = hasattr(servo, "memory")
-        if smart:
+        if hasattr(servo, "memory"):
             configs = {one.name: one for one in servo_configs(rig)}
             for name, one in bench.servos.items():
                 self._set_up(one, configs[name], rig.joints[name].gains or ())
@@ -105,14 +86,7 @@ class Both:
         bench.pass_ms(SETTLED_MS)
         if move.kind == "stall":
             servo.shaft.jam(True)
-        if move.kind == "fall":
-            for name, one in bench.servos.items():
-                if smart:
-                    write(one, "torque_enable", 0)
-                else:
-                    self._board(bench).body.channels[rig.joints[name].id].set_target(0)
-        else:
-            self._send(bench, {move.joint: move.to_deg})
+        self._send(bench, {move.joint: move.to_deg})
         self._start_rad = bench.world.joints_rad()
         at = bench.world.model.rigs[0].dof[move.joint]
         unit = STEPS_PER_TURN / joint.model_facts.steps_per_turn
@@ -144,10 +118,8 @@ class Both:
             if hasattr(servo, "memory"):
                 write(servo, "goal_position", steps)
             else:
-                self._board(bench).body.channels[joint.id].set_target(steps)
-
-    def _board(self, bench: WorldBench) -> Any:
-        return next(iter(bench.devices.values()))
+                (board,) = bench.devices.values()
+                board.body.channels[joint.id].set_target(steps)
 
     def _from_deg(self, name: str) -> float:
         return self._move.from_deg if name == self._move.joint else 0.0
@@ -166,8 +138,6 @@ class Both:
             mujoco.mj_step(model, data)
         if move.kind == "stall":
             model.dof_frictionloss[at] = 20.0
-        if move.kind == "fall":
-            model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         angles, torques = [], []
         has_slew = len(data.actuator(move.joint).ctrl) > 1
         smooth = 0.0
@@ -195,5 +165,3 @@ def moves() -> Iterator[Move]:
             yield Move(rig, joint, "profile", -10.0, 10.0, 400)
         yield Move(rig, joint, "jump", -10.0, 10.0, 500)
         yield Move(rig, joint, "stall", -10.0, 15.0, 200)
-    for rig in ("desk", "feetech", "expressive"):
-        yield Move(rig, "neck_pitch", "fall", 15.0, 0.0, 600)

@@ -31,9 +31,6 @@ def test_a_world_is_what_is_looked_at() -> None:
     [
         ({"mock": False}, "--world needs --mock"),
         ({"scene": "visitor"}, "--scene and --world exclude each other"),
-        ({"camera": 0}, "--camera and --world exclude each other"),
-        ({"oak": True}, "--oak and --world exclude each other"),
-        ({"pixels": True}, "rendered in any case"),
         ({"bus": "ideal", "fast": False}, "needs --fast: ideal servos"),
         ({"world": None, "no_pictures": True}, "--no-pictures needs --world"),
     ],

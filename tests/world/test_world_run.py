@@ -46,25 +46,6 @@ def test_a_head_in_a_world_finds_the_person_there() -> None:
     assert made.figures["joint_faults"] == {}
 
 
-def test_the_servos_move_joints_that_weigh_something() -> None:
-    """The world's joints follow the servos' registers, and gravity draws at them."""
-    made = assemble(load_rig("desk"), FAST)
-    try:
-        made.robot.start(made.clock)
-        tick = ticks(made, 60)[-1]
-        camera = made.robot.camera
-        assert isinstance(camera, SceneCamera)
-        R, _ = camera._head_pose(0.0)
-        measured = dict(zip(tick.guard_result.joints, tick.joints.position_rad, strict=True))
-        truly = made.live_params.parts.kinematics.head_pose(
-            (measured["neck_yaw"], measured["neck_pitch"], measured["neck_roll"]), (0.0, 0.0)
-        )[0]
-        assert R[0] == pytest.approx(truly[0], abs=0.01)
-        made.robot.stop()
-    finally:
-        made.close()
-
-
 def test_without_a_renderer_it_goes_on_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(make: object) -> object:
         raise NoRenderer("no pictures of a world: egl: it is missing")

@@ -1,14 +1,10 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
-from math import radians
 from pathlib import Path
 from typing import Any
 
 import pytest
 from world_rigs import WorldBench, arm, write
-
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.run_bus import JOINT_PLAY_DEG
 
 pytestmark = pytest.mark.usefixtures("mujoco")
 STEP = 200
@@ -57,32 +53,6 @@ def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(
             max(abs(b[nth]) for b in own), rel=0.08
         )
     assert abs(world[-1][0] - STEP) < 6.0
-
-
-@pytest.mark.parametrize(("name", "joint"), [("desk", "left_eye_pan"), ("feetech", "neck_yaw")])
-def test_a_joint_with_play_stays_behind_as_that_of_an_emulated_servo(name: str, joint: str) -> None:
-    rig = load_rig(name)
-    bench = WorldBench(rig)
-    half = radians(0.5 * JOINT_PLAY_DEG)
-    for servo in bench.both(joint):
-        arm(servo, rig.joints[joint].gains or ())
-    bench.pass_ms(100)
-    began = round(bench.servos[joint].position_steps)
-    gaps = []
-    for steps in (60, 59, 60, 0, 30):
-        for servo in bench.both(joint):
-            write(servo, "goal_position", began + steps)
-        before = bench.world.joints_rad()[joint]
-        for _ in range(40):
-            bench.pass_ms(10)
-            angle = bench.world.joints_rad()[joint]
-            gaps.append(rig.joints[joint].angle_rad(bench.servos[joint].position_steps) - angle)
-            own = bench.own[joint]
-            behind = own.position_steps + (own.shaft.joint - own.shaft.x)
-            assert angle == pytest.approx(rig.joints[joint].angle_rad(behind), abs=radians(0.15))
-        if steps == 59:  # within the play
-            assert angle == pytest.approx(before, abs=1e-5)
-    assert max(gaps) == pytest.approx(half) and min(gaps) == pytest.approx(-half)
 
 
 def test_without_torque_a_hand_turns_the_joint_and_it_stays_there() -> None:

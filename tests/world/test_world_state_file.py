@@ -42,33 +42,3 @@ def test_states_are_never_mixed(tmp_path: Path) -> None:
         thread.join()
     assert seen
     assert all(len({one.host_s, one.t_s, *one.qpos.tolist()}) == 1 for one in seen)
-
-
-def test_a_reader_that_was_overtaken_reads_again(tmp_path: Path) -> None:
-    """Two states are written while it copies: what it has copied is half of the one it wanted."""
-    writer = StateWriter(tmp_path / "state", 2)
-    reader = StateReader(tmp_path / "state")
-    writer.write(1.0, 1.0, (1.0, 1.0))
-
-    class Overtaken:
-        """The reader's rows, of which the first copy takes long."""
-
-        def __init__(self) -> None:
-            self.rows, self.row = reader._rows, 0
-
-        def __getitem__(self, row: int) -> "Overtaken":
-            self.row = row
-            return self
-
-        def copy(self) -> np.ndarray:
-            if reader.count == 1:
-                half = self.rows[self.row, :3].copy()
-                for k in (2.0, 3.0):
-                    writer.write(k, k, (k, k))
-                return np.concatenate((half, self.rows[self.row, 3:]))
-            return np.array(self.rows[self.row])
-
-    reader._rows = Overtaken()  # type: ignore[assignment]
-    found = reader.newest()
-    assert found is not None
-    assert (found.host_s, found.t_s, *found.qpos.tolist()) == (3.0, 3.0, 3.0, 3.0)
