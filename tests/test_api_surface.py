@@ -36,6 +36,8 @@ def surface() -> Iterator[str]:
 def members(kind: type) -> Iterator[str]:
     if dataclasses.is_dataclass(kind):
         yield from (f"{one.name}: {text(one.type)}" for one in dataclasses.fields(kind))
+    for name in getattr(kind, "__struct_fields__", ()):
+        yield f"{name}: {text(kind.__annotations__[name])}"
     for name, member in sorted(vars(kind).items()):
         if name.startswith("_") and name not in ("__enter__", "__exit__"):
             continue

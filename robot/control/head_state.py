@@ -5,9 +5,10 @@ roll + right ear down; lengths in m; times in s of the rig's own clock.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from math import degrees
 from typing import Any
+
+from msgspec import Struct
 
 from gazerig.gaze.angles import add, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
@@ -24,8 +25,7 @@ from gazerig.robot.model.control_source import (
 from gazerig.robot.model.conversation import NO_CONVERSATION, ConversationState
 
 
-@dataclass(frozen=True, slots=True)
-class JointReading:
+class JointReading(Struct, frozen=True):
     """A joint in one tick.
 
     Attributes:
@@ -74,8 +74,7 @@ class JointReading:
         return degrees(self.measured_rad)
 
 
-@dataclass(frozen=True, slots=True)
-class GazeReading:
+class GazeReading(Struct, frozen=True):
     """The measured poses of head and eyes, and their target.
 
     Attributes:
@@ -111,8 +110,7 @@ class GazeReading:
         return degrees(yaw), degrees(pitch)
 
 
-@dataclass(frozen=True, slots=True)
-class Person:
+class Person(Struct, frozen=True):
     """A visible person at the time of the frame.
 
     Attributes:
@@ -141,8 +139,7 @@ class Person:
     speaks: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class HeadEvent:
+class HeadEvent(Struct, frozen=True):
     """An event: a message, or a change of gaze, people or track.
 
     Attributes:
@@ -162,8 +159,7 @@ class HeadEvent:
     subject: int | str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class HeadState:
+class HeadState(Struct, frozen=True):
     """The state of a head in one tick of the control loop.
 
     Attributes:
@@ -191,16 +187,15 @@ class HeadState:
     reasons: tuple[str, ...]
     stopped: str
     controlled_by: str
-    client_control: ControlState = field(default=NO_CLIENT_CONTROL)
+    client_control: ControlState = NO_CLIENT_CONTROL
     tracks: tuple[TrackState, ...] = ()
     frame_s: float | None = None
-    control_source: ControlSource = field(default=ControlSource())
+    control_source: ControlSource = ControlSource()
     headline: str = ""
-    conversation: ConversationState = field(default=NO_CONVERSATION)
+    conversation: ConversationState = NO_CONVERSATION
 
 
-@dataclass(frozen=True, slots=True)
-class HeadReport:
+class HeadReport(Struct, frozen=True):
     """The newest tick, None before the first, and events; number: that of the newest event."""
 
     state: HeadState | None

@@ -6,7 +6,8 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+
+from msgspec import structs
 
 from gazerig.robot.control.command_handler import CommandHandler, PathGuard
 from gazerig.robot.control.head_state import HeadReport, head_state
@@ -85,7 +86,7 @@ class LoopMonitor:
             return {"ticks": 0, "stopped": "", "said": ()}
         state = head_state(tick)
         return {
-            **{field.name: getattr(state, field.name) for field in fields(state)},
+            **structs.asdict(state),
             "ticks": self._feed.ticks,
             "age_s": self._clock.now_s() - tick.t_s,
             "camera": camera_conditions(tick),
