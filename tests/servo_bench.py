@@ -11,8 +11,7 @@ from gazerig.drivers.feetech import memory_table
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech
 
-PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT = 1, 2, 3, 4, 5, 6, 8
-RESET_TURNS, CALIBRATE, SYNC_READ, SYNC_WRITE = 10, 11, 0x82, 0x83
+PING, READ, WRITE, REBOOT, SYNC_READ, SYNC_WRITE = 1, 2, 3, 8, 0x82, 0x83
 ALL = 0xFE
 
 
@@ -29,10 +28,8 @@ class Bench:
     """
 
     model: str
-    factory_baud: int
     words: int
     pong: int
-    highest_id: int
     registers: dict
     build: Callable[..., Any]
     instruction: Callable[..., bytes]
@@ -136,8 +133,8 @@ class Bench:
 
 
 class DynamixelBench(Bench):
-    model, words, factory_baud = "xl330-m288", 2, 57_600
-    pong, highest_id, living = 14, 252, (100, 47)
+    model, words = "xl330-m288", 2
+    pong, living = 14, (100, 47)
     registers = control_table.REGISTERS
     build = staticmethod(build_dynamixel)
 
@@ -163,8 +160,8 @@ class DynamixelBench(Bench):
 
 
 class FeetechBench(Bench):
-    model, words, factory_baud = "sts3215", 1, 1_000_000
-    pong, highest_id, living = 6, 253, (40, 40)
+    model, words = "sts3215", 1
+    pong, living = 6, (40, 40)
     registers = memory_table.REGISTERS
     build = staticmethod(build_feetech)
 

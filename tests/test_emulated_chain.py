@@ -169,9 +169,6 @@ def test_echo_and_babble(make):
     assert bench.chain.receive(b"").startswith(ping[:2])
 
 
-# --- as text
-
-
 # --- two clocks, one result
 
 

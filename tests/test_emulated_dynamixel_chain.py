@@ -22,12 +22,6 @@ def vector(text: str) -> bytes:
 PING = vector("FF FF FD 00 01 03 00 01 19 4E")
 
 
-def error_of_read(bench, servo_id, address, size):
-    """Return error byte and number of bytes of a read."""
-    [(_, error, data)] = bench.ask(servo_id, READ, bench.span(address, size))
-    return error, len(data)
-
-
 ONE = [(1, "xm430-w210", 166, 38)]
 TWO = [(2, "xm430-w210", 2079, 38), *ONE]
 THREE = [(3, "xm430-w210", 166), (7, "xm430-w210", 2079), (4, "xm430-w210", 1023)]
@@ -90,16 +84,6 @@ def test_examples_of_the_manual_to_the_byte(name):
         assert bench.read(servo_id, address, size) == value
 
 
-def test_clear_brings_many_turns_back_into_one():
-    bench = DynamixelBench((1, "xm430-w210"))
-    bench.write(1, 11, 4, 1)
-    bench.chain[1].shaft.place(4096 * 3 + 100)
-    clear = vector("FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC")
-    assert bench.chain.receive(clear)[8] == 0
-    assert bench.read(1, 132, 4) == 100
-    assert bench.chain.receive(instruction(1, 0x10, b"\x02"))[8] == 4
-
-
 def test_stuffed_write_is_unstuffed():
     bench = DynamixelBench((1, "xm430-w210"))
     bench.write(1, 11, 1, 1)
@@ -111,17 +95,14 @@ def test_stuffed_write_is_unstuffed():
     assert bench.read(1, 224, 4) == 0x00FDFFFF
 
 
-# --- resynchronisation
-
-
 # --- rules
 
 
 def test_reading_what_is_not_there_gives_an_error_and_no_bytes():
     bench = DynamixelBench((1, "xl330-m288"))
-    assert error_of_read(bench, 1, 64, 4) == (7, 0)
-    assert error_of_read(bench, 1, 1000, 2) == (7, 0)
-    assert error_of_read(bench, 1, 124, 23) == (0, 23)
+    for address, size, error in ((64, 4, 7), (1000, 2, 7), (124, 23, 0)):
+        [(_, found, data)] = bench.ask(1, READ, bench.span(address, size))
+        assert (found, len(data)) == (error, 0 if error else size)
 
 
 def test_unknown_instruction():
@@ -233,23 +214,3 @@ def test_the_eeprom_is_locked_under_torque_and_nothing_changes(model):
             value = register.low or 0
             assert servo.write(register.address, raw(value, register.size)) == ACCESS
     assert bytes(servo.memory.bytes[:64]) == before
-
-
-# Servos on the emulated Dynamixel chain, and its behaviour where documents differ
-
-
-# --- who listens
-
-
-def test_a_secondary_id_obeys_and_never_answers():
-    bench = DynamixelBench((1, "xl330-m288"), (2, "xl330-m288"))
-    assert bench.write(2, 12, 1, 1) == 0
-    assert bench.write(1, 65, 1, 1) == 0
-    assert (bench.read(1, 65, 1), bench.read(2, 65, 1)) == (1, 1)
-    assert len(bench.chain.receive(PING)) == 14
-    # EEPROM is not to be had by the secondary id.
-    assert bench.write(1, 31, 60, 1) == 0
-    assert (bench.read(1, 31, 1), bench.read(2, 31, 1)) == (60, 70)
-
-
-# --- where documents and devices differ

@@ -1,7 +1,7 @@
 """The emulated STS bus against the written rules: instructions, memory, lock, groups, quirks."""
 
 import pytest
-from servo_bench import ALL, FACTORY_RESET, PING, REBOOT, FeetechBench
+from servo_bench import ALL, PING, FeetechBench
 
 from gazerig.drivers.feetech import memory_table as feetech_table
 from gazerig.sim_mock.feetech.memory import STS
@@ -74,28 +74,6 @@ def test_only_what_is_written_while_it_is_open_is_kept(bench):
     assert [bench.read(1, at) for at in (21, 22, 23, 55)] == [16, 32, 0, 1]
 
 
-# --- kept writes
-
-
-# --- restart, factory settings
-
-
-def test_restore_gives_everything_back_but_the_id():
-    bench = FeetechBench((4, "sts3215", 2048.0))
-    bench.write(4, 55, 0)
-    for address in (6, 21, 36):
-        bench.write(4, address, 3)
-    assert bench.ask(4, FACTORY_RESET) == [(4, 0, b"")]
-    bench.wait(1.0)
-    assert [bench.read(4, at) for at in (5, 6, 21, 36)] == [4, 0, 32, 80]
-
-
-def test_a_reboot_may_be_met_with_silence(bench):
-    assert bench.ask(1, REBOOT) == []
-    bench.wait(0.79)
-    assert bench.ask(1, PING) == []
-
-
 # --- groups
 
 
@@ -104,6 +82,3 @@ def test_broadcast_ping(policy, ids):
     bench = three()
     bench.chain.choose_behaviour("broadcast-ping", policy)
     assert [i for i, _, _ in bench.ask(ALL, PING)] == ids
-
-
-# --- two clocks, one result

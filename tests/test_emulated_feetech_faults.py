@@ -35,18 +35,6 @@ def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(volts, bits):
     assert bench.error() == 0
 
 
-def test_a_wrong_voltage_takes_the_torque_only_where_that_is_chosen():
-    bench = FeetechBench()
-    bench.enable_torque()
-    bench.chain.faults.command("voltage 1 9")
-    bench.wait(0.1)
-    assert bench.read(1, 40) == 1
-    bench.write(1, 19, 1)
-    assert bench.read(1, 40) == 0
-    bench.write(1, 40, 1)
-    assert bench.read(1, 40) == 0
-
-
 def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on():
     bench = FeetechBench()
     bench.enable_torque()
@@ -81,49 +69,6 @@ def test_a_torque_limit_below_it_never_overloads():
     bench.write(1, 48, 790, 2)
     bench.wait(10.0)
     assert (bench.error(), bench.read(1, 60, 2, 10)) == (0, 790)
-
-
-@pytest.mark.parametrize(
-    ("policy", "by_goal", "by_torque"),
-    [
-        ("new-goal", 0, 0),
-        ("goal-away", OVERLOAD, 0),
-        ("torque", OVERLOAD, 0),
-        ("restart", OVERLOAD, OVERLOAD),
-    ],
-)
-def test_what_ends_an_overload(policy, by_goal, by_torque):
-    bench = FeetechBench()
-    bench.chain.choose_behaviour("overload-ends", policy)
-    bench.enable_torque()
-    bench.chain.faults.command("overload 1")
-    assert bench.error() == OVERLOAD
-    bench.write(1, 42, 2048, 2)
-    assert bench.error() == OVERLOAD
-    bench.write(1, 42, 2040, 2)
-    assert bench.error() == by_goal
-    bench.write(1, 40, 0)
-    bench.write(1, 40, 1)
-    assert bench.error() == by_torque
-    bench.chain.faults.command("brown-out 1")
-    bench.wait(1.0)
-    assert bench.error() == 0
-
-
-def test_overcurrent_takes_the_torque_until_it_is_switched_on_again():
-    bench = jammed()
-    bench.write(1, 28, 300, 2)
-    bench.write(1, 38, 50)
-    bench.wait(0.45)
-    assert bench.error() == 0
-    bench.wait(0.2)
-    assert (bench.error(), bench.read(1, 40)) == (CURRENT, 0)
-    bench.chain.faults.command("free 1")
-    bench.write(1, 40, 1)
-    assert (bench.error(), bench.read(1, 40)) == (0, 1)
-
-
-# --- restarts
 
 
 # --- the line

@@ -1,7 +1,7 @@
-"""Motion of emulated STS servos: closed forms of the profile, modes, limits, origin, torque."""
+"""Motion of emulated STS servos: closed forms of the profile, limits, origin, force."""
 
 import pytest
-from servo_bench import CALIBRATE, RESET_TURNS, WRITE, FeetechBench
+from servo_bench import WRITE, FeetechBench
 
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -52,16 +52,6 @@ def test_acceleration_makes_ramps_at_both_ends(bench, seconds, at):
     assert led_to(bench) == pytest.approx(2048 + at)
 
 
-def test_goal_time_decides_how_long_it_takes_or_nothing():
-    for policy, at in (("obey", 2248.0), ("ignore", 3000.0)):
-        bench = one()
-        bench.chain.choose_behaviour("goal-time", policy)
-        bench.enable_torque()
-        command(bench, 3048, speed=2000, time_ms=2400)
-        bench.wait(0.48)
-        assert led_to(bench) == pytest.approx(at + (policy == "ignore") * 8)
-
-
 def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
     bench = one(start=0.0)
     bench.enable_torque()
@@ -97,27 +87,6 @@ def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing(bench):
         bench.wait(0.01)
         command(bench, 3048, speed=1000)
     assert led_to(bench) == pytest.approx(2048 + 100 + 200)
-
-
-# --- torque
-
-
-def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on(bench):
-    bench.chain.choose_behaviour("torque-on", "present")
-    bench.write(1, 42, 3000, 2)
-    bench.write(1, 40, 1)
-    bench.wait(1.0)
-    assert bench.position() == bench.read(1, 42, 2) == 2048
-
-
-def test_a_goal_may_switch_the_torque_on(bench):
-    bench.chain.choose_behaviour("goal", "torque-on")
-    bench.write(1, 46, 1000, 2)
-    assert bench.read(1, 40) == 0
-    bench.write(1, 42, 2500, 2)
-    assert bench.read(1, 40) == 1
-    bench.wait(1.0)
-    assert bench.position() == pytest.approx(2500, abs=STEADY_STEPS)
 
 
 # --- force
@@ -160,22 +129,6 @@ def test_goals_end_at_the_angle_limits(bench, goal, at):
     assert bench.read(1, 42, 2) == goal
 
 
-def test_both_limits_0_count_turns():
-    bench = one(start=4000.0)
-    bench.write(1, 9, 0, 2)
-    bench.write(1, 11, 0, 2)
-    bench.enable_torque(goal=4000 + 5000)
-    bench.wait(3.0)
-    assert bench.position() == pytest.approx(9000, abs=STEADY_STEPS)
-    command(bench, 0x8000 | 700)
-    bench.wait(4.0)
-    assert bench.position() == pytest.approx(-700, abs=STEADY_STEPS)
-    assert bench.ask(1, RESET_TURNS) == [(1, 0, b"")]
-    assert bench.position() == pytest.approx(4096 - 700, abs=STEADY_STEPS)
-    bench.wait(0.5)
-    assert bench.position() == pytest.approx(4096 - 700, abs=STEADY_STEPS)
-
-
 def test_within_one_turn_it_reads_on_from_0_and_goes_the_long_way():
     bench = one(start=4090.0)
     bench.chain.faults.command("turn 1 20")
@@ -192,68 +145,3 @@ def test_the_offset_moves_the_origin(bench):
     assert bench.position() == 1948
     bench.write(1, 31, 0x800 | 100, 2)
     assert bench.position() == 2148
-
-
-@pytest.mark.parametrize("start", [0.0, 2049.0, 4095.0])
-def test_128_makes_the_present_place_the_middle_for_good(start):
-    bench = one(start=start)
-    bench.write(1, 40, 128)
-    assert bench.position() == pytest.approx(2048, abs=1)
-    assert bench.read(1, 40) == 0
-    offset = bench.read(1, 31, 2, 11)
-    assert (start - offset) % 4096 == pytest.approx(2048, abs=1)
-    bench.chain.faults.command("brown-out 1")
-    bench.wait(1.0)
-    assert bench.position() == pytest.approx(2048, abs=1)
-    assert bench.read(1, 31, 2, 11) == offset
-
-
-def test_calibrate_takes_any_place():
-    bench = one(start=1500.0)
-    assert len(bench.ask(1, CALIBRATE, 0xE8, 3)) == 1
-    assert bench.position() == 1000
-    assert bench.ask(1, CALIBRATE, 1) == []
-
-
-# --- other modes
-
-
-def test_mode_wheel_turns_at_the_goal_speed_both_ways_and_stops_at_0():
-    bench = one(Physics())
-    bench.write(1, 33, 1)
-    bench.write(1, 46, 1000, 2)
-    bench.write(1, 40, 1)
-    bench.wait(3.0)
-    assert bench.read(1, 58, 2, 15) == pytest.approx(1000, abs=15)
-    bench.write(1, 46, 0x8000 | 500, 2)
-    bench.wait(3.0)
-    assert bench.read(1, 58, 2, 15) == pytest.approx(-500, abs=15)
-    bench.write(1, 46, 0, 2)
-    bench.wait(3.0)
-    assert abs(bench.read(1, 58, 2, 15)) <= 3
-
-
-@pytest.mark.parametrize(("duty", "share"), [(500, 0.5), (0x400 | 250, -0.25), (0, 0.0)])
-def test_mode_pwm_gives_the_duty(bench, duty, share):
-    bench.write(1, 33, 2)
-    bench.write(1, 44, duty, 2)
-    bench.write(1, 40, 1)
-    bench.wait(2.0)
-    assert bench.read(1, 60, 2, 10) == round(1000 * share)
-    assert bench.chain[1].shaft.speed_steps_s == pytest.approx(TOP_STEPS_S * share, rel=0.01)
-
-
-def test_mode_step_goes_on_from_the_last_goal(bench):
-    for address in (9, 11):
-        bench.write(1, address, 0, 2)
-    bench.write(1, 33, 3)
-    bench.write(1, 40, 1)
-    bench.wait(0.5)
-    assert bench.position() == 2048
-    for _ in range(2):
-        bench.write(1, 42, 3000, 2)
-    bench.wait(4.0)
-    assert bench.position() == pytest.approx(8048, abs=STEADY_STEPS)
-    bench.write(1, 42, 0x8000 | 1000, 2)
-    bench.wait(2.0)
-    assert bench.position() == pytest.approx(7048, abs=STEADY_STEPS)

@@ -1,4 +1,4 @@
-"""The profile generator: shapes, times, new goals in motion."""
+"""The profile generator: shapes, new goals in motion."""
 
 import pytest
 from hypothesis import given, settings
@@ -10,7 +10,6 @@ from gazerig.sim_mock.smart_servo.profile import (
     TRAPEZOID,
     TRIANGLE,
     PositionProfile,
-    SpeedProfile,
 )
 
 
@@ -47,18 +46,6 @@ def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
         assert max(speeds(positions)) <= cruise + 1e-9
 
 
-@pytest.mark.parametrize(("total", "ramp"), [(500, 0), (500, 100), (500, 250)])
-@pytest.mark.parametrize("goal", [7.0, -3000.0])
-def test_a_time_based_profile_takes_its_time_whatever_the_distance(total, ramp, goal):
-    made = PositionProfile(0.0)
-    made.plan_by_time(goal, total, ramp)
-    assert made.kind == (RECTANGLE if ramp == 0 else TRAPEZOID if ramp < 250 else TRIANGLE)
-    positions = path(made)
-    assert len(positions) - 1 == total
-    assert positions[-1] == goal
-    assert positions[total // 2] == pytest.approx(goal / 2)
-
-
 FLOATS = st.floats(-5000, 5000)
 
 
@@ -78,14 +65,3 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
     # Average speeds of neighbouring milliseconds differ by one ramp, two where phases meet.
     changes = [abs(b - a) for a, b in zip([0.0, *v], [*v, 0.0], strict=False)]
     assert max(changes) <= 2.0 * ramp + 1e-6
-
-
-def test_a_speed_profile_ramps_and_ends():
-    made = SpeedProfile(0.0, 0.0)
-    made.set_goal(2.0, 0.01)
-    positions = made.advance(300)
-    assert made.v == 2.0 and made.running
-    assert speeds(positions)[:3] == pytest.approx([0.02, 0.03, 0.04])
-    made.set_goal(0.0, 0.0)
-    assert made.advance(2) == [positions[-1]] * 2
-    assert not made.running

@@ -46,26 +46,17 @@ def run(made: Shaft, ms: int) -> list[float]:
     return path
 
 
-@pytest.mark.parametrize("model", ["xl330-m077", "xc330-m288", "xl430-w250", "xh430-v350"])
+@pytest.mark.parametrize("model", ["xl330-m077", "xl430-w250"])
 def test_full_pwm_reaches_the_no_load_speed_of_the_data_sheet(model):
     made = shaft(model, Loop(bias=1.0), supply_ohm=0.0)
     run(made, 1500)
     assert made.speed_steps_s == pytest.approx(MODELS[model].no_load_steps_s, rel=1e-3)
 
 
-def test_speed_and_stall_torque_scale_with_the_voltage():
-    weak = shaft(loop=Loop(bias=1.0), supply_v=3.7, **SMOOTH)
-    run(weak, 1500)
-    assert weak.speed_steps_s / 4096 * 60 == pytest.approx(383 * 3.7 / 5.0, rel=1e-3)
-    weak.jam(True)
-    weak.run(2)
-    assert weak.effort == pytest.approx(0.74)
-
-
 # --- what the gains do
 
 
-@pytest.mark.parametrize("gain", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("gain", [1.0, 4.0])
 def test_the_steady_error_under_load_is_the_load_over_p(gain):
     # 0.05 Nm of 0.215 Nm, no friction: PWM 0.2326, of which P makes one share per step.
     made = shaft(loop=Loop(p=gain * P, d=D), load_nm=-0.05, **SMOOTH)
@@ -80,14 +71,7 @@ def test_i_removes_the_steady_error():
     assert abs(go(with_i, 300, 4000)[-1] - 300) < 1.0
 
 
-def test_the_i_part_does_not_wind_up_beyond_the_limit():
-    made = shaft(loop=Loop(p=P, i=0.01, d=D, u_max=0.5), stop_high_steps=100.0)
-    go(made, 4000, 3000)
-    back = go(made, 0, 300)
-    assert back[-1] < 60
-
-
-@pytest.mark.parametrize(("more_p", "more_d"), [(1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (1.0, 3.0)])
+@pytest.mark.parametrize(("more_p", "more_d"), [(1.0, 0.0), (2.0, 1.0)])
 def test_pd_control_moves_a_shaft_as_its_differential_equation_says(more_p, more_d):
     # x'' = a (P (goal - x) - D x') - x' / T, a the no-load speed over the time T to reach it.
     from scipy.linalg import expm
@@ -158,26 +142,12 @@ def test_a_load_below_friction_is_held_without_torque_and_a_larger_one_falls_to_
     assert falls.quiet and falls.v == 0.0
 
 
-def test_gravity_pulls_away_from_upright_and_back_to_hanging():
-    top = shaft(loop=DISABLED, gravity_nm=0.1, upright_steps=-300.0)
-    hanging = shaft(loop=DISABLED, gravity_nm=-0.1, upright_steps=-300.0)
-    assert run(top, 300)[-1] > 300
-    assert run(hanging, 300)[-1] < -100
-
-
 def test_stops_are_never_passed_and_a_stalled_motor_draws_its_stall_current():
     made = shaft(stop_low_steps=-50.0, stop_high_steps=80.0, supply_ohm=0.0)
     assert max(go(made, 2000, 500)) == 80.0
     assert made.effort == pytest.approx(1.0)
     assert min(go(made, -2000, 500)) == -50.0
     assert made.effort == pytest.approx(-1.0)
-
-
-def test_load_sags_the_voltage():
-    made = shaft(loop=Loop(bias=1.0), stop_high_steps=0.0, supply_ohm=0.4)
-    run(made, 50)
-    assert made.volts == pytest.approx(1.0 / (1.0 + 0.4 * 1.47 / 5.0), rel=1e-3)
-    assert made.volts < 0.9
 
 
 def test_the_joint_lags_behind_the_encoder_by_half_the_play():

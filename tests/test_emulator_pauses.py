@@ -12,7 +12,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.protection import ServoProtection
 
 HOUR_S = 3600.0
-GOAL, GOAL_SPEED, MODE = 42, 46, 33
+GOAL, GOAL_SPEED = 42, 46
 
 
 @pytest.fixture
@@ -46,13 +46,6 @@ def slow(bench):
     bench.wait(0.5)
 
 
-def wheel(bench):
-    bench.write(1, MODE, 1)
-    bench.write(1, 40, 1)
-    bench.write(1, GOAL_SPEED, 700, 2)
-    bench.wait(0.5)
-
-
 def loose(bench):
     moved(bench)
     bench.write(1, 40, 0)
@@ -65,7 +58,7 @@ def jammed(bench):
     bench.wait(0.5)
 
 
-STATES = [moved, slow, wheel, loose, jammed]
+STATES = [moved, slow, loose, jammed]
 
 
 @pytest.mark.parametrize("begin", STATES)
@@ -89,7 +82,7 @@ def test_a_pause_ends_where_a_life_through_it_does(begin):
         ends.append((bench.position(), servo.torque, servo.protection.temperature_c))
     (at, torque, warm), (truly, torque_truly, warm_truly) = ends
     apart = abs(at - truly)
-    assert min(apart, 4096 - apart) <= (40 if begin is wheel else 2)
+    assert min(apart, 4096 - apart) <= 2
     assert torque == torque_truly and warm == pytest.approx(warm_truly, abs=0.5)
 
 

@@ -105,16 +105,6 @@ def test_all_channels_at_once_and_what_cannot_be_read(bench):
     assert not any(bench.pulse_us(channel) for channel in range(16))
 
 
-def test_all_call_and_software_reset(bench):
-    bench.bus.write_i2c_block_data(0x70, MODE1, [AI])
-    assert bench.get(MODE1) == [AI]
-    with pytest.raises(OSError) as caught:
-        bench.bus.write_i2c_block_data(0x70, MODE1, [0])
-    assert caught.value.errno == errno.EREMOTEIO
-    bench.bus.i2c_rdwr(i2c_msg.write(0, [6]))
-    assert bench.get(MODE1) == [0x11]
-
-
 def test_boards_have_their_own_registers_and_strangers_are_not_there(bench):
     bench.wake()
     assert bench.bus.read_byte_data(0x41, MODE1) == 0x11
