@@ -201,13 +201,6 @@ def test_a_thing_that_no_longer_moves_is_not_searched_for() -> None:
     assert {t.kind for t in run(model, 0.5, 6.0)} == {"rest", "glance"}
 
 
-def test_more_things_than_can_be_remembered_push_out_the_oldest() -> None:
-    model = idle(2)
-    for name in range(100):
-        model.record_seen({name: (1.0, 0.001 * name, 0.2)}, 0.0)
-    assert len(model._seen) == 16 and 99 in model._seen and 0 not in model._seen
-
-
 def test_each_glance_is_a_look_of_its_own() -> None:
     model = idle(7)
     model.remember(seen())

@@ -128,30 +128,29 @@ def test_shifts_in_quick_succession_share_one_blink() -> None:
     assert min(b - a for a, b in pairwise(times)) >= 0.6 - 1e-9
 
 
-@pytest.mark.parametrize("law", ["people", "nakamoto"])
-def test_e53_no_blink_storm(law: str) -> None:
-    model = lids(2, law=law)
-    model.step(0.0, 0.0, radians(40.0))  # the shift that left the head 40 deg aside
-    onsets(model, 60.0, DT)
-    assert 5 <= model.blinks <= 25
+KINEMATICS = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
+
+
+def whole_head(blinking: Lids, reach_deg: float) -> Oculomotor:
+    """Return eyes and head, each of which reach so far aside, with these lids."""
+    span = (-radians(reach_deg), radians(reach_deg))
+    return Oculomotor(
+        EXACT,
+        KINEMATICS,
+        ((span, span), (span, span)),
+        SaccadeModel(SaccadeParams()),
+        Pursuit(PursuitParams()),
+        HeadModel(HeadParams(), radians(reach_deg), (span, span)),
+        blinking,
+        np.random.default_rng(0),
+    )
 
 
 @pytest.mark.parametrize("law", ["people", "nakamoto"])
 def test_e53_no_blink_storm_with_the_head_held_aside(law: str) -> None:
-    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
-    span = (-radians(55.0), radians(55.0))
-    model = Oculomotor(
-        EXACT,
-        kinematics,
-        ((span, span), (span, span)),
-        SaccadeModel(SaccadeParams()),
-        Pursuit(PursuitParams()),
-        HeadModel(HeadParams(), radians(55.0), (span, span)),
-        lids(2, law=law),
-        np.random.default_rng(0),
-    )
+    model = whole_head(lids(2, law=law), 55.0)
     held = JointState((0.0,) * 6 + (radians(40.0), 0.0, 0.0), (0.0,) * 9, (0.0,) * 9, ())
-    state = kinematics.forward(held)
+    state = KINEMATICS.forward(held)
     aside = (np.cos(radians(40.0)), np.sin(radians(40.0)), 0.0)
     target = Target(aside, (0.0, 0.0, 0.0), 0.0, "face", 1, 0.5, True, None, 1, "")
     commands = [model.step(target, state, k * 0.02, 0.02) for k in range(round(60.0 / 0.02))]
@@ -176,19 +175,8 @@ def test_e74_a_shift_of_3_degrees_brings_no_blink() -> None:
 
 def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_after() -> None:
     """A person moves from side to side every 2 s; eyes and head wait for the lids."""
-    span = (-radians(60.0), radians(60.0))
-    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
-    model = Oculomotor(
-        EXACT,
-        kinematics,
-        ((span, span), (span, span)),
-        SaccadeModel(SaccadeParams()),
-        Pursuit(PursuitParams()),
-        HeadModel(HeadParams(), radians(60.0), (span, span)),
-        lids(3, blinks_per_min=0.0),
-        np.random.default_rng(0),
-    )
-    state = kinematics.forward(JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()))
+    model = whole_head(lids(3, blinks_per_min=0.0), 60.0)
+    state = KINEMATICS.forward(JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()))
     blinks_s, waits_s, counts, every = [], [], (0, 0), 400
     for k in range(120 * every):
         side = radians(20.0) * (1 if k // every % 2 else -1)

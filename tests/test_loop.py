@@ -17,7 +17,6 @@ from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotatio
 from gazerig.gaze.types import PARTS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -235,15 +234,3 @@ def test_the_same_picture_is_seen_once() -> None:
     first = perception.see(seen_from(0.0, 0.0, 1), poses)
     assert perception.see(seen_from(0.0, 0.0, 1), poses) is first
     assert perception.frames == 1
-
-
-def test_the_visitor_comes_moves_waves_leaves_and_comes_back() -> None:
-    scene = load_scene("visitor")
-    faces = [scene.people(t)[0].p_world_face_m for t in np.arange(0.0, 44.0, 0.1)]
-    assert max(y for _, y, _ in faces) > 0.25 and min(y for _, y, _ in faces) < -2.4
-    assert np.linalg.norm(np.array(faces[0]) - faces[-1]) < 0.1
-    steps = np.linalg.norm(np.diff(faces, axis=0), axis=1) / 0.1
-    assert steps.max() < 2.7  # m/s, walking
-    hands = [scene.people(t)[0].hand is not None for t in np.arange(0.0, 44.0, 0.1)]
-    assert 30 <= sum(hands) <= 40
-    assert scene.people(10.0) == scene.people(10.0)

@@ -44,7 +44,6 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs" / "connect-your-program.md"
 
 PATIENCE_S = 60.0
-ROOT = Path(__file__).parents[1]
 
 
 class Rig(NamedTuple):
@@ -281,14 +280,11 @@ BAD = (
     (DEEP, 400, "nested too deep"),
     (b'{"do": "status", "tag": [1]}', 400, "tag: a whole number or text"),
     (b'{"do": "look_at", "p_world_m": [NaN, 0, 0]}', 400, "not JSON"),
-    (b'{"do": "look_at", "p_world_m": [1e999, 0, 0]}', 400, "Number out of range"),
     (b'{"do": "look_at", "p_world_m": [1, 0, 0], "x": 1}', 409, "look_at has p_world_m, pointer"),
     (b'{"do": "dance"}', 409, "available: hello"),
-    (b'{"do": "hello", "version": 2}', 409, "version 2 of the messages: this rig has 1"),
     (b'{"do": "save", "path": "/etc/passwd.yaml"}', 409, "only files in"),
     (b'{"do": "character", "name": "/etc/passwd"}', 409, "and below can be named"),
     (b'{"do": "set", "changes": {"doors": ["wyoming"]}}', 409, "cannot be set over the network"),
-    (b'{"do": "set", "changes": {"bus.port": "/dev/x"}}', 409, "cannot be set over the network"),
     (b" " * 70_000, 413, "longer than 65536 bytes"),
 )
 
@@ -311,9 +307,7 @@ def test_a_bad_message_gets_one_clear_error(rig: Rig, body: bytes, status: int, 
     ("path", "text"),
     [
         ("/socket?rate_hz=0", "rate_hz=0: a number 1..60"),
-        ("/socket?rate_hz=61", "1..60"),
         ("/socket?rate_hz=nan", "1..60"),
-        ("/socket?events=1", "true or false"),
         ("/state?after=-1", "after=-1"),
     ],
 )

@@ -1,26 +1,22 @@
 """The pseudo-terminal server: start, stop, and clients that are not ours."""
 
-import fcntl
 import json
 import os
 import signal
 import subprocess
 import sys
-import termios
 import time
 from pathlib import Path
 
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
-from fakes.waiting import eventually
 from present import present
 
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
-from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -218,27 +214,6 @@ def test_answers_that_a_client_did_not_read_are_not_the_next_ones(path):
     os.close(fd)
 
 
-def test_a_client_killed_with_a_lock_leaves_the_port_to_the_next(path):
-    """A client locks the terminal for itself and dies; the lock goes with time."""
-    fd = opened(path)
-    fcntl.ioctl(fd, termios.TIOCEXCL)
-    os.close(fd)
-    assert eventually(lambda: not locked(path))
-
-
-def locked(path):
-    """Return whether a terminal is locked, without being kept out by the lock oneself."""
-    try:
-        fd = opened(path)
-    except OSError:
-        return True
-    try:
-        get_lock = 0x80045440  # TIOCGEXCL
-        return any(fcntl.ioctl(fd, get_lock, bytes(4)))
-    finally:
-        os.close(fd)
-
-
 # --- other kinds of devices, and several buses in one process
 
 
@@ -250,17 +225,6 @@ def asked(path, data, length, baud=1_000_000):
     answer = port.read_until(length, port.now_s() + 20.0)
     port.closePort()
     return answer
-
-
-def test_a_board_tells_what_its_channels_send():
-    with PtyBus() as bus:
-        board = MaestroLine(12, servos=(HobbySpec(3, 5000.0),))
-        path = bus.start_device(board, choices={"max-us": "1400"})
-        assert asked(path, bytes.fromhex("9003"), 2, 115_200) == bytes(2)
-        assert asked(path, bytes.fromhex("8403702E9003"), 2, 9600) == (5600).to_bytes(2, "little")
-        assert asked(path, bytes.fromhex("A1"), 2) == bytes(2)
-        status = json.loads(bus.command("status"))
-        assert len(status["servos"]) == 12
 
 
 def test_the_buses_of_a_rig_live_in_one_process():
@@ -293,14 +257,3 @@ def test_a_command_for_no_bus_is_refused_with_the_names():
             buses.command("status")
         with pytest.raises(ValueError, match="name the bus first"):
             buses.command("status", "tail")
-
-
-def test_a_bus_that_cannot_be_ends_the_others(capfd):
-    with PtyBuses() as buses, pytest.raises(RuntimeError, match="did not start"):
-        buses.start(
-            {
-                "eyes": DynamixelLine((ServoSpec(1, "xl330-m288"),)),
-                "neck": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=12),
-            }
-        )
-    assert "baud 12: xl330-m288 supports" in capfd.readouterr().err

@@ -358,11 +358,9 @@ def line_of(end: socket.socket) -> dict[str, Any]:
     [
         (b"hello\n", "not a line of JSON"),
         (b'{"do": "get", "prefix": NaN}\n', "not a line of JSON"),
-        (b'{"do": "stop", "why": "\\ud800"}\n', "not a line of JSON"),
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
         (b'{"do": "dance"}\n', "unknown request; available: hello, status, "),
-        (b'{"do": "get", "prefix": 1}\n', "get has prefix"),
         (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
         (b'{"do": "tune", "changes": [["a", 1]]}\n', "requests set and say"),
     ],

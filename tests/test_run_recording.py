@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 from mcap.reader import make_reader
-from msgspec import structs
 from msgspec.structs import replace
 from recorded_run import (
     STARTED,
@@ -38,7 +37,6 @@ from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import FramePicker, Recorder
 from gazerig.robot.recording.run_info import RunInfo, as_text, read_text
-from gazerig.robot.recording.viewer_messages import orientation
 
 
 def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
@@ -206,21 +204,18 @@ def test_any_tick_comes_back(recorded: Recorded, odd: float, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("name", "nonsense"),
     [
-        *(("seed", value) for value in (-1, 1.5, True)), *(("rate_hz", value) for value in (0, 1e9)),
-        ("pictures_hz", -1), ("mock", 1), ("rig", 5), ("versions", []), ("started_utc", "yesterday"),
+        ("seed", -1),
+        ("rate_hz", 1e9),
+        ("mock", 1),
+        ("started_utc", "yesterday"),
     ],
-)  # fmt: skip
+)
 def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: object) -> None:
     ((key, text),) = as_text(info_for()).items()
     assert read_text({key: text}, RunInfo) == info_for()
     wrong = json.dumps({**json.loads(text), name: nonsense})
     with pytest.raises(ValueError, match=name):
         read_text({key: wrong}, RunInfo)
-
-
-def test_a_rotation_as_a_quaternion() -> None:
-    turned = orientation(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-    assert structs.astuple(turned) == pytest.approx((0.0, 0.0, 0.5**0.5, 0.5**0.5))
 
 
 def test_a_late_frame_does_not_delay_those_that_follow() -> None:
