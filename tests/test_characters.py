@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.config.load import load, read_yaml, shipped_names, shipped_path
+from gazerig.config.load import read_yaml, shipped_names, shipped_path
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
-from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
+from gazerig.gaze.attention.top_down import Rule, TopDown
 from gazerig.gaze.types import Bodies, GazeState, Percept
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -104,22 +104,6 @@ def test_the_strong_boxer_keeps_the_face_and_the_weak_one_loses_it() -> None:
 def test_the_bold_look_at_a_face_more_than_the_shy() -> None:
     shy, bold = (face_share(load_rig("desk", name).gaze) for name in ("shy", "bold"))
     assert shy < bold - 0.1
-
-
-def test_shipped_rule_sets_load() -> None:
-    sets = {
-        name: load(shipped_path("rules", name), TopDownParams) for name in shipped_names("rules")
-    }
-    assert set(sets) == {"boxing", "conversation", "greeting", "group"}
-    boxing, talk = sets["boxing"], sets["conversation"]
-    assert boxing.rules == TopDownParams().rules and boxing.behaviour == "wait"
-    assert set(talk.rules) >= {"wait", "listen", "talk", "think"}
-    assert (
-        talk.rules["listen"].salience > talk.rules["talk"].salience > talk.rules["think"].salience
-    )
-    assert talk.rules["recall"].point_world_m == (1.2, 0.35, 0.75)
-    for rules in sets.values():
-        TopDown(rules).behave(rules.behaviour)
 
 
 @pytest.mark.parametrize("rig", shipped_names("rigs"))

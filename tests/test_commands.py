@@ -2,29 +2,15 @@
 
 from collections.abc import Iterator
 from math import degrees, inf, nan, pi, radians
-from typing import Any
 
 import msgspec
-import numpy as np
 import pytest
 from commanded_robot import YAW, Running, running_desk
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.attention.conversation import (
-    AversionParams,
-    ConversationGaze,
-    ConversationParams,
-)
-from gazerig.gaze.attention.top_down import TopDown, TopDownParams
-from gazerig.gaze.lids.blink import LidParams
-from gazerig.gaze.lids.lids import Lids
-from gazerig.gaze.track.expression import Expressions
-from gazerig.gaze.track.track_player import TrackPlayer
 from gazerig.robot.app.session import shut_down
-from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.track_choices import TrackChoices
 from gazerig.robot.model.commands import (
     AnyCommand,
     Ask,
@@ -212,27 +198,6 @@ def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running)
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
     assert running.go(0.1)[0].controlled_by == "a client: jog neck_yaw 70.0"
-
-
-def blinks_in_two_minutes(lids: Lids) -> int:
-    for k in range(6000):
-        lids.step(0.02 * k, 0.0, None)
-    return lids.blinks
-
-
-def test_who_is_in_a_conversation_blinks_as_people_do_there() -> None:
-    blinks = {}
-    for mode in ("talk", "none"):
-        lids = Lids(LidParams(), np.random.default_rng(1))
-        none = TrackChoices({}, TrackPlayer(0), ("eyes_pan",), {})
-        unused: Any = None  # no turn is reported
-        rngs = (np.random.default_rng(n) for n in (2, 3))
-        params = AversionParams(), ConversationParams()
-        turns = ConversationGaze("people", *params, unused, *rngs)
-        menus = Menus(turns, lids, Expressions({}, 0.5, 0), none)
-        menus.choose(Ask("conversation", mode), TopDown(TopDownParams()), 0.0)
-        blinks[mode] = blinks_in_two_minutes(lids)
-    assert blinks["talk"] > blinks["none"] + 5
 
 
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:

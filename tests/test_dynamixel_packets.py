@@ -31,10 +31,6 @@ def test_instructions_are_the_protocols():
     assert instruction(1, 3, struct.pack("<Hi", 116, 512)) == vector(
         "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89"
     )
-    assert instruction(1, 4, struct.pack("<Hi", 104, 200)) == vector(
-        "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E"
-    )
-    assert instruction(1, 5) == vector("FF FF FD 00 01 03 00 05 02 CE")
     assert instruction(1, 8) == vector("FF FF FD 00 01 03 00 08 2F 4E")
     assert sync_read((1, 2), 132, 4) == vector("FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA")
     assert sync_read((3, 7, 4), 132, 4, fast=True) == vector(

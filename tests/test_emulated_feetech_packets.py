@@ -11,8 +11,6 @@ MAKERS = {
     "ping": "FF FF 01 02 01 FB",
     "read": "FF FF 01 04 02 38 02 BE",
     "write": "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5",
-    "action": "FF FF FE 02 05 FA",
-    "reset turns": "FF FF 01 02 0A F2",
     "sync write": "FF FF FE 20 83 2A 06 01 00 08 00 00 E8 03 02 00 08 00 00 E8 03"
     " 03 00 08 00 00 E8 03 04 00 08 00 00 E8 03 58",
 }

@@ -1,7 +1,6 @@
 """Emulators without queries for an hour: the next packet is answered immediately and correctly."""
 
 import pytest
-from maestro_world import World, acceleration, speed, target
 from servo_bench import FeetechBench
 
 from gazerig.config.schema import load_rig
@@ -84,22 +83,6 @@ def test_a_pause_ends_where_a_life_through_it_does(begin):
     apart = abs(at - truly)
     assert min(apart, 4096 - apart) <= 2
     assert torque == torque_truly and warm == pytest.approx(warm_truly, abs=0.5)
-
-
-@pytest.mark.parametrize("timeout_s", [0, 100])
-def test_a_maestro_whose_script_runs_all_night_answers(timeout_s):
-    world = World(12)
-    for channel in range(12):
-        world.ask(target(channel, 5000))
-        world.ask(speed(channel, 1) + acceleration(channel, 1) + target(channel, 6000))
-    world.do("script 3")
-    world.do(f"set timeout-ms {1000 * timeout_s}")
-    world.after(HOUR_S)
-    here = world.positions()
-    # Speed 1 is 100 a second: all the others are there, or sent off by the timeout.
-    assert here[0] == (0 if timeout_s else 6000)
-    swung = {world.after(0.5).position(3) for _ in range(8)}
-    assert len(swung) > 1
 
 
 @pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])

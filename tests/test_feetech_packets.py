@@ -5,11 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.feetech.protocol import (
-    ACTION,
-    BROADCAST,
     PING,
     REBOOT,
-    RESET,
     GoalWrite,
     Status,
     all_intact,
@@ -18,7 +15,6 @@ from gazerig.drivers.feetech.protocol import (
     instruction,
     parse_statuses,
     read,
-    reg_write,
     sync_read,
     sync_write,
     write,
@@ -29,9 +25,6 @@ VECTORS = [
     (read(1, 56, 2), "FF FF 01 04 02 38 02 BE"),
     (write(1, 42, bytes((0x00, 0x08, 0, 0, 0xE8, 0x03))),
      "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5"),
-    (reg_write(1, 42, b"\x00\x08"), "FF FF 01 05 04 2A 00 08 C3"),
-    (instruction(BROADCAST, ACTION), "FF FF FE 02 05 FA"),
-    (instruction(0, RESET), "FF FF 00 02 06 F7"),
     (instruction(1, REBOOT), "FF FF 01 02 08 F4"),
     (sync_read((1, 2, 3), 56, 15), "FF FF FE 07 82 38 0F 01 02 03 2B"),
     (sync_write((1, 2), 40, 1, (b"\x01", b"\x01")), "FF FF FE 08 83 28 01 01 01 02 01 48"),

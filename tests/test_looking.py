@@ -2,20 +2,14 @@
 
 from collections.abc import Iterator
 from math import degrees, radians
-from pathlib import Path
 from typing import Any
 
 import pytest
 from commanded_robot import Running, running_desk
 
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.session import compose
-from gazerig.robot.app.session import run as run_session
 from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.commands import (
-    Command,
     Jog,
     LookAt,
     LookAtDirection,
@@ -26,7 +20,6 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.control_source import NO_CLIENT_CONTROL
 from gazerig.robot.model.requests import read_request
-from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -133,21 +126,6 @@ def test_a_pixel_without_a_frame_is_refused(rig: Running) -> None:
     assert "no camera frame" in rig.do(LookAtPixel((1.0, 1.0)))[0].refused
 
 
-def test_a_lead_ends_after_its_time_and_says_so(rig: Running) -> None:
-    ticks = rig.do(LookAt((1.0, 0.5, 0.3), who="a show", stay=True, for_s=0.5), 1.0)[1]
-    led = [tick for tick in ticks if tick.controlled_by]
-    assert led[-1].t_s - led[0].t_s == pytest.approx(0.5, abs=0.011)
-    assert (
-        ticks[-1].client_control.end_reason == "its time is over"
-        and not ticks[-1].client_control.active
-    )
-    words = [event for tick in ticks for event in tick.events]
-    assert (
-        "a show: look at 1 0.5 0.3: its time is over, so the gaze models are in control again"
-        in words
-    )
-
-
 def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:
     assert rig.go(0.006)[-1].client_control == NO_CLIENT_CONTROL
     assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
@@ -167,34 +145,3 @@ def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:
     assert reply.control_number == 3 and degrees(ticks[0].client_control.error_rad) > 3.0
     assert rig.go(2.0)[-1].client_control.arrived
     assert rig.do(Stop("a hand"))[1][-1].client_control.end_reason == "stopped: a hand"
-
-
-def test_looks_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
-    file = tmp_path / "looks.mcap"
-    options = RunOptions(
-        mock=True, fast=True, seed=5, scene="face-to-face", seconds=5.0, record=file, bus="emulated"
-    )
-    composed = compose(options)
-    asked: dict[int, Command] = {
-        300: LookAtPixel((200.0, 150.0), stay=True),
-        450: LookAtDirection((-0.3, 0.1), "head", for_s=0.4, stay=True),
-        600: LookAtInHead((1.0, -0.2, 0.1), stay=True),
-        750: LookAtPerson(1, stay=True),
-    }
-    count = iter(range(10_000))
-    see = composed.assembly.robot.perception.see
-
-    def see_and_ask(found: Any, poses: Any) -> Any:
-        command = asked.get(next(count))
-        if command is not None:
-            composed.assembly.robot.command(command)
-        return see(found, poses)
-
-    watched: Any = see_and_ask
-    composed.assembly.robot.perception.see = watched  # type: ignore[method-assign]
-    run_session(composed, lambda: None, lambda line: None)
-    recording = RunRecording(file)
-    given = [command for one in recording.moments() for command in one.tick.commands]
-    assert [type(one) for one in given] == [type(one) for one in asked.values()]
-    again = rerun(recording)
-    assert again.is_same and again.sent_bytes_same and not again.notes

@@ -59,20 +59,6 @@ def test_errors_at_will(world, name):
     assert world.position() == 0
 
 
-def test_a_script_runs_and_swings_a_channel_against_the_host(world):
-    assert world.ask("AE") == b"\x01"
-    world.do("script 2")
-    assert world.ask("AE") == b"\x00"
-    seen = {world.after(0.5).position(2) for _ in range(8)}
-    assert seen >= {3968, 8000}
-    world.ask("A4")
-    assert world.ask("AE") == b"\x01"
-    world.ask(target(2, 6000))
-    assert world.after(5.0).position(2) == 6000
-    world.ask("A7 00")
-    assert world.errors() == 1 << ERRORS.index("script-counter")
-
-
 def test_servos_without_their_supply_are_limp_and_the_board_notices_nothing(world):
     world.ask(target(0, 7000))
     world.after(1.0)
@@ -124,9 +110,6 @@ def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
 def test_boards_that_do_not_exist(channels, options, says):
     with pytest.raises(ValueError, match=says):
         build_board(channels, lambda: 0.0, **options)
-
-
-# --- on a line
 
 
 # --- anything at all

@@ -86,16 +86,6 @@ def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
     ]
 
 
-def test_an_end_of_answers_names_the_option(monkeypatch: pytest.MonkeyPatch) -> None:
-    def ended(prompt: str) -> str:
-        raise EOFError
-
-    monkeypatch.setattr("builtins.input", ended)
-    monkeypatch.setattr("sys.stdin", type("Tty", (), {"isatty": lambda self: True})())
-    assert typed("new", "a.yaml") == 2
-    assert not Path("a.yaml").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "told"),
     [

@@ -1,6 +1,5 @@
 """Each paper's profile is its paper and nothing else, proved by running it (docs/profiles.md)."""
 
-import re
 from math import atan2, radians
 
 import numpy as np
@@ -87,14 +86,6 @@ def test_the_head_of_mitake_joins_in_before_the_camera_loses_a_face() -> None:
     half_face_rad, lag_rad = atan2(0.11, 1.0), radians(4.0)  # a stroll of 10 deg/s for .4 s
     seen_rad = atan2(200.0, lens.fy_px) - half_face_rad
     assert radians(rig.gaze.head.max_offset_deg) < seen_rad - lag_rad
-
-
-def test_profiles_name_the_section_of_each_value() -> None:
-    for profile in ("mitake", "nakamoto"):
-        text = (PAGE.parents[1] / "config" / "profiles" / f"{profile}.yaml").read_text("utf-8")
-        values = [line for line in text.splitlines() if re.match(r"^ +\w+: [^ #]", line)]
-        bare = [line for line in values if "#" not in line and "explores" not in line]
-        assert not bare, bare
 
 
 def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head() -> None:
