@@ -26,10 +26,12 @@ from gazerig.robot.model.commands import (
     Ask,
     Command,
     EndTrack,
+    Express,
     Jog,
     LookAt,
     Play,
     Resume,
+    SetLevel,
     Speak,
     Stop,
     SyncTrack,
@@ -178,7 +180,8 @@ frames:
 COMMANDS: dict[int, Command] = {
     100: Play("a_show", loop=True, from_s="here"), 260: Play("wink_brow"),
     340: SyncTrack(1, 1.2), 360: SyncTrack(1, 0.1), 520: EndTrack("a_show"),
-    550: Speak("absent.wav", 0.3, "mouth", ((0.1, 0.6), (0.2, 0.0))), 600: Play("a_show", from_s=1.0), 680: Stop("test", who="me"),
+    550: Speak("absent.wav", 0.3, "mouth", ((0.1, 0.6), (0.2, 0.0))), 600: Play("a_show", from_s=1.0),
+    640: Express("happy", 0.5), 660: SetLevel("mouth", 0.4), 680: Stop("test", who="me"),
 }  # fmt: skip
 
 
