@@ -30,11 +30,6 @@ def skip_without_part(part: str) -> None:
         pytest.skip(f"the feature of {part} is not there")
 
 
-def has_command(command: str) -> bool:
-    """Return whether the feature of a command is there, or it is the core's."""
-    return is_there(SHIPPED[COMMAND].get(command, ""))
-
-
 def skip_without(command: str) -> None:
     """Skip a test of a command whose feature is not there; those of the core always are."""
     skip_without_part(SHIPPED[COMMAND].get(command, ""))

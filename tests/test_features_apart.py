@@ -10,7 +10,6 @@ import pytest
 
 import gazerig
 
-FEATURES = sorted(path.parent.name for path in Path(gazerig.__path__[0]).glob("features/*/cli"))
 RUN = "run desk --mock --fast --no-page --scene visitor --seconds 0.5 --seed 0 --summary -"
 
 
