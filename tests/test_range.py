@@ -15,7 +15,7 @@ def test_e81_range_stays_as_assumed_whatever_the_direction_does(
 
 
 def test_e81_walkers_are_not_at_the_nose_and_the_gaze_is_not_beside_the_picture() -> None:
-    figures = row.believed(8.0, row.SIZE, seed=1).figures("walkers")
+    figures = row.believed(8.0, seed=1).figures()
     assert figures["walkers: things a picture"] > 4.0
     for name, (low, high) in row.WANTED.items():
         if name in figures:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -47,17 +47,16 @@ class MeasuredRun:
         the guard
     head_deg, head_goal_deg: (n, 3) yaw, pitch, roll of the neck, measured; as commanded
     plan_deg: (n, 2) direction of the planned gaze point from the head
-    lids, lids_goal: (n, 2) opening of left and right upper lid, 0 shut .. 1 open, measured; planned
+    lids_goal: (n, 2) planned opening of left and right upper lid, 0 shut .. 1 open
     phase: (n,) "fixate", "saccade" or "pursue", as planned; blink: (n,) whether a blink lasts
     saccades, blinks: (n,) number of those planned until then
     target_m: (n, 3) the target's position at the tick; target_deg: (n, 2) direction from the head
     shift: (n,) counts up with each newly chosen target
-    target_name: (n,) such as "face 3"; part: (n,) face part or ""; salience: (n,)
+    target_name: (n,) such as "face 3"; part: (n,) face part or ""
     truth: positions that the scene held, (n, 3) by "face 0", "hand 0" (of person 0), "thing 7";
         nan where there is none
     head_m: (n, 3) position of the midpoint of the eyes in the world
     angles: what exports are made of; trace: what the report is made of (both of the whole run)
-    figures: the summary's
     """
 
     t_s: np.ndarray
@@ -67,7 +66,6 @@ class MeasuredRun:
     eyes_goal_deg: np.ndarray
     head_goal_deg: np.ndarray
     plan_deg: np.ndarray
-    lids: np.ndarray
     lids_goal: np.ndarray
     phase: np.ndarray
     blink: np.ndarray
@@ -78,12 +76,10 @@ class MeasuredRun:
     shift: np.ndarray
     target_name: np.ndarray
     part: np.ndarray
-    salience: np.ndarray
     head_m: np.ndarray
     truth: dict[str, np.ndarray]
     angles: GazeAngles
     trace: GazeTrace
-    figures: dict[str, object]
 
     def truth_deg(self, name: str) -> np.ndarray:
         """Return the direction of something in the scene from the head, (n, 2)."""
@@ -91,24 +87,8 @@ class MeasuredRun:
         return np.degrees(np.column_stack((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)))))
 
 
-class Runner(Protocol):
-    """``measured_run``, or what a test puts in its place."""
-
-    def __call__(
-        self,
-        scene: str | Scene,
-        profile: str = "robot",
-        seed: int = 0,
-        seconds: float = 60.0,
-        overrides: Mapping[str, Value] | None = None,
-        **options: Any,
-    ) -> MeasuredRun:
-        """Return the columns of one run."""
-        ...
-
-
-Measure = Callable[[Runner, float, Sequence[int]], dict[str, float]]
-"""``measure`` of a row: (run, seconds of each run, seeds) -> figures by name."""
+Runner = Callable[..., MeasuredRun]
+"""``measured_run``, which rows get as an argument."""
 
 _kept: dict[str, MeasuredRun] = {}
 
@@ -141,51 +121,27 @@ def measured_run(
     return _kept[key]
 
 
-def ideal_run(
-    scene: str | Scene,
-    profile: str = "robot",
-    seed: int = 0,
-    seconds: float = 60.0,
-    overrides: Mapping[str, Value] | None = None,
-    **options: Any,
-) -> MeasuredRun:
-    """Return a measured run on servos without bytes, in half the processor time."""
-    return measured_run(scene, profile, seed, seconds, overrides, bus="ideal", **options)
-
-
-def half_rate_run(
-    scene: str | Scene,
-    profile: str = "robot",
-    seed: int = 0,
-    seconds: float = 60.0,
-    overrides: Mapping[str, Value] | None = None,
-    **options: Any,
-) -> MeasuredRun:
-    """Return an ideal run of 100 ticks a second, in half its processor time."""
-    slower = {"loop.rate_hz": 100.0, **(overrides or {})}
-    return ideal_run(scene, profile, seed, seconds, slower, **options)
-
-
-_worlds: dict[str, Counter[str]] = {}
+def half_rate_run(scene: str, profile: str, seconds: float) -> MeasuredRun:
+    """Return a run on servos without bytes, of 100 ticks a second, in a quarter of the time."""
+    return measured_run(
+        scene, profile, seconds=seconds, overrides={"loop.rate_hz": 100.0}, bus="ideal"
+    )
 
 
 def world_targets(world: str, seed: int, seconds: float) -> Counter[str]:
     """Return the ticks on each kind of target while a face is seen, in an unrendered world."""
-    key = repr((world, seed, seconds))
-    if key not in _worlds:
-        kinds: Counter[str] = Counter()
-        options = RunOptions(
-            True, True, seed, world=world, no_pictures=True, seconds=seconds, bus="ideal"
-        ).check_and_complete()
-        rig = with_options(load_rig(options.rig, options.character, options.profile), options)
+    kinds: Counter[str] = Counter()
+    options = RunOptions(
+        True, True, seed, world=world, no_pictures=True, seconds=seconds, bus="ideal"
+    ).check_and_complete()
+    rig = with_options(load_rig(options.rig, options.character, options.profile), options)
 
-        def update(tick: Tick) -> None:
-            if tick.percept is not None and tick.percept.faces:
-                kinds.update((tick.target.kind,))
+    def update(tick: Tick) -> None:
+        if tick.percept is not None and tick.percept.faces:
+            kinds.update((tick.target.kind,))
 
-        simulate(rig, options, watch=update)
-        _worlds[key] = kinds
-    return _worlds[key]
+    simulate(rig, options, watch=update)
+    return kinds
 
 
 @contextmanager
@@ -220,7 +176,7 @@ def _run(
     )
     columns, held = _Columns(), run_rig.load_scene(scene, seed)
     made = simulate(rig, options, watch=columns.update)
-    return columns.gathered(held, made.trace, made.figures)
+    return columns.gathered(held, made.trace)
 
 
 class _Columns:
@@ -254,7 +210,6 @@ class _Columns:
         rows["eyes_goal"].append([commanded[i] for i in eyes])
         rows["neck_goal"].append([commanded[i] for i in neck])
         rows["plan"].append(yaw_pitch(sub(gaze.gaze_point_world_m, pose.p_world_head_m)))
-        rows["lids"].append((pose.lid_left, pose.lid_right))
         rows["lids_goal"].append((gaze.lid_left, gaze.lid_right))
         rows["phase"].append(gaze.phase)
         rows["counts"].append((gaze.blink, gaze.saccades, gaze.blinks, target.shift))
@@ -262,10 +217,9 @@ class _Columns:
         rows["target"].append(yaw_pitch(sub(point, pose.p_world_head_m)))
         rows["name"].append(target_text(target))
         rows["part"].append(target.part or "")
-        rows["salience"].append(target.salience)
         rows["head_m"].append(pose.p_world_head_m)
 
-    def gathered(self, scene: Scene, trace: GazeTrace, figures: dict[str, object]) -> MeasuredRun:
+    def gathered(self, scene: Scene, trace: GazeTrace) -> MeasuredRun:
         """Return the columns."""
         rows, angles = self._rows, self._angles.trace()
         eyes, eyes_goal = (
@@ -283,7 +237,6 @@ class _Columns:
             eyes_goal_deg=eyes_goal,
             head_goal_deg=head_goal,
             plan_deg=plan,
-            lids=np.array(rows["lids"]),
             lids_goal=np.array(rows["lids_goal"]),
             phase=np.array(rows["phase"]),
             blink=blink > 0,
@@ -294,12 +247,10 @@ class _Columns:
             shift=shift,
             target_name=np.array(rows["name"]),
             part=np.array(rows["part"]),
-            salience=np.array(rows["salience"]),
             head_m=np.array(rows["head_m"]),
             truth=_truth(scene, rows["clock_s"]),
             angles=angles,
             trace=trace,
-            figures=figures,
         )
 
 

@@ -11,12 +11,13 @@ from types import CodeType
 from typing import Any, NamedTuple, cast
 
 import pytest
+from fakes.scenes import EmptyScene
 
 from gazerig.config.parameters import apply_changes, value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app import run_rig
 from gazerig.robot.app.options import RunOptions
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 pytest.importorskip("gazerig.features.lab")  # its measures
 from gazerig.features.lab.simulated_run import simulate  # noqa: E402
@@ -29,12 +30,11 @@ _ROW = re.compile(
 )
 
 
-class EverythingOnce:
+class EverythingOnce(EmptyScene):
     """A person who comes, walks 37 deg aside, waves and goes; then a hand that moves past."""
 
     name = "everything-once"
     round_s = SECONDS
-    behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the person, who goes at 10 s."""
@@ -51,10 +51,6 @@ class EverythingOnce:
         if not 10.5 < t_s < 11.5:
             return ()
         return (Thing(9, "hand", (0.9, 0.5 - 0.2 * (t_s - 10.5), 0.2), 0.05),)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
 
 
 class Claim(NamedTuple):

@@ -34,12 +34,10 @@ _SPEED_OVER_S = 0.03
 
 
 class Following(NamedTuple):
-    """Gain and phase of the smooth gaze against the face, and its highest speed."""
+    """Gain of the smooth gaze against the face, and its highest speed."""
 
     gain: float
-    phase_deg: float
     fastest_deg_s: float
-    saccades_1_s: float
 
 
 def smooth(run: MeasuredRun) -> np.ndarray:
@@ -69,12 +67,7 @@ def following(
     step = round(_SPEED_OVER_S / float(np.median(np.diff(t))))
     speed = np.abs(gaze[step:] - gaze[:-step]) / (t[step:] - t[:-step])
     calm = np.convolve(~kept, np.ones(step + 1))[step : len(kept)] < 0.5
-    return Following(
-        abs(response),
-        float(np.degrees(np.angle(response))),
-        float(speed[calm].max()),
-        float(np.ptp(seen.saccades[t > _SETTLED_S]) / (t[-1] - _SETTLED_S)),
-    )
+    return Following(abs(response), float(speed[calm].max()))
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
@@ -88,8 +81,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     every += [following(run, hz, seconds, seeds[0]) for hz in _BETWEEN]
     out["largest gain, .1 to 2 Hz"] = max(row.gain for row in every)
     out["fastest smooth gaze, deg/s"] = max(row.fastest_deg_s for row in every)
-    out["phase at 1 Hz, deg"] = float(np.mean([row.phase_deg for row in rows[1.0]]))
-    out["saccades while it swings, 1/s"] = float(np.mean([row.saccades_1_s for row in every]))
     return out
 
 

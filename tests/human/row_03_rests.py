@@ -115,9 +115,4 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             sum(one.saccades[-1] - one.saccades[0] for one in runs)
             / sum(one.t_s[-1] - one.t_s[0] for one in runs)
         ),
-        "mean visit, s": float(lasting.mean()),
-        "mean rest, s": float(rests.mean()),
-        "shortest rest, s": float(rests.min()),
-        "longest rest, s": float(rests.max()),
-        "rests": float(len(rests)),
     }

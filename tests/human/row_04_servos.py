@@ -39,8 +39,5 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             f"{name}, fastest over its cap of speed": max(
                 float(one.speed_deg_s.max()) / one.most_deg_s for one in every
             ),
-            f"{name}, farthest from the goal at rest, deg": max(
-                abs(float(one.done_deg[-1]) - one.size_deg) for one in every
-            ),
         }
     return figures

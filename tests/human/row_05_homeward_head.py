@@ -8,20 +8,19 @@ later; what comes after that brings an eccentric eye back, whatever the law.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import cos, radians, sin
 
 import numpy as np
+from fakes.scenes import EmptyScene
+from human.lights import at_yaw
 from human.measured_run import MeasuredRun, Runner
 
-from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import Thing
 
 _STAGES = ((0.0, 60.0), (4.0, 25.0))
 """From when on the thing is at which yaw."""
 
 _TURNED_S = 0.75
 _INTERESTS = (0.2, 0.5, 1.0)
-_EYES_M: Vec3 = (0.04, 0.0, 0.13)
 
 WANTED = {
     "past the target, deg": (0.0, 1.5),
@@ -30,28 +29,18 @@ WANTED = {
 }
 
 
-class ThereAndBack:
+class ThereAndBack(EmptyScene):
     """A thing 60 deg to the left, then one at 25 deg."""
 
     name = "there-and-back"
     round_s = 7.0
-    behaviours: tuple[str, ...] = ()
-
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return no one."""
-        return ()
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return the one thing that is there now."""
         rounds, since_s = divmod(t_s, self.round_s)
         number = sum(since_s >= start_s for start_s, _ in _STAGES) - 1
-        yaw, (x, y, z) = radians(_STAGES[number][1]), _EYES_M
-        place = (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z)
+        place = at_yaw(_STAGES[number][1])
         return (Thing(10 * int(rounds) + number, "ball", place, 0.05),)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
 
 
 SCENE = ThereAndBack()
@@ -75,7 +64,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "default law: homeward by Stahl, measured less expected, deg": float(
             np.median(law[:, 1] - expected)
         ),
-        **{f"turned at interest {i:g}, deg": t for i, t in zip(_INTERESTS, turned, strict=True)},
     }
 
 

@@ -51,14 +51,11 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         [saccade_table(run(s, seed=n, seconds=seconds).trace) for s in SCENES for n in seeds]
     )
     fast, long = inside(single)
-    scene_fast, scene_long = inside(scenes)
+    scene_fast, _ = inside(scenes)
     small, large = single[single[:, 0] <= 10.5], single[single[:, 0] >= 17.5]
     return {
         "1-30 deg, inside both bands, share": float(np.mean(fast & long)),
-        "1-30 deg, peak inside its band, share": float(np.mean(fast)),
-        "1-30 deg, duration inside its band, share": float(np.mean(long)),
         "scenes, peak inside its band, share": float(np.mean(scene_fast)),
-        "scenes, duration inside its band, share": float(np.mean(scene_long)),
         "time of the peak less people's, up to 10 deg, median": float(
             np.median(small[:, 3] - people.acceleration_share(small[:, 0]))
         ),

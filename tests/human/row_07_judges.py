@@ -12,8 +12,6 @@ from human.saccade_judges import JUDGES, exported, marks
 
 SCENES = ("visitor", "face-to-face")
 
-_NO_BLINKS = np.zeros((0, 2))
-
 WANTED = {
     f"{scene}, {judge}: {what}": band
     for scene in SCENES
@@ -31,14 +29,8 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             seen = [judge(one) for one in runs]
             pairs = list(zip(runs, seen, strict=True))
             all_of_it = [marks(*pair, True) for pair in pairs]
-            bare = [marks(one._replace(blinks=_NO_BLINKS), saw, True) for one, saw in pairs]
-            slow = [marks(*pair) for pair in pairs]
             out[f"{scene}, {name}: found, %"] = _percent([mark.ours for mark in all_of_it])
             out[f"{scene}, {name}: not ours, %"] = _percent([~mark.theirs for mark in all_of_it])
-            every = [~mark.theirs for mark in bare]
-            out[f"{scene}, {name}: not ours, motion of blinks too, %"] = _percent(every)
-            out[f"{scene}, {name}: found, slow targets, %"] = _percent([m.ours for m in slow])
-            out[f"{scene}, {name}: not ours, slow, %"] = _percent([~m.theirs for m in slow])
     return out
 
 

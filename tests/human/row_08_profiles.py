@@ -51,10 +51,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "mitake: a person before it, share of time on the face": float(
             np.mean([_on_face(one) for one in mitake])
         ),
-        "nakamoto: shifts on the face, 1/s": 1.0 / float(np.mean([v.seconds for v in found])),
-        "nakamoto: largest eye angle in flight, deg": float(
-            max(np.abs(one.eyes_goal_deg).max() for one in nakamoto)
-        ),
         "nakamoto: targets other than faces, %": _elsewhere(nakamoto),
         "nakamoto: blinks a minute": _blinks(nakamoto),
         "mitake: blinks a minute": _blinks(mitake),

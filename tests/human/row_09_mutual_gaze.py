@@ -65,5 +65,4 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         * float(np.mean([one.part[begin] in nearest(one, begin) for one, begin in entries])),
         "entries at the paper's first part, %": 100.0
         * float(np.mean([one.part[begin] == "FR" for one, begin in entries])),
-        "bouts": float(len(bouts)),
     }

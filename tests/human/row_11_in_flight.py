@@ -81,7 +81,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     waits = np.concatenate([one[3] for one in late])
     return {
         "shortest pause after a landing, ms": float(pauses.min()),
-        "pauses below 100 ms, %": 100.0 * float(np.mean(pauses < 99.0)),
         "early jumps that bend the saccade, share": float(
             np.mean(np.concatenate([one[0] for one in early]) == 1)
         ),

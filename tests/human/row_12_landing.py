@@ -66,7 +66,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         places = [point(float(y), float(p)) for y, p in zip(yaws, pitches, strict=True)]
         parts.append(landings(commanded(list(EVERY_S * np.arange(count)), places, "desk", seed)))
     every = np.vstack(parts)
-    short, across, after_ms, rest, size = every[every[:, 4] >= 10.0].T
+    short, across, after_ms, rest, _ = every[every[:, 4] >= 10.0].T
     corrected = after_ms[np.isfinite(after_ms)]
     return {
         "undershoot, mean, %": 100.0 * float(short.mean()),
@@ -76,5 +76,4 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "earliest correction after the landing, ms": float(corrected.min()),
         "latest correction after the landing, ms": float(corrected.max()),
         "error once all is over, median, deg": float(np.median(rest)),
-        "saccades": float(len(size)),
     }

@@ -27,10 +27,7 @@ WANTED = {
     "size measured, 95th percentile, deg": (0.5, 1.8),
     "farthest from the middle, 95th percentile, deg": (0.0, 1.6),
     "hobby servos, re-fixations": (0.0, 0.0),
-    "smallest commanded, least of all rigs, encoder steps": (5.0, 100.0),
 }
-_LEAST_DEG = 1.15
-_EYES = {"desk": "left_eye_pan", "feetech": "left_eye_pan", "expressive": "eyes_pan"}
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
@@ -59,13 +56,4 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             np.percentile(np.concatenate(off), 95)
         ),
         "hobby servos, re-fixations": float(load_rig("maker").gaze.oculomotor.refixations),
-        "smallest commanded, least of all rigs, encoder steps": min(map(_least_steps, _EYES)),
     }
-
-
-def _least_steps(name: str) -> float:
-    """Return the smallest re-fixation of a rig in steps of its eye's encoder."""
-    rig = load_rig(name)
-    joint = rig.joints[_EYES[name]]
-    step_deg = 360.0 / joint.model_facts.steps_per_turn / joint.ratio
-    return _LEAST_DEG / step_deg

@@ -79,7 +79,6 @@ def _shapes(runs: Sequence[MeasuredRun], depths: np.ndarray) -> dict[str, float]
         "left less right lid, mean size of the largest difference": float(np.mean(apart)),
         "eyes down in a blink, median deg": float(np.median(down)) if down else nan,
         "eyes towards the nose in a blink, median deg": float(np.median(nasal)) if nasal else nan,
-        "planned duration, mean, ms": 1e3 * float(np.mean(lasting)),
     }
 
 

@@ -6,13 +6,10 @@ Seen from where the head points, 0.77 of what exceeds 17.9 deg is the head's (St
 """
 
 from collections.abc import Sequence
-from math import cos, radians, sin
 
 import numpy as np
+from human.lights import Lights
 from human.measured_run import MeasuredRun, Runner
-
-from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 _YAWS = (0, 25, 0, -35, -25, 45, 30, -20, -55, -45, 0, 14, 5, -30, 55, 40, -40, -10, 20, 50)
 _EACH_S = 2.5
@@ -21,8 +18,6 @@ _FREE_DEG, _SLOPE = 17.9, 0.77
 _MARGIN_DEG = 1.5
 _SEARCHED = ("search", "glance", "rest")
 """Looks about after a light has gone: many from one place, in which the head relieves the eyes."""
-
-_EYES_M: Vec3 = (0.04, 0.0, 0.13)
 
 WANTED = {
     "outward: degrees of head a degree beyond the eye-only range": (0.61, 0.93),
@@ -33,30 +28,7 @@ WANTED = {
 }
 
 
-class Lights:
-    """One thing after the other at angles to both sides, at the height of the eyes."""
-
-    name = "lights"
-    round_s = _EACH_S * len(_YAWS)
-    behaviours: tuple[str, ...] = ()
-
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return no one."""
-        return ()
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the lit one."""
-        number = int(t_s / _EACH_S)
-        yaw = radians(_YAWS[number % len(_YAWS)])
-        x, y, z = _EYES_M
-        return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
-
-
-SCENE = Lights()
+SCENE = Lights("lights", _YAWS, _EACH_S)
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
@@ -77,7 +49,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "within the range: head, deg, at most": float(within.max()) if len(within) else np.nan,
         "roll with targets 20 deg or more aside, deg, median": float(np.median(inclined)),
         "roll to the side of the target, %": 100.0 * float((inclined > 0.0).mean()),
-        "shifts": float(len(rows)),
     }
 
 

@@ -7,10 +7,11 @@ People who look about make one to two shifts of gaze a second; 8 to 21 blinks a 
 from collections.abc import Sequence
 
 import numpy as np
+from fakes.scenes import EmptyScene
 from human.measured_run import BEGIN_S, MeasuredRun, Runner
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import Thing
 
 WANTED = {
     "empty room, saccades/s": (1.0, 2.0),
@@ -26,11 +27,10 @@ _ON_DEG = 3.0
 _PLACES: tuple[Vec3, ...] = ((1.4, 0.55, 0.20), (1.6, -0.75, 0.10), (1.3, 0.05, 0.45))
 
 
-class Room:
+class Room(EmptyScene):
     """A room without any person, with still things."""
 
     round_s = 60.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(self, name: str, places: Sequence[Vec3]) -> None:
         self.name = name
@@ -38,17 +38,9 @@ class Room:
             Thing(n, "thing", place, 0.05) for n, place in enumerate(places, start=1)
         )
 
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return no one."""
-        return ()
-
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return the things of the room."""
         return self._things
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
 
 
 EMPTY, FURNISHED = Room("empty-room", ()), Room("room-with-things", _PLACES)

@@ -54,10 +54,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         ),
         "largest step of a goal in a tick, encoder steps": float(goals.max() / _STEP_DEG),
         "gaze off the plan, 95th percentile, deg": float(np.percentile(off, 95)),
-        "steps of the neck's encoders a second": float(
-            np.mean([(np.diff(one.head_deg, axis=0) != 0.0).sum() for one in runs])
-            / (lasted_s / len(runs))
-        ),
     }
 
 

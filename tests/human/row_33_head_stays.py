@@ -5,18 +5,14 @@ beyond 17.9 deg, and the eyes stay within their range, off the middle, as long a
 """
 
 from collections.abc import Sequence
-from math import cos, radians, sin
 
 import numpy as np
+from human.lights import Lights
 from human.measured_run import MeasuredRun, Runner
-
-from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 _YAWS = (0, 35, -15, 40, 0, -45, -20, 30, -25, 15)
 _EACH_S, _LATE_S = 12.0, 3.0
 _FREE_DEG, _SLOPE = 17.9, 0.77
-_EYES_M: Vec3 = (0.04, 0.0, 0.13)
 _MOVED_DEG = 3.0
 
 WANTED = {
@@ -29,29 +25,7 @@ WANTED = {
 }
 
 
-class LongLooks:
-    """One thing after the other at angles to both sides, each for long."""
-
-    name = "long-looks"
-    round_s = _EACH_S * len(_YAWS)
-    behaviours: tuple[str, ...] = ()
-
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return no one."""
-        return ()
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the present one."""
-        number = int(t_s / _EACH_S)
-        yaw, (x, y, z) = radians(_YAWS[number % len(_YAWS)]), _EYES_M
-        return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
-
-
-SCENE = LongLooks()
+SCENE = Lights("long-looks", _YAWS, _EACH_S)
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
@@ -92,9 +66,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "eyes off straight ahead at the end of a look, deg, median": float(
             np.median(end[arc > _FREE_DEG])
         ),
-        "looks": float(len(looks)),
-        "recentrings": float(len(delays)),
-        "delay of recentring, s, mean": float(np.mean(delays)) if delays else np.nan,
     }
 
 

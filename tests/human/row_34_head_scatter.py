@@ -8,19 +8,16 @@ sway counts little): servos hide both alike.
 """
 
 from collections.abc import Sequence
-from math import cos, radians, sin
 
 import numpy as np
+from human.lights import Lights, at_yaw
 from human.measured_run import MeasuredRun, Runner
 from human.row_16_idle import Room
 
-from gazerig.gaze.types import Vec3
 from gazerig.robot.model.commands import Value
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 _YAWS = (40, 0, -40, 0)
 _EACH_S, _TURNED_S = 2.5, 0.9
-_EYES_M: Vec3 = (0.04, 0.0, 0.13)
 _TOGETHER_S = 0.008
 _FREE_DEG = 17.9
 _WAYS, _AT = (0.05, 0.95), (0.189, 0.811)
@@ -38,36 +35,8 @@ WANTED = {
 }
 
 
-class EqualLights:
-    """The same thing at the same places, to both sides."""
-
-    name = "equal-lights"
-    round_s = _EACH_S * len(_YAWS)
-    behaviours: tuple[str, ...] = ()
-
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return no one."""
-        return ()
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return the lit one."""
-        number = int(t_s / _EACH_S)
-        yaw, (x, y, z) = radians(_YAWS[number % len(_YAWS)]), _EYES_M
-        return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
-
-
-SCENE = EqualLights()
-WIDE = Room(
-    "wide-room",
-    [
-        (1.5 * cos(radians(yaw)), 1.5 * sin(radians(yaw)), _EYES_M[2])
-        for yaw in (-56, -28, 0, 28, 56)
-    ],
-)
+SCENE = Lights("equal-lights", _YAWS, _EACH_S)
+WIDE = Room("wide-room", [at_yaw(yaw) for yaw in (-56, -28, 0, 28, 56)])
 """Things so far apart that many looks are as large as in that task."""
 
 
@@ -95,9 +64,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         * float(np.nanstd(out[:, 3])),
         "natural shifts: head first, %": 100.0 * float((lag < -_TOGETHER_S).mean()),
         "natural shifts: eye first, %": 100.0 * float((lag > _TOGETHER_S).mean()),
-        "natural shifts": float(len(lag)),
-        "equal looks: slope of the head, mean": float(slopes.mean()),
-        "equal looks": float(len(out)),
     }
 
 

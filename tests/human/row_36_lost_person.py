@@ -52,7 +52,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "eyes off straight ahead at the end of a look of the search, median, deg": float(
             np.median(ends)
         ),
-        "steps": float(len(found)),
     }
 
 

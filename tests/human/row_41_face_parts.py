@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from math import atan2, hypot, pi, sin
 
 import numpy as np
+from fakes.scenes import EmptyScene
 from human.measured_run import MeasuredRun, Runner
 from human.row_03_rests import SCENE, visits
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 WANTED = {
     "looks at the eyes, %": (40.0, 60.0),
@@ -28,11 +29,10 @@ WANTED = {
 }
 
 
-class Talker:
+class Talker(EmptyScene):
     """A person who alternately speaks and is silent for 6 s, at one place."""
 
     round_s = 12.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(self, away_m: float = 0.95, talks: bool = True) -> None:
         self.name = f"talker {away_m:g} m {talks}"
@@ -49,14 +49,6 @@ class Talker:
         yaw, pitch = atan2(-face[1], 0.04 - face[0]), atan2(0.13 - face[2], hypot(*face[:2]))
         return (ScenePerson(face, (yaw, pitch), None, self.speaks(t_s)),)
 
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return nothing."""
-        return ()
-
-    def events(self) -> tuple[Event, ...]:
-        """Expect nothing."""
-        return ()
-
 
 TALKER, FAR = Talker(), Talker(2.0, talks=False)
 
@@ -64,16 +56,17 @@ TALKER, FAR = Talker(), Talker(2.0, talks=False)
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the figures over all seeds."""
     runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
-    parts = _parts(runs)
+    parts = np.array([visit.part for one in runs for visit in visits(one)])
     talk = [run(TALKER, seed=seed, seconds=seconds) for seed in seeds]
     loud, quiet = (np.concatenate([_looks(one, spoken) for one in talk]) for spoken in (1, 0))
     far = [run(FAR, seed=seed, seconds=min(seconds, 120.0)) for seed in seeds]
-    of = {
-        name: [run(SCENE, seed=seed, seconds=min(seconds, 120.0), character=name) for seed in seeds]
+    bold, shy = (
+        [
+            _height_mm(run(SCENE, seed=seed, seconds=min(seconds, 120.0), character=name))
+            for seed in seeds
+        ]
         for name in ("bold", "shy")
-    }
-    heights = {name: [_height_mm(one) for one in them] for name, them in of.items()}
-    mine = [_height_mm(one) for one in runs]
+    )
     eyes = np.isin(parts, ("LE", "RE"))
     return {
         "looks at the eyes, %": 100.0 * float(eyes.mean()),
@@ -84,20 +77,12 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             (loud == "M").mean() / max(1e-9, (quiet == "M").mean())
         ),
         "looks at the eyes of a speaker, %": 100.0 * float(np.isin(loud, ("LE", "RE")).mean()),
-        "mean height on the face, SD over seeds, mm": float(np.std(mine)),
-        "bold above shy, mm": float(np.mean(heights["bold"]) - np.mean(heights["shy"])),
+        "mean height on the face, SD over seeds, mm": float(
+            np.std([_height_mm(one) for one in runs])
+        ),
+        "bold above shy, mm": float(np.mean(bold) - np.mean(shy)),
         "shifts below 1.5 deg at a face 2 m away, %": 100.0 * _small(far),
-        "looks at the mouth of a speaker, %": 100.0 * float((loud == "M").mean()),
-        "looks at the nose, %": 100.0 * float((parts == "N").mean()),
-        "mean height above the nose, mm": float(np.mean(mine)),
-        "shy: looks at the eyes, %": 100.0 * float(np.isin(_parts(of["shy"]), ("LE", "RE")).mean()),
-        "bold: looks at the eyes, %": 100.0
-        * float(np.isin(_parts(of["bold"]), ("LE", "RE")).mean()),
     }
-
-
-def _parts(runs: Sequence[MeasuredRun]) -> np.ndarray:
-    return np.array([visit.part for one in runs for visit in visits(one)])
 
 
 def _looks(one: MeasuredRun, spoken: int) -> np.ndarray:

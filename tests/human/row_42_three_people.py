@@ -9,16 +9,17 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from fakes.scenes import EmptyScene
 from human.measured_run import MeasuredRun, Runner
 
 from gazerig.robot.app.scene_files import load_scene
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 SCENE = "three-people"
 _HALF_FIELD_DEG = 31.0
 
 
-class Silent:
+class Silent(EmptyScene):
     """The same people, who only look at each other and at the robot."""
 
     name = "three silent people"
@@ -30,14 +31,6 @@ class Silent:
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return the people."""
         return tuple(person._replace(speaks=False) for person in self._scene.people(t_s))
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return nothing."""
-        return ()
-
-    def events(self) -> tuple[Event, ...]:
-        """Expect nothing."""
-        return ()
 
 
 WANTED = {
@@ -56,13 +49,11 @@ _SEEN_S = 1.0
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
     """Return the figures over all seeds."""
     runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
-    seen, at, delays, lengths, counts = [], [], list[float](), list[float](), np.zeros(3)
+    seen, delays, lengths, counts = [], list[float](), list[float](), np.zeros(3)
     for one in runs:
         who, speaker, _ = _columns(one)
         in_view = _in_view(one, speaker)
-        here = (who >= 0) & _lasts(one, speaker)
-        at.append((who == speaker)[here & (speaker >= 0)])
-        here &= in_view & _lasts(one, in_view)
+        here = (who >= 0) & _lasts(one, speaker) & in_view & _lasts(one, in_view)
         seen.append((who == speaker)[here])
         counts += np.bincount(who[who >= 0], minlength=3)
         delays += _delays(one, who, speaker)
@@ -77,9 +68,6 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "longest stay, s": float(stays.max()),
         "nobody speaks: looks at the head, time over others": _preference(silent),
         "least looked at, % of the time on faces": 100.0 * float(counts.min() / counts.sum()),
-        "on the speaker, in view or not, %": 100.0 * float(np.concatenate(at).mean()),
-        "stays": float(len(stays)),
-        "median stay, s": float(np.median(stays)),
     }
 
 

@@ -38,7 +38,6 @@ class Exported(NamedTuple):
 
     time_s: (n,); gaze_deg: (n, 2), yaw and pitch in space
     commanded: (m, 2) onset and end of each commanded saccade by the export's events;
-    amplitude_deg: (m,) of it
     fast: (n,) whether what the robot followed moved faster than ``FAST_DEG_S``
     blinks: (b, 2) onset and end of each blink, in which the eyes turn down and back
     """
@@ -46,7 +45,6 @@ class Exported(NamedTuple):
     time_s: np.ndarray
     gaze_deg: np.ndarray
     commanded: np.ndarray
-    amplitude_deg: np.ndarray
     fast: np.ndarray
     blinks: np.ndarray
 
@@ -55,12 +53,11 @@ class Marks(NamedTuple):
     """What a judge found of our saccades.
 
     ours: (m,) whether each commanded one overlaps one of the judge's
-    seen: (k, 2) onset and end of the judge's; theirs: (k,) whether each overlaps one of ours, or
-        is the eyes' motion of a blink
+    theirs: (k,) whether each of the judge's overlaps one of ours, or is the eyes' motion of a
+        blink
     """
 
     ours: np.ndarray
-    seen: np.ndarray
     theirs: np.ndarray
 
 
@@ -86,9 +83,8 @@ def exported(run: MeasuredRun) -> Exported:
     late = time_s >= BEGIN_S
     kept = (onset >= BEGIN_S + _EDGE_S) & (onset + length <= time_s[-1] - _EDGE_S)
     commanded = np.column_stack([onset, onset + length])[kept]
-    amplitude = _column(saccades, "amplitude_deg")[kept]
     return Exported(
-        time_s[late], gaze[late], commanded, amplitude, _fast(run)[late],
+        time_s[late], gaze[late], commanded, _fast(run)[late],
         np.column_stack([shut, shut + shut_s]),
     )  # fmt: skip
 
@@ -155,7 +151,7 @@ def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
     )
     known = np.asarray(over.any(axis=0) | blink.any(axis=0))
     ours, theirs = _judged(run, run.commanded, with_fast), _judged(run, seen, with_fast)
-    return Marks(np.asarray(over.any(axis=1))[ours], seen[theirs], known[theirs])
+    return Marks(np.asarray(over.any(axis=1))[ours], known[theirs])
 
 
 def _judged(run: Exported, spans: np.ndarray, with_fast: bool) -> np.ndarray:

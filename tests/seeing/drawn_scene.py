@@ -9,6 +9,7 @@ from math import degrees, radians
 from typing import NamedTuple
 
 import numpy as np
+from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import DetectedFace, ImageArray
@@ -22,7 +23,7 @@ from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
-from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _HZ = 30.0
 
@@ -35,7 +36,7 @@ class _Standing:
         return rotation(head_rad), HEAD_M
 
 
-class _Later:
+class _Later(EmptyScene):
     """A scene that begins at another time."""
 
     def __init__(self, scene: Scene, start_s: float) -> None:
@@ -49,10 +50,6 @@ class _Later:
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return the things."""
         return self._scene.things(t_s + self._start_s)
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none."""
-        return ()
 
 
 class _TrueFaces:

@@ -2,14 +2,13 @@
 
 Walls and furniture are textured boards at several distances; people are textured figures that
 walk back and forth. The lens is off the camera's axis of rotation, as on a table or a
-neck. Films and photos are shaken the same, seen through a part of them.
+neck.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from math import exp, pi, sin, tan
-from pathlib import Path
 from typing import NamedTuple
 
 import cv2
@@ -83,9 +82,6 @@ def knocked_turn(t_s: float) -> Pose:
     """Turn, on a table that is bumped."""
     a, b = turn(t_s), bump(t_s)
     return Pose(*(one + other for one, other in zip(a, b, strict=True)))
-
-
-MOTIONS: dict[str, Motion] = {"still": still, "shake": shake, "bump": bump, "pan": pan}
 
 
 def rotation(pose: Pose) -> Floats:
@@ -255,65 +251,3 @@ def _fills(H: Floats, size: tuple[int, int], shape: tuple[int, int]) -> bool:
     ends = np.array([[(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)]])
     at = cv2.perspectiveTransform(ends, H)[0]
     return bool((at >= 1.0).all() and (at <= (shape[1] - 2.0, shape[0] - 2.0)).all())
-
-
-def shaken(picture: Image, motion: Pose, share: float = 0.72, view_rad: float = FIELD_RAD) -> Image:
-    """Return the part of a picture that a camera in front of it sees which is moved so.
-
-    picture: of ``view_rad`` from edge to edge
-    share: of its width and height that is seen
-    """
-    H, size = looked_through(picture.shape, motion, share, view_rad)
-    seen = cv2.warpPerspective(
-        picture, H, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
-    )
-    return np.asarray(seen, np.uint8)
-
-
-def looked_through(
-    shape: tuple[int, ...], motion: Pose, share: float = 0.72, view_rad: float = FIELD_RAD
-) -> tuple[Floats, tuple[int, int]]:
-    """Return the homography from a picture to what is seen of it, and the size of that."""
-    height, width = shape[:2]
-    focal = 0.5 * width / tan(0.5 * view_rad)
-    size = round(share * width), round(share * height)
-    K = np.array([(focal, 0, 0.5 * (width - 1)), (0, focal, 0.5 * (height - 1)), (0, 0, 1)])
-    seen = K.copy()
-    seen[:2, 2] = 0.5 * (size[0] - 1), 0.5 * (size[1] - 1)
-    return seen @ rotation(motion).T @ np.linalg.inv(K), size
-
-
-def street(
-    film: Path, motion: Motion, first: int, count: int, rate_hz: float = 10.0
-) -> Iterator[Seen]:
-    """Yield a shaken film of a stationary camera; what differs from its background moves.
-
-    first, count: frames of the film
-    """
-    taken = cv2.VideoCapture(str(film))
-    ground = cv2.createBackgroundSubtractorMOG2(detectShadows=True)
-    speck, near = np.ones((3, 3), np.uint8), np.ones((7, 7), np.uint8)
-    for k in range(first + count):
-        if not taken.grab():
-            break
-        if k < first - 200 or (k < first and k % 5):
-            continue
-        _, picture = taken.retrieve()
-        moving = (ground.apply(picture) == 255).astype(np.uint8)
-        if k < first:
-            continue
-        moving = cv2.dilate(cv2.morphologyEx(moving, cv2.MORPH_OPEN, speck), near)
-        t_s = (k - first) / rate_hz
-        H, size = looked_through(picture.shape, motion(t_s))
-        seen = cv2.warpPerspective(moving, H, size, flags=cv2.INTER_NEAREST)
-        movers, resting = _parts(np.asarray(seen, np.uint8))
-        yield Seen(t_s, shaken(np.asarray(picture, np.uint8), motion(t_s)), movers, resting)
-    taken.release()
-
-
-def _parts(moving: NDArray[np.uint8]) -> tuple[tuple[Mask, ...], tuple[Mask, ...]]:
-    """Return the parts that are as large as people at a distance, and those too small to count."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(moving)
-    large = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] > 0.003 * moving.size]
-    small = [k for k in range(1, count) if k not in large]
-    return tuple(labels == k for k in large), (np.isin(labels, small),) if small else ()

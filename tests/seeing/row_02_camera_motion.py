@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from seeing.material import at_hand
 from seeing.moving_room import (
     BEFORE_PLAIN,
     CLOSE,
     FIELD_RAD,
-    MOTIONS,
     NEAR,
     PEOPLE,
     PLAIN,
@@ -33,9 +31,7 @@ from seeing.moving_room import (
     pan,
     rotation,
     shake,
-    shaken,
     still,
-    street,
     turn,
 )
 
@@ -113,13 +109,9 @@ def measured_head(motion: Motion) -> PoseBuffer:
     return poses
 
 
-def judged(
-    seen: Iterable[Seen],
-    turns: PoseBuffer | None = None,
-    field: float = FIELD_RAD,
-) -> Score:
+def judged(seen: Iterable[Seen], turns: PoseBuffer | None = None) -> Score:
     """Let the detector look, as the program uses it, and compare with the truth."""
-    source = MotionSource(MotionParams(), None, field, turns)
+    source = MotionSource(MotionParams(), None, FIELD_RAD, turns)
     pictures = false = right = moving = noticed = 0
     costs = []
     for k, one in enumerate(seen):
@@ -161,25 +153,9 @@ def rendered(name: str, seconds: float) -> dict[str, float]:
 
 
 def measure(full: bool) -> dict[str, float]:
-    """Measure in the rendered room; with ``full`` on the street and the photo as well."""
+    """Measure in the rendered room."""
     cv2.setNumThreads(1)
     out: dict[str, float] = {}
     for name in FILMS:
         out |= rendered(name, 6.0 if full else 1.5)
-    return out | (_real() if full else {})
-
-
-def _real() -> dict[str, float]:
-    """Measure on the street and on a photo, where they are at hand."""
-    out: dict[str, float] = {}
-    film, photo = at_hand("vtest.avi"), at_hand("astronaut.png")
-    view = 2 * np.arctan(np.tan(0.5 * FIELD_RAD) * 0.72)
-    for name, motion in MOTIONS.items():
-        if film is not None:
-            out |= judged(street(film, motion, 210, 120), field=view).figures(f"street, {name}")
-        if photo is not None:
-            picture = np.asarray(cv2.imread(str(photo)), np.uint8)
-            taken = (Seen(k / 30, shaken(picture, motion(k / 30)), ()) for k in range(60))
-            score = judged(taken, field=view)
-            out[f"photo, {name}: false things a picture"] = score.false / score.pictures
     return out

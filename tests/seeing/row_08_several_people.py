@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import atan2, cos, dist, pi, sin
 
 import numpy as np
+from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
@@ -14,7 +15,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.faces_scene import HEAD_M
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 _SETTLED_S = 2.0
 UNLIKE_M = (2.4, 1.0, 3.2, 0.75, 1.8, 1.35)
@@ -34,12 +35,11 @@ WANTED = {
 }
 
 
-class StillPeople:
+class StillPeople(EmptyScene):
     """People on an arc before the robot, who look at it and hardly move."""
 
     name = "still-people"
     round_s = 3600.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(self, away_m: Sequence[float], field_deg: float = 44.0) -> None:
         aside = np.radians(np.linspace(0.5 * field_deg, -0.5 * field_deg, len(away_m)))
@@ -56,14 +56,6 @@ class StillPeople:
             )
             for k, (x, y, z) in enumerate(self._places)
         )
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return nothing."""
-        return ()
-
-    def events(self) -> tuple[Event, ...]:
-        """Return none: all figures are measured here."""
-        return ()
 
 
 def looked_at(scene: StillPeople, seconds: float, seed: int) -> np.ndarray:

@@ -4,7 +4,7 @@ The time in which a frontal face within 1.5 m is there, and the share of it in w
 gaze is on a face, that one or another. Looks away from a face, which end mutual gaze after some
 seconds as people do, are left out. And the share of the time in which the target is outside the
 picture of a film, whose camera is stationary: nothing is visible there. Looks away from that
-picture are planned, and counted apart.
+picture are planned, and left out.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,6 @@ TALK_SEEDS = (0, 1, 2, 3, 4)
 OTHERS = "Megamind.avi", "vtest.avi", "people_from_behind.mp4"
 PACKAGED = "bikes.mp4", "bigbuckbunny.mp4"
 OUTSIDE = "worst film, % outside the picture"
-AWAY_OUTSIDE = "worst film, % looks away beside the picture"
 
 WANTED = {
     "talks in a car, % on the face": (75.0, 100.0),
@@ -47,14 +46,12 @@ class Share(NamedTuple):
     """Ticks outside saccades, those with a near frontal face, and those of them on a face.
 
     outside: ticks whose target is outside the picture, of a film
-    away_outside: likewise, while it looks away, which ``ticks`` does not count
     """
 
     ticks: int
     there: int
     on_face: int
     outside: int
-    away_outside: int
 
     @property
     def percent(self) -> float:
@@ -65,11 +62,6 @@ class Share(NamedTuple):
     def outside_percent(self) -> float:
         """Return the share of the ticks whose target was outside the picture."""
         return 100.0 * self.outside / max(1, self.ticks)
-
-    @property
-    def away_outside_percent(self) -> float:
-        """Return looks outside the picture as a share of the other ticks."""
-        return 100.0 * self.away_outside / max(1, self.ticks)
 
 
 def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
@@ -83,24 +75,19 @@ def share_on_faces(options: RunOptions, rate_hz: float = 100.0) -> Share:
     """Run the shipped desk rig; return how much of the time was spent on present faces."""
     rig = load_rig(options.rig)
     made = assemble(replace(rig, loop=replace(rig.loop, rate_hz=rate_hz)), options)
-    ticks = there = on_face = outside = away_outside = 0
+    ticks = there = on_face = outside = 0
     size_px = (0, 0)
 
     def count(tick: Tick) -> None:
-        nonlocal ticks, there, on_face, outside, away_outside, size_px
+        nonlocal ticks, there, on_face, outside, size_px
         if tick.detections is not None:
             size_px = tick.detections.width_px, tick.detections.height_px
-        if tick.gaze.phase == "saccade" or tick.percept is None:
+        if tick.gaze.phase == "saccade" or tick.percept is None or tick.target.kind == "away":
             return
-        off = False
         if options.video is not None:
             x, y = in_picture(made, tick.target.p_world_m, *size_px)
-            off = not (0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
-        if tick.target.kind == "away":
-            away_outside += off
-            return
+            outside += not (0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
         ticks += 1
-        outside += off
         left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
         eye = scale(add(left, right), 0.5)
         faces = tick.percept.faces
@@ -117,7 +104,7 @@ def share_on_faces(options: RunOptions, rate_hz: float = 100.0) -> Share:
     finally:
         made.robot.stop()
         made.close()
-    return Share(ticks, there, on_face, outside, away_outside)
+    return Share(ticks, there, on_face, outside)
 
 
 def _ends_after(seconds: float | None) -> Callable[[float], str | None]:
@@ -151,7 +138,6 @@ def measure(full: bool) -> dict[str, float]:
         if path.name in SIGNERS:
             figures[f"{path.name}, % on the face"] = share.percent
     figures[OUTSIDE] = max(share.outside_percent for share in films)
-    figures[AWAY_OUTSIDE] = max(share.away_outside_percent for share in films)
     seeds = TALK_SEEDS if full else TALK_SEEDS[:1]
     seen = [conversation(seed, 24.0 if full else 8.0).percent for seed in seeds]
     figures["rendered conversation, % on a face"] = sum(seen) / len(seen)
