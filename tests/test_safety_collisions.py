@@ -54,18 +54,13 @@ class World:
     def crossed(self) -> bool:
         """Whether the straight path between any two successive commands touches a box."""
         path = np.degrees(np.array(self.path))
-        begin, end = path[:-1], path[1:]
-        return any(
-            bool(
-                touches(
-                    begin[:, [GAZE_JOINTS.index(p.first[0]), GAZE_JOINTS.index(p.second[0])]],
-                    end[:, [GAZE_JOINTS.index(p.first[0]), GAZE_JOINTS.index(p.second[0])]],
-                    np.array([p.first[1], p.second[1]]),
-                    np.array([p.first[2], p.second[2]]),
-                ).any()
-            )
-            for p in self.pairs
-        )
+        for pair in self.pairs:
+            (first, *one), (second, *other) = pair.first, pair.second
+            places = path[:, [GAZE_JOINTS.index(first), GAZE_JOINTS.index(second)]]
+            low, high = np.array([one, other]).T
+            if touches(places[:-1], places[1:], low, high).any():
+                return True
+        return False
 
 
 def touches(begin: np.ndarray, end: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -1,6 +1,5 @@
 """Hundreds of thousands of random wishes with random servos: nothing outside any limit leaves."""
 
-import os
 from collections.abc import Callable
 from math import inf, nan, radians
 from typing import Any
@@ -8,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams
@@ -20,7 +17,7 @@ from gazerig.robot.safety.guard import Guard
 Array = NDArray[np.float64]
 Row = tuple[float, ...]
 LENGTH = 25  # ticks of one sequence
-WISHES = int(float(os.environ.get("GUARD_WISHES", "3e5")))
+WISHES = 12_500  # of each guard, of which there are 24
 EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000), 70.0, 3.5, 7.0)
 LID = JointLimit(radians(-30), radians(25), radians(1200), radians(60_000), 70.0, 3.5, 7.0)
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0, 3.5, 7.0)
@@ -73,8 +70,8 @@ class Trial:
         assert verdict.level == "torque_off" or not any(joints.fault)
         assert (verdict.level == "ok") == (not verdict.reasons)
 
-    def judge(self) -> int:
-        """Assert every limit on every command; give how many wishes that were."""
+    def judge(self) -> None:
+        """Assert every limit on every command."""
         p0, v0, p1 = map(np.array, (self.begin_p, self.begin_v, self.after))
         dt_s = np.array(self.dt_s)[:, None]
         low, high, speed, accel = self.limits[:, :4].T
@@ -85,7 +82,6 @@ class Trial:
         assert (np.abs(v1 - v0) <= accel * dt_s + 4e-6).all()
         for box in self.boxes:
             self._judge_box(box, p0, v0, p1, v1)
-        return p1.size
 
     def _judge_box(self, box: CollisionParams, p0: Array, v0: Array, p1: Array, v1: Array) -> None:
         """Once a joint of the pair can stay out of its range, one always can, and does."""
@@ -164,48 +160,14 @@ WISH_MOODS: tuple[Callable[[np.random.Generator, int], Array], ...] = (
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_random_wishes_never_leave_the_limits(
-    seed: int, record_property: Callable[[str, object], None]
-) -> None:
+def test_random_wishes_never_leave_the_limits(seed: int) -> None:
     rng = np.random.default_rng([2024, seed])
-    wishes = 0
-    trials = [Trial(RIGS[seed % 2], BOXES[seed // 2]) for _ in range(4)]
-    for trial in trials:
+    for _ in range(4):
+        trial = Trial(RIGS[seed % 2], BOXES[seed // 2])
         trial.restart(np.zeros(9))
-        while 9 * len(trial.after) < WISHES / 6 / len(trials):
+        while 9 * len(trial.after) < WISHES:
             sequence(trial, rng)
-        wishes += trial.judge()
-    record_property("wishes", wishes)
-    print(f"{wishes} wishes tried against the guard, no violation")
-    assert wishes >= WISHES // 6
-
-
-@settings(max_examples=20, deadline=None)
-@given(
-    seed=st.integers(0, 2**32),
-    wishes=st.lists(
-        st.one_of(st.floats(-4.0, 4.0), st.floats(allow_nan=True, allow_infinity=True)),
-        min_size=1,
-        max_size=30,
-    ),
-    ticks=st.lists(st.floats(0.001, 0.1), min_size=30, max_size=30),
-    rig=st.sampled_from(RIGS),
-    boxes=st.sampled_from(BOXES),
-)
-def test_any_shape_of_wishes_keeps_the_limits(
-    seed: int,
-    wishes: list[float],
-    ticks: list[float],
-    rig: tuple[JointLimit, ...],
-    boxes: tuple[CollisionParams, ...],
-) -> None:
-    rng = np.random.default_rng(seed)
-    trial = Trial(rig, boxes)
-    trial.restart(rng.uniform(trial.low, trial.high))
-    for desired, tick in zip(wishes, ticks, strict=False):
-        joints = JointState(trial.p, (0.0,) * 9, (trial.t_s + tick,) * 9, ())
-        trial.tick((desired,) * 9, joints, 0.0, tick)
-    trial.judge()
+        trial.judge()
 
 
 # Limits changed at random in full flight: every command keeps the present ones, and new ones come

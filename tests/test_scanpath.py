@@ -42,12 +42,6 @@ def drawn(count: int) -> np.ndarray:
     return np.array(parts)
 
 
-def test_printed_matrix_is_as_printed() -> None:
-    assert [round(sum(row), 1) for row in WALK.matrix] == [0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9]
-    assert WALK.order == ("DN", "FL", "LE", "M", "N", "FR", "RE", "UP")
-    assert WALK.start == "FR"
-
-
 def test_e35_transitions_follow_the_normalised_matrix() -> None:
     parts = drawn(200_000)
     counts = np.zeros((8, 8))
@@ -331,9 +325,9 @@ def test_what_cannot_be_trusted_is_refused() -> None:
 PEOPLE = load(shipped_path("scanpaths", "people"), Walk)
 
 
-def visited(face: Face, params: ScanpathParams | None = None, seed: int = 1) -> dict[str, float]:
+def visited(face: Face, params: ScanpathParams | None = None) -> dict[str, float]:
     """Return the share of the looks at each part of a face 1 m or more ahead."""
-    walk = Scanpath(params or ScanpathParams(), PEOPLE, np.random.default_rng(seed))
+    walk = Scanpath(params or ScanpathParams(), PEOPLE, np.random.default_rng(1))
     percept, parts = Percept(0.0, Bodies(), (face,)), []
     target = structs.replace(TARGET, p_world_m=face.p_world_m)
     shift = None
@@ -366,16 +360,6 @@ def test_the_average_observer_looks_at_the_eyes_most() -> None:
 def test_speech_draws_looks_to_the_mouth() -> None:
     quiet, loud = visited(face_at(0.8)), visited(face_at(0.8, speaks=True))
     assert 1.8 < loud["M"] / quiet["M"] < 3.0
-
-
-def test_a_look_that_returns_from_the_side_begins_at_an_eye_or_the_nose() -> None:
-    face = face_at(0.8)
-    percept = Percept(0.0, Bodies(), (face,))
-    target = structs.replace(TARGET, p_world_m=face.p_world_m)
-    for aside in (-1.0, 1.0):
-        walk = Scanpath(ScanpathParams(), PEOPLE, np.random.default_rng(0))
-        look = walk.wander(target, percept, 0.0, True, gaze_world_m=(0.8, aside, -0.3))
-        assert look.part in ENTRY_PARTS
 
 
 def test_a_spot_of_ones_own_draws_looks() -> None:

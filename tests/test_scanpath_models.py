@@ -198,11 +198,6 @@ def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
     assert shifts == pytest.approx(3.68, abs=0.2)
 
 
-def test_a_part_that_is_never_left_keeps_its_row() -> None:
-    rows = (*WALK.matrix[:7], (0.0,) * 7 + (1.0,))
-    assert merge_refixations(rows)[7].tolist() == [0.0] * 7 + [1.0]
-
-
 def test_row_sums_are_reported_as_printed() -> None:
     assert WALK.row_sums == pytest.approx((0.9, 0.8, 1.1, 1.1, 0.9, 1.0, 1.0, 0.9))
     assert row_sums_note(WALK) == (

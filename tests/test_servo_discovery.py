@@ -69,17 +69,6 @@ def family(request):
     return request.param
 
 
-def mixed(bauds=None):
-    """Return a port to Dynamixel servos, each at its own baud rate, or heard at every one."""
-    chain = build_dynamixel(SPECS, lambda: 0.0)
-    for servo, baud in zip(chain.servos, bauds or (), strict=False):
-        servo.memory.set("baud_rate", BAUD_RATES.index(baud))
-    if bauds is not None:
-        chain.choose_behaviour("baud", "heed")
-    chain.refresh()
-    return InProcessPort(chain)
-
-
 # --- servos of every family
 
 
@@ -135,7 +124,7 @@ def test_a_rate_the_adaptor_cannot_run_at_is_passed_over(family):
 
 
 def test_a_ping_to_all_finds_servos_with_model_and_firmware():
-    port = mixed()
+    port = InProcessPort(build_dynamixel(SPECS, lambda: 0.0))
     port.setBaudRate(57_600)
     assert scan_ids(port, DYNAMIXEL, 57_600) == (
         (

@@ -26,8 +26,8 @@ def settled() -> SaccadeTrigger:
     return rule
 
 
-def first_s(rule: SaccadeTrigger, seen: Slip, until_s: float = 1.0) -> float | None:
-    times = (k / 1000 for k in range(1, round(until_s * 1000)))
+def first_s(rule: SaccadeTrigger, seen: Slip) -> float | None:
+    times = (k / 1000 for k in range(1, 1000))
     return next((t for t in times if rule.is_due(seen, t, REFRACTORY_S)), None)
 
 

@@ -1,6 +1,7 @@
 """A camera that stops giving pictures: hold, search, come to rest, and begin again."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import pairwise
 from math import degrees, radians
 
@@ -46,6 +47,9 @@ class BackAndForth(Passer):
         return (ScenePerson((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
 
 
+PASSER, ASIDE = Passer(), BackAndForth()
+
+
 @dataclass
 class Unplugged:
     """A camera that gives nothing new for a while, as one whose cable is out."""
@@ -76,33 +80,23 @@ class Unplugged:
         self.camera.close()
 
 
-def watched(scene: Passer, patch: pytest.MonkeyPatch) -> tuple[Rig, list[Tick]]:
+@cache
+def watched(scene: Passer) -> tuple[Rig, list[Tick]]:
     """Run the rig before a scene, its camera unplugged for a while."""
-    patch.setattr(run_rig, "load_scene", lambda name, seed: scene)
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     options = RunOptions(mock=True, fast=True, seed=3, scene=scene.name)
-    made: Assembly = assemble(rig, options, Substitutes(camera=Unplugged))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_rig, "load_scene", lambda name, seed: scene)
+        made: Assembly = assemble(rig, options, Substitutes(camera=Unplugged))
     ticks: list[Tick] = []
     play(made, END_S, ticks.append)
     return rig, ticks
 
 
-@pytest.fixture(scope="module")
-def run_of_passer() -> tuple[Rig, list[Tick]]:
-    with pytest.MonkeyPatch.context() as patch:
-        return watched(Passer(), patch)
-
-
-@pytest.fixture(scope="module")
-def run_of_someone_aside() -> tuple[Rig, list[Tick]]:
-    with pytest.MonkeyPatch.context() as patch:
-        return watched(BackAndForth(), patch)
-
-
 LAST_LOOK_S = 0.4
 """What is looked at when the search is over is looked at to its end."""
-RUNS = pytest.mark.parametrize("name", ["run_of_passer", "run_of_someone_aside"])
+RUNS = pytest.mark.parametrize("scene", [PASSER, ASIDE])
 
 
 def between(ticks: list[Tick], start_s: float, end_s: float) -> list[Tick]:
@@ -124,8 +118,8 @@ def phases(rig: Rig, ticks: list[Tick]) -> tuple[float, float, float]:
 
 
 @RUNS
-def test_hold_then_search_then_rest(name: str, request: pytest.FixtureRequest) -> None:
-    rig, ticks = request.getfixturevalue(name)
+def test_hold_then_search_then_rest(scene: Passer) -> None:
+    rig, ticks = watched(scene)
     stale_s, search_s, over_s = phases(rig, ticks)
     assert over_s < BACK_S - 1.0
     slack = 0.02
@@ -148,11 +142,9 @@ def test_hold_then_search_then_rest(name: str, request: pytest.FixtureRequest) -
 
 
 @RUNS
-def test_the_neck_does_not_move_on_a_stale_picture(
-    name: str, request: pytest.FixtureRequest
-) -> None:
+def test_the_neck_does_not_move_on_a_stale_picture(scene: Passer) -> None:
     """From the guard's age on it stands, whatever search and rest wish."""
-    rig, ticks = request.getfixturevalue(name)
+    _, ticks = watched(scene)
     blind_s = last_picture_s(ticks) + FRAME_TIMEOUT_S
     blind = between(ticks, blind_s + 0.02, BACK_S)
     commands = {tick.guard_result.command_rad[NECK] for tick in blind}
@@ -164,10 +156,8 @@ def test_the_neck_does_not_move_on_a_stale_picture(
     assert max(eyes) - min(eyes) > 3.0  # the eyes do search
 
 
-def test_who_was_walking_is_waited_for_ahead_not_where_the_last_picture_showed_them(
-    run_of_passer: tuple[Rig, list[Tick]],
-) -> None:
-    rig, ticks = run_of_passer
+def test_who_was_walking_is_waited_for_ahead_not_where_the_last_picture_showed_them() -> None:
+    rig, ticks = watched(PASSER)
     stale_s, search_s, _ = phases(rig, ticks)
     held = between(ticks, stale_s + 0.02, search_s - 0.02)
     percept, centre = held[0].percept, held[0].target.centre_world_m
@@ -177,11 +167,9 @@ def test_who_was_walking_is_waited_for_ahead_not_where_the_last_picture_showed_t
     assert centre[1] - shown[1] == pytest.approx(v[1] * 0.2, abs=1e-6)
 
 
-def test_it_goes_on_with_the_first_new_pictures(
-    run_of_someone_aside: tuple[Rig, list[Tick]],
-) -> None:
+def test_it_goes_on_with_the_first_new_pictures() -> None:
     """Without a restart, without a jerk, and with the eyes back on the face."""
-    rig, ticks = run_of_someone_aside
+    rig, ticks = watched(ASIDE)
     back = between(ticks, BACK_S + 0.5, END_S)
     kinds = [tick.target.kind for tick in back]
     assert set(kinds) <= {"face", "away"} and kinds.count("face") > 0.6 * len(kinds)

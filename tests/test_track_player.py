@@ -46,13 +46,13 @@ def show(**tracks: Track) -> Show:
     return Show(player, choices, limits(rig().joints))
 
 
-def long_track(seconds: float, seed: int, size: float = 1.0) -> Track:
+def long_track(seconds: float, seed: int) -> Track:
     """Return a track with a key of neck and jaw in each second or so."""
     random, times = np.random.default_rng(seed), np.arange(0.8, seconds, 0.9)
     frames = tuple(
         KeyFrame(
             round(float(t), 3),
-            head_yaw_deg=size * float(random.uniform(-15, 15)),
+            head_yaw_deg=float(random.uniform(-15, 15)),
             head_pitch_deg=float(random.uniform(-6, 6)),
             joints_deg={"jaw": float(random.uniform(0, 6))},
         )

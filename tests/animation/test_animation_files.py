@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import SetupError
-from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map, listed
+from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map
 from gazerig.features.animation.cli.import_track import app
 from gazerig.robot.app.track_file import fit_to_rig, track_text, write_track
 from gazerig.robot.description.links import Link, LinkJoint
@@ -91,13 +91,13 @@ def test_the_command_imports_a_table_for_a_rig(tmp_path: Path) -> None:
     assert wrong.exit_code != 0 and "lower-case letters" in wrong.stderr
 
 
-def glb(tree: dict[str, Any], binary: bytes = b"", version: int = 2) -> bytes:
+def glb(tree: dict[str, Any], binary: bytes = b"") -> bytes:
     """Return a binary glTF file, written by nothing of ours."""
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
     body = struct.pack("<I4s", len(text), b"JSON") + text
     body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return struct.pack("<4sII", b"glTF", version, 12 + len(body)) + body
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
 def clip(
@@ -105,7 +105,6 @@ def clip(
     rotations: np.ndarray[Any, Any],
     interpolation: str = "LINEAR",
     node: str = "neck_yaw",
-    path: str = "rotation",
 ) -> bytes:
     """Return a file with one node and its rotations x, y, z, w."""
     clock, values = np.array(times, "<f4").tobytes(), rotations.astype("<f4").tobytes()
@@ -123,7 +122,7 @@ def clip(
             "animations": [
                 {
                     "name": "wave",
-                    "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
+                    "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
                     "samplers": [{"input": 0, "output": 1, "interpolation": interpolation}],
                 }
             ],
@@ -318,7 +317,6 @@ CURVES = {
             lambda: "time" + ",c" * 200_000 + "\n0" + ",1" * 200_000,
             "200,000 columns; at most",
         ),
-        ("empty.csv", lambda: "\n" * 30_000_000, "30,000,000 lines; at most"),
         ("words.csv", lambda: "time,neck_yaw\n" + "a,b\n" * 2_000_000, "and at least 990 more"),
         ("curves.gltf", lambda: json.dumps(CURVES), "300,000 curves; at most"),
     ],
@@ -343,9 +341,3 @@ def test_a_table_in_radians_gets_a_hint(largest: str, hinted: bool, tmp_path: Pa
     path.write_text(text, encoding="utf-8")
     notes = animation(path).notes
     assert any("degrees? these look like radians" in note for note in notes) == hinted
-
-
-def test_what_is_left_out_of_a_large_scene_is_named_in_part() -> None:
-    names = [f"bone{i}" for i in range(500)]
-    text = listed(names)
-    assert text.startswith("bone0, bone1, ") and text.endswith("bone19, and 480 more")

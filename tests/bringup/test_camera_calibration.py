@@ -86,8 +86,8 @@ def corners(
     )
 
 
-def some_views(noise_px: float = 0.3, seed: int = 0, count: int = VIEWS) -> list[DetectedBoard]:
-    rng = np.random.default_rng(seed)
+def some_views(noise_px: float = 0.3, count: int = VIEWS) -> list[DetectedBoard]:
+    rng = np.random.default_rng(0)
     return [corners(k, noise_px, rng, LENS) for k in range(count)]
 
 
@@ -314,19 +314,14 @@ def planned(scene: BoardScene) -> tuple[Angles3, ...]:
 
 
 def neck_views(
-    scene: BoardScene,
-    noise_px: float = 0.3,
-    joint_deg: float = 0.0,
-    angles: Sequence[Angles3] = (),
-    seed: int = 0,
+    scene: BoardScene, angles: Sequence[Angles3], noise_px: float = 0.3
 ) -> list[NeckView]:
     """Return what a detector would find, without pictures."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     views = []
-    for truly in angles or planned(scene):
+    for truly in angles:
         seen = seen_board(*scene.seen_pose(truly), scene.lens, noise_px, rng)
-        yaw, pitch, roll = (np.array(truly) + rng.normal(0.0, radians(joint_deg), 3)).tolist()
-        views.append(NeckView(*KINEMATICS.head_pose((yaw, pitch, roll)), seen))
+        views.append(NeckView(*KINEMATICS.head_pose(truly), seen))
     return views
 
 
@@ -341,13 +336,13 @@ def test_turns_about_one_axis_are_refused(axis: int) -> None:
         tuple(a if k == axis else 0.0 for k in range(3)) for a in np.linspace(-0.25, 0.25, 12)
     ]
     with pytest.raises(CameraCalibrationRefused, match="about one axis and only by 0.0 deg"):
-        found_in(scene, neck_views(scene, angles=angles))  # type: ignore[arg-type]
+        found_in(scene, neck_views(scene, angles))  # type: ignore[arg-type]
 
 
 def test_a_place_that_is_not_sure_is_refused() -> None:
     scene = scene_of(0)
     small = [(0.3 * y, 0.45 * p, 0.3 * r) for y, p, r in planned(scene)]
-    views = neck_views(scene, 0.6, angles=small)
+    views = neck_views(scene, small, 0.6)
     with pytest.raises(CameraCalibrationRefused, match="sure to .* mm and .* deg only"):
         found_in(scene, views, least_turn_deg=1.0, most_position_std_mm=0.5)
 

@@ -377,11 +377,11 @@ MINI, MICRO = "1ffb:008a", "1ffb:0089"
 class BoardRig:
     """A board in this process; what is sent to it is kept."""
 
-    def __init__(self, channels=12, params=None, setups=SETUPS, usb="", **board):
+    def __init__(self, channels=12, setups=SETUPS, usb="", **board):
         self.board = build_board(channels, lambda: 0.0, **board)
         self.sent = b""
         self.port = InProcessPort(self.board, self.tap)
-        self.params, self.setups, self.usb = params or MaestroParams(), setups, usb
+        self.params, self.setups, self.usb = MaestroParams(), setups, usb
 
     def tap(self, data):
         self.sent += data

@@ -43,8 +43,8 @@ PLACE_M = st.tuples(*3 * (st.floats(-3.0, 3.0),))
 KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
 
 
-def after(*keys: Key, own: dict[str, Vec3] | None = None) -> FaceCalibration:
-    state = initial_calibration(own or {})
+def after(*keys: Key) -> FaceCalibration:
+    state = initial_calibration({})
     for key in keys:
         state = apply_key(state, key)
     return state

@@ -50,7 +50,6 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
-NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0)
 STS = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
 GENTLY = StopSearchParams()
 FREE = (-1e9, 1e9)
@@ -76,8 +75,9 @@ class Bench:
         self.script: list[int] = []
         self.said: list[str] = []
         self.agreed = True
-        name = "neck_yaw" if joint is NECK else "left_eye_pan"
-        self.joint = SmartServoAccess(name, joint, self.port, self.clock, lambda: self.why)
+        self.joint = SmartServoAccess(
+            "left_eye_pan", joint, self.port, self.clock, lambda: self.why
+        )
 
     def get(self, register: str) -> int:
         value = self.registers.read(self.id, register)
@@ -117,7 +117,6 @@ class Bench:
         return self.agreed
 
 
-JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096
 
 
@@ -164,7 +163,7 @@ def test_turning_unseen_is_refused_when_its_way_is_unknown() -> None:
 def test_what_is_found_is_what_is_there_or_it_is_refused(
     zero: int, sign: int, plus_deg: float, minus_deg: float, margin: float, ratio: float, turn: int
 ) -> None:
-    joint = replace(JOINT, ratio=ratio, min_deg=-1.0, max_deg=1.0)
+    joint = replace(EYE, ratio=ratio, min_deg=-1.0, max_deg=1.0)
     scale = sign * ratio * STEPS_PER_DEG
     # Turned before by hand by whole turns: that must not matter.
     place = zero + turn * TURN
@@ -194,7 +193,7 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
     start = TURN - 1 - int(below * (span - 1))
     marks = Marks(start + span, start, start + round(at * span))
     with pytest.raises(CalibrationRefused, match="seam") as refused:
-        joint_calibration("neck_yaw", marks, JOINT, 0.0)
+        joint_calibration("neck_yaw", marks, EYE, 0.0)
     words = str(refused.value).split()
     turn_deg = float(words[words.index("by") + 1])
     more = "towards more steps" in str(refused.value)
@@ -213,12 +212,10 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
 )
 def test_marks_that_make_no_calibration_are_refused_in_words(marks: Marks, says: str) -> None:
     with pytest.raises(CalibrationRefused, match=says):
-        joint_calibration("left_eye_pan", marks, JOINT, 2.0)
+        joint_calibration("left_eye_pan", marks, EYE, 2.0)
 
 
 # --- finding a stop
-
-PARAMS = StopSearchParams()
 
 
 class Toy:
@@ -243,7 +240,7 @@ class Toy:
         self.pushed_s = self.pushed_s + 0.02 if stuck else 0.0
         self.longest_push_s = max(self.longest_push_s, self.pushed_s)
         # A position servo pushes with its error; a share of the stall current.
-        load = max(-PARAMS.strength, min(PARAMS.strength, error * 3.1 / 885.0)) if stuck else 0.0
+        load = max(-GENTLY.strength, min(GENTLY.strength, error * 3.1 / 885.0)) if stuck else 0.0
         return round(self.x), load, self.t_s
 
 
@@ -258,13 +255,13 @@ def test_a_stop_is_found_where_it_is_and_never_pushed_for_half_a_second(
     at: float, low: int, span: int, way: int, friction: float
 ) -> None:
     toy = Toy(low + at * span, low, low + span, friction)
-    found = find_end_stop(PARAMS, way, (0, TURN - 1), toy.exchange)
+    found = find_end_stop(GENTLY, way, (0, TURN - 1), toy.exchange)
     end = low + span if way > 0 else low
     assert found.kind == "stop"
     assert abs(found.position_steps - end) <= 2
     assert toy.longest_push_s <= 0.5
     back = (end - toy.x) * way / STEPS_PER_DEG
-    assert 1.5 <= back <= PARAMS.back_off_deg + 0.1
+    assert 1.5 <= back <= GENTLY.back_off_deg + 0.1
 
 
 # --- Calibrating one emulated joint by hand or by motion; refused joints

@@ -11,7 +11,6 @@ from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.loop import LoopCount, run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunInfo
 
 VISIT = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
 
@@ -49,11 +48,10 @@ def record(
     seconds: float,
     options: RunOptions = VISIT,
     at: Callable[[int, Assembly], None] = lambda n, made: None,
-    info: RunInfo | None = None,
     start_s: float = 0.0,
 ) -> list[Tick]:
     """Record a run as ``gazerig run --fast --record`` does; ``at``: called after each tick."""
-    recorder = Recorder(path, info or run_info(rig, options), patient=True)
+    recorder = Recorder(path, run_info(rig, options), patient=True)
     recorder.open()
     made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     seen: list[Tick] = []

@@ -18,9 +18,9 @@ def wait_for(what: Callable[[], T], patience_s: float = PATIENCE_S) -> T:
     return found
 
 
-def eventually(check: Callable[[], object], patience_s: float = 20.0) -> bool:
+def eventually(check: Callable[[], object]) -> bool:
     """Wait for a condition; return False if it does not become true."""
-    end_s = time.monotonic() + patience_s
+    end_s = time.monotonic() + 20.0
     while time.monotonic() < end_s:
         if check():
             return True

@@ -48,11 +48,11 @@ def point(yaw_deg: float, pitch_deg: float = 0.0) -> Vec3:
     return add(_HEAD_M, scale(way, DISTANCE_M))
 
 
-def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, seed: int) -> Looks:
-    """Return the motion of a rig with commands to look at points at times after ``STARTS_S``."""
-    options = RunOptions(rig=rig_name, mock=True, fast=True, seed=seed, scene="sits-still")
+def commanded(times_s: Sequence[float], points: Sequence[Vec3], seed: int) -> Looks:
+    """Return the motion of the desk rig, told to look at points at times after ``STARTS_S``."""
+    options = RunOptions(rig="desk", mock=True, fast=True, seed=seed, scene="sits-still")
     rows, number = [], -1
-    with looked_at(load_rig(rig_name), options) as (made, clock):
+    with looked_at(load_rig("desk"), options) as (made, clock):
         clock.looking = False
         _seen_and_not_ordered(made.robot)
         made.robot.start(clock)

@@ -22,12 +22,11 @@ _REST_TICKS, _WAY_TICKS = 90, 60
 class Step:
     """One saccade from rest, in ms from its command and in deg from its start, onward positive.
 
-    size_deg, law_s: as commanded; most_deg_s: the rig's cap
+    size_deg: as commanded; most_deg_s: the rig's cap
     asked_deg, done_deg: (n,) commanded by the law and done by the true shaft, one a millisecond
     """
 
     size_deg: float
-    law_s: float
     most_deg_s: float
     asked_deg: np.ndarray
     done_deg: np.ndarray
@@ -85,4 +84,4 @@ def steps(rig_name: str, sizes_deg: Sequence[float]) -> Iterator[Step]:
             done = side * (np.degrees([row[i] for row in bench.shafts.angles_rad]) - begin)
             times = np.arange(1, len(done) + 1) / 1e3
             asked = np.degrees([law.displacement_rad(radians(size), t) for t in times])
-            yield Step(size, seconds, rig.gaze.saccade.max_speed_deg_s, asked, done)
+            yield Step(size, rig.gaze.saccade.max_speed_deg_s, asked, done)

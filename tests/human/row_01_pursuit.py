@@ -4,7 +4,7 @@ From picture to joints: tracker, prediction, pursuit, byte-true servos. The gaze
 of the face, so that its following and not its wandering is measured; saccades are left out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -49,16 +49,10 @@ def smooth(run: MeasuredRun) -> np.ndarray:
     return np.asarray(near < 0.5)
 
 
-def following(
-    run: Runner,
-    hz: float,
-    seconds: float,
-    seed: int,
-    overrides: Mapping[str, Value] = ON_ONE_POINT,
-) -> Following:
+def following(run: Runner, hz: float, seconds: float, seed: int) -> Following:
     """Return how a face that swings at a frequency is followed."""
     lasts_s = min(seconds, max(_SETTLED_S + 8.0 / hz, 16.0) if hz > 0.15 else 26.0)
-    seen = run(SwingingFace(hz), seed=seed, seconds=lasts_s, overrides=overrides)
+    seen = run(SwingingFace(hz), seed=seed, seconds=lasts_s, overrides=ON_ONE_POINT)
     t, kept = seen.t_s, smooth(seen) & (seen.t_s > _SETTLED_S)
     gaze, face = seen.gaze_deg[:, 0], seen.truth_deg("face 0")[:, 0]
     response = _phasor(t, np.gradient(gaze, t), hz, kept) / _phasor(

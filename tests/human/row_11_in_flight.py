@@ -49,7 +49,7 @@ def changed(
         ]
     # From one side to the other: the first look only goes where they begin.
     times, points = [0.0, *(t + 1.5 for t in times)], [point(18.0, 1.0), *points]
-    looks = commanded(times, points, "desk", seed)
+    looks = commanded(times, points, seed)
     counts, hardest, errors, waits = [], [], [], []
     for n in range(len(after_s)):
         rows = np.flatnonzero((looks.look == 2 * n + 1) | (looks.look == 2 * n + 2))

@@ -64,7 +64,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         yaws = sides * rng.uniform(5.5, 7.0, count)
         pitches = 1.0 + rng.uniform(-2.5, 2.5, count)
         places = [point(float(y), float(p)) for y, p in zip(yaws, pitches, strict=True)]
-        parts.append(landings(commanded(list(EVERY_S * np.arange(count)), places, "desk", seed)))
+        parts.append(landings(commanded(list(EVERY_S * np.arange(count)), places, seed)))
     every = np.vstack(parts)
     short, across, after_ms, rest, _ = every[every[:, 4] >= 10.0].T
     corrected = after_ms[np.isfinite(after_ms)]

@@ -8,9 +8,10 @@ sway counts little): servos hide both alike.
 """
 
 from collections.abc import Sequence
+from math import cos, sin
 
 import numpy as np
-from human.lights import Lights, at_yaw
+from human.lights import EYES_M, Lights
 from human.measured_run import MeasuredRun, Runner
 from human.row_16_idle import Room
 
@@ -36,7 +37,8 @@ WANTED = {
 
 
 SCENE = Lights("equal-lights", _YAWS, _EACH_S)
-WIDE = Room("wide-room", [at_yaw(yaw) for yaw in (-56, -28, 0, 28, 56)])
+_WIDE = np.radians([-56.0, -28.0, 0.0, 28.0, 56.0])
+WIDE = Room("wide-room", [(1.5 * cos(yaw), 1.5 * sin(yaw), EYES_M[2]) for yaw in _WIDE.tolist()])
 """Things so far apart that many looks are as large as in that task."""
 
 

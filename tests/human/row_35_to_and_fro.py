@@ -29,8 +29,8 @@ WANTED = {
 class ToAndFro(SwingingFace):
     """The face goes at one speed between two turns."""
 
-    def __init__(self, deg_s: float, deg: float = _HALF_DEG) -> None:
-        super().__init__(deg_s / (4.0 * deg), deg)
+    def __init__(self, deg_s: float) -> None:
+        super().__init__(deg_s / (4.0 * _HALF_DEG), _HALF_DEG)
         self.name = f"a face goes to and fro at {deg_s:g} deg/s"
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:

@@ -73,12 +73,12 @@ def model_alone(role: Script, seed: int, minutes: float, step_s: float = 0.02) -
     return TurnTrace(table[:, 0], table[:, 1], table[:, 2], table[:, 3:], np.zeros(len(table)))
 
 
-def whole_product(
-    role: Script, seed: int, minutes: float, rig: str = "desk", scene: str = "face-to-face"
-) -> TurnTrace:
+def whole_product(role: Script, seed: int, minutes: float) -> TurnTrace:
     """Return the trace of a simulated rig: from reported states to measured joints."""
     rng, builder = np.random.default_rng((seed, 9)), GazeTraceBuilder()
-    made = assemble(load_rig(rig), RunOptions(mock=True, fast=True, seed=seed, scene=scene))
+    made = assemble(
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=seed, scene="face-to-face")
+    )
     made.robot.start(made.clock)
 
     def watch(tick: Tick) -> None:

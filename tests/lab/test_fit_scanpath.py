@@ -89,10 +89,10 @@ def as_csv(path: Path, s: Samples) -> Path:
     return written(path, "time,x,y", (f"{t:.4f},{x:.2f},{y:.2f}" for t, x, y in rows))
 
 
-def labelled_csv(path: Path, count: int, seed: int = 1) -> Path:
+def labelled_csv(path: Path, count: int) -> Path:
     def rows() -> Iterator[str]:
         t_s = 0.0
-        for part, dwell_s in walked(count, seed):
+        for part, dwell_s in walked(count, 1):
             yield f"{t_s:.6f},{max(dwell_s, 1e-6):.6f},{part}"
             t_s += dwell_s + 0.03
 

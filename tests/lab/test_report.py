@@ -183,10 +183,10 @@ def test_people_are_as_published() -> None:
     assert published_walk().share(np.random.default_rng(0)) == pytest.approx(share, abs=0.02)
 
 
-def fixed(parts: list[int], seconds: float = 0.3) -> GazeTrace:
+def fixed(parts: list[int]) -> GazeTrace:
     """Make a run that looks at one part after the other."""
     every = tuple(
-        FixationEvent(n * seconds, seconds, PARTS[part], True, 1, "face", PARTS[part])
+        FixationEvent(n * 0.3, 0.3, PARTS[part], True, 1, "face", PARTS[part])
         for n, part in enumerate(parts)
     )
     return GazeTrace(np.zeros((0, len(TraceRow._fields))), (), every, ())
@@ -429,17 +429,15 @@ def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> N
 # --- Measures of landings, rests, gains, blinks and reactions, from synthetic traces
 
 
-def flown(
-    jumps: list[tuple[float, float, float]], goal: float = 12.0, over: float = 0.0
-) -> GazeTrace:
-    """Make a run of planned saccades to a goal, onset in s, and from and to in deg of yaw.
+def flown(jumps: list[tuple[float, float, float]], over: float = 0.0) -> GazeTrace:
+    """Make a run of planned saccades to a goal at 12 deg, onset in s, from and to in deg of yaw.
 
     over: how far the gaze swings beyond in flight, in deg
     """
     t = np.arange(0.0, 3.0, 0.005)
     rows = np.zeros((len(t), len(TraceRow._fields)))
     column = {name: at for at, name in enumerate(TraceRow._fields)}
-    rows[:, column["t"]], rows[:, column["target_yaw"]] = t, goal
+    rows[:, column["t"]], rows[:, column["target_yaw"]] = t, 12.0
     gaze, events = np.full(len(t), jumps[0][1]), []
     for onset, start, end in jumps:
         s = np.clip((t - onset) / 0.05, 0.0, 1.0)

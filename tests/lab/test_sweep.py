@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -140,15 +141,11 @@ def test_two_processes_make_the_table_of_one(desk_rig: Rig, tmp_path: Path) -> N
     assert not alive(pids)
     ordered = [found[i] for i in range(len(runs))]
     alone = [
-        Outcome(point, seed, figures_at(desk_rig, _with_seed(seed), point, lambda: None))
+        Outcome(point, seed, figures_at(desk_rig, replace(OPTIONS, seed=seed), point, lambda: None))
         for point, seed in runs
     ]
     assert table_rows(ordered) == table_rows(alone)
     assert ordered[0].figures != ordered[1].figures
-
-
-def _with_seed(seed: int) -> RunOptions:
-    return RunOptions(mock=True, fast=True, scene="visitor", seconds=1.0, bus="ideal", seed=seed)
 
 
 def alive(pids: Sequence[int]) -> list[int]:

@@ -153,7 +153,7 @@ BEFORE_PLAIN = (Board((0.0, 0.4, 1.4), (0.35, 0.8), 5, True, 0.5, 0.5),)
 
 
 @cache
-def _texture(number: int, contrast: float = 42.0) -> Floats:
+def _texture(number: int) -> Floats:
     """Return blobs of several sizes, so that there is something to see from near and far."""
     rng = np.random.default_rng(100 + number)
     height, width = (700, 1260) if number == 0 else (240, 160)
@@ -162,7 +162,7 @@ def _texture(number: int, contrast: float = 42.0) -> Floats:
         grain = cv2.GaussianBlur(rng.standard_normal((height, width)), (0, 0), sigma)
         out += grain / grain.std()
     mean = 128 + 12 * (number % 3 - 1)
-    return np.asarray(np.clip(mean + contrast * out / out.std(), 0, 255)).astype(np.float32)
+    return np.asarray(np.clip(mean + 42.0 * out / out.std(), 0, 255)).astype(np.float32)
 
 
 @cache
@@ -184,12 +184,10 @@ def frames(
     seconds: float,
     people: tuple[Board, ...] = PEOPLE,
     room: tuple[Board, ...] = ROOM,
-    seed: int = 1,
-    from_s: float = 0.0,
 ) -> Iterator[Seen]:
-    """Yield the camera's images, frame by frame, from a time on."""
-    rng, first = np.random.default_rng(seed), round(from_s * RATE_HZ)
-    for k in range(first, first + round(seconds * RATE_HZ)):
+    """Yield the camera's images, frame by frame."""
+    rng = np.random.default_rng(1)
+    for k in range(round(seconds * RATE_HZ)):
         yield frame(motion(k / RATE_HZ), k / RATE_HZ, (*room, *people), rng)
 
 

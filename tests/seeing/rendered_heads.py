@@ -92,7 +92,6 @@ def rendered(
     gaze: np.ndarray,
     rng: np.random.Generator,
     stretch: tuple[float, ...] = (1.0, 1.0, 1.0),
-    opening: float = 1.0,
 ) -> ImageArray:
     """Return an image of a head whose eyes look somewhere, with the noise of a camera.
 
@@ -103,7 +102,6 @@ def rendered(
         gaze: unit vector along which the eyes look, camera frame.
         rng: of the room behind, the eyes, the light and the noise.
         stretch: of the face along its axes.
-        opening: of the lids, 1 as in the photo.
     """
     room = rng.integers(60, 180, (HEIGHT // 40, WIDTH // 40, 3), dtype=np.uint8)
     image = np.asarray(cv2.resize(room, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC), np.uint8)
@@ -111,7 +109,7 @@ def rendered(
     colour = np.array(IRIS_COLOURS[rng.integers(len(IRIS_COLOURS))], float)
     for eye in _EYES:
         off_m = rng.normal(0.0, _BALL_SD_M, 3)
-        _draw_eye(image, vertices, eye, R, p_m, R.T @ gaze, colour, off_m, opening)
+        _draw_eye(image, vertices, eye, R, p_m, R.T @ gaze, colour, off_m)
     soft = cv2.GaussianBlur(image, (0, 0), 0.6).astype(float) * rng.uniform(0.6, 1.1)
     return np.clip(soft + rng.normal(0.0, 4.0, soft.shape), 0, 255).astype(np.uint8)
 
@@ -151,18 +149,6 @@ def _draw_triangle(
     into[y0:y1, x0:x1][mask > 0] = patch[mask > 0]
 
 
-def _cover(into: ImageArray, lids_px: np.ndarray) -> None:
-    """Draw the skin of the lids over the whole eye of the photo, and the lashes along its foot."""
-    wider = lids_px.mean(axis=0) + 1.15 * (lids_px - lids_px.mean(axis=0))
-    above = wider[1:8] + 1.2 * (wider[1:8] - wider[9:][::-1])
-    inside = np.clip(np.round(above).astype(int), 0, (WIDTH - 1, HEIGHT - 1))
-    skin = np.median(into[inside[:, 1], inside[:, 0]], axis=0)
-    at = np.round(wider * 16).astype(np.int32)
-    cv2.fillPoly(into, [at], tuple(map(float, skin)), lineType=cv2.LINE_AA, shift=4)
-    foot = at[[0, *range(15, 8, -1), 8]]
-    cv2.polylines(into, [foot], False, tuple(map(float, 0.4 * skin)), 1, cv2.LINE_AA, 4)
-
-
 def _draw_eye(
     into: ImageArray,
     vertices: np.ndarray,
@@ -172,21 +158,17 @@ def _draw_eye(
     gaze: np.ndarray,
     colour: np.ndarray,
     off_m: np.ndarray,
-    opening: float,
 ) -> None:
     """Draw what is seen of an eyeball between the lids; gaze and the ball's place in the face."""
     corners = vertices[list(eye[:2])]
     lids = vertices[list(eye[2])].copy()
     lids[1:8, 2] += 0.7 * _IRIS_OUT_M * float(np.clip(np.arcsin(gaze[2]), -0.5, 0.5))
-    lids[:, 2] += (opening - 1.0) * (lids[:, 2] - corners[:, 2].mean())
     iris = corners.mean(axis=0) + (-_BALL_M, 0.0, 0.0) + off_m + _IRIS_OUT_M * gaze
     outline = _pixels(lids @ R.T + p_m)
     x0, y0 = np.maximum(np.floor(outline.min(axis=0)).astype(int) - 4, 0)
     x1, y1 = np.minimum(np.ceil(outline.max(axis=0)).astype(int) + 4, (WIDTH, HEIGHT))
     if x1 - x0 < 2 or y1 - y0 < 2:
         return
-    if opening < 1.0:
-        _cover(into, _pixels(vertices[list(eye[2])] @ R.T + p_m))
     part = into[y0:y1, x0:x1]
     fine = cv2.resize(part, None, fx=_FINER, fy=_FINER)
 

@@ -99,9 +99,8 @@ class Walkers:
     some of them wrong by a third, and growth as noise.
     """
 
-    def __init__(self, seed: int, count: int = 5) -> None:
+    def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
-        self._count = count
         self._newest: Detections | None = None
 
     def open(self) -> None:
@@ -118,7 +117,7 @@ class Walkers:
         """Return the newest picture; there are ten a second, as of a camera in a street."""
         number = int(10.0 * now_s + 1e-6)
         if number >= 1 and (self._newest is None or self._newest.number != number):
-            blobs = [self._walker(k, 0.1 * number) for k in range(self._count)]
+            blobs = [self._walker(k, 0.1 * number) for k in range(5)]
             self._newest = Detections(0.1 * number, number, *SIZE, blobs=tuple(blobs))
         return self._newest
 

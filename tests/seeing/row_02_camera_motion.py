@@ -1,12 +1,11 @@
 """A camera whose motion is not known: shaken, bumped, panned.
 
 Figures: false things a picture; of what is reported, the share that really moves (precision); of
-what moves, the share on which a thing is reported (recall); processor milliseconds a picture.
+what moves, the share on which a thing is reported (recall).
 "knock": a camera on a head whose joints are measured and at rest, or turn, while the table is
 bumped, which they do not feel.
 """
 
-import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -87,7 +86,6 @@ class Score(NamedTuple):
     right: int
     moving: int
     noticed: int
-    processor_ms: float
 
     def figures(self, name: str) -> dict[str, float]:
         """Return the row's figures of one film."""
@@ -96,7 +94,6 @@ class Score(NamedTuple):
             f"{name}: false things a picture": self.false / self.pictures,
             f"{name}: precision": self.right / reported if reported else 1.0,
             f"{name}: recall": self.noticed / self.moving if self.moving else float("nan"),
-            f"{name}: processor ms a picture": self.processor_ms,
         }
 
 
@@ -113,11 +110,8 @@ def judged(seen: Iterable[Seen], turns: PoseBuffer | None = None) -> Score:
     """Let the detector look, as the program uses it, and compare with the truth."""
     source = MotionSource(MotionParams(), None, FIELD_RAD, turns)
     pictures = false = right = moving = noticed = 0
-    costs = []
     for k, one in enumerate(seen):
-        began_s = time.thread_time()
         blobs = source(Shot(one.t_s, k + 1, one.image))
-        costs.append(time.thread_time() - began_s)
         if k < _LEARN:
             continue
         pictures += 1
@@ -133,7 +127,7 @@ def judged(seen: Iterable[Seen], turns: PoseBuffer | None = None) -> Score:
         large = [j for j, mask in enumerate(one.movers) if mask.mean() > 0.003]
         moving += len(large)
         noticed += sum(any(row[j] for row in on) for j in large)
-    return Score(pictures, false, right, moving, noticed, 1e3 * float(np.median(costs)))
+    return Score(pictures, false, right, moving, noticed)
 
 
 def _on(blob: MovingBlob, mask: Mask) -> bool:

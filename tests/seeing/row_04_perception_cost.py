@@ -22,12 +22,12 @@ WANTED = {
 }
 
 
-def crowd(people: int, count: int, seed: int = 0, things: int = 0) -> list[Detections]:
+def crowd(people: int, count: int, things: int = 0) -> list[Detections]:
     """Return pictures of people who sway, located in the camera's axes as its process does.
 
     things: how many move besides
     """
-    rng, locate = np.random.default_rng(seed), FrameLocator(None, np.radians(FIELD_DEG), None)
+    rng, locate = np.random.default_rng(0), FrameLocator(None, np.radians(FIELD_DEG), None)
     out = []
     for number in range(1, count + 1):
         faces: list[DetectedFace] = []

@@ -41,8 +41,8 @@ class StillPeople(EmptyScene):
     name = "still-people"
     round_s = 3600.0
 
-    def __init__(self, away_m: Sequence[float], field_deg: float = 44.0) -> None:
-        aside = np.radians(np.linspace(0.5 * field_deg, -0.5 * field_deg, len(away_m)))
+    def __init__(self, away_m: Sequence[float]) -> None:
+        aside = np.radians(np.linspace(22.0, -22.0, len(away_m)))
         self.away_m = tuple(away_m)
         self._places = [(d * cos(a), d * sin(a), 0.16) for d, a in zip(away_m, aside, strict=True)]
 
@@ -89,12 +89,12 @@ def _apart(a: Vec3, b: Vec3) -> float:
     return dist(*[one / np.linalg.norm(one) for one in rel])
 
 
-def gaps_s(looks: np.ndarray, people: int, rate_hz: float = 50.0) -> list[float]:
+def gaps_s(looks: np.ndarray, people: int) -> list[float]:
     """Return for each person the longest time without a look, the run's ends included."""
     out = []
     for k in range(people):
         on = np.concatenate(([-1], np.flatnonzero(looks == k), [len(looks)]))
-        out.append(float(np.diff(on).max()) / rate_hz)
+        out.append(float(np.diff(on).max()) / 50.0)
     return out
 
 

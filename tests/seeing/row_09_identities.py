@@ -33,6 +33,7 @@ Way = Callable[[float], tuple[float, float, float]]
 _FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
 _HIDDEN_M = 0.16  # a face nearer than this to the view of a nearer one is not found
 _MISSED, _MARKS_PX = 0.05, 0.8
+_FALSE_PER_MIN = 2.0
 _SAME_DEG = 3.0
 
 # Clothes above and below the hips as the street shows them, blue, green, red: most are dark.
@@ -119,22 +120,18 @@ def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:
     }
 
 
-def pictures(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: bool) -> Iterator[
+def pictures(ways: list[Way], seconds: float, rng: np.random.Generator) -> Iterator[
     tuple[Detections, dict[int, NDArray[np.float64]], set[int]]
 ]:  # fmt: skip
-    """Yield what a detector finds, where people are by number, and who of them can be found.
-
-    drawn: their bodies are drawn, so that the colours of their clothes are seen
-    """
-    crowd = Crowd(len(ways), rng.spawn(1)[0]) if drawn else None
+    """Yield what a detector finds, where people are by number, and who of them can be found."""
+    crowd = Crowd(len(ways), rng.spawn(1)[0])
     reader = ClothingReader()
     for k in range(1, int(seconds * RATE_HZ) + 1):
         places = {i: np.array(way(k / RATE_HZ)) for i, way in enumerate(ways)}
         seen = {i: p for i, p in places.items() if _in_view(p) and not _hidden(p, places.values())}
         faces = [detected(p, rng) for p in seen.values() if rng.random() >= _MISSED]
         found = tuple(faces[n] for n in rng.permutation(len(faces)))
-        if crowd is not None:
-            found, _ = reader.add_clothing(crowd.image(places, k), k / RATE_HZ, found)
+        found, _ = reader.add_clothing(crowd.image(places, k), k / RATE_HZ, found)
         yield Detections(k / RATE_HZ, k, *SIZE, faces=found), places, set(seen)
 
 
@@ -160,9 +157,7 @@ def visits(rng: np.random.Generator, people: int, seconds: float) -> Iterator[
         start = end + rng.uniform(4, 120)
 
 
-def come_and_go(
-    people: int, seconds: float, rng: np.random.Generator, false_per_min: float = 2.0
-) -> tuple[int, int, int, int]:
+def come_and_go(people: int, seconds: float, rng: np.random.Generator) -> tuple[int, int, int, int]:
     """Return visits, returns within 5 minutes, kept numbers, numbers of others.
 
     The number of a visit is the one that it had in most pictures.
@@ -180,7 +175,7 @@ def come_and_go(
                 places[who] = p = np.array(way(t))
                 if _in_view(p) and rng.random() >= _MISSED:
                     faces.append(detected(p, rng))
-            if rng.random() < false_per_min / 60.0 / RATE_HZ:
+            if rng.random() < _FALSE_PER_MIN / 60.0 / RATE_HZ:
                 faces.append(detected(rng.uniform((-0.7, -0.2, 1.0), (0.7, 0.4, 2.0)), rng))
             found, _ = reader.add_clothing(crowd.image(places, k), t, tuple(faces))
             percept = see.see(Detections(t, k, *SIZE, faces=found), poses)
@@ -266,7 +261,7 @@ def perception() -> tuple[Perception, PoseHistory]:
     return Perception(mount, FIELD_DEG, Tracker()), poses
 
 
-def idf1(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: bool = True) -> float:
+def idf1(ways: list[Way], seconds: float, rng: np.random.Generator) -> float:
     """Return IDF1: pairs of truth and track that agree in the best pairing of whole identities.
 
     Source: Ristani et al., "Performance measures and a data set for multi-target, multi-camera
@@ -277,7 +272,7 @@ def idf1(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: bool 
     hits: Counter[tuple[int, int]] = Counter()
     true: Counter[int] = Counter()
     believed: Counter[int] = Counter()
-    for found, there, seen in pictures(ways, seconds, rng, drawn):
+    for found, there, seen in pictures(ways, seconds, rng):
         percept = see.see(found, poses)
         assert percept is not None
         for i, number in _matched(there, [(face.id, face.p_world_m) for face in percept.faces]):
@@ -335,7 +330,7 @@ def room(rng: np.random.Generator, width: int = 1000, height: int = 600) -> Imag
     return np.repeat(np.clip(image, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
 
 
-def cut_film(rng: np.random.Generator, scenes: int = 4) -> Film:
+def cut_film(rng: np.random.Generator) -> Film:
     """Return rooms one after the other, with the trouble that is no cut in each.
 
     A pan of 11 deg a picture, light that is switched, noise, and a hand before the lens.
@@ -343,7 +338,7 @@ def cut_film(rng: np.random.Generator, scenes: int = 4) -> Film:
     images: list[Image] = []
     cuts: list[int] = []
     noise = [rng.normal(0.0, 3.0, (*SIZE[::-1], 1)) for _ in range(4)]
-    for scene in range(scenes):
+    for scene in range(4):
         if scene:
             cuts.append(len(images))
         view = room(rng)

@@ -105,13 +105,10 @@ WANTED = {
 } | {f"{film}: false": (0.0, 0.02) for film in TRIPOD}
 
 
-def plain_room(
-    seconds: float, people: bool, tremble_px: float = 0.0, from_s: float = 0.0
-) -> Iterator[Seen]:
+def plain_room(seconds: float, people: bool) -> Iterator[Seen]:
     """Yield people before a plain wall with a board, a skirting and a screen: straight edges.
 
-    tremble_px: by how much the camera trembles from frame to frame, standard deviation
-    from_s: when to begin; between 2.5 and 3.2 s the people are all of the texture that there is
+    The camera trembles from frame to frame.
     """
     room = np.full((HEIGHT, WIDTH), 178.0, np.float32)
     board = np.array([(470, 50), (640, 22), (640, 300), (500, 320)], np.int32)
@@ -119,8 +116,8 @@ def plain_room(
     cv2.line(room, (0, 312), (WIDTH, 304), (120.0,), 2, cv2.LINE_AA)
     cv2.fillPoly(room, [np.array([(0, 60), (90, 110), (70, 400), (0, 400)], np.int32)], (30.0,))
     rng = np.random.default_rng(2)
-    for one in frames(still, seconds, PEOPLE if people else (), PLAIN, from_s=from_s):
-        x, y = rng.normal(0.0, tremble_px, 2)
+    for one in frames(still, seconds, PEOPLE if people else (), PLAIN):
+        x, y = rng.normal(0.0, _TREMBLE_PX, 2)
         M = np.array([(1.0, 0.0, x), (0.0, 1.0, y)])
         moved = cv2.warpAffine(room, M, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE)
         image = noisy(np.asarray(moved, np.float32), _NOISE_LEVELS, rng)
@@ -129,11 +126,9 @@ def plain_room(
         yield one._replace(image=image)
 
 
-def changed(
-    change: Change, people: bool, seconds: float, from_s: float = 0.0
-) -> tuple[float, float]:
+def changed(change: Change, people: bool, seconds: float) -> tuple[float, float]:
     """Return false things a picture and recall in the rendered room."""
-    score = judged(change(plain_room(seconds, people, _TREMBLE_PX, from_s)))
+    score = judged(change(plain_room(seconds, people)))
     recall = score.noticed / score.moving if score.moving else 1.0
     return score.false / score.pictures, recall
 

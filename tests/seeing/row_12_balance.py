@@ -71,10 +71,10 @@ def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
     return degrees(off - atan(FACE_M / norm(way)))
 
 
-def share_on_faces(options: RunOptions, rate_hz: float = 100.0) -> Share:
+def share_on_faces(options: RunOptions) -> Share:
     """Run the shipped desk rig; return how much of the time was spent on present faces."""
     rig = load_rig(options.rig)
-    made = assemble(replace(rig, loop=replace(rig.loop, rate_hz=rate_hz)), options)
+    made = assemble(replace(rig, loop=replace(rig.loop, rate_hz=100.0)), options)
     ticks = there = on_face = outside = 0
     size_px = (0, 0)
 

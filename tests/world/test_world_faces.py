@@ -1,8 +1,7 @@
-"""Both detectors find the faces of a world's people."""
+"""The default detector finds the faces of a world's people."""
 
 from collections.abc import Iterator
 from math import radians
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,11 +21,6 @@ from gazerig.sim_mock.scenes.script import PersonScript, SceneScript
 
 pytestmark = pytest.mark.usefixtures("renders")
 
-YUNET_FILE = Path(__file__).parents[3] / "shared" / "models" / "face_detection_yunet_2026may.onnx"
-DETECTORS = {
-    "mtcnn": FaceDetectorParams(kind="mtcnn"),
-    "yunet": FaceDetectorParams(kind="yunet", model_file=str(YUNET_FILE), work_width_px=640),
-}
 OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 SIZE_PX = 640, 400
 LENS = intrinsics_of_view(radians(69.0), *SIZE_PX)
@@ -66,13 +60,10 @@ def pictures_of(look: int) -> Iterator[tuple[ImageArray, Floats]]:
     picture.close()
 
 
-@pytest.mark.parametrize("kind", DETECTORS)
 def test_faces_of_all_looks_are_found_where_they_are(
-    pictures: list[tuple[ImageArray, Floats]], kind: str
+    pictures: list[tuple[ImageArray, Floats]],
 ) -> None:
-    if kind == "yunet" and not YUNET_FILE.exists():
-        pytest.skip(f"no {YUNET_FILE}")
-    detector = face_detector(DETECTORS[kind])
+    detector = face_detector(FaceDetectorParams(kind="mtcnn"))
     off_px = []
     for image, true_px in pictures:
         (face,) = detector.find(image)
